@@ -1,0 +1,1 @@
+//! Links, rovers, sensor nodes and planners for Farside.

@@ -1,0 +1,1 @@
+//! Scenarios, reports and the farside command.

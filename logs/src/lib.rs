@@ -1,0 +1,1 @@
+//! MCAP logs of Farside runs: write, read, verify, diff, recover.

@@ -1,0 +1,1 @@
+//! What crosses Farside's crates: determinism, replay, properties, the command line.

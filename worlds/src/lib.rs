@@ -1,0 +1,1 @@
+//! Terrain, roadmaps and sensor networks for Farside.
