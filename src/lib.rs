@@ -1,1 +1,4 @@
 //! The Farside kernel.
+
+pub mod random;
+pub mod time;
