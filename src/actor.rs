@@ -1,0 +1,102 @@
+//! What an actor is: a state, the messages it accepts, and a handler for each.
+
+use std::any::{Any, TypeId};
+
+use crate::context::{Context, Core};
+use crate::encoding::{Schema, SchemaError};
+use crate::fault::Outcome;
+use crate::message::Message;
+
+/// An actor: private state that changes only in its handlers, at instants of virtual time.
+///
+/// Actors are built by a constructor that a restart calls again, so that a run, a restart and a
+/// replay build the same one.
+pub trait Actor: Sized + Send + 'static {
+    /// The message types that the actor handles, as a tuple: `(Ping,)` or `(Ping, Pong)`.
+    type Accepts: Accepts<Self>;
+
+    /// Called at the start of the run, and again after each restart.
+    fn started(&mut self, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+/// An actor that handles messages of type `M`.
+pub trait Handler<M: Message>: Actor {
+    /// Handles one message at the present instant. An error ends the run.
+    fn handle(&mut self, message: M, ctx: &mut Context<'_, Self>) -> Outcome;
+}
+
+/// A tuple of message types, each of which `A` handles. Implemented for tuples of up to 16.
+pub trait Accepts<A> {
+    #[doc(hidden)]
+    fn list(kinds: &mut Vec<KindEntry>);
+}
+
+/// A message type as an actor lists it.
+#[doc(hidden)]
+pub struct KindEntry {
+    pub(crate) type_id: TypeId,
+    pub(crate) type_name: &'static str,
+    pub(crate) trace: fn() -> Result<Schema, SchemaError>,
+}
+
+impl KindEntry {
+    pub(crate) fn of<M: Message>() -> Self {
+        KindEntry {
+            type_id: TypeId::of::<M>(),
+            type_name: std::any::type_name::<M>(),
+            trace: Schema::of::<M>,
+        }
+    }
+}
+
+macro_rules! accepts_tuples {
+    ($($name:ident)*) => {
+        impl<Host, $($name: Message),*> Accepts<Host> for ($($name,)*)
+        where
+            $(Host: Handler<$name>,)*
+        {
+            fn list(_kinds: &mut Vec<KindEntry>) {
+                $(_kinds.push(KindEntry::of::<$name>());)*
+            }
+        }
+    };
+}
+
+accepts_tuples!();
+accepts_tuples!(A);
+accepts_tuples!(A B);
+accepts_tuples!(A B C);
+accepts_tuples!(A B C D);
+accepts_tuples!(A B C D E);
+accepts_tuples!(A B C D E F);
+accepts_tuples!(A B C D E F G);
+accepts_tuples!(A B C D E F G H);
+accepts_tuples!(A B C D E F G H I);
+accepts_tuples!(A B C D E F G H I J);
+accepts_tuples!(A B C D E F G H I J K);
+accepts_tuples!(A B C D E F G H I J K L);
+accepts_tuples!(A B C D E F G H I J K L M);
+accepts_tuples!(A B C D E F G H I J K L M N);
+accepts_tuples!(A B C D E F G H I J K L M N O);
+accepts_tuples!(A B C D E F G H I J K L M N O P);
+
+/// An actor whose type the engine does not know.
+pub(crate) trait AnyActor: Send {
+    fn started(&mut self, core: &mut Core<'_>) -> Outcome;
+    fn as_any(&mut self) -> &mut dyn Any;
+}
+
+impl<A: Actor> AnyActor for A {
+    fn started(&mut self, core: &mut Core<'_>) -> Outcome {
+        Actor::started(self, &mut Context::new(core))
+    }
+
+    fn as_any(&mut self) -> &mut dyn Any {
+        self
+    }
+}
+
+/// The constructor of an actor, called with its name at the start and at each restart.
+pub(crate) type Factory = Box<dyn Fn(&str) -> Box<dyn AnyActor> + Send>;

@@ -1,0 +1,291 @@
+//! Committing: the one place where a run becomes a digest, counts, and records for observers.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::digest::Digest;
+use crate::engine::{Head, Sink, hash_if_wanted};
+use crate::key::{EntityId, EventKey};
+use crate::plan::{Kind, Plan};
+use crate::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use crate::report::{Counts, End, Report};
+use crate::time::SimTime;
+
+/// Hashed records from one checkpoint to the next.
+const CHECKPOINT_RECORDS: usize = 8192;
+
+/// Takes records in key order, and is told nothing else.
+pub(crate) struct Committer {
+    plan: Arc<Plan>,
+    observers: Vec<(Wants, Box<dyn Observer>)>,
+    digest: Digest,
+    hashes: Vec<u32>,
+    hashed: u64,
+    counts: Counts,
+    /// Losses by reason, in order of first occurrence: reasons are few.
+    reasons: Vec<(&'static str, u64)>,
+    last: EventKey,
+    pub(crate) stop: Option<(EventKey, EntityId, String)>,
+    failure: Option<String>,
+    interrupt: Arc<AtomicBool>,
+}
+
+impl Committer {
+    pub(crate) fn new(
+        plan: Arc<Plan>,
+        observers: Vec<Box<dyn Observer>>,
+        interrupt: Arc<AtomicBool>,
+    ) -> Result<Self, ObserverError> {
+        let mut observers: Vec<_> = observers.into_iter().map(|o| (o.wants(), o)).collect();
+        for (_, observer) in &mut observers {
+            observer.begin(&plan.info)?;
+        }
+        Ok(Committer {
+            last: plan.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            plan,
+            observers,
+            digest: Digest::EMPTY,
+            hashes: Vec::with_capacity(CHECKPOINT_RECORDS),
+            hashed: 0,
+            counts: Counts::default(),
+            reasons: Vec::new(),
+            stop: None,
+            failure: None,
+            interrupt,
+        })
+    }
+
+    /// The key of the last record committed.
+    pub(crate) fn last(&self) -> EventKey {
+        self.last
+    }
+
+    /// Why the run cannot go on, if it cannot.
+    pub(crate) fn verdict(&self) -> Option<End> {
+        if let Some(failure) = &self.failure {
+            return Some(End::ObserverFailed(failure.clone()));
+        }
+        self.interrupt
+            .load(Ordering::Relaxed)
+            .then_some(End::Interrupted)
+    }
+
+    /// Records what is still on its way, tells the observers that the run is over, and reports.
+    pub(crate) fn finish(
+        mut self,
+        end: End,
+        end_time: SimTime,
+        mut in_flight: Vec<(EventKey, Head, Vec<u8>)>,
+    ) -> Report {
+        in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
+        let plan = self.plan.clone();
+        for (key, head, body) in in_flight {
+            let record = head.record(&plan, RecordClass::InFlight, key, &body);
+            self.commit(&record, hash_if_wanted(&plan, &record));
+        }
+        self.checkpoint();
+        self.counts.lost_by_reason = self
+            .reasons
+            .iter()
+            .map(|(reason, n)| ((*reason).to_owned(), *n))
+            .collect();
+        let mut report = Report {
+            digest: self.digest,
+            counts: self.counts,
+            end_time,
+            end,
+        };
+        if let Some(failure) = self.failure {
+            report.end = End::ObserverFailed(failure);
+        }
+        for (_, observer) in &mut self.observers {
+            if let Err(error) = observer.end(&report) {
+                report.end = End::ObserverFailed(error.to_string());
+            }
+        }
+        report
+    }
+
+    fn count(&mut self, record: &Record<'_>) {
+        let counts = &mut self.counts;
+        counts.sent += u64::from(record.sends);
+        if record.class.is_fate() && record.copy > 0 {
+            counts.duplicated += 1;
+        }
+        match record.class {
+            RecordClass::Delivered => {
+                counts.delivered += 1;
+                counts.events += 1;
+            }
+            RecordClass::Lost => {
+                counts.lost += 1;
+                match self
+                    .reasons
+                    .iter_mut()
+                    .find(|(reason, _)| *reason == record.reason)
+                {
+                    Some((_, n)) => *n += 1,
+                    None => self.reasons.push((record.reason, 1)),
+                }
+            }
+            RecordClass::InFlight => counts.in_flight += 1,
+            RecordClass::Sample => {}
+            _ => counts.events += 1,
+        }
+    }
+
+    fn checkpoint(&mut self) {
+        if self.hashes.is_empty() {
+            return;
+        }
+        let checkpoint = Checkpoint {
+            records: self.hashed,
+            key: self.last,
+            digest: self.digest,
+            hashes: &self.hashes,
+        };
+        for (wants, observer) in &mut self.observers {
+            if wants.checkpoints
+                && let Err(error) = observer.checkpoint(&checkpoint)
+            {
+                self.failure.get_or_insert(error.to_string());
+            }
+        }
+        self.hashes.clear();
+    }
+}
+
+impl Sink for Committer {
+    fn commit(&mut self, record: &Record<'_>, hash: u128) {
+        self.count(record);
+        self.last = record.key;
+        for (wants, observer) in &mut self.observers {
+            if record.class == RecordClass::Sample && !wants.samples {
+                continue;
+            }
+            match observer.record(record) {
+                Ok(Flow::Continue) => {}
+                Ok(Flow::Stop(reason)) => {
+                    self.stop
+                        .get_or_insert((record.key, EntityId::CONTROL, reason));
+                }
+                Err(error) => {
+                    self.failure.get_or_insert(error.to_string());
+                }
+            }
+        }
+        if self.plan.digest && record.class != RecordClass::Sample {
+            self.digest.extend(hash);
+            self.hashed += 1;
+            self.hashes.push(hash as u32);
+            if self.hashes.len() == CHECKPOINT_RECORDS {
+                self.checkpoint();
+            }
+        }
+    }
+
+    fn paused(&self) -> bool {
+        self.stop.is_some() || self.failure.is_some() || self.interrupt.load(Ordering::Relaxed)
+    }
+}
+
+/// A record kept until its window is committed.
+struct Kept {
+    record: Record<'static>,
+    kind: Option<Arc<Kind>>,
+    body: Range<usize>,
+    hash: u128,
+}
+
+/// What one engine did in one window, in key order.
+#[derive(Default)]
+pub(crate) struct Batch {
+    kept: Vec<Kept>,
+    bytes: Vec<u8>,
+}
+
+impl Batch {
+    /// The key of the record at `at`.
+    pub(crate) fn key(&self, at: usize) -> Option<EventKey> {
+        self.kept.get(at).map(|kept| kept.record.key)
+    }
+
+    /// Commits the record at `at`.
+    pub(crate) fn commit(&self, at: usize, sink: &mut impl Sink) {
+        let kept = &self.kept[at];
+        let record = Record {
+            kind: kept.kind.as_ref(),
+            body: &self.bytes[kept.body.clone()],
+            ..kept.record
+        };
+        sink.commit(&record, kept.hash);
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.kept.clear();
+        self.bytes.clear();
+    }
+
+    /// The messages that the uncommitted records from `at` on had taken from their way, though
+    /// committed events before `fault` sent them.
+    pub(crate) fn undone(
+        &self,
+        at: usize,
+        fault: EventKey,
+        plan: &Plan,
+    ) -> Vec<(EventKey, Head, Vec<u8>)> {
+        let mut found = Vec::new();
+        let mut unit: Option<(EventKey, RecordClass)> = None;
+        for kept in &self.kept[at..] {
+            let record = &kept.record;
+            let first = unit.is_none_or(|(key, _)| key != record.key);
+            if first {
+                unit = Some((record.key, record.class));
+            }
+            // A loss that a hand-over decided is undone with the hand-over, which is counted.
+            let message = match record.class {
+                RecordClass::Delivered | RecordClass::HandOver => true,
+                RecordClass::Lost => first,
+                _ => false,
+            };
+            if message && record.cause.is_some_and(|cause| cause < fault) {
+                let head = Head {
+                    sender: record.sender,
+                    receiver: record.receiver,
+                    link: record.link,
+                    kind: kept.kind.as_ref().and_then(|kind| plan.kind_index(kind)),
+                    ordinal: record.ordinal,
+                    copy: record.copy,
+                    match_key: record.match_key,
+                    sent: record.sent,
+                    cause: record.cause,
+                    ..Head::of_entity(record.sender, record.sent)
+                };
+                found.push((record.key, head, self.bytes[kept.body.clone()].to_vec()));
+            }
+        }
+        found
+    }
+}
+
+impl Sink for Batch {
+    fn commit(&mut self, record: &Record<'_>, hash: u128) {
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(record.body);
+        self.kept.push(Kept {
+            record: Record {
+                kind: None,
+                body: &[],
+                ..*record
+            },
+            kind: record.kind.cloned(),
+            body: start..self.bytes.len(),
+            hash,
+        });
+    }
+
+    fn paused(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,221 @@
+//! All that an actor can reach: the present instant, its random streams, other actors, timers, its
+//! durable memory, the log, and the end of the run. No wall clock, no environment, no I/O.
+
+use std::any::TypeId;
+use std::marker::PhantomData;
+
+use crate::actor::{Actor, Handler};
+use crate::engine::{CellState, Outbound, Parts};
+use crate::fault::{FaultCause, LookupError};
+use crate::key::{EntityId, EventKey};
+use crate::message::{Address, MatchKey, Message, Target};
+use crate::plan::KindIndex;
+use crate::random::{RandomKey, Stream};
+use crate::time::{SimDuration, SimTime};
+
+/// What a handler works with, whatever its actor's type.
+pub(crate) struct Core<'a> {
+    pub(crate) parts: &'a mut Parts,
+    pub(crate) state: &'a mut CellState,
+    pub(crate) me: EntityId,
+    /// The key of the event being handled.
+    pub(crate) key: EventKey,
+}
+
+/// A timer that is set, for [`Context::cancel`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimerId {
+    pub(crate) slot: u32,
+    pub(crate) kind: KindIndex,
+    /// Tells this timer from a later one in the same slot.
+    pub(crate) ordinal: u64,
+}
+
+/// A handler's way to the world, at one instant of virtual time.
+pub struct Context<'a, A> {
+    parts: &'a mut Parts,
+    state: &'a mut CellState,
+    me: EntityId,
+    key: EventKey,
+    actor: PhantomData<fn() -> A>,
+}
+
+impl<'a, A: Actor> Context<'a, A> {
+    pub(crate) fn new(core: &'a mut Core<'_>) -> Self {
+        Context {
+            parts: &mut *core.parts,
+            state: &mut *core.state,
+            me: core.me,
+            key: core.key,
+            actor: PhantomData,
+        }
+    }
+
+    /// The present instant.
+    pub fn now(&self) -> SimTime {
+        self.key.time
+    }
+
+    /// This actor's name.
+    pub fn name(&self) -> &str {
+        self.parts.plan.name(self.me)
+    }
+
+    /// This actor's own address.
+    pub fn address(&self) -> Address<A> {
+        Address::new(self.state.declared)
+    }
+
+    /// How often this actor was restarted; 0 in its first life.
+    pub fn incarnation(&self) -> u32 {
+        self.state.incarnation
+    }
+
+    /// The address of the actor called `name`.
+    ///
+    /// # Errors
+    /// When no actor has that name, or it is not a `B`.
+    pub fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
+        self.parts.plan.lookup::<B>(name)
+    }
+
+    /// Sends `message`, within the host at once, to another host through the link between them.
+    ///
+    /// That the link may lose it is no error here. That there is no link ends the run.
+    pub fn send<M: Message>(&mut self, target: impl Target<M>, message: M) {
+        self.dispatch(target, message, None, SimDuration::ZERO);
+    }
+
+    /// Sends `message` with an identity of the protocol's own (a cycle, an iteration), by which
+    /// runs are compared and links draw, where the message's ordinal would not be stable.
+    pub fn send_keyed<M: Message>(&mut self, target: impl Target<M>, key: MatchKey, message: M) {
+        self.dispatch(target, message, Some(key), SimDuration::ZERO);
+    }
+
+    /// Sends `message` to an actor of the same host, to arrive after `delay`.
+    pub fn send_after<M: Message>(
+        &mut self,
+        target: impl Target<M>,
+        delay: SimDuration,
+        message: M,
+    ) {
+        self.dispatch(target, message, None, delay);
+    }
+
+    /// Sets a timer: `message` comes back to this actor after `delay`, unless cancelled first. A
+    /// restart voids it.
+    pub fn timer<M: Message>(&mut self, delay: SimDuration, message: M) -> TimerId
+    where
+        A: Handler<M>,
+    {
+        let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
+            self.not_listed::<M>(self.me);
+            return TimerId {
+                slot: u32::MAX,
+                kind: 0,
+                ordinal: u64::MAX,
+            };
+        };
+        let letter = self.address().seal(message);
+        self.parts
+            .set_timer(self.state, self.me, kind, letter, delay)
+    }
+
+    /// Cancels a timer. False if it has fired or was cancelled before.
+    pub fn cancel(&mut self, timer: TimerId) -> bool {
+        self.parts.cancel_timer(self.me, timer)
+    }
+
+    /// This actor's random stream for `purpose`, derived from (run seed, actor, purpose,
+    /// incarnation). It goes on where it was left.
+    pub fn random(&mut self, purpose: &'static str) -> &mut Stream {
+        let at = match self
+            .state
+            .streams
+            .iter()
+            .position(|(known, _)| *known == purpose)
+        {
+            Some(at) => at,
+            None => {
+                let stream = self
+                    .random_at(purpose, u64::from(self.state.incarnation))
+                    .stream();
+                self.state.streams.push((purpose, stream));
+                self.state.streams.len() - 1
+            }
+        };
+        &mut self.state.streams[at].1
+    }
+
+    /// The address of draws by `key` (a cycle, a sample's number), the same whatever was drawn
+    /// before.
+    pub fn random_at(&self, purpose: &str, key: u64) -> RandomKey {
+        RandomKey::new(self.parts.plan.seed)
+            .number(self.parts.plan.name_hash(self.me))
+            .text(purpose)
+            .number(key)
+    }
+
+    /// Durable memory: a value of type `D` that outlives a crash, made by `Default` when first
+    /// asked for. One for each type.
+    pub fn durable<D: Default + Send + 'static>(&mut self) -> &mut D {
+        let durable = &mut self.state.durable;
+        let at = match durable.iter().position(|value| value.is::<D>()) {
+            Some(at) => at,
+            None => {
+                durable.push(Box::new(D::default()));
+                durable.len() - 1
+            }
+        };
+        durable[at].downcast_mut().expect("found by its type")
+    }
+
+    /// True if someone watches state samples; for skipping work that only [`Context::sample`] needs.
+    pub fn samples_wanted(&self) -> bool {
+        self.parts.plan.samples
+    }
+
+    /// Records a sample of this actor's state, for logs, monitors and viewers. Samples are no part
+    /// of the digest, and cost next to nothing if nobody watches.
+    pub fn sample<S: Message>(&mut self, sample: &S) {
+        if self.samples_wanted() {
+            self.parts.add_sample(self.me, sample);
+        }
+    }
+
+    /// Asks for the run to stop, for `reason`, one look-ahead from now.
+    pub fn stop(&mut self, reason: impl Into<String>) {
+        if self.parts.stop.is_none() {
+            self.parts.stop = Some((self.key, self.me, reason.into()));
+        }
+    }
+
+    fn dispatch<M: Message>(
+        &mut self,
+        target: impl Target<M>,
+        message: M,
+        match_key: Option<MatchKey>,
+        delay: SimDuration,
+    ) {
+        let receiver = self.parts.plan.declared[target.declared() as usize];
+        let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
+            self.not_listed::<M>(receiver);
+            return;
+        };
+        let letter = target.seal(message);
+        let outbound = Outbound {
+            receiver,
+            kind,
+            letter,
+            match_key,
+            delay,
+        };
+        self.parts.send(self.state, self.me, outbound);
+    }
+
+    fn not_listed<M>(&mut self, receiver: EntityId) {
+        let receiver = self.parts.plan.name(receiver).to_owned();
+        let kind = std::any::type_name::<M>().to_owned();
+        self.parts.raise(FaultCause::NotListed { receiver, kind });
+    }
+}

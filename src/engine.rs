@@ -1,0 +1,467 @@
+//! The engine: runs a set of hosts, event by event, in key order. Each executor has one or more.
+//!
+//! An engine knows nothing of threads. What leaves its hosts for another engine's waits in
+//! `outgoing` for the executor to carry over.
+
+mod parts;
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use crate::actor::{AnyActor, Factory};
+use crate::carrier::{AnyCarrier, SealedChange};
+use crate::context::Core;
+use crate::digest::record_hash;
+use crate::fault::{Fault, FaultCause, Outcome};
+use crate::key::{Bound, EntityId, EventKey};
+use crate::message::{MatchKey, Sealed};
+use crate::plan::{FixedMap, KindIndex, Plan};
+use crate::queue::Entry;
+use crate::random::Stream;
+use crate::record::{Record, RecordClass};
+use crate::time::{SimDuration, SimTime};
+
+pub(crate) use parts::Parts;
+
+/// Where an engine commits what happened, in key order.
+pub(crate) trait Sink {
+    fn commit(&mut self, record: &Record<'_>, hash: u128);
+    /// True once the run must not go on without its driver having a look.
+    fn paused(&self) -> bool;
+}
+
+/// What an event does when its time comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    Start,
+    Message,
+    Timer,
+    /// A message reaches a shared link.
+    HandOver,
+    /// A message is lost on its way.
+    LateLoss,
+    /// A cancelled timer.
+    Void,
+}
+
+/// An event yet to happen.
+pub(crate) struct Pending {
+    pub(crate) class: Class,
+    pub(crate) head: Head,
+    pub(crate) letter: Option<Sealed>,
+}
+
+/// What is known of a message besides its content.
+#[derive(Clone, Copy)]
+pub(crate) struct Head {
+    pub(crate) sender: EntityId,
+    pub(crate) receiver: EntityId,
+    pub(crate) link: Option<EntityId>,
+    pub(crate) kind: Option<KindIndex>,
+    pub(crate) ordinal: u64,
+    /// How many messages with the same match key came right before in the flow.
+    pub(crate) repeat: u32,
+    pub(crate) copy: u32,
+    pub(crate) match_key: Option<MatchKey>,
+    pub(crate) sent: SimTime,
+    /// The event in whose handler the message was sent.
+    pub(crate) cause: Option<EventKey>,
+    /// The event that scheduled the next hop: `cause`, or the hand-over to a shared link.
+    pub(crate) scheduled_by: Option<EventKey>,
+    pub(crate) incarnation: u32,
+    pub(crate) reason: &'static str,
+}
+
+impl Head {
+    pub(crate) fn of_entity(entity: EntityId, now: SimTime) -> Self {
+        Head {
+            sender: entity,
+            receiver: entity,
+            link: None,
+            kind: None,
+            ordinal: 0,
+            repeat: 0,
+            copy: 0,
+            match_key: None,
+            sent: now,
+            cause: None,
+            scheduled_by: None,
+            incarnation: 0,
+            reason: "",
+        }
+    }
+
+    pub(crate) fn record<'a>(
+        &self,
+        plan: &'a Plan,
+        class: RecordClass,
+        key: EventKey,
+        body: &'a [u8],
+    ) -> Record<'a> {
+        Record {
+            class,
+            key,
+            cause: self.cause,
+            sender: self.sender,
+            receiver: self.receiver,
+            link: self.link,
+            kind: self.kind.map(|kind| plan.kind(kind)),
+            ordinal: self.ordinal,
+            copy: self.copy,
+            match_key: self.match_key,
+            sent: self.sent,
+            reason: self.reason,
+            body,
+            sends: 0,
+        }
+    }
+}
+
+/// A message as a handler sends it.
+pub(crate) struct Outbound {
+    pub(crate) receiver: EntityId,
+    pub(crate) kind: KindIndex,
+    pub(crate) letter: Sealed,
+    pub(crate) match_key: Option<MatchKey>,
+    pub(crate) delay: SimDuration,
+}
+
+/// An event for another engine.
+pub(crate) struct Outgoing {
+    pub(crate) engine: u32,
+    pub(crate) key: EventKey,
+    pub(crate) pending: Pending,
+}
+
+/// The place of a message in its flow.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Flow {
+    pub(crate) next: u64,
+    pub(crate) last_key: Option<MatchKey>,
+    pub(crate) repeat: u32,
+}
+
+/// What the kernel keeps for an actor, crashed or not.
+pub(crate) struct CellState {
+    pub(crate) declared: u32,
+    pub(crate) incarnation: u32,
+    /// The next of the keys that this actor assigns.
+    pub(crate) count: u64,
+    pub(crate) streams: Vec<(&'static str, Stream)>,
+    pub(crate) durable: Vec<Box<dyn Any + Send>>,
+    /// By receiver and kind; a timer's receiver is `u32::MAX`.
+    pub(crate) flows: FixedMap<u64, Flow>,
+}
+
+impl CellState {
+    pub(crate) fn new(declared: u32) -> Self {
+        CellState {
+            declared,
+            incarnation: 0,
+            count: 0,
+            streams: Vec::new(),
+            durable: Vec::new(),
+            flows: FixedMap::default(),
+        }
+    }
+}
+
+/// An actor, with what outlives it.
+pub(crate) struct ActorCell {
+    pub(crate) entity: EntityId,
+    /// `None` while crashed.
+    pub(crate) actor: Option<Box<dyn AnyActor>>,
+    pub(crate) factory: Factory,
+    pub(crate) state: CellState,
+}
+
+/// A link, with its key counter.
+pub(crate) struct LinkCell {
+    pub(crate) carrier: Box<dyn AnyCarrier>,
+    pub(crate) count: u64,
+}
+
+/// What a control event does to one entity.
+pub(crate) enum Action {
+    Crash,
+    Restart,
+    Change(SealedChange),
+}
+
+/// Runs the events of a set of hosts.
+pub(crate) struct Engine {
+    actors: Vec<ActorCell>,
+    pub(crate) parts: Parts,
+}
+
+impl Engine {
+    pub(crate) fn new(
+        plan: Arc<Plan>,
+        index: u32,
+        actors: Vec<ActorCell>,
+        links: Vec<LinkCell>,
+    ) -> Self {
+        let mut engine = Engine {
+            actors,
+            parts: Parts::new(plan, index, links),
+        };
+        for cell in &mut engine.actors {
+            let key = engine
+                .parts
+                .plan
+                .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
+            cell.state.count += 1;
+            let head = Head::of_entity(cell.entity, SimTime::ZERO);
+            engine.parts.insert(
+                key,
+                Pending {
+                    class: Class::Start,
+                    head,
+                    letter: None,
+                },
+            );
+        }
+        engine
+    }
+
+    /// Time and step of the next event.
+    pub(crate) fn peek(&self) -> Option<Bound> {
+        self.parts.queue.peek()
+    }
+
+    /// Handles every event before `bound`, unless the sink or an actor asks for a pause.
+    pub(crate) fn run(&mut self, bound: Bound, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
+        while !sink.paused() && self.parts.stop.is_none() {
+            let Some(entry) = self.parts.queue.pop_before(bound) else {
+                break;
+            };
+            self.handle(entry, sink)?;
+        }
+        Ok(())
+    }
+
+    fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
+        let Pending {
+            class,
+            head,
+            letter,
+        } = self.parts.take(entry.slot);
+        let key = entry.key();
+        if key.step > self.parts.plan.step_limit {
+            return Err(self.step_limit_fault(key, &head));
+        }
+        match class {
+            Class::Void => Ok(()),
+            Class::Start => self.run_handler(RecordClass::Start, key, head, None, sink),
+            Class::Message | Class::Timer => self.deliver(class, key, head, letter, sink),
+            Class::HandOver => self.hand_over(key, head, letter, sink),
+            Class::LateLoss => {
+                self.parts.begin(key, letter.as_ref(), head.kind)?;
+                self.commit(RecordClass::Lost, key, &head, sink);
+                Ok(())
+            }
+        }
+    }
+
+    fn deliver(
+        &mut self,
+        class: Class,
+        key: EventKey,
+        mut head: Head,
+        letter: Option<Sealed>,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let cell = &self.actors[self.parts.plan.place(head.receiver).local as usize];
+        let crashed = cell.actor.is_none();
+        if class == Class::Timer {
+            if crashed || head.incarnation != cell.state.incarnation {
+                return Ok(());
+            }
+            return self.run_handler(RecordClass::Timer, key, head, letter, sink);
+        }
+        if crashed {
+            head.reason = "crashed";
+            self.parts.begin(key, letter.as_ref(), head.kind)?;
+            self.commit(RecordClass::Lost, key, &head, sink);
+            return Ok(());
+        }
+        self.run_handler(RecordClass::Delivered, key, head, letter, sink)
+    }
+
+    /// Runs one handler, and commits the event if it did not fail.
+    fn run_handler(
+        &mut self,
+        class: RecordClass,
+        key: EventKey,
+        head: Head,
+        letter: Option<Sealed>,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        self.parts.begin(key, letter.as_ref(), head.kind)?;
+        let cell = &mut self.actors[self.parts.plan.place(head.receiver).local as usize];
+        let result = invoke(cell, &mut self.parts, key, letter);
+        if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
+            let kind = head.kind.map(|kind| self.parts.plan.kind(kind).name());
+            let message =
+                kind.map(|kind| format!("{kind} from {}", self.parts.plan.name(head.sender)));
+            self.parts.note_unfinished(key, head);
+            let blamed = self.parts.carrying.unwrap_or(head.receiver);
+            return Err(self.parts.fault_at(key, blamed, message, cause));
+        }
+        self.commit(class, key, &head, sink);
+        Ok(())
+    }
+
+    fn hand_over(
+        &mut self,
+        key: EventKey,
+        head: Head,
+        letter: Option<Sealed>,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        self.parts.begin(key, letter.as_ref(), head.kind)?;
+        let (Some(link), Some(letter)) = (head.link, letter) else {
+            unreachable!("a message is handed over with its letter, to a link");
+        };
+        let parts = &mut self.parts;
+        let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter)));
+        let result = carried.map_err(|payload| FaultCause::Panic(panic_text(&*payload)));
+        if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
+            self.parts.note_unfinished(key, head);
+            let message = format!("a message from {}", self.parts.plan.name(head.sender));
+            return Err(self.parts.fault_at(key, link, Some(message), cause));
+        }
+        self.commit(RecordClass::HandOver, key, &head, sink);
+        Ok(())
+    }
+
+    /// Applies a control event to one of this engine's entities.
+    pub(crate) fn control(
+        &mut self,
+        key: EventKey,
+        entity: EntityId,
+        action: Action,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let mut head = Head::of_entity(entity, key.time);
+        head.sender = EntityId::CONTROL;
+        let local = self.parts.plan.place(entity).local as usize;
+        match action {
+            Action::Crash => {
+                self.actors[local].actor = None;
+                self.parts.begin(key, None, None)?;
+                self.commit(RecordClass::Crash, key, &head, sink);
+                Ok(())
+            }
+            Action::Restart => {
+                let cell = &mut self.actors[local];
+                cell.state.incarnation += 1;
+                cell.state.streams.clear();
+                cell.actor = None;
+                let (plan, factory) = (&self.parts.plan, &cell.factory);
+                let built = catch_unwind(AssertUnwindSafe(|| factory(plan.name(entity))));
+                match built {
+                    Ok(actor) => cell.actor = Some(actor),
+                    Err(payload) => {
+                        let cause = FaultCause::Panic(panic_text(&*payload));
+                        return Err(self.parts.fault_at(key, entity, None, cause));
+                    }
+                }
+                self.run_handler(RecordClass::Restart, key, head, None, sink)
+            }
+            Action::Change(change) => {
+                head.kind = self
+                    .parts
+                    .plan
+                    .links
+                    .get(&entity)
+                    .map(|link| link.change_kind);
+                self.parts.begin(key, None, None)?;
+                self.parts.apply_change(local, key, head.kind, change);
+                self.commit(RecordClass::Change, key, &head, sink);
+                Ok(())
+            }
+        }
+    }
+
+    /// Commits the event just handled, then what happened in it.
+    fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
+        let parts = &mut self.parts;
+        let mut record = head.record(&parts.plan, class, key, &parts.body);
+        record.sends = parts.sends;
+        sink.commit(&record, hash_if_wanted(&parts.plan, &record));
+        if !parts.effects.is_empty() {
+            parts.commit_effects(sink);
+        }
+    }
+
+    fn step_limit_fault(&mut self, key: EventKey, head: &Head) -> Box<Fault> {
+        // The hops that follow would show the same loop: name the ones still waiting here.
+        let plan = self.parts.plan.clone();
+        let hop = |head: &Head| {
+            let kind = head.kind.map_or("start", |kind| plan.kind(kind).name());
+            format!(
+                "{} -> {} ({kind})",
+                plan.name(head.sender),
+                plan.name(head.receiver)
+            )
+        };
+        let mut chain = vec![hop(head)];
+        for entry in self.parts.queue.drain_sorted() {
+            let (waiting, at) = (self.parts.take(entry.slot), entry.key());
+            if at.time == key.time && waiting.class != Class::Void && chain.len() < 8 {
+                chain.push(hop(&waiting.head));
+            }
+            self.parts.insert(at, waiting);
+        }
+        self.parts.note_unfinished(key, *head);
+        let cause = FaultCause::StepLimit {
+            limit: plan.step_limit,
+            chain,
+        };
+        self.parts.fault_at(key, head.receiver, None, cause)
+    }
+}
+
+pub(crate) fn hash_if_wanted(plan: &Plan, record: &Record<'_>) -> u128 {
+    if plan.digest {
+        record_hash(plan, record)
+    } else {
+        0
+    }
+}
+
+fn invoke(
+    cell: &mut ActorCell,
+    parts: &mut Parts,
+    key: EventKey,
+    letter: Option<Sealed>,
+) -> Result<(), FaultCause> {
+    let Some(actor) = cell.actor.as_deref_mut() else {
+        unreachable!("handlers run on living actors only");
+    };
+    let mut core = Core {
+        parts,
+        state: &mut cell.state,
+        me: cell.entity,
+        key,
+    };
+    let outcome: Result<Outcome, _> = catch_unwind(AssertUnwindSafe(|| match letter {
+        Some(mut letter) => letter.0.deliver(actor.as_any(), &mut core),
+        None => actor.started(&mut core),
+    }));
+    match outcome {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(FaultCause::Error(error.to_string())),
+        Err(payload) => Err(FaultCause::Panic(panic_text(&*payload))),
+    }
+}
+
+pub(crate) fn panic_text(payload: &(dyn Any + Send)) -> String {
+    let text = payload
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned());
+    text.or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "a value that is no text".to_owned())
+}

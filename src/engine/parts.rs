@@ -1,0 +1,585 @@
+//! What a handler changes while its actor is borrowed: the queue, the payloads, the links, and
+//! what the event in hand has done so far.
+
+use std::any::TypeId;
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Arc;
+
+use slab::Slab;
+
+use super::{
+    CellState, Class, Flow, Head, LinkCell, Outbound, Outgoing, Pending, Sink, hash_if_wanted,
+};
+use crate::carrier::{Parcel, SealedChange, Verdict, Verdicts};
+use crate::context::TimerId;
+use crate::fault::{Fault, FaultCause};
+use crate::key::{EntityId, EventKey};
+use crate::message::{Message, Sealed};
+use crate::plan::{Kind, KindIndex, Plan};
+use crate::queue::{Entry, Queue};
+use crate::record::RecordClass;
+use crate::time::SimDuration;
+
+/// Cancelled timers are shed from the queue once there are this many, and more than half of it.
+const VOIDS_TO_SHED: usize = 1024;
+
+/// What happened in the event in hand besides the event: committed right after it.
+pub(crate) enum Effect {
+    Lost {
+        head: Head,
+        body: Range<usize>,
+    },
+    Sample {
+        entity: EntityId,
+        kind: Arc<Kind>,
+        body: Range<usize>,
+    },
+}
+
+/// The mutable part of an engine, apart from its actors.
+pub(crate) struct Parts {
+    pub(crate) plan: Arc<Plan>,
+    index: u32,
+    links: Vec<LinkCell>,
+    pub(crate) queue: Queue,
+    pending: Slab<Pending>,
+    voids: usize,
+    pub(crate) outgoing: Vec<Outgoing>,
+    /// The key of the event in hand.
+    key: EventKey,
+    /// The encoded message in hand.
+    pub(crate) body: Vec<u8>,
+    pub(crate) effects: Vec<Effect>,
+    effect_bytes: Vec<u8>,
+    verdicts: Verdicts,
+    pub(crate) sends: u32,
+    pub(crate) fault: Option<FaultCause>,
+    /// The link that was deciding a fate when a handler failed.
+    pub(crate) carrying: Option<EntityId>,
+    /// The first request to stop: at which event, by whom, why.
+    pub(crate) stop: Option<(EventKey, EntityId, String)>,
+    /// The event whose handler failed, so that its message can be counted as in flight.
+    pub(crate) unfinished: Option<(EventKey, Head)>,
+    /// The last kind looked up: handlers tend to send one kind at a time.
+    last_kind: Option<(TypeId, KindIndex)>,
+}
+
+impl Parts {
+    pub(crate) fn new(plan: Arc<Plan>, index: u32, links: Vec<LinkCell>) -> Self {
+        Parts {
+            key: plan.key(crate::time::SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            plan,
+            index,
+            links,
+            queue: Queue::default(),
+            pending: Slab::new(),
+            voids: 0,
+            outgoing: Vec::new(),
+            body: Vec::new(),
+            effects: Vec::new(),
+            effect_bytes: Vec::new(),
+            verdicts: Verdicts::default(),
+            sends: 0,
+            fault: None,
+            carrying: None,
+            stop: None,
+            unfinished: None,
+            last_kind: None,
+        }
+    }
+
+    pub(crate) fn insert(&mut self, key: EventKey, pending: Pending) -> u32 {
+        let slot =
+            u32::try_from(self.pending.insert(pending)).expect("fewer than 2^32 events wait");
+        self.queue.push(Entry::new(key, slot));
+        slot
+    }
+
+    pub(crate) fn take(&mut self, slot: u32) -> Pending {
+        let pending = self.pending.remove(slot as usize);
+        if pending.class == Class::Void {
+            self.voids -= 1;
+        }
+        pending
+    }
+
+    /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
+    pub(crate) fn begin(
+        &mut self,
+        key: EventKey,
+        letter: Option<&Sealed>,
+        kind: Option<KindIndex>,
+    ) -> Result<(), Box<Fault>> {
+        self.key = key;
+        self.sends = 0;
+        self.carrying = None;
+        self.body.clear();
+        if let (Some(letter), Some(kind), true) = (letter, kind, self.plan.recording()) {
+            let kind = self.plan.kind(kind);
+            if let Err(error) = letter.0.encode(kind.schema(), &mut self.body) {
+                let (kind, error) = (kind.name().to_owned(), error.to_string());
+                let cause = FaultCause::Encoding { kind, error };
+                return Err(self.fault_at(key, key.source, None, cause));
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn kind_of(&mut self, type_id: TypeId) -> Option<KindIndex> {
+        match self.last_kind {
+            Some((last, kind)) if last == type_id => Some(kind),
+            _ => {
+                let kind = *self.plan.kind_of_type.get(&type_id)?;
+                self.last_kind = Some((type_id, kind));
+                Some(kind)
+            }
+        }
+    }
+
+    /// Keeps the first fault of the event in hand.
+    pub(crate) fn raise(&mut self, cause: FaultCause) {
+        self.fault.get_or_insert(cause);
+    }
+
+    pub(crate) fn fault_at(
+        &self,
+        key: EventKey,
+        entity: EntityId,
+        message: Option<String>,
+        cause: FaultCause,
+    ) -> Box<Fault> {
+        let actor = self.plan.name(entity).to_owned();
+        Box::new(Fault {
+            key,
+            time: key.time,
+            actor,
+            message,
+            cause,
+        })
+    }
+
+    pub(crate) fn note_unfinished(&mut self, key: EventKey, head: Head) {
+        self.unfinished = Some((key, head));
+    }
+
+    pub(crate) fn send(&mut self, state: &mut CellState, me: EntityId, outbound: Outbound) {
+        if self.fault.is_some() {
+            return;
+        }
+        let Outbound {
+            receiver,
+            kind,
+            letter,
+            match_key,
+            delay,
+        } = outbound;
+        let flow = state
+            .flows
+            .entry(u64::from(receiver.0) << 32 | u64::from(kind))
+            .or_default();
+        let (ordinal, repeat) = flow.advance(match_key);
+        let head = Head {
+            receiver,
+            kind: Some(kind),
+            ordinal,
+            repeat,
+            match_key,
+            cause: Some(self.key),
+            scheduled_by: Some(self.key),
+            ..Head::of_entity(me, self.key.time)
+        };
+        self.sends += 1;
+        let (from, to) = (self.plan.place(me), self.plan.place(receiver));
+        if from.host == to.host {
+            let key = self.later_key(me, &mut state.count, delay);
+            self.schedule(to.engine, key, Class::Message, head, letter);
+        } else if !delay.is_zero() {
+            let receiver = self.plan.name(receiver).to_owned();
+            self.raise(FaultCause::DelayedAcrossHosts { receiver });
+        } else if let Some(link) = self.plan.link(from.host, to.host) {
+            let head = Head {
+                link: Some(link),
+                ..head
+            };
+            if self.plan.links.get(&link).is_some_and(|link| link.shared) {
+                let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
+                let engine = self.plan.place(link).engine;
+                self.schedule(engine, key, Class::HandOver, head, letter);
+            } else {
+                self.carry(link, head, letter);
+            }
+        } else {
+            self.raise(FaultCause::NoRoute {
+                from: self.plan.host_name(me).to_owned(),
+                to: self.plan.host_name(receiver).to_owned(),
+                receiver: self.plan.name(receiver).to_owned(),
+                kind: self.plan.kind(kind).name().to_owned(),
+            });
+        }
+    }
+
+    /// The key that `source` gives an event `delay` from now.
+    fn later_key(&self, source: EntityId, count: &mut u64, delay: SimDuration) -> EventKey {
+        let own = *count;
+        *count += 1;
+        if delay.is_zero() {
+            self.plan.key(self.key.time, self.key.step + 1, source, own)
+        } else {
+            self.plan.key(self.key.time + delay, 0, source, own)
+        }
+    }
+
+    fn schedule(&mut self, engine: u32, key: EventKey, class: Class, head: Head, letter: Sealed) {
+        let pending = Pending {
+            class,
+            head,
+            letter: Some(letter),
+        };
+        if engine == self.index {
+            self.insert(key, pending);
+        } else {
+            self.outgoing.push(Outgoing {
+                engine,
+                key,
+                pending,
+            });
+        }
+    }
+
+    /// Lets `link` decide the fate of a message, now.
+    pub(crate) fn carry(&mut self, link: EntityId, head: Head, letter: Sealed) {
+        self.carrying = Some(link);
+        let plan = self.plan.clone();
+        let Some(kind) = head.kind.map(|kind| plan.kind(kind)) else {
+            return;
+        };
+        let parcel = Parcel {
+            plan: &plan,
+            now: self.key.time,
+            link,
+            sender: head.sender,
+            receiver: head.receiver,
+            kind,
+            ordinal: head.ordinal,
+            repeat: head.repeat,
+            match_key: head.match_key,
+            letter: &letter,
+            size: Cell::new(None),
+        };
+        let mut verdicts = std::mem::take(&mut self.verdicts);
+        let cell = &mut self.links[plan.place(link).local as usize];
+        cell.carrier.carry(&parcel, &mut verdicts);
+        let mut count = cell.count;
+        self.execute(link, &mut count, head, letter, kind, &verdicts);
+        self.links[plan.place(link).local as usize].count = count;
+        verdicts.list.clear();
+        self.verdicts = verdicts;
+        if self.fault.is_none() {
+            self.carrying = None;
+        }
+    }
+
+    /// Turns a link's verdicts into deliveries and losses, the last copy with the letter itself.
+    fn execute(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        head: Head,
+        letter: Sealed,
+        kind: &Kind,
+        verdicts: &Verdicts,
+    ) {
+        let mut letter = Some(letter);
+        for (copy, verdict) in verdicts.list.iter().enumerate() {
+            let head = Head {
+                copy: copy as u32,
+                scheduled_by: Some(self.key),
+                ..head
+            };
+            let last = copy + 1 == verdicts.list.len();
+            let Some(own) = (if last {
+                letter.take()
+            } else {
+                self.copy_of(letter.as_ref(), kind)
+            }) else {
+                return;
+            };
+            match *verdict {
+                Verdict::Deliver { after } => {
+                    if let Err(cause) = self.check_delay(link, after) {
+                        return self.raise(cause);
+                    }
+                    let key = self.later_key(link, count, after);
+                    let engine = self.plan.place(head.receiver).engine;
+                    self.schedule(engine, key, Class::Message, head, own);
+                }
+                Verdict::Lose { after, reason } => {
+                    let head = Head { reason, ..head };
+                    if after.is_zero() {
+                        self.lose(head, &own, kind);
+                    } else {
+                        let key = self.later_key(link, count, after);
+                        self.schedule(self.index, key, Class::LateLoss, head, own);
+                    }
+                }
+            }
+        }
+        if verdicts.list.is_empty() {
+            self.raise(FaultCause::NoFate {
+                link: self.plan.name(link).to_owned(),
+                kind: kind.name().to_owned(),
+                sender: self.plan.name(head.sender).to_owned(),
+            });
+        }
+    }
+
+    /// A further copy of a message, through its encoding.
+    fn copy_of(&mut self, letter: Option<&Sealed>, kind: &Kind) -> Option<Sealed> {
+        let letter = letter?;
+        let mut bytes = Vec::new();
+        let encoded = letter
+            .0
+            .encode(kind.schema(), &mut bytes)
+            .map_err(|error| error.to_string());
+        let copy = encoded.and_then(|()| {
+            letter
+                .0
+                .decode(kind.schema(), &bytes)
+                .map_err(|error| error.to_string())
+        });
+        match copy {
+            Ok(copy) => Some(copy),
+            Err(error) => {
+                self.raise(FaultCause::Encoding {
+                    kind: kind.name().to_owned(),
+                    error,
+                });
+                None
+            }
+        }
+    }
+
+    fn check_delay(&self, link: EntityId, actual: SimDuration) -> Result<(), FaultCause> {
+        let declared = self
+            .plan
+            .links
+            .get(&link)
+            .map_or(SimDuration::ZERO, |link| link.min_delay);
+        if actual >= declared || !self.plan.check_min_delay {
+            return Ok(());
+        }
+        let link = self.plan.name(link).to_owned();
+        Err(FaultCause::UndercutsMinDelay {
+            link,
+            declared,
+            actual,
+        })
+    }
+
+    fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind) {
+        let start = self.effect_bytes.len();
+        if self.plan.recording()
+            && let Err(error) = letter.0.encode(kind.schema(), &mut self.effect_bytes)
+        {
+            let (kind, error) = (kind.name().to_owned(), error.to_string());
+            return self.raise(FaultCause::Encoding { kind, error });
+        }
+        self.effects.push(Effect::Lost {
+            head,
+            body: start..self.effect_bytes.len(),
+        });
+    }
+
+    pub(crate) fn add_sample<S: Message>(&mut self, entity: EntityId, sample: &S) {
+        let start = self.effect_bytes.len();
+        let kind = self.plan.sample_kind::<S>().and_then(|kind| {
+            let encoded = kind.schema().encode(sample, &mut self.effect_bytes);
+            encoded.map(|()| kind).map_err(|error| error.to_string())
+        });
+        match kind {
+            Ok(kind) => {
+                let body = start..self.effect_bytes.len();
+                self.effects.push(Effect::Sample { entity, kind, body });
+            }
+            // A run must not depend on whether it is watched, so a sample that cannot be written
+            // is no fault.
+            Err(error) => {
+                self.effect_bytes.truncate(start);
+                tracing::warn!(actor = self.plan.name(entity), %error, "state sample dropped");
+            }
+        }
+    }
+
+    pub(crate) fn commit_effects(&mut self, sink: &mut impl Sink) {
+        for effect in self.effects.drain(..) {
+            match effect {
+                Effect::Lost { head, body } => {
+                    let body = &self.effect_bytes[body];
+                    let record = head.record(&self.plan, RecordClass::Lost, self.key, body);
+                    sink.commit(&record, hash_if_wanted(&self.plan, &record));
+                }
+                Effect::Sample { entity, kind, body } => {
+                    let head = Head {
+                        cause: Some(self.key),
+                        ..Head::of_entity(entity, self.key.time)
+                    };
+                    let body = &self.effect_bytes[body];
+                    let mut record = head.record(&self.plan, RecordClass::Sample, self.key, body);
+                    record.kind = Some(&kind);
+                    sink.commit(&record, 0);
+                }
+            }
+        }
+        self.effect_bytes.clear();
+    }
+
+    pub(crate) fn set_timer(
+        &mut self,
+        state: &mut CellState,
+        me: EntityId,
+        kind: KindIndex,
+        letter: Sealed,
+        delay: SimDuration,
+    ) -> TimerId {
+        let flow = state
+            .flows
+            .entry(u64::from(u32::MAX) << 32 | u64::from(kind))
+            .or_default();
+        let (ordinal, _) = flow.advance(None);
+        let head = Head {
+            kind: Some(kind),
+            ordinal,
+            cause: Some(self.key),
+            incarnation: state.incarnation,
+            ..Head::of_entity(me, self.key.time)
+        };
+        let key = self.later_key(me, &mut state.count, delay);
+        let slot = self.insert(
+            key,
+            Pending {
+                class: Class::Timer,
+                head,
+                letter: Some(letter),
+            },
+        );
+        // The ordinal tells a reused slot from this timer's.
+        TimerId {
+            slot,
+            kind,
+            ordinal,
+        }
+    }
+
+    pub(crate) fn cancel_timer(&mut self, me: EntityId, timer: TimerId) -> bool {
+        let Some(pending) = self.pending.get_mut(timer.slot as usize) else {
+            return false;
+        };
+        let head = &pending.head;
+        let same = pending.class == Class::Timer
+            && head.receiver == me
+            && head.kind == Some(timer.kind)
+            && head.ordinal == timer.ordinal;
+        if same {
+            pending.class = Class::Void;
+            pending.letter = None;
+            self.voids += 1;
+            if self.voids >= VOIDS_TO_SHED && self.voids * 2 > self.pending.len() {
+                self.shed_voids();
+            }
+        }
+        same
+    }
+
+    fn shed_voids(&mut self) {
+        let pending = &mut self.pending;
+        self.queue
+            .retain(|entry| pending[entry.slot as usize].class != Class::Void);
+        pending.retain(|_, pending| pending.class != Class::Void);
+        self.voids = 0;
+    }
+
+    pub(crate) fn apply_change(
+        &mut self,
+        local: usize,
+        key: EventKey,
+        kind: Option<KindIndex>,
+        change: SealedChange,
+    ) {
+        if let (Some(kind), true) = (kind, self.plan.recording()) {
+            (change.encode)(
+                &*change.value,
+                self.plan.kind(kind).schema(),
+                &mut self.body,
+            );
+        }
+        self.links[local].carrier.change(change.value, key.time);
+    }
+
+    /// Takes every message still on its way, with the key its next event would have had. `until`
+    /// leaves out what events at or after that key sent: a fault undid them.
+    pub(crate) fn take_in_flight(
+        &mut self,
+        until: Option<EventKey>,
+    ) -> Vec<(EventKey, Head, Vec<u8>)> {
+        let mut found = Vec::new();
+        if let Some((key, head)) = self.unfinished.take() {
+            if head.kind.is_some() && head.sender != head.receiver {
+                found.push((key, head, self.body.clone()));
+            }
+        }
+        for entry in self.queue.drain_sorted() {
+            let Pending {
+                class,
+                head,
+                letter,
+            } = self.take(entry.slot);
+            found.extend(self.in_flight(entry.key(), class, head, letter, until));
+        }
+        for Outgoing { key, pending, .. } in std::mem::take(&mut self.outgoing) {
+            let Pending {
+                class,
+                head,
+                letter,
+            } = pending;
+            found.extend(self.in_flight(key, class, head, letter, until));
+        }
+        found
+    }
+
+    fn in_flight(
+        &self,
+        key: EventKey,
+        class: Class,
+        head: Head,
+        letter: Option<Sealed>,
+        until: Option<EventKey>,
+    ) -> Option<(EventKey, Head, Vec<u8>)> {
+        let message = matches!(class, Class::Message | Class::HandOver | Class::LateLoss);
+        let undone = until.is_some_and(|until| head.scheduled_by.is_none_or(|by| by >= until));
+        if !message || undone {
+            return None;
+        }
+        let mut body = Vec::new();
+        if let (Some(letter), Some(kind), true) = (letter, head.kind, self.plan.recording()) {
+            // It will never be handled; what cannot be encoded is recorded empty.
+            let _ = letter.0.encode(self.plan.kind(kind).schema(), &mut body);
+        }
+        Some((key, Head { reason: "", ..head }, body))
+    }
+}
+
+impl Flow {
+    /// The next ordinal, and how many messages before this one had the same match key.
+    fn advance(&mut self, match_key: Option<crate::message::MatchKey>) -> (u64, u32) {
+        let ordinal = self.next;
+        self.next += 1;
+        self.repeat = if match_key.is_some() && match_key == self.last_key {
+            self.repeat + 1
+        } else {
+            0
+        };
+        self.last_key = match_key;
+        (ordinal, self.repeat)
+    }
+}

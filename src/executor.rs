@@ -1,0 +1,113 @@
+//! Executors: how the events of a run meet processors. The result is the same.
+//!
+//! *Inline* runs everything on the calling thread. *Kameo* runs engines as kameo actors on tokio's
+//! threads; light hosts share one engine, a host declared heavy has its own.
+
+mod inline;
+mod kameo;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::commit::Committer;
+use crate::engine::{Engine, Head};
+use crate::engine::{Sink, hash_if_wanted};
+use crate::fault::{BuildError, Fault};
+use crate::key::{EntityId, EventKey};
+use crate::plan::Plan;
+use crate::record::{Observer, RecordClass};
+use crate::report::{End, Report};
+use crate::schedule::Schedule;
+use crate::time::SimTime;
+
+/// How to execute a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Executor {
+    /// On the calling thread: the fastest for one core.
+    Inline,
+    /// On `threads` threads of a pool, at least one.
+    Kameo {
+        /// How many.
+        threads: usize,
+    },
+}
+
+impl Executor {
+    /// The executor's name: `inline` or `kameo`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Executor::Inline => "inline",
+            Executor::Kameo { .. } => "kameo",
+        }
+    }
+}
+
+/// A run, ready to start.
+pub(crate) struct Ready {
+    pub(crate) plan: Arc<Plan>,
+    pub(crate) engines: Vec<Engine>,
+    pub(crate) schedule: Schedule,
+    pub(crate) observers: Vec<Box<dyn Observer>>,
+    pub(crate) interrupt: Arc<AtomicBool>,
+}
+
+pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError> {
+    let Ready {
+        plan,
+        engines,
+        schedule,
+        observers,
+        interrupt,
+    } = ready;
+    let committer = Committer::new(plan.clone(), observers, interrupt)?;
+    match executor {
+        Executor::Inline => Ok(inline::run(plan, engines, schedule, committer)),
+        Executor::Kameo { threads } => kameo::run(plan, engines, schedule, committer, threads),
+    }
+}
+
+/// How a run ended, before what is still on its way is counted.
+pub(crate) struct Ending {
+    end: End,
+    time: SimTime,
+    /// The key of the fault, if there was one: what happened at or after it is undone.
+    fault: Option<EventKey>,
+}
+
+impl Ending {
+    fn fault(fault: Box<Fault>) -> Self {
+        Ending {
+            time: fault.time,
+            fault: Some(fault.key),
+            end: End::Fault(fault),
+        }
+    }
+
+    fn early(end: End, time: SimTime) -> Self {
+        Ending {
+            end,
+            time,
+            fault: None,
+        }
+    }
+
+    /// Commits a stop and ends the run with it.
+    fn stop(
+        plan: &Plan,
+        committer: &mut Committer,
+        key: EventKey,
+        by: EntityId,
+        reason: String,
+    ) -> Self {
+        let mut head = Head::of_entity(EntityId::CONTROL, key.time);
+        head.sender = by;
+        let record = head.record(plan, RecordClass::Stop, key, reason.as_bytes());
+        committer.commit(&record, hash_if_wanted(plan, &record));
+        let by = plan.name(by).to_owned();
+        Ending {
+            end: End::Stopped { by, reason },
+            time: key.time,
+            fault: None,
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The inline executor: one engine, one thread, no windows.
+
+use std::sync::Arc;
+
+use super::Ending;
+use crate::commit::Committer;
+use crate::engine::Engine;
+use crate::plan::Plan;
+use crate::report::{End, Report};
+use crate::schedule::{Due, Schedule};
+
+/// Runs to the end. Expects one engine: with several, hosts would have to wait for each other.
+pub(super) fn run(
+    plan: Arc<Plan>,
+    engines: Vec<Engine>,
+    mut schedule: Schedule,
+    mut committer: Committer,
+) -> Report {
+    let Ok([mut engine]) = <[Engine; 1]>::try_from(engines) else {
+        unreachable!("the builder gives this executor a single engine");
+    };
+    let ending = run_to_end(&plan, &mut engine, &mut schedule, &mut committer);
+    let in_flight = engine.parts.take_in_flight(ending.fault);
+    committer.finish(ending.end, ending.time, in_flight)
+}
+
+fn run_to_end(
+    plan: &Plan,
+    engine: &mut Engine,
+    schedule: &mut Schedule,
+    committer: &mut Committer,
+) -> Ending {
+    loop {
+        if let Err(fault) = engine.run(schedule.bound(), committer) {
+            return Ending::fault(fault);
+        }
+        if let Some(end) = committer.verdict() {
+            return Ending::early(end, committer.last().time);
+        }
+        let asked = [engine.parts.stop.take(), committer.stop.take()];
+        if asked.iter().any(Option::is_some) {
+            for (key, by, reason) in asked.into_iter().flatten() {
+                schedule.ask_stop(key, by, reason);
+            }
+            continue;
+        }
+        if engine.peek().is_none() && schedule.only_stops_left() {
+            return Ending::early(End::Completed, committer.last().time);
+        }
+        match schedule.take_due(plan) {
+            Some(Due::Stop { key, by, reason }) => {
+                return Ending::stop(plan, committer, key, by, reason);
+            }
+            Some(Due::Control(key, entity, action)) => {
+                if let Err(fault) = engine.control(key, entity, action, committer) {
+                    return Ending::fault(fault);
+                }
+            }
+            None => return Ending::early(End::Completed, committer.last().time),
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Messages, the addresses they go to, and the sealed form in which they travel.
+
+use std::any::Any;
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use smallbox::SmallBox;
+use smallbox::space::S8;
+
+use crate::actor::{Actor, Handler};
+use crate::context::{Context, Core};
+use crate::encoding::{DecodeError, EncodeError, Schema};
+use crate::fault::Outcome;
+
+/// A message: any type that serde can write and read back, and that may cross threads.
+///
+/// Implemented for every such type; derive `Serialize` and `Deserialize` and nothing else.
+pub trait Message: Serialize + DeserializeOwned + Send + 'static {}
+
+impl<M: Serialize + DeserializeOwned + Send + 'static> Message for M {}
+
+/// A protocol's own identity for a message, by which runs are compared and links draw, in place
+/// of the ordinal in its flow: the planning cycle and the iteration in it, say.
+///
+/// ```
+/// use farside::MatchKey;
+/// let key = MatchKey::new(12, 3);
+/// assert_eq!((key.major(), key.minor()), (12, 3));
+/// assert_eq!(key.to_string(), "12.3");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MatchKey(u64);
+
+impl MatchKey {
+    /// The key of iteration `minor` in cycle `major`.
+    pub const fn new(major: u32, minor: u32) -> Self {
+        MatchKey((major as u64) << 32 | minor as u64)
+    }
+
+    /// The cycle.
+    pub const fn major(self) -> u32 {
+        (self.0 >> 32) as u32
+    }
+
+    /// The iteration.
+    pub const fn minor(self) -> u32 {
+        self.0 as u32
+    }
+
+    /// Both as one number, cycle first.
+    pub const fn bits(self) -> u64 {
+        self.0
+    }
+
+    /// The key with these [`MatchKey::bits`].
+    pub const fn from_bits(bits: u64) -> Self {
+        MatchKey(bits)
+    }
+}
+
+impl fmt::Display for MatchKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.major(), self.minor())
+    }
+}
+
+/// The address of an actor of type `A`: takes every message that `A` handles, and no other.
+///
+/// ```compile_fail
+/// # use farside::prelude::*;
+/// struct Deaf;
+/// impl Actor for Deaf { type Accepts = (); }
+/// #[derive(serde::Serialize, serde::Deserialize)]
+/// struct Ping;
+/// fn greet(ctx: &mut Context<'_, Deaf>, deaf: Address<Deaf>) {
+///     ctx.send(deaf, Ping); // `Deaf` does not handle `Ping`
+/// }
+/// ```
+pub struct Address<A> {
+    pub(crate) declared: u32,
+    pub(crate) actor: PhantomData<fn() -> A>,
+}
+
+/// The address of an actor known only by handling `M`.
+pub struct Recipient<M> {
+    declared: u32,
+    seal: fn(M) -> Sealed,
+}
+
+impl<A> Clone for Address<A> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A> Copy for Address<A> {}
+
+impl<A> fmt::Debug for Address<A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Address({})", self.declared)
+    }
+}
+
+impl<M> Clone for Recipient<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Recipient<M> {}
+
+impl<M> fmt::Debug for Recipient<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Recipient({})", self.declared)
+    }
+}
+
+impl<A: Actor> Address<A> {
+    pub(crate) fn new(declared: u32) -> Self {
+        Address {
+            declared,
+            actor: PhantomData,
+        }
+    }
+
+    /// The same actor, known only by handling `M`.
+    pub fn recipient<M: Message>(self) -> Recipient<M>
+    where
+        A: Handler<M>,
+    {
+        Recipient {
+            declared: self.declared,
+            seal: seal::<A, M>,
+        }
+    }
+}
+
+/// What `M` can be sent to: an [`Address`] or a [`Recipient`].
+pub trait Target<M>: Copy {
+    #[doc(hidden)]
+    fn declared(&self) -> u32;
+    #[doc(hidden)]
+    fn seal(&self, message: M) -> Sealed;
+}
+
+impl<A: Handler<M>, M: Message> Target<M> for Address<A> {
+    fn declared(&self) -> u32 {
+        self.declared
+    }
+
+    fn seal(&self, message: M) -> Sealed {
+        seal::<A, M>(message)
+    }
+}
+
+impl<M: Message> Target<M> for Recipient<M> {
+    fn declared(&self) -> u32 {
+        self.declared
+    }
+
+    fn seal(&self, message: M) -> Sealed {
+        (self.seal)(message)
+    }
+}
+
+/// A message on its way, with what it takes to deliver, encode and copy it.
+#[doc(hidden)]
+pub struct Sealed(pub(crate) SmallBox<dyn Letter, S8>);
+
+/// What the engine can do with a message whose type it does not know.
+pub(crate) trait Letter: Send {
+    /// Hands the message to `actor`, which must be of the type it was addressed to.
+    fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome;
+    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError>;
+    /// Another letter with the message that `bytes` encode, for a link's further copies: messages
+    /// need not be `Clone`.
+    fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError>;
+}
+
+struct Addressed<A, M> {
+    /// `None` once delivered.
+    message: Option<M>,
+    actor: PhantomData<fn() -> A>,
+}
+
+fn seal<A: Handler<M>, M: Message>(message: M) -> Sealed {
+    let letter = Addressed::<A, M> {
+        message: Some(message),
+        actor: PhantomData,
+    };
+    Sealed(smallbox::smallbox!(letter))
+}
+
+impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
+    fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome {
+        let actor = actor
+            .downcast_mut::<A>()
+            .expect("addresses are typed by their actor");
+        let message = self.message.take().expect("a letter is delivered once");
+        actor.handle(message, &mut Context::new(core))
+    }
+
+    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError> {
+        match &self.message {
+            Some(message) => schema.encode(message, out),
+            None => Ok(()),
+        }
+    }
+
+    fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
+        Ok(seal::<A, M>(schema.decode(bytes)?))
+    }
+}

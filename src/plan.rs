@@ -1,0 +1,265 @@
+//! What is fixed before a run starts: who takes part, which messages they exchange, which link
+//! joins which hosts. Shared, read-only, by every engine of the run.
+
+use std::any::TypeId;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rustc_hash::FxBuildHasher;
+
+use crate::actor::Actor;
+use crate::encoding::Schema;
+use crate::fault::LookupError;
+use crate::key::{EntityId, EventKey};
+use crate::message::Address;
+use crate::random::name_hash;
+use crate::time::{SimDuration, SimTime};
+
+/// A hash map that is only ever asked for a key, with a hasher that is the same on every machine.
+pub(crate) type FixedMap<K, V> = hashbrown::HashMap<K, V, FxBuildHasher>;
+
+/// A message type of a run: its name and how it is written.
+#[derive(Debug)]
+pub struct Kind {
+    pub(crate) name: String,
+    pub(crate) hash: u64,
+    pub(crate) schema: Schema,
+}
+
+impl Kind {
+    pub(crate) fn new(schema: Schema) -> Self {
+        let name = schema.name().to_owned();
+        Kind {
+            hash: name_hash(&name),
+            name,
+            schema,
+        }
+    }
+
+    /// The serde name of the message type.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The [`name_hash`] of the name.
+    pub fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// How bodies of this kind are encoded.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+}
+
+/// What an entity is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EntityRole {
+    /// `@control`.
+    Control,
+    /// An actor.
+    Actor,
+    /// A link.
+    Link,
+}
+
+/// One entity of a run.
+#[derive(Clone, Debug)]
+pub struct Entity {
+    /// Its name: unique, and what logs call it.
+    pub name: String,
+    /// What it is.
+    pub role: EntityRole,
+    /// The host it lives on; a shared link is a host of its own, and `@control` has none.
+    pub host: Option<String>,
+}
+
+/// What observers are told about a run before it starts.
+#[derive(Debug)]
+pub struct RunInfo {
+    /// The run's seed.
+    pub seed: u64,
+    /// The tie seed, if ties are shuffled.
+    pub tie_seed: Option<u64>,
+    /// Every entity, in name order: [`EntityId`]s index it.
+    pub entities: Vec<Entity>,
+    /// The message types that actors accept and links take as changes, in name order.
+    pub kinds: Vec<Arc<Kind>>,
+    /// The least delay between hosts.
+    pub look_ahead: SimDuration,
+}
+
+impl RunInfo {
+    /// The name of an entity.
+    pub fn name(&self, entity: EntityId) -> &str {
+        &self.entities[entity.index()].name
+    }
+
+    /// The entity with this name.
+    pub fn entity(&self, name: &str) -> Option<EntityId> {
+        let found = self
+            .entities
+            .binary_search_by(|e| e.name.as_str().cmp(name));
+        found.ok().map(EntityId::from_index)
+    }
+}
+
+/// Index of a host.
+pub(crate) type HostIndex = u32;
+/// Index of a kind in [`RunInfo::kinds`].
+pub(crate) type KindIndex = u32;
+
+/// Where an entity's state lives.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) host: HostIndex,
+    /// Which engine runs the host.
+    pub(crate) engine: u32,
+    /// The place in the engine's list of actors or of links.
+    pub(crate) local: u32,
+}
+
+/// Which link takes what a host sends to another.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Routes {
+    /// Link to every host that has no link of its own.
+    pub(crate) uplink: Option<EntityId>,
+    /// Link by receiving host; empty if there is none.
+    pub(crate) by_host: Vec<Option<EntityId>>,
+}
+
+/// A link as the plan knows it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkPlan {
+    pub(crate) min_delay: SimDuration,
+    pub(crate) shared: bool,
+    pub(crate) change_kind: KindIndex,
+}
+
+/// Everything fixed about a run.
+pub(crate) struct Plan {
+    pub(crate) seed: u64,
+    pub(crate) info: Arc<RunInfo>,
+    pub(crate) name_hashes: Vec<u64>,
+    /// From the number in an address to the entity.
+    pub(crate) declared: Vec<EntityId>,
+    /// From the number in an address to the Rust type of the actor.
+    pub(crate) actor_types: Vec<(TypeId, &'static str)>,
+    pub(crate) places: Vec<Place>,
+    pub(crate) host_names: Vec<String>,
+    pub(crate) routes: Vec<Routes>,
+    pub(crate) links: FixedMap<EntityId, LinkPlan>,
+    pub(crate) kind_of_type: FixedMap<TypeId, KindIndex>,
+    pub(crate) sample_kinds: Mutex<Vec<(TypeId, Arc<Kind>)>>,
+    pub(crate) step_limit: u32,
+    pub(crate) digest: bool,
+    /// Someone wants records: without, and without a digest, none are made.
+    pub(crate) observed: bool,
+    pub(crate) samples: bool,
+    /// False only in the test that shows why the check of `min_delay` is there.
+    pub(crate) check_min_delay: bool,
+}
+
+impl Plan {
+    pub(crate) fn name(&self, entity: EntityId) -> &str {
+        self.info.name(entity)
+    }
+
+    pub(crate) fn name_hash(&self, entity: EntityId) -> u64 {
+        self.name_hashes[entity.index()]
+    }
+
+    pub(crate) fn host_name(&self, entity: EntityId) -> &str {
+        &self.host_names[self.places[entity.index()].host as usize]
+    }
+
+    pub(crate) fn place(&self, entity: EntityId) -> Place {
+        self.places[entity.index()]
+    }
+
+    pub(crate) fn kind(&self, index: KindIndex) -> &Arc<Kind> {
+        &self.info.kinds[index as usize]
+    }
+
+    pub(crate) fn link(&self, from: HostIndex, to: HostIndex) -> Option<EntityId> {
+        let routes = &self.routes[from as usize];
+        routes
+            .by_host
+            .get(to as usize)
+            .copied()
+            .flatten()
+            .or(routes.uplink)
+    }
+
+    pub(crate) fn kind_index(&self, kind: &Arc<Kind>) -> Option<KindIndex> {
+        let at = self
+            .info
+            .kinds
+            .iter()
+            .position(|known| Arc::ptr_eq(known, kind));
+        at.and_then(|at| KindIndex::try_from(at).ok())
+    }
+
+    /// The address of the actor called `name`.
+    pub(crate) fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
+        let unknown = || LookupError::Unknown {
+            name: name.to_owned(),
+        };
+        let entity = self.info.entity(name).ok_or_else(unknown)?;
+        let declared = self.declared.iter().position(|known| *known == entity);
+        let declared = declared.ok_or_else(unknown)?;
+        let (type_id, actual) = self.actor_types[declared];
+        if type_id != TypeId::of::<B>() {
+            let expected = std::any::type_name::<B>();
+            return Err(LookupError::WrongType {
+                name: name.to_owned(),
+                expected,
+                actual,
+            });
+        }
+        Ok(Address::new(declared as u32))
+    }
+
+    /// True if records, and so encoded bodies, are needed at all.
+    pub(crate) fn recording(&self) -> bool {
+        self.digest || self.observed
+    }
+
+    /// Completes a key with the tie hash that this run's tie seed gives it.
+    pub(crate) fn key(&self, time: SimTime, step: u32, source: EntityId, count: u64) -> EventKey {
+        let tie = match self.info.tie_seed {
+            // `@control` comes first whatever the tie seed.
+            Some(seed) if source != EntityId::CONTROL => {
+                let key = crate::random::RandomKey::new(seed)
+                    .number(time.as_nanos())
+                    .number(u64::from(step))
+                    .number(self.name_hash(source));
+                // The top bit keeps the hash above zero, which is `@control`'s.
+                key.hash() as u32 | 1
+            }
+            _ => 0,
+        };
+        EventKey {
+            time,
+            step,
+            tie,
+            source,
+            count,
+        }
+    }
+
+    /// The kind of a sample type, traced when it is first met.
+    pub(crate) fn sample_kind<S: crate::message::Message>(&self) -> Result<Arc<Kind>, String> {
+        let type_id = TypeId::of::<S>();
+        let mut kinds = self
+            .sample_kinds
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, kind)) = kinds.iter().find(|(known, _)| *known == type_id) {
+            return Ok(kind.clone());
+        }
+        let schema = Schema::of::<S>().map_err(|error| error.to_string())?;
+        let kind = Arc::new(Kind::new(schema));
+        kinds.push((type_id, kind.clone()));
+        Ok(kind)
+    }
+}

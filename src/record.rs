@@ -1,0 +1,176 @@
+//! What a run tells those who watch it: records in key order, checkpoints, and the end.
+//!
+//! An observer sees only what was committed. It may ask the run to stop, as part of the scenario;
+//! it can change nothing else.
+
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use crate::digest::Digest;
+use crate::key::{EntityId, EventKey};
+use crate::message::MatchKey;
+use crate::plan::{Kind, RunInfo};
+use crate::report::Report;
+use crate::time::SimTime;
+
+/// What a [`Record`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum RecordClass {
+    /// An actor starts, at time zero.
+    Start = 0,
+    /// A message arrived and was handled: its fate is `delivered`.
+    Delivered = 1,
+    /// A message was lost: its fate is `lost`, and the record has the reason.
+    Lost = 2,
+    /// A message was still on its way when the run ended: its fate is `in_flight`.
+    InFlight = 3,
+    /// A timer fired.
+    Timer = 4,
+    /// A message reached a shared link, which then decided its fate.
+    HandOver = 5,
+    /// A control event crashed an actor.
+    Crash = 6,
+    /// A control event restarted an actor.
+    Restart = 7,
+    /// A control event changed a link.
+    Change = 8,
+    /// The run was stopped.
+    Stop = 9,
+    /// An actor recorded a state sample. Not part of the digest.
+    Sample = 10,
+}
+
+impl RecordClass {
+    /// The class's name in logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            RecordClass::Start => "start",
+            RecordClass::Delivered => "delivered",
+            RecordClass::Lost => "lost",
+            RecordClass::InFlight => "in_flight",
+            RecordClass::Timer => "timer",
+            RecordClass::HandOver => "hand_over",
+            RecordClass::Crash => "crash",
+            RecordClass::Restart => "restart",
+            RecordClass::Change => "change",
+            RecordClass::Stop => "stop",
+            RecordClass::Sample => "sample",
+        }
+    }
+
+    /// True for the fate of a message copy: each copy has exactly one.
+    pub fn is_fate(self) -> bool {
+        matches!(
+            self,
+            RecordClass::Delivered | RecordClass::Lost | RecordClass::InFlight
+        )
+    }
+}
+
+/// One committed event or fate.
+#[derive(Clone, Copy)]
+pub struct Record<'a> {
+    /// What the record is about.
+    pub class: RecordClass,
+    /// The key of the event. For a loss decided as a message was sent, the key of the sending
+    /// event; for a message in flight, the key its delivery would have had.
+    pub key: EventKey,
+    /// The key of the event that caused this one, where one did.
+    pub cause: Option<EventKey>,
+    /// Who sent the message; for other events, who they happen to.
+    pub sender: EntityId,
+    /// Who the message is for; for other events, who they happen to.
+    pub receiver: EntityId,
+    /// The link that carried it; none within a host.
+    pub link: Option<EntityId>,
+    /// The type of the body, where there is one.
+    pub kind: Option<&'a Arc<Kind>>,
+    /// The message's place in the flow (sender, receiver, kind); timers are counted apart.
+    pub ordinal: u64,
+    /// Which copy of the message this is; 0 unless the link made several.
+    pub copy: u32,
+    /// The protocol's own identity for the message, if it gave one.
+    pub match_key: Option<MatchKey>,
+    /// When the message was sent, or the timer set.
+    pub sent: SimTime,
+    /// Why the message was lost; empty otherwise.
+    pub reason: &'static str,
+    /// The encoded message; empty if no observer wants bodies and the digest is off.
+    pub body: &'a [u8],
+    /// How many messages the actor sent while it handled this event.
+    pub sends: u32,
+}
+
+impl Record<'_> {
+    /// When the record belongs in the log: the time of the event.
+    pub fn time(&self) -> SimTime {
+        self.key.time
+    }
+}
+
+/// What an observer answers to a record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// Go on.
+    Continue,
+    /// Stop the run, for this reason, one look-ahead after this record's time.
+    Stop(String),
+}
+
+/// The state of the digest after some event, with a short hash of each event since the last
+/// checkpoint, so that a mismatch can be narrowed down to one event.
+#[derive(Clone, Copy, Debug)]
+pub struct Checkpoint<'a> {
+    /// How many hashed records came before this point.
+    pub records: u64,
+    /// The key of the last of them.
+    pub key: EventKey,
+    /// The digest at this point.
+    pub digest: Digest,
+    /// The low 32 bits of the hash of each record since the last checkpoint, in order.
+    pub hashes: &'a [u32],
+}
+
+/// What an observer wants to be shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wants {
+    /// Encoded message bodies.
+    pub bodies: bool,
+    /// State samples.
+    pub samples: bool,
+    /// Checkpoints.
+    pub checkpoints: bool,
+}
+
+/// An observer could not go on: a full disk, for example. The run ends, its committed part stands.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct ObserverError(pub String);
+
+/// Someone who watches a run: a log writer, a monitor, a progress bar.
+pub trait Observer: Send {
+    /// What to show this observer; asked once, before [`Observer::begin`].
+    fn wants(&self) -> Wants {
+        Wants::default()
+    }
+
+    /// The run is about to start.
+    fn begin(&mut self, _run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// An event or fate was committed. Called in key order.
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError>;
+
+    /// The digest reached a checkpoint. Called every few thousand records, and at the end.
+    fn checkpoint(&mut self, _checkpoint: &Checkpoint<'_>) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    /// The run is over.
+    fn end(&mut self, _report: &Report) -> Result<(), ObserverError> {
+        Ok(())
+    }
+}

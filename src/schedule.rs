@@ -1,0 +1,118 @@
+//! When a run must pause: control events fixed beforehand, and requests to stop.
+
+use crate::engine::Action;
+use crate::key::{Bound, EntityId, EventKey};
+use crate::plan::Plan;
+use crate::time::{SimDuration, SimTime};
+
+/// A control event.
+pub(crate) struct Control {
+    pub(crate) time: SimTime,
+    /// Its place among the control events, in order of declaration.
+    pub(crate) count: u64,
+    pub(crate) what: ControlAction,
+}
+
+/// What a control event does.
+pub(crate) enum ControlAction {
+    Entity(EntityId, Action),
+    Stop(String),
+}
+
+/// What the run must do when it reaches the next bound.
+pub(crate) enum Due {
+    /// Commit a stop.
+    Stop {
+        key: EventKey,
+        by: EntityId,
+        reason: String,
+    },
+    /// Apply this control event.
+    Control(EventKey, EntityId, Action),
+}
+
+/// Control events to come, and the earliest stop asked for.
+pub(crate) struct Schedule {
+    /// Latest first.
+    controls: Vec<Control>,
+    stop: Option<(Bound, EntityId, String)>,
+    next_count: u64,
+    look_ahead: SimDuration,
+}
+
+impl Schedule {
+    pub(crate) fn new(mut controls: Vec<Control>, look_ahead: SimDuration) -> Self {
+        let next_count = controls.len() as u64;
+        controls.sort_by_key(|control| (control.time, control.count));
+        controls.reverse();
+        Schedule {
+            controls,
+            stop: None,
+            next_count,
+            look_ahead,
+        }
+    }
+
+    /// Takes a request made in the event `key`: it takes effect one look-ahead later, so that
+    /// hosts that run ahead in parallel have not passed it.
+    pub(crate) fn ask_stop(&mut self, key: EventKey, by: EntityId, reason: String) {
+        let at = if self.look_ahead.is_zero() {
+            Bound {
+                time: key.time,
+                step: key.step + 1,
+            }
+        } else {
+            Bound::at(key.time + self.look_ahead)
+        };
+        if self
+            .stop
+            .as_ref()
+            .is_none_or(|(earliest, ..)| at < *earliest)
+        {
+            self.stop = Some((at, by, reason));
+        }
+    }
+
+    /// Nothing at or after this may be handled before [`Schedule::take_due`].
+    pub(crate) fn bound(&self) -> Bound {
+        let control = self
+            .controls
+            .last()
+            .map_or(Bound::NEVER, |next| Bound::at(next.time));
+        self.stop
+            .as_ref()
+            .map_or(control, |(stop, ..)| control.min(*stop))
+    }
+
+    /// True if all that could still happen in a run without events is that it is stopped by the
+    /// clock.
+    pub(crate) fn only_stops_left(&self) -> bool {
+        let mut controls = self.controls.iter();
+        self.stop.is_none() && controls.all(|next| matches!(next.what, ControlAction::Stop(_)))
+    }
+
+    /// What is due at [`Schedule::bound`]. A control event goes before a stop asked for at the
+    /// same instant, as it would in key order.
+    pub(crate) fn take_due(&mut self, plan: &Plan) -> Option<Due> {
+        let bound = self.bound();
+        if self
+            .controls
+            .last()
+            .is_some_and(|next| Bound::at(next.time) == bound)
+        {
+            let Control { time, count, what } = self.controls.pop()?;
+            let key = plan.key(time, 0, EntityId::CONTROL, count);
+            return Some(match what {
+                ControlAction::Entity(entity, action) => Due::Control(key, entity, action),
+                ControlAction::Stop(reason) => Due::Stop {
+                    key,
+                    by: EntityId::CONTROL,
+                    reason,
+                },
+            });
+        }
+        let (at, by, reason) = self.stop.take()?;
+        let key = plan.key(at.time, at.step, EntityId::CONTROL, self.next_count);
+        Some(Due::Stop { key, by, reason })
+    }
+}

@@ -1,0 +1,297 @@
+//! Assembling a simulation: hosts, actors, links, control events, observers; then running it.
+
+mod assemble;
+
+use std::any::TypeId;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::actor::{Accepts, Actor, AnyActor, Factory, KindEntry};
+use crate::carrier::{AnyCarrier, Carrier, SealedChange};
+use crate::executor::{self, Executor};
+use crate::fault::BuildError;
+use crate::message::Address;
+use crate::record::Observer;
+use crate::report::Report;
+use crate::time::{SimDuration, SimTime};
+
+/// A host: the actors on it form one logical process and reach each other without a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct HostId(u32);
+
+/// A link of a simulation that takes changes of type `C`.
+pub struct LinkId<C> {
+    declared: u32,
+    change: std::marker::PhantomData<fn(C)>,
+}
+
+impl<C> Clone for LinkId<C> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<C> Copy for LinkId<C> {}
+
+struct HostDecl {
+    name: String,
+    heavy: bool,
+}
+
+struct ActorDecl {
+    name: String,
+    host: HostId,
+    type_id: TypeId,
+    type_name: &'static str,
+    factory: Factory,
+}
+
+struct LinkDecl {
+    name: String,
+    /// `None` for a shared link, which is a process of its own.
+    host: Option<HostId>,
+    change: KindEntry,
+    carrier: Box<dyn AnyCarrier>,
+}
+
+struct RouteDecl {
+    from: HostId,
+    /// `None` for every host without a route of its own.
+    to: Option<HostId>,
+    link: u32,
+}
+
+enum Target {
+    Actor(u32),
+    Link(u32),
+}
+
+enum Planned {
+    Crash,
+    Restart,
+    Change(SealedChange),
+    Stop(String),
+}
+
+struct ControlDecl {
+    time: SimTime,
+    target: Option<Target>,
+    what: Planned,
+}
+
+/// A simulation under assembly. Mistakes are kept and reported by [`Simulation::run`].
+///
+/// See the crate's front page for a tutorial.
+pub struct Simulation {
+    seed: u64,
+    tie_seed: Option<u64>,
+    hosts: Vec<HostDecl>,
+    actors: Vec<ActorDecl>,
+    links: Vec<LinkDecl>,
+    routes: Vec<RouteDecl>,
+    controls: Vec<ControlDecl>,
+    kinds: Vec<KindEntry>,
+    observers: Vec<Box<dyn Observer>>,
+    interrupt: Arc<AtomicBool>,
+    step_limit: u32,
+    digest: bool,
+    check_min_delay: bool,
+}
+
+impl Simulation {
+    /// An empty simulation with this seed, from which every random stream is derived.
+    pub fn new(seed: u64) -> Self {
+        Simulation {
+            seed,
+            tie_seed: None,
+            hosts: Vec::new(),
+            actors: Vec::new(),
+            links: Vec::new(),
+            routes: Vec::new(),
+            controls: Vec::new(),
+            kinds: Vec::new(),
+            observers: Vec::new(),
+            interrupt: Arc::default(),
+            step_limit: 10_000,
+            digest: true,
+            check_min_delay: true,
+        }
+    }
+
+    /// The host called `name`, declared if it is new.
+    pub fn host(&mut self, name: &str) -> HostId {
+        let at = self.hosts.iter().position(|host| host.name == name);
+        let at = at.unwrap_or_else(|| {
+            self.hosts.push(HostDecl {
+                name: name.to_owned(),
+                heavy: false,
+            });
+            self.hosts.len() - 1
+        });
+        HostId(at as u32)
+    }
+
+    /// Declares that handlers on this host take long enough (tens of microseconds) to be worth a
+    /// thread. Changes no result.
+    pub fn heavy(&mut self, host: HostId) {
+        self.hosts[host.0 as usize].heavy = true;
+    }
+
+    /// Declares an actor on `host`, and what it accepts. `build` is called with the actor's name
+    /// at the start, and again at each restart.
+    pub fn actor<A: Actor>(
+        &mut self,
+        host: HostId,
+        name: &str,
+        build: impl Fn(&str) -> A + Send + 'static,
+    ) -> Address<A> {
+        A::Accepts::list(&mut self.kinds);
+        self.actors.push(ActorDecl {
+            name: name.to_owned(),
+            host,
+            type_id: TypeId::of::<A>(),
+            type_name: std::any::type_name::<A>(),
+            factory: Box::new(move |name| Box::new(build(name)) as Box<dyn AnyActor>),
+        });
+        Address::new(self.actors.len() as u32 - 1)
+    }
+
+    /// Declares a link that carries what `from` sends to `to`, one way.
+    pub fn link<C: Carrier>(
+        &mut self,
+        from: HostId,
+        to: HostId,
+        name: &str,
+        carrier: C,
+    ) -> LinkId<C::Change> {
+        let link = self.declare_link(name, Some(from), carrier);
+        self.routes.push(RouteDecl {
+            from,
+            to: Some(to),
+            link: link.declared,
+        });
+        link
+    }
+
+    /// Declares a link that carries whatever `from` sends to hosts it has no other link to.
+    pub fn uplink<C: Carrier>(
+        &mut self,
+        from: HostId,
+        name: &str,
+        carrier: C,
+    ) -> LinkId<C::Change> {
+        let link = self.declare_link(name, Some(from), carrier);
+        self.routes.push(RouteDecl {
+            from,
+            to: None,
+            link: link.declared,
+        });
+        link
+    }
+
+    /// Declares a link that several hosts send through, a shared medium. [`Simulation::route`]
+    /// says which.
+    pub fn shared_link<C: Carrier>(&mut self, name: &str, carrier: C) -> LinkId<C::Change> {
+        self.declare_link(name, None, carrier)
+    }
+
+    /// Lets `link`, a shared one, carry what `from` sends to `to`.
+    pub fn route<C>(&mut self, from: HostId, to: HostId, link: LinkId<C>) {
+        self.routes.push(RouteDecl {
+            from,
+            to: Some(to),
+            link: link.declared,
+        });
+    }
+
+    fn declare_link<C: Carrier>(
+        &mut self,
+        name: &str,
+        host: Option<HostId>,
+        carrier: C,
+    ) -> LinkId<C::Change> {
+        self.links.push(LinkDecl {
+            name: name.to_owned(),
+            host,
+            change: KindEntry::of::<C::Change>(),
+            carrier: Box::new(carrier),
+        });
+        LinkId {
+            declared: self.links.len() as u32 - 1,
+            change: std::marker::PhantomData,
+        }
+    }
+
+    /// Crashes an actor at `time`: its state is gone, its timers are void, and what reaches it is
+    /// lost as `crashed` until it is restarted. Durable memory stays.
+    pub fn crash_at<A>(&mut self, time: SimTime, actor: Address<A>) {
+        self.control(time, Some(Target::Actor(actor.declared)), Planned::Crash);
+    }
+
+    /// Restarts an actor at `time`, crashed or not: a new one is built, in a new incarnation.
+    pub fn restart_at<A>(&mut self, time: SimTime, actor: Address<A>) {
+        self.control(time, Some(Target::Actor(actor.declared)), Planned::Restart);
+    }
+
+    /// Changes a link at `time`.
+    pub fn change_at<C: crate::Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
+        let what = Planned::Change(SealedChange::new(change));
+        self.control(time, Some(Target::Link(link.declared)), what);
+    }
+
+    /// Stops the run at `time`, before anything that would happen then.
+    pub fn stop_at(&mut self, time: SimTime, reason: &str) {
+        self.control(time, None, Planned::Stop(reason.to_owned()));
+    }
+
+    fn control(&mut self, time: SimTime, target: Option<Target>, what: Planned) {
+        self.controls.push(ControlDecl { time, target, what });
+    }
+
+    /// Adds an observer. Observers are told the same things in the same order, first added first.
+    pub fn observe(&mut self, observer: impl Observer + 'static) {
+        self.observers.push(Box::new(observer));
+    }
+
+    /// Shuffles the order of sources at equal (time, step), to show whether a result hangs on it.
+    pub fn tie_seed(&mut self, tie_seed: Option<u64>) {
+        self.tie_seed = tie_seed;
+    }
+
+    /// The most zero-delay hops at one instant, 10,000 unless set; more is a fault that names them.
+    pub fn step_limit(&mut self, limit: u32) {
+        self.step_limit = limit;
+    }
+
+    /// Switches the digest off, for benchmarks: a run without one cannot be verified.
+    pub fn without_digest(&mut self) {
+        self.digest = false;
+    }
+
+    /// Lets links undercut their `min_delay` unchecked. There to show what the check is for.
+    #[doc(hidden)]
+    pub fn without_min_delay_check(&mut self) {
+        self.check_min_delay = false;
+    }
+
+    /// The flag that ends the run after the event in hand when it is raised, as Ctrl-C does.
+    pub fn interrupt(&self) -> Arc<AtomicBool> {
+        self.interrupt.clone()
+    }
+
+    /// Runs to the end.
+    ///
+    /// # Errors
+    /// When the simulation cannot start. What goes wrong later is in [`Report::end`].
+    pub fn run(self, executor: Executor) -> Result<Report, BuildError> {
+        let split = matches!(executor, Executor::Kameo { .. });
+        executor::run(self.assemble(split && false)?, executor)
+    }
+
+    /// The least delay that any link declares, zero if there are none: how far hosts may run ahead
+    /// of each other, and how long a stop takes to reach them all.
+    fn look_ahead(&self) -> SimDuration {
+        let delays = self.links.iter().map(|link| link.carrier.min_delay());
+        delays.min().unwrap_or(SimDuration::ZERO)
+    }
+}

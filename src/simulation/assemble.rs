@@ -1,0 +1,385 @@
+//! From declarations to a plan and engines: names are checked and ranked, message types traced,
+//! hosts dealt to engines.
+
+use std::any::TypeId;
+use std::sync::{Arc, Mutex};
+
+use super::{HostId, LinkDecl, Planned, Simulation, Target};
+use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
+use crate::executor::Ready;
+use crate::fault::BuildError;
+use crate::key::EntityId;
+use crate::plan::{
+    Entity, EntityRole, FixedMap, Kind, KindIndex, LinkPlan, Place, Plan, Routes, RunInfo,
+};
+use crate::random::name_hash;
+use crate::schedule::{Control, ControlAction, Schedule};
+
+/// Which entity each declaration became.
+struct Ranked {
+    entities: Vec<Entity>,
+    actors: Vec<EntityId>,
+    links: Vec<EntityId>,
+}
+
+/// Message types, in name order, and where to find them.
+struct Kinds {
+    list: Vec<Arc<Kind>>,
+    of_type: FixedMap<TypeId, KindIndex>,
+}
+
+impl Simulation {
+    /// Checks the declarations and builds the engines: one, or if `split`, one for each heavy
+    /// host, one for all light ones and one for shared links.
+    pub(super) fn assemble(mut self, split: bool) -> Result<Ready, BuildError> {
+        self.check_names()?;
+        let ranked = self.rank();
+        let kinds = self.trace_kinds()?;
+        let (engine_of_host, engine_of_shared, engine_count) = self.deal(split);
+        let places = self.place(&ranked, &engine_of_host, engine_of_shared, engine_count);
+        let look_ahead = self.look_ahead();
+        let mut links: FixedMap<EntityId, LinkPlan> = FixedMap::default();
+        for (link, entity) in self.links.iter().zip(&ranked.links) {
+            let min_delay = link.carrier.min_delay();
+            let change_kind = kinds.of_type[&link.change.type_id];
+            links.insert(
+                *entity,
+                LinkPlan {
+                    min_delay,
+                    shared: link.host.is_none(),
+                    change_kind,
+                },
+            );
+        }
+        let wants: Vec<_> = self
+            .observers
+            .iter()
+            .map(|observer| observer.wants())
+            .collect();
+        let plan = Arc::new(Plan {
+            seed: self.seed,
+            name_hashes: ranked
+                .entities
+                .iter()
+                .map(|entity| name_hash(&entity.name))
+                .collect(),
+            declared: ranked.actors.clone(),
+            actor_types: self
+                .actors
+                .iter()
+                .map(|a| (a.type_id, a.type_name))
+                .collect(),
+            places,
+            host_names: self.host_names(),
+            routes: self.routes(&ranked)?,
+            links,
+            kind_of_type: kinds.of_type,
+            sample_kinds: Mutex::default(),
+            step_limit: self.step_limit,
+            digest: self.digest,
+            observed: !wants.is_empty(),
+            samples: wants.iter().any(|wants| wants.samples),
+            check_min_delay: self.check_min_delay,
+            info: Arc::new(RunInfo {
+                seed: self.seed,
+                tie_seed: self.tie_seed,
+                entities: ranked.entities.clone(),
+                kinds: kinds.list,
+                look_ahead,
+            }),
+        });
+        let schedule = Schedule::new(self.take_controls(&ranked), look_ahead);
+        let observers = std::mem::take(&mut self.observers);
+        let interrupt = self.interrupt.clone();
+        let engines = self.build_engines(&plan, &ranked, engine_count);
+        Ok(Ready {
+            plan,
+            engines,
+            schedule,
+            observers,
+            interrupt,
+        })
+    }
+
+    fn check_names(&self) -> Result<(), BuildError> {
+        for host in &self.hosts {
+            check_name(&host.name, "")?;
+        }
+        for actor in &self.actors {
+            check_name(&actor.name, "")?;
+        }
+        for link in &self.links {
+            // A link is named after what it joins: `base-rover_1`.
+            check_name(&link.name, "-")?;
+        }
+        let mut names: Vec<&str> = self
+            .actors
+            .iter()
+            .map(|actor| actor.name.as_str())
+            .collect();
+        names.extend(self.links.iter().map(|link| link.name.as_str()));
+        names.sort_unstable();
+        match names.windows(2).find(|pair| pair[0] == pair[1]) {
+            Some(pair) => Err(BuildError::DuplicateName {
+                name: pair[0].to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// Numbers the entities in name order, so that nothing hangs on the order of declaration.
+    fn rank(&self) -> Ranked {
+        let host_name = |host: HostId| self.hosts[host.0 as usize].name.clone();
+        let mut all: Vec<(Entity, Option<Target>)> = Vec::new();
+        let control = Entity {
+            name: "@control".to_owned(),
+            role: EntityRole::Control,
+            host: None,
+        };
+        all.push((control, None));
+        for (at, actor) in self.actors.iter().enumerate() {
+            let host = Some(host_name(actor.host));
+            let entity = Entity {
+                name: actor.name.clone(),
+                role: EntityRole::Actor,
+                host,
+            };
+            all.push((entity, Some(Target::Actor(at as u32))));
+        }
+        for (at, link) in self.links.iter().enumerate() {
+            let host = link.host.map_or_else(|| link.name.clone(), host_name);
+            let entity = Entity {
+                name: link.name.clone(),
+                role: EntityRole::Link,
+                host: Some(host),
+            };
+            all.push((entity, Some(Target::Link(at as u32))));
+        }
+        all.sort_by(|(a, _), (b, _)| a.name.cmp(&b.name));
+        let mut actors = vec![EntityId::CONTROL; self.actors.len()];
+        let mut links = vec![EntityId::CONTROL; self.links.len()];
+        for (index, (_, target)) in all.iter().enumerate() {
+            match target {
+                Some(Target::Actor(at)) => actors[*at as usize] = EntityId::from_index(index),
+                Some(Target::Link(at)) => links[*at as usize] = EntityId::from_index(index),
+                None => {}
+            }
+        }
+        Ranked {
+            entities: all.into_iter().map(|(entity, _)| entity).collect(),
+            actors,
+            links,
+        }
+    }
+
+    fn trace_kinds(&self) -> Result<Kinds, BuildError> {
+        let mut traced: Vec<(TypeId, &'static str, Arc<Kind>)> = Vec::new();
+        for entry in self
+            .kinds
+            .iter()
+            .chain(self.links.iter().map(|link| &link.change))
+        {
+            if traced.iter().any(|(known, ..)| *known == entry.type_id) {
+                continue;
+            }
+            let schema = (entry.trace)().map_err(|error| BuildError::Schema {
+                name: entry.type_name.to_owned(),
+                error: error.to_string(),
+            })?;
+            traced.push((entry.type_id, entry.type_name, Arc::new(Kind::new(schema))));
+        }
+        traced.sort_by(|(_, _, a), (_, _, b)| a.name().cmp(b.name()));
+        if let Some(pair) = traced
+            .windows(2)
+            .find(|pair| pair[0].2.name() == pair[1].2.name())
+        {
+            return Err(BuildError::DuplicateKind {
+                name: pair[0].2.name().to_owned(),
+                first: pair[0].1.to_owned(),
+                second: pair[1].1.to_owned(),
+            });
+        }
+        let of_type = traced
+            .iter()
+            .enumerate()
+            .map(|(at, (id, ..))| (*id, at as KindIndex))
+            .collect();
+        Ok(Kinds {
+            list: traced.into_iter().map(|(_, _, kind)| kind).collect(),
+            of_type,
+        })
+    }
+
+    /// Deals hosts to engines. Returns the engine of each host, that of shared links, and how
+    /// many there are.
+    fn deal(&self, split: bool) -> (Vec<u32>, u32, u32) {
+        let heavy = self.hosts.iter().filter(|host| host.heavy).count();
+        if !split || heavy == 0 {
+            return (vec![0; self.hosts.len()], 0, 1);
+        }
+        let mut count = 0;
+        let mut next = || {
+            count += 1;
+            count - 1
+        };
+        let light = if heavy < self.hosts.len() { next() } else { 0 };
+        let of_host = self
+            .hosts
+            .iter()
+            .map(|host| if host.heavy { next() } else { light })
+            .collect();
+        let shared = if self.links.iter().any(|link| link.host.is_none()) {
+            next()
+        } else {
+            0
+        };
+        (of_host, shared, count)
+    }
+
+    /// Hosts, then shared links, each of which is a host of its own.
+    fn host_names(&self) -> Vec<String> {
+        let shared = self.links.iter().filter(|link| link.host.is_none());
+        let hosts = self.hosts.iter().map(|host| host.name.clone());
+        hosts.chain(shared.map(|link| link.name.clone())).collect()
+    }
+
+    fn place(
+        &self,
+        ranked: &Ranked,
+        engine_of_host: &[u32],
+        engine_of_shared: u32,
+        engine_count: u32,
+    ) -> Vec<Place> {
+        let nowhere = Place {
+            host: u32::MAX,
+            engine: u32::MAX,
+            local: u32::MAX,
+        };
+        let mut places = vec![nowhere; ranked.entities.len()];
+        let mut actors_on = vec![0; engine_count as usize];
+        let mut links_on = vec![0; engine_count as usize];
+        let mut deal = |counts: &mut Vec<u32>, entity: EntityId, host: u32, engine: u32| {
+            let local = &mut counts[engine as usize];
+            places[entity.index()] = Place {
+                host,
+                engine,
+                local: *local,
+            };
+            *local += 1;
+        };
+        for (actor, entity) in self.actors.iter().zip(&ranked.actors) {
+            deal(
+                &mut actors_on,
+                *entity,
+                actor.host.0,
+                engine_of_host[actor.host.0 as usize],
+            );
+        }
+        let mut shared_host = self.hosts.len() as u32;
+        for (link, entity) in self.links.iter().zip(&ranked.links) {
+            match link.host {
+                Some(host) => deal(
+                    &mut links_on,
+                    *entity,
+                    host.0,
+                    engine_of_host[host.0 as usize],
+                ),
+                None => {
+                    deal(&mut links_on, *entity, shared_host, engine_of_shared);
+                    shared_host += 1;
+                }
+            }
+        }
+        places
+    }
+
+    fn routes(&self, ranked: &Ranked) -> Result<Vec<Routes>, BuildError> {
+        let mut routes = vec![Routes::default(); self.hosts.len()];
+        for route in &self.routes {
+            let link = ranked.links[route.link as usize];
+            let from = &mut routes[route.from.0 as usize];
+            let place = match route.to {
+                None => &mut from.uplink,
+                Some(to) => {
+                    let least = to.0 as usize + 1;
+                    if from.by_host.len() < least {
+                        from.by_host.resize(least, None);
+                    }
+                    &mut from.by_host[to.0 as usize]
+                }
+            };
+            if let Some(other) = place.replace(link) {
+                let name = |host: HostId| self.hosts[host.0 as usize].name.clone();
+                return Err(BuildError::DuplicateRoute {
+                    from: name(route.from),
+                    to: route.to.map_or_else(|| "*".to_owned(), name),
+                    first: ranked.entities[other.index()].name.clone(),
+                    second: ranked.entities[link.index()].name.clone(),
+                });
+            }
+        }
+        Ok(routes)
+    }
+
+    fn take_controls(&mut self, ranked: &Ranked) -> Vec<Control> {
+        let controls = std::mem::take(&mut self.controls).into_iter().enumerate();
+        let control = |(count, decl): (usize, super::ControlDecl)| {
+            let entity = match decl.target {
+                Some(Target::Actor(at)) => ranked.actors[at as usize],
+                Some(Target::Link(at)) => ranked.links[at as usize],
+                None => EntityId::CONTROL,
+            };
+            let what = match decl.what {
+                Planned::Crash => ControlAction::Entity(entity, Action::Crash),
+                Planned::Restart => ControlAction::Entity(entity, Action::Restart),
+                Planned::Change(change) => ControlAction::Entity(entity, Action::Change(change)),
+                Planned::Stop(reason) => ControlAction::Stop(reason),
+            };
+            Control {
+                time: decl.time,
+                count: count as u64,
+                what,
+            }
+        };
+        controls.map(control).collect()
+    }
+
+    fn build_engines(self, plan: &Arc<Plan>, ranked: &Ranked, count: u32) -> Vec<Engine> {
+        let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
+        let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
+        for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
+            let state = CellState::new(declared as u32);
+            let built = (actor.factory)(&actor.name);
+            let cell = ActorCell {
+                entity: *entity,
+                actor: Some(built),
+                factory: actor.factory,
+                state,
+            };
+            actors[plan.place(*entity).engine as usize].push(cell);
+        }
+        for (LinkDecl { carrier, .. }, entity) in self.links.into_iter().zip(&ranked.links) {
+            links[plan.place(*entity).engine as usize].push(LinkCell { carrier, count: 0 });
+        }
+        let lists = actors.into_iter().zip(links).enumerate();
+        lists
+            .map(|(at, (a, l))| Engine::new(plan.clone(), at as u32, a, l))
+            .collect()
+    }
+}
+
+/// Names become topics and frames, as in ROS: `snake_case` segments joined by `/`.
+fn check_name(name: &str, extra: &str) -> Result<(), BuildError> {
+    let fits =
+        |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || extra.contains(c);
+    let good = name
+        .split('/')
+        .all(|segment| !segment.is_empty() && segment.chars().all(fits));
+    if good {
+        Ok(())
+    } else {
+        Err(BuildError::BadName {
+            name: name.to_owned(),
+        })
+    }
+}
