@@ -31,6 +31,102 @@ pub enum WorldError {
     /// The file is TOML, but what it describes is no roadmap.
     #[error("the file describes no roadmap: {0}")]
     Roadmap(#[from] RoadmapError),
+    /// A generator was asked for what cannot be.
+    #[error("no such terrain: {0}")]
+    Terrain(#[from] TerrainError),
+    /// The generator's terrain leaves no room for the roadmap asked for.
+    #[error(
+        "the terrain has no room for a roadmap of {vertices} vertices and {edges} edges: {reason}"
+    )]
+    NoRoom {
+        /// The vertices asked for.
+        vertices: usize,
+        /// The edges asked for.
+        edges: usize,
+        /// What there was no room for.
+        reason: &'static str,
+    },
+}
+
+/// Why terrain cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TerrainError {
+    /// The samples do not form a grid.
+    #[error(
+        "a height field has 2 or more full rows of 2 or more columns; {samples} samples in {columns} columns are none"
+    )]
+    Shape {
+        /// The columns asked for.
+        columns: usize,
+        /// The samples found.
+        samples: usize,
+    },
+    /// There are more samples than a height field may have.
+    #[error("a height field may have {limit} samples; this one has {actual}")]
+    TooManySamples {
+        /// The most samples.
+        limit: usize,
+        /// The samples asked for.
+        actual: usize,
+    },
+    /// The resolution is not a positive finite number.
+    #[error("the resolution must be a positive number of metres; it is {actual_m}")]
+    Resolution {
+        /// The resolution found [m].
+        actual_m: f64,
+    },
+    /// The origin is not finite.
+    #[error("the origin must be finite; it is ({x_m} m, {y_m} m)")]
+    Origin {
+        /// Its x [m].
+        x_m: f64,
+        /// Its y [m].
+        y_m: f64,
+    },
+    /// A height is not finite.
+    #[error("the height in column {column}, row {row} must be finite; it is {height_m} m")]
+    Height {
+        /// The sample's column, from the west.
+        column: usize,
+        /// The sample's row, from the south.
+        row: usize,
+        /// The height found [m].
+        height_m: f64,
+    },
+    /// A setting of the crater is out of its range.
+    #[error("{setting} must be over {above} and at most {limit}; it is {actual}")]
+    Setting {
+        /// The setting's name, with its unit.
+        setting: &'static str,
+        /// What it must be over.
+        above: f64,
+        /// The largest value it may have.
+        limit: f64,
+        /// The value found.
+        actual: f64,
+    },
+    /// The share of ground covered by rocks is out of range.
+    #[error("rocks must cover over 0 and at most 1 of the ground; they are to cover {actual}")]
+    RockAbundance {
+        /// The share found.
+        actual: f64,
+    },
+    /// The least diameter of the rocks to draw is out of range.
+    #[error("the smallest rocks must be of 0.01 m to {limit_m} m; they are of {actual_m} m")]
+    RockDiameter {
+        /// The diameter found [m].
+        actual_m: f64,
+        /// The largest rock there is [m].
+        limit_m: f64,
+    },
+    /// More rocks would be drawn than a field may hold.
+    #[error("a rock field may hold {limit} rocks; this one would hold about {expected}")]
+    TooManyRocks {
+        /// The most rocks.
+        limit: f64,
+        /// The rocks to be expected.
+        expected: f64,
+    },
 }
 
 /// Why a graph is no roadmap.

@@ -16,10 +16,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod crater;
 pub mod error;
 pub mod roadmap;
+pub mod rocks;
 pub mod sensors;
+pub mod terrain;
 
-pub use error::{RoadmapError, SensorError, WorldError};
+pub use crater::{Crater, CraterSettings, Hazard};
+pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
 pub use roadmap::{Endpoints, Roadmap, VertexId};
+pub use rocks::{Rock, RockAbundance};
 pub use sensors::{NodeId, SensorNetwork};
+pub use terrain::HeightField;
