@@ -41,20 +41,20 @@ pub struct CraterSettings {
 
 impl Default for CraterSettings {
     /// An old, shallow crater 400 m across with slopes that a rover can mostly drive. The rovers of
-    /// the Mars Exploration mission stopped at a tilt of 30 degrees; 18 leave a margin for rocks
+    /// the Mars Exploration mission stopped at a tilt of 30 degrees; 20 leave a margin for rocks
     /// under a wheel. Rocks are as frequent as at a fairly rocky site (8 %).
     fn default() -> Self {
         CraterSettings {
             seed: 2010,
             rim_radius_m: 200.0,
-            depth_m: 26.0,
+            depth_m: 25.0,
             rim_height_m: 5.0,
             half_side_m: 256.0,
             resolution_m: 2.0,
             rock_abundance: 0.08,
             rock_least_m: 0.5,
             boulder_least_m: 1.0,
-            slope_limit_rad: 18.0 * std::f64::consts::PI / 180.0,
+            slope_limit_rad: 20.0 * std::f64::consts::PI / 180.0,
         }
     }
 }

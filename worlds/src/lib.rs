@@ -18,6 +18,7 @@
 
 pub mod crater;
 pub mod error;
+pub mod generate;
 pub mod roadmap;
 pub mod rocks;
 pub mod sensors;

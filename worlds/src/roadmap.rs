@@ -14,6 +14,7 @@ use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RoadmapError;
+pub(crate) use check::segments_meet;
 pub use endpoints::Endpoints;
 
 /// The index of a vertex of a [`Roadmap`], from 0.
