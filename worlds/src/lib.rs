@@ -1,1 +1,32 @@
 //! Terrain, roadmaps and sensor networks for Farside.
+//!
+//! A world is what rovers drive on and what radio nodes stand in: it holds no time, sends no
+//! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
+//! a [`SensorNetwork`] over it.
+//!
+//! ```
+//! use farside_worlds::{Roadmap, SensorNetwork};
+//! let roadmap = Roadmap::builtin("crater-dense")?;
+//! let radius_m = SensorNetwork::default_radius_m(&roadmap, 28);
+//! let network = SensorNetwork::place(&roadmap, 28, radius_m, 1)?;
+//! for &(u, v) in roadmap.edges() {
+//!     let (a, b) = (network.owner(u), network.owner(v));
+//!     assert!(a == b || network.are_neighbors(a, b));
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod crater;
+pub mod error;
+pub mod generate;
+pub mod roadmap;
+pub mod rocks;
+pub mod sensors;
+pub mod terrain;
+
+pub use crater::{Crater, CraterSettings, Hazard};
+pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
+pub use roadmap::{Endpoints, Roadmap, VertexId};
+pub use rocks::{Rock, RockAbundance};
+pub use sensors::{NodeId, SensorNetwork};
+pub use terrain::HeightField;
