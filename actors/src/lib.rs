@@ -1,3 +1,4 @@
 //! Links, rovers, sensor nodes and planners for Farside.
 
+pub mod link;
 pub mod units;
