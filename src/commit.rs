@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::digest::Digest;
-use crate::engine::{Head, Sink, hash_if_wanted};
+use crate::engine::{Head, InFlight, Sink, hash_if_wanted};
 use crate::key::{EntityId, EventKey};
 use crate::plan::{Kind, Plan};
 use crate::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
@@ -76,7 +76,7 @@ impl Committer {
         mut self,
         end: End,
         end_time: SimTime,
-        mut in_flight: Vec<(EventKey, Head, Vec<u8>)>,
+        mut in_flight: Vec<InFlight>,
     ) -> Report {
         in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
         let plan = self.plan.clone();
@@ -234,7 +234,7 @@ impl Batch {
         at: usize,
         fault: EventKey,
         plan: &Plan,
-    ) -> Vec<(EventKey, Head, Vec<u8>)> {
+    ) -> Vec<InFlight> {
         let mut found = Vec::new();
         let mut unit: Option<(EventKey, RecordClass)> = None;
         for kept in &self.kept[at..] {
