@@ -107,6 +107,7 @@ impl Head {
             class,
             key,
             cause: self.cause,
+            scheduled_by: self.scheduled_by,
             sender: self.sender,
             receiver: self.receiver,
             link: self.link,
@@ -246,7 +247,11 @@ impl Engine {
     }
 
     fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
-        let Pending { class, head, letter } = self.parts.take(entry.slot);
+        let Pending {
+            class,
+            head,
+            letter,
+        } = self.parts.take(entry.slot);
         let key = entry.key();
         if class == Class::Void || self.died_with_its_incarnation(class, &head) {
             return Ok(());
@@ -263,7 +268,10 @@ impl Engine {
             Class::Start => self.run_handler(class, RecordClass::Start, key, head, None, sink),
             Class::Timer => self.run_handler(class, RecordClass::Timer, key, head, letter, sink),
             Class::Message if self.is_crashed(head.receiver) => {
-                let head = Head { reason: "crashed", ..head };
+                let head = Head {
+                    reason: "crashed",
+                    ..head
+                };
                 self.commit(RecordClass::Lost, key, &head, sink);
                 Ok(())
             }

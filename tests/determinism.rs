@@ -27,11 +27,14 @@ prop_compose! {
 }
 
 fn inline(model: &Chatter) -> Report {
-    model.build().run(Executor::Inline).expect("the model can start")
+    model
+        .build()
+        .run(Executor::Inline)
+        .expect("the model can start")
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 256, ..ProptestConfig::default() })]
 
     #[test]
     fn every_executor_gives_the_same_report(model in chatter(), threads in 1usize..4) {
@@ -110,5 +113,8 @@ fn without_the_min_delay_check_executors_disagree() {
         sim.run(executor).expect("the model can start").digest
     };
     let disagree = |seed| run(seed, Executor::Inline) != run(seed, Executor::Kameo { threads: 2 });
-    assert!((0..10).any(disagree), "the check of min_delay would be for nothing");
+    assert!(
+        (0..10).any(disagree),
+        "the check of min_delay would be for nothing"
+    );
 }

@@ -9,7 +9,8 @@ use std::sync::Arc;
 use slab::Slab;
 
 use super::{
-    CellState, Class, Flow, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink, hash_if_wanted,
+    CellState, Class, Flow, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink,
+    hash_if_wanted,
 };
 use crate::carrier::{Parcel, SealedChange, Verdict, Verdicts};
 use crate::context::TimerId;
@@ -560,7 +561,14 @@ impl Pending {
             // It will never be handled; what cannot be encoded is recorded empty.
             let _ = letter.0.encode(plan.kind(kind).schema(), &mut body);
         }
-        Some((key, Head { reason: "", ..self.head }, body))
+        Some((
+            key,
+            Head {
+                reason: "",
+                ..self.head
+            },
+            body,
+        ))
     }
 }
 

@@ -38,11 +38,21 @@ pub(super) fn run(
         .map_err(|error| BuildError::Threads(error.to_string()))?;
     let report = runtime.block_on(async move {
         if engines.len() == 1 {
-            let alone = RunAlone { plan, engines, schedule, committer };
+            let alone = RunAlone {
+                plan,
+                engines,
+                schedule,
+                committer,
+            };
             let solo = Solo::spawn(Solo);
-            *solo.ask(alone).await.unwrap_or_else(|error| lost_worker(&error))
+            *solo
+                .ask(alone)
+                .await
+                .unwrap_or_else(|error| lost_worker(&error))
         } else {
-            window::Coordinator::new(plan, engines, schedule, committer).run().await
+            window::Coordinator::new(plan, engines, schedule, committer)
+                .run()
+                .await
         }
     });
     Ok(report)
@@ -76,12 +86,13 @@ impl Actor for Solo {
 impl Message<RunAlone> for Solo {
     type Reply = Box<Report>;
 
-    async fn handle(
-        &mut self,
-        run: RunAlone,
-        _: &mut Context<Self, Self::Reply>,
-    ) -> Self::Reply {
-        let RunAlone { plan, engines, schedule, committer } = run;
+    async fn handle(&mut self, run: RunAlone, _: &mut Context<Self, Self::Reply>) -> Self::Reply {
+        let RunAlone {
+            plan,
+            engines,
+            schedule,
+            committer,
+        } = run;
         Box::new(inline::run(plan, engines, schedule, committer))
     }
 }
@@ -149,7 +160,11 @@ impl Message<RunWindow> for Worker {
         window: RunWindow,
         _: &mut Context<Self, Self::Reply>,
     ) -> Self::Reply {
-        let RunWindow { bound, inbox, mut batch } = window;
+        let RunWindow {
+            bound,
+            inbox,
+            mut batch,
+        } = window;
         for Outgoing { key, pending, .. } in inbox {
             self.engine.parts.insert(key, pending);
         }
@@ -172,7 +187,12 @@ impl Message<Apply> for Worker {
     type Reply = Box<Done>;
 
     async fn handle(&mut self, apply: Apply, _: &mut Context<Self, Self::Reply>) -> Self::Reply {
-        let Apply { key, entity, action, mut batch } = apply;
+        let Apply {
+            key,
+            entity,
+            action,
+            mut batch,
+        } = apply;
         let result = self.engine.control(key, entity, action, &mut batch);
         Box::new(self.done(batch, result))
     }

@@ -93,7 +93,10 @@ impl Talker {
         for _ in 0..ctx.random("how_many").below(3) {
             let (name, host) = &names[ctx.random("to").below(names.len() as u64) as usize];
             let to = ctx.lookup::<Talker>(name)?;
-            let chat = Chat { hops: hops - 1, note: hops.is_multiple_of(2).then(|| name.clone()) };
+            let chat = Chat {
+                hops: hops - 1,
+                note: hops.is_multiple_of(2).then(|| name.clone()),
+            };
             match ctx.random("how").below(3) {
                 0 => ctx.send_keyed(to, MatchKey::new(hops, self.handled), chat),
                 1 if *host == self.host => {
@@ -109,7 +112,9 @@ impl Talker {
     fn count(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         self.handled += 1;
         ctx.durable::<Memory>().0 += 1;
-        ctx.sample(&Mood { handled: self.handled });
+        ctx.sample(&Mood {
+            handled: self.handled,
+        });
         if self.handled == self.stop_after {
             ctx.stop("enough");
         }
@@ -166,7 +171,8 @@ impl Carrier for Noisy {
         let copies = 1 + u32::from(parcel.random(1, 0, 0).uniform() < one_in_16(self.copies_16));
         for copy in 0..copies {
             let mut draws = parcel.random(2, 0, copy).stream();
-            let mut delay = self.min_delay + SimDuration::from_nanos(draws.below(self.jitter_ns + 1));
+            let mut delay =
+                self.min_delay + SimDuration::from_nanos(draws.below(self.jitter_ns + 1));
             if self.undercut && draws.chance(0.3) {
                 delay = SimDuration::from_nanos(1);
             }
@@ -204,8 +210,9 @@ impl Chatter {
             names.extend((0..*actors).map(|actor| (format!("h{host}/a{actor}"), host)));
         }
         let names = Arc::new(names);
-        let hosts: Vec<HostId> =
-            (0..self.hosts.len()).map(|host| sim.host(&format!("h{host}"))).collect();
+        let hosts: Vec<HostId> = (0..self.hosts.len())
+            .map(|host| sim.host(&format!("h{host}")))
+            .collect();
         let mut addresses = Vec::new();
         for (name, host) in names.iter() {
             let (names, host) = (names.clone(), *host);
@@ -252,7 +259,9 @@ impl Chatter {
                     Some(medium) if a % 2 == 0 => sim.route(*from, *to, medium),
                     _ => {
                         let link = sim.link(*from, *to, &format!("h{a}-h{b}"), noisy());
-                        let change = NewLoss { loss_16: self.loss_16.saturating_sub(1) };
+                        let change = NewLoss {
+                            loss_16: self.loss_16.saturating_sub(1),
+                        };
                         sim.change_at(SimTime::from_nanos(self.until_ns / 2), link, change);
                     }
                 }
@@ -284,30 +293,50 @@ impl Ledger {
     /// A ledger, and where to read it after the run.
     pub fn new() -> (Self, Arc<Mutex<Tally>>) {
         let tally = Arc::<Mutex<Tally>>::default();
-        (Ledger { tally: tally.clone(), last: None }, tally)
+        (
+            Ledger {
+                tally: tally.clone(),
+                last: None,
+            },
+            tally,
+        )
     }
 }
 
 impl Observer for Ledger {
     fn wants(&self) -> Wants {
-        Wants { bodies: true, samples: true, checkpoints: false }
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: false,
+        }
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        let mut tally = self.tally.lock().map_err(|error| ObserverError(error.to_string()))?;
+        let mut tally = self
+            .tally
+            .lock()
+            .map_err(|error| ObserverError(error.to_string()))?;
         tally.sent += u64::from(record.sends);
         if self.last.is_some_and(|last| record.key < last) {
             tally.out_of_order += 1;
         }
         self.last = Some(record.key);
         let effect = record.class == RecordClass::Lost || record.class == RecordClass::Sample;
-        if record.cause.is_some_and(|cause| cause > record.key || (cause == record.key && !effect)) {
+        if record
+            .cause
+            .is_some_and(|cause| cause > record.key || (cause == record.key && !effect))
+        {
             tally.before_their_cause += 1;
         }
         if record.class.is_fate() {
-            let kind = record.kind.map_or_else(String::new, |kind| kind.name().to_owned());
+            let kind = record
+                .kind
+                .map_or_else(String::new, |kind| kind.name().to_owned());
             let (sender, receiver) = (record.sender.index(), record.receiver.index());
-            tally.fates.push((sender, receiver, kind, record.ordinal, record.copy));
+            tally
+                .fates
+                .push((sender, receiver, kind, record.ordinal, record.copy));
         }
         Ok(Flow::Continue)
     }

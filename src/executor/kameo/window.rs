@@ -64,7 +64,15 @@ impl Coordinator {
             batch: Batch::default(),
         };
         let seats = engines.into_iter().map(seat).collect();
-        Coordinator { plan, seats, shared, schedule, committer, look_ahead, order: Vec::new() }
+        Coordinator {
+            plan,
+            seats,
+            shared,
+            schedule,
+            committer,
+            look_ahead,
+            order: Vec::new(),
+        }
     }
 
     pub(super) async fn run(mut self) -> Report {
@@ -80,7 +88,9 @@ impl Coordinator {
                 let found = pending.in_flight(&self.plan, key, ending.fault);
                 in_flight.extend(found);
             }
-            let collect = CollectInFlight { until: ending.fault };
+            let collect = CollectInFlight {
+                until: ending.fault,
+            };
             let found = seat.worker.ask(collect).await;
             in_flight.extend(found.unwrap_or_else(|error| lost_worker(&error)));
         }
@@ -97,7 +107,10 @@ impl Coordinator {
         match earliest {
             Some(earliest) if earliest < limit => {
                 let window = if self.look_ahead.is_zero() {
-                    Bound { time: earliest.time, step: earliest.step + 1 }
+                    Bound {
+                        time: earliest.time,
+                        step: earliest.step + 1,
+                    }
                 } else {
                     Bound::at(earliest.time + self.look_ahead)
                 };
@@ -107,9 +120,13 @@ impl Coordinator {
                 Some(Ending::early(End::Completed, self.committer.last().time))
             }
             _ => match self.schedule.take_due(&self.plan) {
-                Some(Due::Stop { key, by, reason }) => {
-                    Some(Ending::stop(&self.plan, &mut self.committer, key, by, reason))
-                }
+                Some(Due::Stop { key, by, reason }) => Some(Ending::stop(
+                    &self.plan,
+                    &mut self.committer,
+                    key,
+                    by,
+                    reason,
+                )),
                 Some(Due::Control(key, entity, action)) => {
                     self.apply(key, entity, action, undone).await
                 }
@@ -120,8 +137,9 @@ impl Coordinator {
 
     async fn run_window(&mut self, bound: Bound, undone: &mut Vec<InFlight>) -> Option<Ending> {
         let shared = self.shared;
-        let independent: Vec<usize> =
-            (0..self.seats.len()).filter(|at| Some(*at) != shared).collect();
+        let independent: Vec<usize> = (0..self.seats.len())
+            .filter(|at| Some(*at) != shared)
+            .collect();
         let mut finished = self.run_engines(&independent, bound).await;
         if let Some(shared) = shared {
             finished.extend(self.run_engines(&[shared], bound).await);
@@ -169,7 +187,15 @@ impl Coordinator {
     ) -> Option<Ending> {
         let at = self.plan.place(entity).engine as usize;
         let batch = std::mem::take(&mut self.seats[at].batch);
-        let reply = self.seats[at].worker.ask(Apply { key, entity, action, batch }).await;
+        let reply = self.seats[at]
+            .worker
+            .ask(Apply {
+                key,
+                entity,
+                action,
+                batch,
+            })
+            .await;
         let mut done = *reply.unwrap_or_else(|error| lost_worker(&error));
         self.seats[at].next = done.next;
         for event in done.outgoing.drain(..) {
@@ -179,7 +205,11 @@ impl Coordinator {
     }
 
     /// Commits what the engines did, in key order, up to the first fault.
-    fn settle(&mut self, finished: Vec<(usize, Done)>, undone: &mut Vec<InFlight>) -> Option<Ending> {
+    fn settle(
+        &mut self,
+        finished: Vec<(usize, Done)>,
+        undone: &mut Vec<InFlight>,
+    ) -> Option<Ending> {
         let fault = finished.iter().filter_map(|(_, done)| done.fault.as_ref());
         let fault: Option<Box<Fault>> = fault.min_by_key(|fault| fault.key).cloned();
         self.order.clear();
