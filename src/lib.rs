@@ -1,1 +1,3 @@
 //! The Farside kernel.
+
+pub mod encoding;
