@@ -94,7 +94,9 @@ fn time(mut call: impl FnMut()) -> f64 {
 fn compare<T: Message + Serialize + DeserializeOwned + 'static>(label: &str, value: &T) {
     let schema = Schema::of::<T>().expect("the type has a schema");
     let mut out = Vec::with_capacity(1 << 16);
-    schema.encode(value, &mut out).expect("the value can be encoded");
+    schema
+        .encode(value, &mut out)
+        .expect("the value can be encoded");
     assert_eq!(out, value.encode_to_vec(), "both write the same bytes");
     let bytes = out.len();
     let ours = time(|| {
@@ -112,7 +114,9 @@ fn compare<T: Message + Serialize + DeserializeOwned + 'static>(label: &str, val
         let done = serde_json::to_writer(&mut out, black_box(value));
         assert!(black_box(done).is_ok());
     });
-    schema.encode(value, &mut out).expect("the value can be encoded");
+    schema
+        .encode(value, &mut out)
+        .expect("the value can be encoded");
     let encoded = value.encode_to_vec();
     let decode = time(|| {
         assert!(black_box(schema.decode::<T>(black_box(&encoded))).is_ok());
@@ -129,8 +133,16 @@ fn main() {
     compare("job, small numbers", &Job { a: 1, b: 2, c: 3 });
     let (a, b, c) = (0x12_3456_789a_bcde, 0x7654_3210_fedc, 0xffff_ffff_ffff);
     compare("job, 24 bytes", &Job { a, b, c });
-    let at = Position { x: 1.5, y: -2.25, heading: 0.125 };
-    let waypoint = |node: u32| Waypoint { node, arrive_s: f64::from(node) + 0.5, at: at.clone() };
+    let at = Position {
+        x: 1.5,
+        y: -2.25,
+        heading: 0.125,
+    };
+    let waypoint = |node: u32| Waypoint {
+        node,
+        arrive_s: f64::from(node) + 0.5,
+        at: at.clone(),
+    };
     let status = Status {
         rover: "rover_17".into(),
         position: at.clone(),
@@ -143,6 +155,12 @@ fn main() {
     compare("status, nested", &status);
     for len in [8_u32, 64, 512] {
         let values = (0..len).map(|n| f64::from(n) * 1.1).collect();
-        compare(&format!("bounds, {len} doubles"), &Bounds { iteration: 3, values });
+        compare(
+            &format!("bounds, {len} doubles"),
+            &Bounds {
+                iteration: 3,
+                values,
+            },
+        );
     }
 }

@@ -10,7 +10,7 @@ use serde::de::{self, DeserializeOwned, Visitor};
 
 use super::error::DecodeError;
 use super::plan::{Card, Field, Kind, MAX_DEPTH, Message, Plan, Shape};
-use super::wire::Payload;
+use super::wire::{Payload, Wire};
 
 mod access;
 mod reader;
@@ -63,24 +63,45 @@ impl From<DecodeError> for Fault {
 pub(super) fn decode<T: DeserializeOwned>(plan: &Plan, bytes: &[u8]) -> Result<T, DecodeError> {
     let message = || plan.messages[0].name.clone();
     // Each new start knows one more required field, and they are remembered from then on.
-    let fields: usize = plan.messages.iter().map(|message| message.fields.len()).sum();
+    let fields: usize = plan
+        .messages
+        .iter()
+        .map(|message| message.fields.len())
+        .sum();
     for _ in 0..=fields {
-        let payload = Payload { bytes, ..Payload::zero(Kind::Message(0).wire()) };
-        let root = ValueDe { plan, field: &plan.root, source: Source::Payload(payload), depth: 0 };
+        let payload = Payload {
+            bytes,
+            ..Payload::zero(Kind::Message(0).wire())
+        };
+        let root = ValueDe {
+            plan,
+            field: &plan.root,
+            source: Source::Payload(payload),
+            depth: 0,
+        };
         match T::deserialize(root) {
             Ok(value) => return Ok(value),
             Err(Fault::Again) => {}
             Err(Fault::Error(error)) => return Err(*error),
             Err(Fault::Custom(reason)) => {
-                return Err(DecodeError::Custom { message: message(), reason });
+                return Err(DecodeError::Custom {
+                    message: message(),
+                    reason,
+                });
             }
             Err(Fault::Missing(field)) => {
                 let reason = format!("missing field `{field}`");
-                return Err(DecodeError::Custom { message: message(), reason });
+                return Err(DecodeError::Custom {
+                    message: message(),
+                    reason,
+                });
             }
         }
     }
-    Err(DecodeError::Custom { message: message(), reason: Fault::Again.to_string() })
+    Err(DecodeError::Custom {
+        message: message(),
+        reason: Fault::Again.to_string(),
+    })
 }
 
 /// Where a value comes from.
@@ -108,6 +129,8 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
         }
     }
 
+    #[cold]
+    #[inline(never)]
     fn mismatch<T>(&self, actual: &str) -> Result<T, Fault> {
         Err(DecodeError::Mismatch {
             place: self.field.place.clone(),
@@ -118,30 +141,49 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
     }
 
     /// Takes the one value of a field of the given kind; protobuf lets the last one win.
+    #[inline(always)]
     fn payload(self, kind: Kind) -> Result<Payload<'b>, Fault> {
         if self.field.kind != kind || self.expect() != Card::Single {
-            return self.mismatch(&format!("{kind:?}").to_lowercase());
+            return self.other_kind(kind);
         }
         let payload = match self.source {
             Source::Payload(payload) => payload,
-            Source::Field(reader, index) => {
-                reader.take_last(index)?.unwrap_or(Payload::zero(kind.wire()))
-            }
+            Source::Field(reader, index) => reader
+                .take_last(index)?
+                .unwrap_or(Payload::zero(kind.wire())),
         };
         if payload.wire != kind.wire() {
-            return Err(DecodeError::WireType {
-                place: self.field.place.clone(),
-                expected: format!("{:?}", kind.wire()),
-                actual: format!("{:?}", payload.wire),
-            }
-            .into());
+            return Self::other_wire(self.field, payload.wire);
         }
         Ok(payload)
     }
 
+    #[cold]
+    #[inline(never)]
+    fn other_wire<T>(field: &Field, wire: Wire) -> Result<T, Fault> {
+        Self::malformed(
+            field,
+            &format!("{:?}", field.kind.wire()),
+            format!("{wire:?}"),
+        )
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn other_kind<T>(&self, kind: Kind) -> Result<T, Fault> {
+        self.mismatch(&format!("{kind:?}").to_lowercase())
+    }
+
+    #[cold]
+    #[inline(never)]
     fn malformed<T>(field: &Field, expected: &str, actual: String) -> Result<T, Fault> {
         let (place, expected) = (field.place.clone(), expected.to_owned());
-        Err(DecodeError::WireType { place, expected, actual }.into())
+        Err(DecodeError::WireType {
+            place,
+            expected,
+            actual,
+        }
+        .into())
     }
 
     fn signed(self, kind: Kind) -> Result<i64, Fault> {
@@ -202,7 +244,12 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
     fn member<'s>(reader: &'s mut Reader<'p, 'b>, index: usize) -> ValueDe<'s, 'p, 'b> {
         let (plan, depth) = (reader.plan, reader.depth);
         let field = &reader.message.fields[index];
-        ValueDe { plan, field, source: Source::Field(reader, index), depth }
+        ValueDe {
+            plan,
+            field,
+            source: Source::Field(reader, index),
+            depth,
+        }
     }
 
     fn elements<V: Visitor<'b>>(self, visitor: V) -> Result<V::Value, Fault> {
@@ -311,7 +358,12 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
                 None => visitor.visit_none(),
                 Some(payload) => {
                     let source = Source::Payload(payload);
-                    visitor.visit_some(ValueDe { plan, field, source, depth })
+                    visitor.visit_some(ValueDe {
+                        plan,
+                        field,
+                        source,
+                        depth,
+                    })
                 }
             };
         }
@@ -355,11 +407,7 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
         self.elements(visitor)
     }
 
-    fn deserialize_tuple<V: Visitor<'b>>(
-        self,
-        _len: usize,
-        visitor: V,
-    ) -> Result<V::Value, Fault> {
+    fn deserialize_tuple<V: Visitor<'b>>(self, _len: usize, visitor: V) -> Result<V::Value, Fault> {
         if self.is_shape(Shape::Tuple) {
             let mut reader = self.open(Shape::Tuple)?;
             return visitor.visit_seq(Members::new(&mut reader));
@@ -410,12 +458,16 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
         if let Kind::Enum(id) = self.field.kind {
             let enumeration = &self.plan.enums[id];
             let number = self.payload(Kind::Enum(id))?.bits;
-            let value = usize::try_from(number).ok().and_then(|at| enumeration.values.get(at));
+            let value = usize::try_from(number)
+                .ok()
+                .and_then(|at| enumeration.values.get(at));
             let Some(value) = value else {
                 let (name, last) = (enumeration.name.clone(), enumeration.values.len() - 1);
                 return Err(DecodeError::UnknownVariant { name, number, last }.into());
             };
-            return visitor.visit_enum(Number { name: value.key.name });
+            return visitor.visit_enum(Number {
+                name: value.key.name,
+            });
         }
         if self.is_shape(Shape::Wrapper) {
             let mut reader = self.open(Shape::Wrapper)?;
@@ -427,8 +479,15 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
         }
         let mut reader = self.open(Shape::Oneof)?;
         match reader.take_any()? {
-            Some((index, payload)) => visitor.visit_enum(OneVariant { reader, index, payload }),
-            None => Err(DecodeError::NoVariant { name: reader.message.name.clone() }.into()),
+            Some((index, payload)) => visitor.visit_enum(OneVariant {
+                reader,
+                index,
+                payload,
+            }),
+            None => Err(DecodeError::NoVariant {
+                name: reader.message.name.clone(),
+            }
+            .into()),
         }
     }
 }

@@ -61,11 +61,15 @@ fn message(plan: &Plan, id: usize, package: &str) -> Vec<u8> {
         } else {
             None
         };
-        bytes(&mut out, 2, &field(plan, one, position + 1, oneof, optional, package));
+        bytes(
+            &mut out,
+            2,
+            &field(plan, one, position + 1, oneof, optional, package),
+        );
     }
     for (other, candidate) in plan.messages.iter().enumerate() {
-        let here = candidate.scope == Scope::MapEntry(id)
-            || (id == 0 && candidate.scope == Scope::Root);
+        let here =
+            candidate.scope == Scope::MapEntry(id) || (id == 0 && candidate.scope == Scope::Root);
         if here {
             bytes(&mut out, 3, &message(plan, other, package));
         }
@@ -109,7 +113,15 @@ fn field(
     let repeated = matches!(field.card, Card::Repeated | Card::Map);
     bytes(&mut out, 1, field.name.as_bytes());
     varint(&mut out, 3, number as u64);
-    varint(&mut out, 4, if repeated { LABEL_REPEATED } else { LABEL_OPTIONAL });
+    varint(
+        &mut out,
+        4,
+        if repeated {
+            LABEL_REPEATED
+        } else {
+            LABEL_OPTIONAL
+        },
+    );
     let (code, type_name) = match field.kind {
         Kind::Bool => (types::BOOL, None),
         Kind::I32 => (types::INT32, None),
@@ -119,12 +131,19 @@ fn field(
         Kind::F32 => (types::FLOAT, None),
         Kind::F64 => (types::DOUBLE, None),
         Kind::Char | Kind::Str => (types::STRING, None),
+        Kind::Pending => unreachable!("no field is of this kind"),
         Kind::Bytes | Kind::I128 | Kind::U128 => (types::BYTES, None),
         Kind::Enum(id) => {
             let root = &plan.messages[0].name;
-            (types::ENUM, Some(format!(".{package}.{root}.{}", plan.enums[id].name)))
+            (
+                types::ENUM,
+                Some(format!(".{package}.{root}.{}", plan.enums[id].name)),
+            )
         }
-        Kind::Message(id) => (types::MESSAGE, Some(format!(".{package}.{}", path(plan, id)))),
+        Kind::Message(id) => (
+            types::MESSAGE,
+            Some(format!(".{package}.{}", path(plan, id))),
+        ),
     };
     varint(&mut out, 5, code);
     if let Some(type_name) = type_name {

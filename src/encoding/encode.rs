@@ -34,7 +34,7 @@ pub(super) fn encode<T: Serialize + ?Sized>(
         plan,
         out,
         field: &plan.root,
-        expect: Card::Single,
+        first: plan.root.first,
         position: Position::Root,
         depth: 0,
     };
@@ -66,26 +66,27 @@ struct ValueSer<'a> {
     plan: &'a Plan,
     out: &'a mut Vec<u8>,
     field: &'a Field,
-    /// What is still to come: the field's own cardinality, or `Single` inside an option or
-    /// sequence.
-    expect: Card,
+    /// What may come at once: the field's own `first`, or its kind inside an option or sequence.
+    first: Kind,
     position: Position,
     depth: u32,
 }
 
 impl<'a> ValueSer<'a> {
     /// A value of the field at `index` in a message that is open in `out`.
-    #[inline]
-    fn inside(
-        plan: &'a Plan,
-        out: &'a mut Vec<u8>,
-        field: &'a Field,
-        depth: u32,
-    ) -> ValueSer<'a> {
-        ValueSer { plan, out, field, expect: field.card, position: Position::Tagged, depth }
+    #[inline(always)]
+    fn inside(plan: &'a Plan, out: &'a mut Vec<u8>, field: &'a Field, depth: u32) -> ValueSer<'a> {
+        ValueSer {
+            plan,
+            out,
+            field,
+            first: field.first,
+            position: Position::Tagged,
+            depth,
+        }
     }
 
-    #[inline]
+    #[inline(always)]
     fn tag(&self) -> Tag {
         match self.position {
             Position::Tagged => self.field.tag,
@@ -93,9 +94,19 @@ impl<'a> ValueSer<'a> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn is(&self, kind: Kind) -> bool {
-        self.field.kind == kind && self.expect == Card::Single
+        self.first == kind
+    }
+
+    /// The cardinality that must come first.
+    #[inline(always)]
+    fn expect(&self) -> Card {
+        if self.first == Kind::Pending {
+            self.field.card
+        } else {
+            Card::Single
+        }
     }
 
     #[cold]
@@ -103,29 +114,25 @@ impl<'a> ValueSer<'a> {
     fn mismatch<T>(&self, actual: impl std::fmt::Display) -> Result<T, Fault> {
         Err(Box::new(EncodeError::Mismatch {
             place: self.field.place.clone(),
-            expected: self.plan.describe(self.field, self.expect),
+            expected: self.plan.describe(self.field, self.expect()),
             actual: actual.to_string(),
         }))
     }
 
-    #[inline]
+    #[inline(always)]
     fn varint(self, kind: Kind, value: u64) -> Result<(), Fault> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
         }
         if self.position == Position::Packed {
-            if value < 0x80 {
-                self.out.push(value as u8);
-            } else {
-                wire::put_varint(self.out, Tag::NONE, value);
-            }
+            wire::put_packed_varint(self.out, value);
         } else {
             wire::put_varint(self.out, self.field.tag, value);
         }
         Ok(())
     }
 
-    #[inline]
+    #[inline(always)]
     fn bytes(self, kind: Kind, bytes: &[u8]) -> Result<(), Fault> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
@@ -135,22 +142,23 @@ impl<'a> ValueSer<'a> {
     }
 
     /// The message that a value of this field is, if one must come now.
-    #[inline]
+    #[inline(always)]
     fn message(&self) -> Option<&'a Message> {
-        match self.field.kind {
-            Kind::Message(id) if self.expect == Card::Single => Some(&self.plan.messages[id]),
+        match self.first {
+            Kind::Message(id) => Some(&self.plan.messages[id]),
             _ => None,
         }
     }
 
     /// Opens the message that this value is.
-    #[inline]
+    #[inline(always)]
     fn open(self, shape: Shape) -> Result<Compound<'a>, Fault> {
-        let Some(message) = self.message().filter(|message| message.shape == shape) else {
-            return self.mismatch(shape);
+        let message = match self.message() {
+            Some(message) if message.shape == shape => message,
+            _ => return self.mismatch(shape),
         };
         if self.depth >= MAX_DEPTH {
-            return Err(Box::new(EncodeError::TooDeep { limit: MAX_DEPTH }));
+            return Err(too_deep());
         }
         let start = match self.position {
             Position::Root => NONE,
@@ -160,7 +168,7 @@ impl<'a> ValueSer<'a> {
             plan: self.plan,
             out: self.out,
             message,
-            next: 0,
+            rest: &message.fields,
             start,
             outer: NONE,
             depth: self.depth + 1,
@@ -200,7 +208,13 @@ impl<'a> ValueSer<'a> {
         shape: Shape,
     ) -> Result<Compound<'a>, Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
-        let Compound { plan, out, start, depth, .. } = oneof;
+        let Compound {
+            plan,
+            out,
+            start,
+            depth,
+            ..
+        } = oneof;
         let mut content = ValueSer::inside(plan, out, field, depth).open(shape)?;
         content.outer = start;
         Ok(content)
@@ -209,7 +223,7 @@ impl<'a> ValueSer<'a> {
 
 /// The position of a variant. `Serialize` counts variants that `Deserialize` skips, and
 /// `Deserialize` lists aliases: the name decides, the index is where to look first.
-#[inline]
+#[inline(always)]
 fn position<T>(
     all: &[T],
     key: impl Fn(&T) -> &Key,
@@ -224,19 +238,27 @@ fn position<T>(
 }
 
 #[cold]
+fn too_deep() -> Fault {
+    Box::new(EncodeError::TooDeep { limit: MAX_DEPTH })
+}
+
+#[cold]
 fn unknown_variant(name: &str, variant: &str) -> Fault {
-    Box::new(EncodeError::UnknownVariant { name: name.to_owned(), variant: variant.to_owned() })
+    Box::new(EncodeError::UnknownVariant {
+        name: name.to_owned(),
+        variant: variant.to_owned(),
+    })
 }
 
 /// Writes a tag and keeps one byte for a length; the answer goes to [`finish`].
-#[inline]
+#[inline(always)]
 fn begin(out: &mut Vec<u8>, tag: Tag) -> usize {
     wire::put_varint(out, tag, 0);
     out.len()
 }
 
 /// Writes the length of what follows `start`.
-#[inline]
+#[inline(always)]
 fn finish(out: &mut Vec<u8>, start: usize) {
     if start == NONE {
         return;
@@ -269,14 +291,22 @@ fn widen(out: &mut Vec<u8>, start: usize, kept: usize, len: usize) {
 }
 
 /// The bits of the one NaN that is ever written, or of `value`.
-#[inline]
+#[inline(always)]
 fn canonical64(value: f64) -> u64 {
-    if value.is_nan() { 0x7ff8_0000_0000_0000 } else { value.to_bits() }
+    if value.is_nan() {
+        0x7ff8_0000_0000_0000
+    } else {
+        value.to_bits()
+    }
 }
 
-#[inline]
+#[inline(always)]
 fn canonical32(value: f32) -> u32 {
-    if value.is_nan() { 0x7fc0_0000 } else { value.to_bits() }
+    if value.is_nan() {
+        0x7fc0_0000
+    } else {
+        value.to_bits()
+    }
 }
 
 impl<'a> ser::Serializer for ValueSer<'a> {
@@ -294,27 +324,27 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         false
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_bool(self, v: bool) -> Result<(), Fault> {
         self.varint(Kind::Bool, u64::from(v))
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i8(self, v: i8) -> Result<(), Fault> {
         self.varint(Kind::I32, i64::from(v) as u64)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i16(self, v: i16) -> Result<(), Fault> {
         self.varint(Kind::I32, i64::from(v) as u64)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i32(self, v: i32) -> Result<(), Fault> {
         self.varint(Kind::I32, i64::from(v) as u64)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i64(self, v: i64) -> Result<(), Fault> {
         self.varint(Kind::I64, v as u64)
     }
@@ -323,22 +353,22 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self.bytes(Kind::I128, &v.to_le_bytes())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u8(self, v: u8) -> Result<(), Fault> {
         self.varint(Kind::U32, u64::from(v))
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u16(self, v: u16) -> Result<(), Fault> {
         self.varint(Kind::U32, u64::from(v))
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u32(self, v: u32) -> Result<(), Fault> {
         self.varint(Kind::U32, u64::from(v))
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u64(self, v: u64) -> Result<(), Fault> {
         self.varint(Kind::U64, v)
     }
@@ -347,7 +377,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self.bytes(Kind::U128, &v.to_le_bytes())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_f32(self, v: f32) -> Result<(), Fault> {
         if !self.is(Kind::F32) {
             return self.mismatch("f32");
@@ -356,7 +386,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         Ok(())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_f64(self, v: f64) -> Result<(), Fault> {
         if !self.is(Kind::F64) {
             return self.mismatch("f64");
@@ -369,18 +399,18 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self.bytes(Kind::Char, v.encode_utf8(&mut [0; 4]).as_bytes())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_str(self, v: &str) -> Result<(), Fault> {
         self.bytes(Kind::Str, v.as_bytes())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_bytes(self, v: &[u8]) -> Result<(), Fault> {
         self.bytes(Kind::Bytes, v)
     }
 
     fn serialize_none(self) -> Result<(), Fault> {
-        if self.expect == Card::Optional {
+        if self.expect() == Card::Optional {
             return Ok(());
         }
         let wrapper = self.open_wrapper("an option")?;
@@ -390,17 +420,23 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         wrapper.close()
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Result<(), Fault> {
-        if self.expect == Card::Optional {
-            return value.serialize(ValueSer { expect: Card::Single, ..self });
+        if self.expect() == Card::Optional {
+            return value.serialize(ValueSer {
+                first: self.field.kind,
+                ..self
+            });
         }
         let mut wrapper = self.open_wrapper("an option")?;
         let inner = wrapper.reborrow_inner();
-        if inner.expect != Card::Optional {
+        if inner.expect() != Card::Optional {
             return inner.mismatch("an option");
         }
-        value.serialize(ValueSer { expect: Card::Single, ..inner })?;
+        value.serialize(ValueSer {
+            first: inner.field.kind,
+            ..inner
+        })?;
         wrapper.close()
     }
 
@@ -412,7 +448,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self.open(Shape::Unit)?.close()
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_unit_variant(
         self,
         name: &'static str,
@@ -426,7 +462,10 @@ impl<'a> ser::Serializer for ValueSer<'a> {
                 None => Err(unknown_variant(&enumeration.name, variant)),
             };
         }
-        if self.message().is_some_and(|message| message.shape == Shape::Wrapper) {
+        if self
+            .message()
+            .is_some_and(|message| message.shape == Shape::Wrapper)
+        {
             // A plain enum at the root: a message must stand around it.
             let mut wrapper = self.open(Shape::Wrapper)?;
             let inner = wrapper.reborrow_inner();
@@ -438,13 +477,16 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self.open_content(index, variant, Shape::Unit)?.close()
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_newtype_struct<T: ?Sized + Serialize>(
         self,
         _name: &'static str,
         value: &T,
     ) -> Result<(), Fault> {
-        if self.message().is_some_and(|message| message.shape == Shape::Newtype) {
+        if self
+            .message()
+            .is_some_and(|message| message.shape == Shape::Newtype)
+        {
             let mut newtype = self.open(Shape::Newtype)?;
             value.serialize(newtype.reborrow_inner())?;
             return newtype.close();
@@ -453,7 +495,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         value.serialize(self)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_newtype_variant<T: ?Sized + Serialize>(
         self,
         _name: &'static str,
@@ -462,16 +504,21 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         value: &T,
     ) -> Result<(), Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
-        value.serialize(ValueSer::inside(oneof.plan, &mut *oneof.out, field, oneof.depth))?;
+        value.serialize(ValueSer::inside(
+            oneof.plan,
+            &mut *oneof.out,
+            field,
+            oneof.depth,
+        ))?;
         oneof.close()
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'a>, Fault> {
         SeqSer::open(self, len)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_tuple(self, len: usize) -> Result<TupleSer<'a>, Fault> {
         match self.message() {
             Some(message) if message.shape == Shape::Tuple => {
@@ -506,12 +553,12 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         MapSer::open(self)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_struct(self, _name: &'static str, _len: usize) -> Result<Compound<'a>, Fault> {
         self.open(Shape::Struct)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_struct_variant(
         self,
         _name: &'static str,

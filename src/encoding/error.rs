@@ -75,7 +75,9 @@ pub enum EncodeError {
         actual: String,
     },
     /// `Serialize` wrote a field that `Deserialize` never reads.
-    #[error("`{message}` has no field `{field}`: `Serialize` writes it, `Deserialize` never reads it")]
+    #[error(
+        "`{message}` has no field `{field}`: `Serialize` writes it, `Deserialize` never reads it"
+    )]
     UnknownField {
         /// The message.
         message: String,

@@ -144,9 +144,9 @@ impl Container {
     pub(super) fn is_plain_enum(&self) -> bool {
         match &self.body {
             Body::Fields(_) => false,
-            Body::Enum(variants) => {
-                variants.iter().all(|variant| matches!(variant.fields, Some(Fields::Unit)))
-            }
+            Body::Enum(variants) => variants
+                .iter()
+                .all(|variant| matches!(variant.fields, Some(Fields::Unit))),
         }
     }
 }

@@ -22,11 +22,14 @@ pub(super) fn lower(containers: &[Container], root: usize) -> Plan {
         work: Vec::new(),
     };
     lowering.run(root);
-    let Lowering { messages, enums, .. } = lowering;
+    let Lowering {
+        messages, enums, ..
+    } = lowering;
     let place = messages[0].name.clone();
     let root = Field {
         tag: Tag::NONE,
         kind: Kind::Message(0),
+        first: Kind::Message(0),
         card: Card::Single,
         packed: false,
         key: Key::new(""),
@@ -34,7 +37,11 @@ pub(super) fn lower(containers: &[Container], root: usize) -> Plan {
         name: place.clone(),
         place,
     };
-    Plan { messages, enums, root }
+    Plan {
+        messages,
+        enums,
+        root,
+    }
 }
 
 /// For each container: is it a newtype struct that needs a message of its own? The root does, one
@@ -52,7 +59,9 @@ fn newtype_messages(containers: &[Container], root: usize) -> Vec<bool> {
             Some(Format::Container(inner)) => needed[*inner],
             _ => false,
         };
-        let next: Vec<bool> = (0..needed.len()).map(|id| needed[id] || around(id)).collect();
+        let next: Vec<bool> = (0..needed.len())
+            .map(|id| needed[id] || around(id))
+            .collect();
         if next == needed {
             return needed;
         }
@@ -66,7 +75,10 @@ fn reaches(containers: &[Container], from: usize, target: usize) -> bool {
     while let Some(id) = work.pop() {
         for fields in containers[id].all_fields() {
             let mut inner = Vec::new();
-            fields.formats().iter().for_each(|format| collect(format, &mut inner));
+            fields
+                .formats()
+                .iter()
+                .for_each(|format| collect(format, &mut inner));
             if inner.contains(&target) {
                 return true;
             }
@@ -116,7 +128,8 @@ impl Lowering<'_> {
         let name = identifier(container.name);
         if container.is_plain_enum() {
             let id = self.push(name, Scope::Top, Shape::Wrapper);
-            self.work.push((id, vec![("", "value".to_owned(), Format::Container(root))]));
+            self.work
+                .push((id, vec![("", "value".to_owned(), Format::Container(root))]));
         } else {
             self.declare(root, Scope::Top);
         }
@@ -128,7 +141,12 @@ impl Lowering<'_> {
     }
 
     fn push(&mut self, name: String, scope: Scope, shape: Shape) -> usize {
-        self.messages.push(Message { name, scope, shape, fields: Vec::new() });
+        self.messages.push(Message {
+            name,
+            scope,
+            shape,
+            fields: Vec::new(),
+        });
         self.inner_names.push(Names::default());
         self.messages.len() - 1
     }
@@ -162,6 +180,11 @@ impl Lowering<'_> {
             let field = Field {
                 tag: Tag::new(position as u32 + 1, wire),
                 kind,
+                first: if card == Card::Single {
+                    kind
+                } else {
+                    Kind::Pending
+                },
                 card,
                 packed,
                 key: Key::new(key),
@@ -174,7 +197,11 @@ impl Lowering<'_> {
     }
 
     fn names(&mut self, id: usize) -> &mut Names {
-        if id == 0 { &mut self.root_names } else { &mut self.inner_names[id] }
+        if id == 0 {
+            &mut self.root_names
+        } else {
+            &mut self.inner_names[id]
+        }
     }
 
     /// The format behind newtype structs that are replaced by what they hold.
@@ -212,9 +239,7 @@ impl Lowering<'_> {
         match self.resolved(format) {
             Format::Option(inner) => (Card::Optional, self.element(&inner)),
             Format::Seq(inner) => (Card::Repeated, self.element(&inner)),
-            Format::Tuple(items) if is_alike(&items) => {
-                (Card::Repeated, self.element(&items[0]))
-            }
+            Format::Tuple(items) if is_alike(&items) => (Card::Repeated, self.element(&items[0])),
             Format::Map(key, value) => {
                 let entry = self.entry(&key, &value, owner, name);
                 (Card::Map, Kind::Message(entry))
@@ -281,6 +306,7 @@ impl Lowering<'_> {
             let plain = |key, name: &str, number, kind: Kind| Field {
                 tag: Tag::new(number, kind.wire()),
                 kind,
+                first: kind,
                 card: Card::Single,
                 packed: false,
                 key: Key::new(key),
@@ -319,8 +345,15 @@ impl Lowering<'_> {
         let wanted = identifier(container.name);
         if container.is_plain_enum() {
             // Some languages forbid a type of its surrounding message's name.
-            let same = self.messages.first().is_some_and(|message| message.name == wanted);
-            let wanted = if same { format!("{wanted}Value") } else { wanted };
+            let same = self
+                .messages
+                .first()
+                .is_some_and(|message| message.name == wanted);
+            let wanted = if same {
+                format!("{wanted}Value")
+            } else {
+                wanted
+            };
             let kind = self.declare_enum(container, &wanted);
             self.by_container.insert(id, kind);
             return kind;
@@ -345,14 +378,19 @@ impl Lowering<'_> {
     fn declare_enum(&mut self, container: &Container, wanted: &str) -> Kind {
         let name = self.root_names.take(wanted);
         let prefix = snake(&name).to_uppercase();
-        let Body::Enum(variants) = &container.body else { unreachable!("it is a plain enum") };
+        let Body::Enum(variants) = &container.body else {
+            unreachable!("it is a plain enum")
+        };
         let mut names = Names::default();
         let values = variants
             .iter()
             .map(|variant| {
                 let value = format!("{prefix}_{}", snake(variant.name).to_uppercase());
                 let value = names.take_folded(&value);
-                Value { key: Key::new(variant.name), name: self.root_names.take(&value) }
+                Value {
+                    key: Key::new(variant.name),
+                    name: self.root_names.take(&value),
+                }
             })
             .collect();
         self.enums.push(Enumeration { name, values });
@@ -361,7 +399,9 @@ impl Lowering<'_> {
 
     /// The fields of a oneof: what a variant holds, or a message for its fields.
     fn variants(&mut self, container: &Container, message: usize) -> Vec<Draft> {
-        let Body::Enum(variants) = &container.body else { return Vec::new() };
+        let Body::Enum(variants) = &container.body else {
+            return Vec::new();
+        };
         let name = self.messages[message].name.clone();
         let mut all = Vec::new();
         for variant in variants {
@@ -403,9 +443,9 @@ impl Lowering<'_> {
             Format::Tuple(items) if is_alike(items) => {
                 format!("{}Array{}", self.describe(&items[0]), items.len())
             }
-            Format::Tuple(items) => {
-                items.iter().fold("Tuple".to_owned(), |name, item| name + &self.describe(item))
-            }
+            Format::Tuple(items) => items
+                .iter()
+                .fold("Tuple".to_owned(), |name, item| name + &self.describe(item)),
             Format::Map(key, value) => {
                 format!("{}To{}Map", self.describe(key), self.describe(value))
             }
@@ -420,12 +460,18 @@ impl Lowering<'_> {
 
 /// Falls back to a short name where a telling one would not end.
 fn short(name: String, fallback: &str) -> String {
-    if name.len() > 60 { fallback.to_owned() } else { name }
+    if name.len() > 60 {
+        fallback.to_owned()
+    } else {
+        name
+    }
 }
 
 /// Can a tuple be a repeated field?
 fn is_alike(items: &[Format]) -> bool {
-    items.first().is_some_and(|first| items.iter().all(|item| item == first))
+    items
+        .first()
+        .is_some_and(|first| items.iter().all(|item| item == first))
 }
 
 fn shape_of(fields: &Fields) -> Shape {

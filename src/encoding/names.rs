@@ -4,7 +4,13 @@ use std::collections::BTreeSet;
 
 /// Makes an identifier of any text: what protobuf forbids becomes `_`.
 pub(super) fn identifier(name: &str) -> String {
-    let keep = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' };
+    let keep = |c: char| {
+        if c.is_ascii_alphanumeric() || c == '_' {
+            c
+        } else {
+            '_'
+        }
+    };
     let mut text: String = name.chars().map(keep).collect();
     if !text.starts_with(|c: char| c.is_ascii_alphabetic()) {
         text.insert_str(0, "x_");
@@ -81,5 +87,8 @@ impl Names {
 }
 
 fn folded(name: &str) -> String {
-    name.chars().filter(|&c| c != '_').map(|c| c.to_ascii_lowercase()).collect()
+    name.chars()
+        .filter(|&c| c != '_')
+        .map(|c| c.to_ascii_lowercase())
+        .collect()
 }

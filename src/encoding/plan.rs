@@ -78,6 +78,9 @@ pub(super) struct Field {
     pub(super) kind: Kind,
     pub(super) card: Card,
     pub(super) packed: bool,
+    /// What an encoder may write at once: the kind, or `Pending` where the cardinality comes
+    /// first. One comparison of it checks both.
+    pub(super) first: Kind,
     /// The serde name.
     pub(super) key: Key,
     /// Set when a reader was seen to reject the field's absence. Such a field reads as zero where
@@ -119,6 +122,8 @@ pub(super) enum Kind {
     U128,
     Enum(usize),
     Message(usize),
+    /// An option, sequence or map must come first.
+    Pending,
 }
 
 impl Kind {
@@ -129,9 +134,8 @@ impl Kind {
             }
             Kind::F32 => Wire::Fixed32,
             Kind::F64 => Wire::Fixed64,
-            Kind::Char | Kind::Str | Kind::Bytes | Kind::I128 | Kind::U128 | Kind::Message(_) => {
-                Wire::Bytes
-            }
+            Kind::Char | Kind::Str | Kind::Bytes | Kind::I128 | Kind::U128 => Wire::Bytes,
+            Kind::Message(_) | Kind::Pending => Wire::Bytes,
         }
     }
 
@@ -170,11 +174,14 @@ pub(super) struct Key {
 
 impl Key {
     pub(super) fn new(name: &'static str) -> Key {
-        Key { name, seen: AtomicUsize::new(0) }
+        Key {
+            name,
+            seen: AtomicUsize::new(0),
+        }
     }
 
     /// Is this the name?
-    #[inline]
+    #[inline(always)]
     pub(super) fn is(&self, name: &'static str) -> bool {
         let address = name.as_ptr() as usize;
         (self.seen.load(Ordering::Relaxed) == address && self.name.len() == name.len())
@@ -188,7 +195,9 @@ impl Key {
             // Only the first is kept: a second copy of the literal must not make threads fight
             // over the cache line.
             let address = name.as_ptr() as usize;
-            let _ = self.seen.compare_exchange(0, address, Ordering::Relaxed, Ordering::Relaxed);
+            let _ = self
+                .seen
+                .compare_exchange(0, address, Ordering::Relaxed, Ordering::Relaxed);
         }
         same
     }

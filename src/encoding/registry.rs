@@ -66,7 +66,11 @@ impl Registry {
         self.depths = vec![INFINITE; self.containers.len()];
         // Depths only fall, and each round settles at least one container.
         loop {
-            let next: Vec<u32> = self.containers.iter().map(|c| self.container_depth(c)).collect();
+            let next: Vec<u32> = self
+                .containers
+                .iter()
+                .map(|c| self.container_depth(c))
+                .collect();
             if next == self.depths {
                 return;
             }
@@ -83,7 +87,10 @@ impl Registry {
                 .map(|container| match &container.body {
                     Body::Fields(fields) => self.are_complete(container, fields),
                     Body::Enum(variants) => variants.iter().all(|variant| {
-                        variant.fields.as_ref().is_some_and(|f| self.are_complete(container, f))
+                        variant
+                            .fields
+                            .as_ref()
+                            .is_some_and(|f| self.are_complete(container, f))
                     }),
                 })
                 .collect();
@@ -115,16 +122,22 @@ impl Registry {
         let of = |fields: &Fields| self.fields_depth(container, fields);
         match &container.body {
             Body::Fields(fields) => of(fields),
-            Body::Enum(_) => {
-                container.all_fields().into_iter().map(of).min().unwrap_or(INFINITE)
-            }
+            Body::Enum(_) => container
+                .all_fields()
+                .into_iter()
+                .map(of)
+                .min()
+                .unwrap_or(INFINITE),
         }
     }
 
     fn fields_depth(&self, container: &Container, fields: &Fields) -> u32 {
         let formats = fields.formats().iter().enumerate();
         let kept = formats.filter(|(at, _)| !container.aliases.contains(at));
-        let deepest = kept.map(|(_, format)| self.depth(format)).max().unwrap_or(0);
+        let deepest = kept
+            .map(|(_, format)| self.depth(format))
+            .max()
+            .unwrap_or(0);
         deepest.saturating_add(1)
     }
 
@@ -151,9 +164,10 @@ impl Registry {
             Format::Container(id) if !seen.contains(id) => {
                 seen.push(*id);
                 match &self.containers[*id].body {
-                    Body::Fields(fields) => {
-                        fields.formats().iter().all(|field| self.enterable(field, seen))
-                    }
+                    Body::Fields(fields) => fields
+                        .formats()
+                        .iter()
+                        .all(|field| self.enterable(field, seen)),
                     Body::Enum(_) => true,
                 }
             }
@@ -197,7 +211,12 @@ impl Registry {
         }
         let id = self.containers.len();
         let (aliases, first) = (Vec::new(), Vec::new());
-        self.containers.push(Container { name, body, aliases, first });
+        self.containers.push(Container {
+            name,
+            body,
+            aliases,
+            first,
+        });
         self.identities.insert((type_name, name, kind), id);
         self.progress += 1;
         Ok(id)
@@ -207,21 +226,33 @@ impl Registry {
     /// the one with the shortest values.
     pub(super) fn choose(&mut self, id: usize, cheap: bool, tries: u32) -> Result<usize, Halt> {
         let container = &self.containers[id];
-        let Body::Enum(variants) = &container.body else { return Err(Halt::Again) };
+        let Body::Enum(variants) = &container.body else {
+            return Err(Halt::Again);
+        };
         let open = |variant: &Variant| match &variant.fields {
             None => true,
             Some(fields) => {
                 !self.are_complete(container, fields)
-                    && fields.formats().iter().all(|format| self.is_enterable(format))
+                    && fields
+                        .formats()
+                        .iter()
+                        .all(|format| self.is_enterable(format))
             }
         };
         let all = variants.iter().enumerate();
-        let unknown = all.clone().filter(|(_, v)| !cheap && open(v)).min_by_key(|(_, v)| v.visits);
+        let unknown = all
+            .clone()
+            .filter(|(_, v)| !cheap && open(v))
+            .min_by_key(|(_, v)| v.visits);
         let depth = |v: &Variant| {
-            v.fields.as_ref().map_or(INFINITE, |fields| self.fields_depth(container, fields))
+            v.fields
+                .as_ref()
+                .map_or(INFINITE, |fields| self.fields_depth(container, fields))
         };
-        let mut finite: Vec<(u32, usize)> =
-            all.map(|(at, v)| (depth(v), at)).filter(|(depth, _)| *depth < INFINITE).collect();
+        let mut finite: Vec<(u32, usize)> = all
+            .map(|(at, v)| (depth(v), at))
+            .filter(|(depth, _)| *depth < INFINITE)
+            .collect();
         finite.sort_unstable();
         let chosen = match (unknown, finite.is_empty()) {
             (Some((at, _)), _) => at,
@@ -236,7 +267,9 @@ impl Registry {
 
     /// Notes how a variant is read.
     pub(super) fn set_variant(&mut self, id: usize, at: usize, new: Fields) -> Result<(), Halt> {
-        let Body::Enum(variants) = &mut self.containers[id].body else { return Err(Halt::Again) };
+        let Body::Enum(variants) = &mut self.containers[id].body else {
+            return Err(Halt::Again);
+        };
         match &variants[at].fields {
             None => {
                 variants[at].fields = Some(new);
@@ -246,8 +279,16 @@ impl Registry {
             Some(old) if old.alike(&new) => Ok(()),
             Some(old) => {
                 let (expected, actual) = (old.to_string(), new.to_string());
-                let place = format!("{}.{}", self.place(), variants_name(&self.containers[id], at));
-                Err(self.fail(SchemaError::Conflict { place, expected, actual }))
+                let place = format!(
+                    "{}.{}",
+                    self.place(),
+                    variants_name(&self.containers[id], at)
+                );
+                Err(self.fail(SchemaError::Conflict {
+                    place,
+                    expected,
+                    actual,
+                }))
             }
         }
     }
@@ -255,7 +296,10 @@ impl Registry {
     /// What is known of a field.
     pub(super) fn format(&self, slot: Slot) -> Format {
         let fields = self.containers[slot.container].fields(slot.variant);
-        fields.and_then(|fields| fields.formats().get(slot.field)).cloned().unwrap_or_default()
+        fields
+            .and_then(|fields| fields.formats().get(slot.field))
+            .cloned()
+            .unwrap_or_default()
     }
 
     /// Adds what was learned of a field.
@@ -291,7 +335,11 @@ impl Registry {
             return Halt::Again;
         }
         let place = self.place();
-        self.fail(SchemaError::Refused { place, tries: MAX_TRIES, reason })
+        self.fail(SchemaError::Refused {
+            place,
+            tries: MAX_TRIES,
+            reason,
+        })
     }
 
     /// Notes that a field came twice: one of its names is an alias.
@@ -319,7 +367,9 @@ impl Registry {
 
     /// Where the tracer is, as in `Plan.steps`.
     pub(super) fn place(&self) -> String {
-        let Some(slot) = self.trail.last() else { return "the root".to_owned() };
+        let Some(slot) = self.trail.last() else {
+            return "the root".to_owned();
+        };
         let container = &self.containers[slot.container];
         let mut place = container.name.to_owned();
         if let Some(at) = slot.variant {
@@ -341,13 +391,21 @@ impl Registry {
     pub(super) fn unsupported(&mut self, type_name: &str, reason: &str) -> Halt {
         let (type_name, reason) = (type_name.to_owned(), reason.to_owned());
         let place = self.place();
-        self.fail(SchemaError::Unsupported { type_name, place, reason })
+        self.fail(SchemaError::Unsupported {
+            type_name,
+            place,
+            reason,
+        })
     }
 
     pub(super) fn conflict(&mut self, old: &Format, new: &Format) -> Halt {
         let (expected, actual) = (old.to_string(), new.to_string());
         let place = self.place();
-        self.fail(SchemaError::Conflict { place, expected, actual })
+        self.fail(SchemaError::Conflict {
+            place,
+            expected,
+            actual,
+        })
     }
 }
 

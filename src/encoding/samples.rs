@@ -36,7 +36,11 @@ impl Sample {
     fn of<T: Copy>(self, all: &[T]) -> T {
         let tries = self.tries as usize;
         // Once all were tried alike, the place joins in.
-        let at = if tries < all.len() { tries } else { mix(self.site, self.tries.into()) as usize };
+        let at = if tries < all.len() {
+            tries
+        } else {
+            mix(self.site, self.tries.into()) as usize
+        };
         all[at % all.len()]
     }
 
@@ -63,7 +67,8 @@ impl Sample {
 
 /// Derives a place from the one around it.
 pub(super) fn mix(site: u64, step: u64) -> u64 {
-    let mixed = (site ^ step.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_add(0x632b_e59b_d9b4_e019);
+    let mixed =
+        (site ^ step.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_add(0x632b_e59b_d9b4_e019);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     mixed ^ (mixed >> 32)
 }

@@ -55,7 +55,10 @@ impl Schema {
     pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
         let traced = trace::trace::<T>()?;
         let plan = lower::lower(&traced.registry.containers, traced.root);
-        let schema = Schema { name: traced.registry.containers[traced.root].name, plan };
+        let schema = Schema {
+            name: traced.registry.containers[traced.root].name,
+            plan,
+        };
         let asymmetric = |reason: String| SchemaError::Asymmetric {
             type_name: type_name::<T>().to_owned(),
             reason,
@@ -97,7 +100,11 @@ impl Schema {
     /// # Ok::<(), farside::encoding::SchemaError>(())
     /// ```
     pub fn file_name(&self) -> String {
-        format!("{}/{}.proto", PACKAGE.replace('.', "/"), self.plan.messages[0].name)
+        format!(
+            "{}/{}.proto",
+            PACKAGE.replace('.', "/"),
+            self.plan.messages[0].name
+        )
     }
 
     /// The declaration as an encoded `google.protobuf.FileDescriptorProto`.

@@ -46,16 +46,31 @@ fn roots_of_every_form_come_back() {
     check(Order::Speed(-0.0));
     check(Order::Via(vec![(1, 2), (3, 4)]));
     check(Order::Pair(7, Mode::Idle));
-    check(Order::Goto { x: 1.0, note: Some("n".into()) });
+    check(Order::Goto {
+        x: 1.0,
+        note: Some("n".into()),
+    });
     check(Order::Again(Box::new(Order::Maybe(None))));
 }
 
 #[test]
 fn recursive_types_come_back() {
     check(Tree(vec![Tree(vec![]), Tree(vec![Tree(vec![])])]));
-    check(List { value: 1, next: Some(Box::new(List { value: 2, next: None })) });
-    check(Expr::Add(Box::new(Expr::Num(1.0)), Box::new(Expr::Neg(Box::new(Expr::Num(2.0))))));
-    check(Holder { trees: Wrapped(Tree(vec![Tree(vec![])])), pair: Some(Box::new((1, None))) });
+    check(List {
+        value: 1,
+        next: Some(Box::new(List {
+            value: 2,
+            next: None,
+        })),
+    });
+    check(Expr::Add(
+        Box::new(Expr::Num(1.0)),
+        Box::new(Expr::Neg(Box::new(Expr::Num(2.0)))),
+    ));
+    check(Holder {
+        trees: Wrapped(Tree(vec![Tree(vec![])])),
+        pair: Some(Box::new((1, None))),
+    });
 }
 
 #[test]
@@ -79,13 +94,30 @@ fn helpers_stand_where_protobuf_has_no_form() {
 
 #[test]
 fn serde_attributes_are_followed() {
-    check(Attributes { kebab_name: 1, kind: 2, skipped: 0, shown: None, seven: 7, aliased: 5 });
-    check(Attributes { kebab_name: 0, kind: 0, skipped: 0, shown: Some(0), seven: 0, aliased: 0 });
+    check(Attributes {
+        kebab_name: 1,
+        kind: 2,
+        skipped: 0,
+        shown: None,
+        seven: 7,
+        aliased: 5,
+    });
+    check(Attributes {
+        kebab_name: 0,
+        kind: 0,
+        skipped: 0,
+        shown: Some(0),
+        seven: 0,
+        aliased: 0,
+    });
     check(SkippedVariant::C);
     assert_eq!(schema::<Renamed>().name(), "Wanted");
     assert_eq!(schema::<Transparent>().name(), "Meters");
     check(Transparent { inner: Meters(1.0) });
-    check(Bounded { low: Low(1), count: std::num::NonZeroU32::new(5).unwrap() });
+    check(Bounded {
+        low: Low(1),
+        count: std::num::NonZeroU32::new(5).unwrap(),
+    });
 }
 
 #[test]
@@ -103,30 +135,55 @@ fn numbers_wait_for_text_nowhere() {
     // Every NaN is one NaN.
     let schema = schema::<Meters>();
     let odd = f64::from_bits(0xfff8_dead_beef_0001);
-    assert_eq!(encode(&schema, &Meters(odd)), encode(&schema, &Meters(f64::NAN)));
-    assert_eq!(encode(&schema, &Meters(odd))[1..], 0x7ff8_0000_0000_0000_u64.to_le_bytes());
+    assert_eq!(
+        encode(&schema, &Meters(odd)),
+        encode(&schema, &Meters(f64::NAN))
+    );
+    assert_eq!(
+        encode(&schema, &Meters(odd))[1..],
+        0x7ff8_0000_0000_0000_u64.to_le_bytes()
+    );
 }
 
 #[test]
 fn long_contents_widen_their_lengths() {
     for len in [0, 1, 126, 127, 128, 129, 16_383, 16_384, 70_000] {
-        check(Blob { before: 1, text: "x".repeat(len), after: 2 });
-        check(Outer { blob: Blob { before: 1, text: "x".repeat(len), after: 2 }, tail: 3 });
+        check(Blob {
+            before: 1,
+            text: "x".repeat(len),
+            after: 2,
+        });
+        check(Outer {
+            blob: Blob {
+                before: 1,
+                text: "x".repeat(len),
+                after: 2,
+            },
+            tail: 3,
+        });
         check(Rows(vec![vec![1; len], vec![u64::MAX; 2]]));
-        check(Reals { values: vec![0.5; len] });
+        check(Reals {
+            values: vec![0.5; len],
+        });
     }
 }
 
 #[test]
 fn maps_are_sorted_by_encoded_key_whatever_the_order_of_writing() {
     let schema = schema::<Counts>();
-    let forward = Counts { by_name: Pairs(vec![(1, 1), (2, 2), (300, 3)]) };
-    let backward = Counts { by_name: Pairs(vec![(300, 3), (2, 2), (1, 1)]) };
+    let forward = Counts {
+        by_name: Pairs(vec![(1, 1), (2, 2), (300, 3)]),
+    };
+    let backward = Counts {
+        by_name: Pairs(vec![(300, 3), (2, 2), (1, 1)]),
+    };
     assert_eq!(encode(&schema, &forward), encode(&schema, &backward));
 }
 
 fn refused<T: Serialize + DeserializeOwned + Debug + 'static>(parts: &[&str]) {
-    let error = Schema::of::<T>().expect_err(std::any::type_name::<T>()).to_string();
+    let error = Schema::of::<T>()
+        .expect_err(std::any::type_name::<T>())
+        .to_string();
     for part in parts {
         assert!(error.contains(part), "no `{part}` in: {error}");
     }
@@ -150,13 +207,21 @@ fn what_has_no_shape_is_refused_by_name() {
 #[test]
 fn values_may_nest_only_as_deep_as_readers_accept() {
     let deep = |levels: u32| {
-        (0..levels).fold(List { value: 0, next: None }, |list, value| List {
-            value,
-            next: Some(Box::new(list)),
-        })
+        (0..levels).fold(
+            List {
+                value: 0,
+                next: None,
+            },
+            |list, value| List {
+                value,
+                next: Some(Box::new(list)),
+            },
+        )
     };
     check(deep(95));
-    let error = schema::<List>().encode(&deep(96), &mut Vec::new()).unwrap_err();
+    let error = schema::<List>()
+        .encode(&deep(96), &mut Vec::new())
+        .unwrap_err();
     assert_eq!(error, EncodeError::TooDeep { limit: 96 });
     // One that a writer without limit made.
     let mut bytes = vec![];
@@ -174,7 +239,9 @@ fn values_may_nest_only_as_deep_as_readers_accept() {
 fn a_failed_encoding_leaves_the_buffer_as_it_was() {
     let schema = schema::<Meters>();
     let mut bytes = vec![1, 2, 3];
-    let error = schema.encode(&Corner(1, 2, String::new()), &mut bytes).unwrap_err();
+    let error = schema
+        .encode(&Corner(1, 2, String::new()), &mut bytes)
+        .unwrap_err();
     assert!(matches!(error, EncodeError::Mismatch { .. }), "{error}");
     assert_eq!(bytes, [1, 2, 3]);
 }
@@ -183,9 +250,18 @@ fn a_failed_encoding_leaves_the_buffer_as_it_was() {
 fn foreign_fields_are_skipped_and_absent_ones_are_zero() {
     let schema = schema::<Blob>();
     // Field 99 as a varint and as bytes, fields out of order, field 3 twice, field 1 absent.
-    let bytes = [0x98, 6, 5, 0x18, 9, 0x12, 1, b'z', 0x9a, 6, 2, 0, 0, 0x18, 4];
+    let bytes = [
+        0x98, 6, 5, 0x18, 9, 0x12, 1, b'z', 0x9a, 6, 2, 0, 0, 0x18, 4,
+    ];
     let blob: Blob = schema.decode(&bytes).unwrap();
-    assert_eq!(blob, Blob { before: 0, text: "z".into(), after: 4 });
+    assert_eq!(
+        blob,
+        Blob {
+            before: 0,
+            text: "z".into(),
+            after: 4
+        }
+    );
     assert_eq!(schema.decode::<Blob>(&[]).unwrap(), Blob::default());
     // A length far beyond the bytes.
     let bytes = [0x12, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x7f];
@@ -196,7 +272,17 @@ fn foreign_fields_are_skipped_and_absent_ones_are_zero() {
 #[test]
 fn unknown_variants_are_errors() {
     let error = schema::<Mode>().decode::<Mode>(&[8, 9]).unwrap_err();
-    assert!(matches!(error, DecodeError::UnknownVariant { number: 9, last: 1, .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            DecodeError::UnknownVariant {
+                number: 9,
+                last: 1,
+                ..
+            }
+        ),
+        "{error}"
+    );
     let error = schema::<Order>().decode::<Order>(&[]).unwrap_err();
     assert!(matches!(error, DecodeError::NoVariant { .. }), "{error}");
 }

@@ -40,7 +40,11 @@ pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
     for _ in 0..MAX_PASSES {
         if registry.begin_pass(&root) && !values.is_empty() {
             return match root {
-                Format::Container(root) => Ok(Traced { registry, root, values }),
+                Format::Container(root) => Ok(Traced {
+                    registry,
+                    root,
+                    values,
+                }),
                 other => Err(SchemaError::NotAContainer {
                     type_name: type_name::<T>().to_owned(),
                     found: other.to_string(),
@@ -67,12 +71,18 @@ pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
             return Err(error);
         }
         // A pass may only have tried another variant: a few in a row may learn nothing.
-        idle = if registry.progress == before { idle + 1 } else { 0 };
+        idle = if registry.progress == before {
+            idle + 1
+        } else {
+            0
+        };
         if idle > registry.containers.len() + 8 {
             break;
         }
     }
-    Err(SchemaError::Infinite { type_name: type_name::<T>().to_owned() })
+    Err(SchemaError::Infinite {
+        type_name: type_name::<T>().to_owned(),
+    })
 }
 
 impl fmt::Display for Halt {
@@ -112,7 +122,10 @@ pub(super) struct Tracer<'a> {
 
 impl<'a> Tracer<'a> {
     fn sample(&self) -> Sample {
-        Sample { tries: self.tries, site: self.site }
+        Sample {
+            tries: self.tries,
+            site: self.site,
+        }
     }
 
     /// Notes the shape.
@@ -149,7 +162,13 @@ impl<'a> Tracer<'a> {
         let (site, tries, cheap) = outer;
         let site = mix(site, step);
         let tries = tries + registry.tries(site);
-        Tracer { registry, slot, site, tries, cheap }
+        Tracer {
+            registry,
+            slot,
+            site,
+            tries,
+            cheap,
+        }
     }
 
     fn context(&self) -> (u64, u32, bool) {
@@ -158,12 +177,18 @@ impl<'a> Tracer<'a> {
 
     /// How many elements of a collection to read.
     fn count(&self, inner: &[&Format]) -> usize {
-        let buildable = inner.iter().all(|format| self.registry.depth(format) < INFINITE);
+        let buildable = inner
+            .iter()
+            .all(|format| self.registry.depth(format) < INFINITE);
         if self.tries > 0 && buildable {
             return [0, 1, 2, 3][self.tries as usize % 4];
         }
-        let unknown = inner.iter().any(|format| !self.registry.is_complete(format));
-        let enterable = inner.iter().all(|format| self.registry.is_enterable(format));
+        let unknown = inner
+            .iter()
+            .any(|format| !self.registry.is_complete(format));
+        let enterable = inner
+            .iter()
+            .all(|format| self.registry.is_enterable(format));
         usize::from(!self.cheap && unknown && enterable)
     }
 
@@ -303,11 +328,15 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
     fn deserialize_option<V: Visitor<'static>>(mut self, visitor: V) -> Result<V::Value, Halt> {
         self.note(Format::Option(Box::default()))?;
         let context = self.context();
-        let Format::Option(inner) = &*self.slot else { return Err(Halt::Again) };
+        let Format::Option(inner) = &*self.slot else {
+            return Err(Halt::Again);
+        };
         if self.count(&[inner]) % 2 == 0 {
             return visitor.visit_none();
         }
-        let Format::Option(inner) = self.slot else { return Err(Halt::Again) };
+        let Format::Option(inner) = self.slot else {
+            return Err(Halt::Again);
+        };
         visitor.visit_some(Tracer::part(self.registry, inner, context, 1))
     }
 
@@ -315,9 +344,13 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         refuse_hashed::<V::Value>(self.registry)?;
         self.note(Format::Seq(Box::default()))?;
         let context = self.context();
-        let Format::Seq(inner) = &*self.slot else { return Err(Halt::Again) };
+        let Format::Seq(inner) = &*self.slot else {
+            return Err(Halt::Again);
+        };
         let left = self.count(&[inner]);
-        let Format::Seq(inner) = self.slot else { return Err(Halt::Again) };
+        let Format::Seq(inner) = self.slot else {
+            return Err(Halt::Again);
+        };
         let slots = std::slice::from_mut(&mut **inner);
         visitor.visit_seq(CollectionAccess::new(self.registry, slots, context, left))
     }
@@ -326,9 +359,13 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         refuse_hashed::<V::Value>(self.registry)?;
         self.note(Format::Map(Box::default(), Box::default()))?;
         let context = self.context();
-        let Format::Map(key, value) = &*self.slot else { return Err(Halt::Again) };
+        let Format::Map(key, value) = &*self.slot else {
+            return Err(Halt::Again);
+        };
         let left = self.count(&[key, value]);
-        let Format::Map(key, value) = self.slot else { return Err(Halt::Again) };
+        let Format::Map(key, value) = self.slot else {
+            return Err(Halt::Again);
+        };
         let mut slots = [std::mem::take(&mut **key), std::mem::take(&mut **value)];
         let access = CollectionAccess::new(self.registry, &mut slots, context, left);
         let flattened = type_name::<V::Value>();
@@ -344,7 +381,9 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
     ) -> Result<V::Value, Halt> {
         self.note(Format::Tuple(unknown(len)))?;
         let context = self.context();
-        let Format::Tuple(slots) = self.slot else { return Err(Halt::Again) };
+        let Format::Tuple(slots) = self.slot else {
+            return Err(Halt::Again);
+        };
         visitor.visit_seq(TupleAccess::new(self.registry, slots, context))
     }
 
@@ -365,7 +404,11 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         let body = Body::Fields(Fields::Newtype(unknown(1)));
         let (id, cheap) = self.enter::<V::Value>(name, body)?;
         // The visitor takes a deserializer, not a seed: what was learned is handed back by hand.
-        let slot = Slot { container: id, variant: None, field: 0 };
+        let slot = Slot {
+            container: id,
+            variant: None,
+            field: 0,
+        };
         let mut format = self.registry.format(slot);
         self.registry.trail.push(slot);
         let context = (self.site, self.tries, cheap);
@@ -417,11 +460,20 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
                  default form of enum",
             ));
         }
-        let each = |name: &&'static str| Variant { name, visits: 0, fields: None };
+        let each = |name: &&'static str| Variant {
+            name,
+            visits: 0,
+            fields: None,
+        };
         let body = Body::Enum(variants.iter().map(each).collect());
         let (id, cheap) = self.enter::<V::Value>(name, body)?;
         let chosen = self.registry.choose(id, cheap, self.tries)?;
-        visitor.visit_enum(VariantChoice { tracer: self, id, chosen, cheap })
+        visitor.visit_enum(VariantChoice {
+            tracer: self,
+            id,
+            chosen,
+            cheap,
+        })
     }
 }
 

@@ -48,14 +48,17 @@ impl Tag {
     pub(super) fn new(number: u32, wire: Wire) -> Tag {
         let value = u64::from(number) << 3 | wire.code();
         let len = varint_len(value);
-        Tag { bits: spread(value, len), len: len as u32 }
+        Tag {
+            bits: spread(value, len),
+            len: len as u32,
+        }
     }
 
     pub(super) fn len(self) -> usize {
         self.len as usize
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn put(self, out: &mut Vec<u8>) {
         if self.len == 1 {
             out.push(self.bits as u8);
@@ -79,12 +82,16 @@ fn spread(value: u64, len: usize) -> u64 {
     let x = (value & 0x0fff_ffff) | ((value & 0x00ff_ffff_f000_0000) << 4);
     let x = (x & 0x0000_3fff_0000_3fff) | ((x & 0x0fff_c000_0fff_c000) << 2);
     let x = (x & 0x007f_007f_007f_007f) | ((x & 0x3f80_3f80_3f80_3f80) << 1);
-    let more = if len > 8 { u64::MAX } else { (1 << (8 * (len - 1))) - 1 };
+    let more = if len > 8 {
+        u64::MAX
+    } else {
+        (1 << (8 * (len - 1))) - 1
+    };
     x | (0x8080_8080_8080_8080 & more)
 }
 
 /// Appends `tag` and `value` as a varint.
-#[inline]
+#[inline(always)]
 pub(super) fn put_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
     if value < 0x80 && tag.len == 1 {
         out.extend_from_slice(&[tag.bits as u8, value as u8]);
@@ -93,7 +100,17 @@ pub(super) fn put_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
     put_long_varint(out, tag, value);
 }
 
-#[inline]
+/// Appends `value` as a varint without a tag.
+#[inline(always)]
+pub(super) fn put_packed_varint(out: &mut Vec<u8>, value: u64) {
+    if value < 0x80 {
+        out.push(value as u8);
+    } else {
+        put_long_varint(out, Tag::NONE, value);
+    }
+}
+
+#[inline(never)]
 fn put_long_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
     let len = varint_len(value);
     let low = u128::from(spread(value, len));
@@ -112,7 +129,7 @@ fn put_long_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
 }
 
 /// Appends `tag` and eight bytes.
-#[inline]
+#[inline(always)]
 pub(super) fn put_fixed64(out: &mut Vec<u8>, tag: Tag, bits: u64) {
     if tag.len == 0 {
         out.extend_from_slice(&bits.to_le_bytes());
@@ -125,7 +142,7 @@ pub(super) fn put_fixed64(out: &mut Vec<u8>, tag: Tag, bits: u64) {
 }
 
 /// Appends `tag` and four bytes.
-#[inline]
+#[inline(always)]
 pub(super) fn put_fixed32(out: &mut Vec<u8>, tag: Tag, bits: u32) {
     tag.put(out);
     out.extend_from_slice(&bits.to_le_bytes());
@@ -151,7 +168,11 @@ pub(super) struct Payload<'b> {
 impl<'b> Payload<'b> {
     /// What a reader must assume where a field is absent.
     pub(super) fn zero(wire: Wire) -> Payload<'b> {
-        Payload { wire, bits: 0, bytes: &[] }
+        Payload {
+            wire,
+            bits: 0,
+            bytes: &[],
+        }
     }
 }
 
@@ -176,14 +197,18 @@ pub(super) fn take_varint(bytes: &[u8], pos: &mut usize) -> Result<u64, Malforme
         value |= u64::from(byte & 0x7f) << (7 * shift);
         if byte < 0x80 {
             // The tenth byte has room for one bit.
-            return if shift == 9 && byte > 1 { Err(Malformed::Varint) } else { Ok(value) };
+            return if shift == 9 && byte > 1 {
+                Err(Malformed::Varint)
+            } else {
+                Ok(value)
+            };
         }
     }
     Err(Malformed::Varint)
 }
 
 /// Reads a value of the given wire type at `pos`, moving it.
-#[inline]
+#[inline(always)]
 pub(super) fn take_payload<'b>(
     bytes: &'b [u8],
     pos: &mut usize,

@@ -28,7 +28,10 @@ impl<'r, 'p, 'b> Members<'r, 'p, 'b> {
 impl<'b> de::MapAccess<'b> for Members<'_, '_, 'b> {
     type Error = Fault;
 
-    fn next_key_seed<K: DeserializeSeed<'b>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
+    fn next_key_seed<K: DeserializeSeed<'b>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Fault> {
         let message = self.reader.message;
         while let Some(field) = message.fields.get(self.next) {
             // Absence of one value is left to serde's default until the type turns out to have
@@ -61,7 +64,8 @@ impl<'b> de::SeqAccess<'b> for Members<'_, '_, 'b> {
             return Ok(None);
         }
         self.next += 1;
-        seed.deserialize(ValueDe::member(self.reader, self.next - 1)).map(Some)
+        seed.deserialize(ValueDe::member(self.reader, self.next - 1))
+            .map(Some)
     }
 }
 
@@ -74,13 +78,20 @@ pub(super) struct Elements<'r, 'p, 'b> {
 
 impl<'r, 'p, 'b> Elements<'r, 'p, 'b> {
     pub(super) fn new(reader: &'r mut Reader<'p, 'b>, index: usize) -> Elements<'r, 'p, 'b> {
-        Elements { reader, index, packed: &[] }
+        Elements {
+            reader,
+            index,
+            packed: &[],
+        }
     }
 
+    #[inline(always)]
     fn next(&mut self) -> Result<Option<Payload<'b>>, Fault> {
         let field = &self.reader.message.fields[self.index];
         while self.packed.is_empty() {
-            let Some(payload) = self.reader.take(self.index)? else { return Ok(None) };
+            let Some(payload) = self.reader.take(self.index)? else {
+                return Ok(None);
+            };
             // Writers may choose to pack or not, and readers must take both.
             if !field.packed || payload.wire != Wire::Bytes {
                 return Ok(Some(payload));
@@ -108,10 +119,18 @@ impl<'b> de::SeqAccess<'b> for Elements<'_, '_, 'b> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Fault> {
-        let Some(payload) = self.next()? else { return Ok(None) };
+        let Some(payload) = self.next()? else {
+            return Ok(None);
+        };
         let (plan, depth) = (self.reader.plan, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
-        seed.deserialize(ValueDe { plan, field, source: Source::Payload(payload), depth }).map(Some)
+        seed.deserialize(ValueDe {
+            plan,
+            field,
+            source: Source::Payload(payload),
+            depth,
+        })
+        .map(Some)
     }
 
     fn size_hint(&self) -> Option<usize> {
@@ -131,13 +150,22 @@ pub(super) struct Entries<'r, 'p, 'b> {
 
 impl<'r, 'p, 'b> Entries<'r, 'p, 'b> {
     pub(super) fn new(reader: &'r mut Reader<'p, 'b>, index: usize) -> Entries<'r, 'p, 'b> {
-        Entries { reader, index, entry: None }
+        Entries {
+            reader,
+            index,
+            entry: None,
+        }
     }
 
     fn open(&mut self, payload: Payload<'b>) -> Result<&mut Reader<'p, 'b>, Fault> {
         let (plan, depth) = (self.reader.plan, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
-        let value = ValueDe { plan, field, source: Source::Payload(payload), depth };
+        let value = ValueDe {
+            plan,
+            field,
+            source: Source::Payload(payload),
+            depth,
+        };
         Ok(self.entry.insert(value.open(Shape::Entry)?))
     }
 }
@@ -145,8 +173,13 @@ impl<'r, 'p, 'b> Entries<'r, 'p, 'b> {
 impl<'b> de::MapAccess<'b> for Entries<'_, '_, 'b> {
     type Error = Fault;
 
-    fn next_key_seed<K: DeserializeSeed<'b>>(&mut self, seed: K) -> Result<Option<K::Value>, Fault> {
-        let Some(payload) = self.reader.take(self.index)? else { return Ok(None) };
+    fn next_key_seed<K: DeserializeSeed<'b>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Fault> {
+        let Some(payload) = self.reader.take(self.index)? else {
+            return Ok(None);
+        };
         let entry = self.open(payload)?;
         seed.deserialize(ValueDe::member(entry, 0)).map(Some)
     }
@@ -154,7 +187,9 @@ impl<'b> de::MapAccess<'b> for Entries<'_, '_, 'b> {
     fn next_value_seed<S: DeserializeSeed<'b>>(&mut self, seed: S) -> Result<S::Value, Fault> {
         match &mut self.entry {
             Some(entry) => seed.deserialize(ValueDe::member(entry, 1)),
-            None => Err(Fault::Custom("a map's value was asked for before its key".to_owned())),
+            None => Err(Fault::Custom(
+                "a map's value was asked for before its key".to_owned(),
+            )),
         }
     }
 }
@@ -177,7 +212,12 @@ impl Number {
     fn mismatch<T>(self, actual: &str) -> Result<T, Fault> {
         let place = self.name.to_owned();
         let expected = "a unit variant".to_owned();
-        Err(DecodeError::Mismatch { place, expected, actual: actual.to_owned() }.into())
+        Err(DecodeError::Mismatch {
+            place,
+            expected,
+            actual: actual.to_owned(),
+        }
+        .into())
     }
 }
 
@@ -216,7 +256,12 @@ impl<'p, 'b> OneVariant<'p, 'b> {
     fn value(&self) -> ValueDe<'_, 'p, 'b> {
         let (plan, depth) = (self.reader.plan, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
-        ValueDe { plan, field, source: Source::Payload(self.payload), depth }
+        ValueDe {
+            plan,
+            field,
+            source: Source::Payload(self.payload),
+            depth,
+        }
     }
 }
 

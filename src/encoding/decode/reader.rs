@@ -25,7 +25,14 @@ impl<'p, 'b> Reader<'p, 'b> {
         bytes: &'b [u8],
         depth: u32,
     ) -> Result<Reader<'p, 'b>, Fault> {
-        let mut reader = Reader { plan, message, depth, bytes, pos: 0, sorted: None };
+        let mut reader = Reader {
+            plan,
+            message,
+            depth,
+            bytes,
+            pos: 0,
+            sorted: None,
+        };
         let (mut last, mut in_order) = (0, true);
         while let Some((index, _, _)) = reader.advance()? {
             in_order &= last <= index;
@@ -67,7 +74,12 @@ impl<'p, 'b> Reader<'p, 'b> {
             Malformed::Varint => "a varint does not end".to_owned(),
             Malformed::Tag(tag) => format!("{tag} is no tag of a field"),
         };
-        DecodeError::Malformed { message, position, reason }.into()
+        DecodeError::Malformed {
+            message,
+            position,
+            reason,
+        }
+        .into()
     }
 
     /// Is there another occurrence of this field? Fields must be asked for in ascending order.

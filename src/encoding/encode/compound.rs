@@ -12,8 +12,8 @@ pub(super) struct Compound<'a> {
     pub(super) plan: &'a Plan,
     pub(super) out: &'a mut Vec<u8>,
     pub(super) message: &'a Message,
-    /// The position of the field that should come next.
-    pub(super) next: usize,
+    /// The fields that are still to come.
+    pub(super) rest: &'a [Field],
     /// Where the content begins.
     pub(super) start: usize,
     /// Where the content of the oneof around it begins.
@@ -22,7 +22,7 @@ pub(super) struct Compound<'a> {
 }
 
 impl<'a> Compound<'a> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn close(self) -> Result<(), Fault> {
         finish(self.out, self.start);
         finish(self.out, self.outer);
@@ -35,54 +35,59 @@ impl<'a> Compound<'a> {
     }
 
     /// The one field of a wrapper or newtype that is closed later.
-    #[inline]
+    #[inline(always)]
     pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_> {
         ValueSer::inside(self.plan, self.out, &self.message.fields[0], self.depth)
     }
 
-    #[inline]
+    #[inline(always)]
     fn put<T: ?Sized + Serialize>(&mut self, field: &'a Field, value: &T) -> Result<(), Fault> {
         value.serialize(ValueSer::inside(self.plan, self.out, field, self.depth))
     }
 
-    #[inline]
-    fn named<T: ?Sized + Serialize>(
-        &mut self,
-        key: &'static str,
-        value: &T,
-    ) -> Result<(), Fault> {
-        let field = match self.message.fields.get(self.next) {
-            Some(field) if field.key.is(key) => field,
+    #[inline(always)]
+    fn named<T: ?Sized + Serialize>(&mut self, key: &'static str, value: &T) -> Result<(), Fault> {
+        let field = match self.rest.split_first() {
+            Some((field, rest)) if field.key.is(key) => {
+                self.rest = rest;
+                field
+            }
             _ => self.find(key)?,
         };
-        self.next += 1;
         self.put(field, value)
     }
 
     /// Finds a field that is not the next one: those between were skipped.
     #[cold]
     fn find(&mut self, key: &'static str) -> Result<&'a Field, Fault> {
-        match self.message.fields.iter().position(|field| field.key.name == key) {
+        match self
+            .message
+            .fields
+            .iter()
+            .position(|field| field.key.name == key)
+        {
             Some(position) => {
-                self.next = position;
+                self.rest = &self.message.fields[position + 1..];
                 Ok(&self.message.fields[position])
             }
-            None => Err(Box::new(EncodeError::UnknownField {
-                message: self.message.name.clone(),
-                field: key.to_owned(),
-            })),
+            None => Err(self.unknown(key.to_owned())),
         }
     }
 
-    #[inline]
+    #[cold]
+    fn unknown(&self, field: String) -> Fault {
+        Box::new(EncodeError::UnknownField {
+            message: self.message.name.clone(),
+            field,
+        })
+    }
+
+    #[inline(always)]
     fn positional<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
-        let Some(field) = self.message.fields.get(self.next) else {
-            return Err(Box::new(EncodeError::UnknownField {
-                message: self.message.name.clone(),
-                field: self.next.to_string(),
-            }));
+        let Some((field, rest)) = self.rest.split_first() else {
+            return Err(self.unknown(self.message.fields.len().to_string()));
         };
-        self.next += 1;
+        self.rest = rest;
         self.put(field, value)
     }
 }
@@ -91,7 +96,7 @@ impl ser::SerializeStruct for Compound<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(
         &mut self,
         key: &'static str,
@@ -100,7 +105,7 @@ impl ser::SerializeStruct for Compound<'_> {
         self.named(key, value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
     }
@@ -110,7 +115,7 @@ impl ser::SerializeStructVariant for Compound<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(
         &mut self,
         key: &'static str,
@@ -119,7 +124,7 @@ impl ser::SerializeStructVariant for Compound<'_> {
         self.named(key, value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
     }
@@ -129,12 +134,12 @@ impl ser::SerializeTupleStruct for Compound<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         self.positional(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
     }
@@ -144,12 +149,12 @@ impl ser::SerializeTupleVariant for Compound<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         self.positional(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
     }
@@ -160,68 +165,97 @@ pub(super) struct SeqSer<'a> {
     plan: &'a Plan,
     out: &'a mut Vec<u8>,
     field: &'a Field,
+    kind: Kind,
+    position: Position,
     /// Where the packed elements begin, and how many bytes are kept for their length.
     packed: usize,
     kept: usize,
+    /// The length that is written already; that of elements of fixed width is right.
+    least: usize,
     /// Where the content of the wrapper around the field begins.
     wrapper: usize,
     depth: u32,
 }
 
 impl<'a> SeqSer<'a> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn open(value: ValueSer<'a>, len: Option<usize>) -> Result<SeqSer<'a>, Fault> {
-        if value.expect == Card::Repeated {
+        if value.expect() == Card::Repeated {
             return Ok(SeqSer::begin(value, len, NONE));
         }
         let wrapper = value.open_wrapper("a sequence")?;
         let start = wrapper.start;
         let inner = wrapper.inner();
-        if inner.expect != Card::Repeated {
+        if inner.expect() != Card::Repeated {
             return inner.mismatch("a sequence");
         }
         Ok(SeqSer::begin(inner, len, start))
     }
 
-    #[inline]
+    #[inline(always)]
     fn begin(value: ValueSer<'a>, len: Option<usize>, wrapper: usize) -> SeqSer<'a> {
-        let ValueSer { plan, out, field, depth, .. } = value;
-        let (mut packed, mut kept) = (NONE, 0);
+        let ValueSer {
+            plan,
+            out,
+            field,
+            depth,
+            ..
+        } = value;
+        let (mut packed, mut kept, mut least) = (NONE, 0, 0);
         if field.packed {
             // Elements take at least their width, or one byte: a good guess of the length's size
             // spares moving them later.
-            let least = len.unwrap_or(0).saturating_mul(field.kind.width().unwrap_or(1));
+            let width = field.kind.width().unwrap_or(1);
+            least = len.unwrap_or(0).saturating_mul(width);
+            // A caller may claim any length.
+            out.reserve(least.min(1 << 16) + 16);
             let before = out.len() + field.tag.len();
             wire::put_varint(out, field.tag, least as u64);
-            kept = out.len() - before;
             packed = out.len();
-            out.reserve(least.min(1 << 16));
+            kept = packed - before;
         }
-        SeqSer { plan, out, field, packed, kept, wrapper, depth }
+        let position = if field.packed {
+            Position::Packed
+        } else {
+            Position::Tagged
+        };
+        let kind = field.kind;
+        SeqSer {
+            plan,
+            out,
+            field,
+            kind,
+            position,
+            packed,
+            kept,
+            least,
+            wrapper,
+            depth,
+        }
     }
 
-    #[inline]
+    #[inline(always)]
     fn element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
-        let position = if self.packed == NONE { Position::Tagged } else { Position::Packed };
         value.serialize(ValueSer {
             plan: self.plan,
             out: self.out,
             field: self.field,
-            expect: Card::Single,
-            position,
+            first: self.kind,
+            position: self.position,
             depth: self.depth,
         })
     }
 
-    #[inline]
+    #[inline(always)]
     fn close(self) -> Result<(), Fault> {
         if self.packed != NONE {
             let len = self.out.len() - self.packed;
             if len == 0 {
-                self.out.truncate(self.packed - self.kept - self.field.tag.len());
+                self.out
+                    .truncate(self.packed - self.kept - self.field.tag.len());
             } else if len < 0x80 && self.kept == 1 {
                 self.out[self.packed - 1] = len as u8;
-            } else {
+            } else if self.least != len {
                 widen(self.out, self.packed, self.kept, len);
             }
         }
@@ -234,12 +268,12 @@ impl ser::SerializeSeq for SeqSer<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         self.element(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
     }
@@ -255,7 +289,7 @@ impl ser::SerializeTuple for TupleSer<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         match self {
             TupleSer::Alike(seq) => seq.element(value),
@@ -263,7 +297,7 @@ impl ser::SerializeTuple for TupleSer<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         match self {
             TupleSer::Alike(seq) => seq.close(),
@@ -298,9 +332,9 @@ pub(super) struct MapSer<'a> {
 }
 
 impl<'a> MapSer<'a> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn open(value: ValueSer<'a>) -> Result<MapSer<'a>, Fault> {
-        let (value, wrapper) = if value.expect == Card::Map {
+        let (value, wrapper) = if value.expect() == Card::Map {
             (value, NONE)
         } else {
             let wrapper = value.open_wrapper("a map")?;
@@ -310,13 +344,30 @@ impl<'a> MapSer<'a> {
         let Kind::Message(entry) = value.field.kind else {
             return value.mismatch("a map");
         };
-        if value.expect != Card::Map {
+        if value.expect() != Card::Map {
             return value.mismatch("a map");
         }
-        let ValueSer { plan, out, field, depth, .. } = value;
+        let ValueSer {
+            plan,
+            out,
+            field,
+            depth,
+            ..
+        } = value;
         let entry = &plan.messages[entry];
         let (spans, tag, key, key_end) = (Vec::new(), NONE, NONE, NONE);
-        Ok(MapSer { plan, out, field, entry, spans, tag, key, key_end, wrapper, depth })
+        Ok(MapSer {
+            plan,
+            out,
+            field,
+            entry,
+            spans,
+            tag,
+            key,
+            key_end,
+            wrapper,
+            depth,
+        })
     }
 
     fn sort(&mut self) {
@@ -339,7 +390,7 @@ impl ser::SerializeMap for MapSer<'_> {
     type Ok = ();
     type Error = Fault;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_key<T: ?Sized + Serialize>(&mut self, key: &T) -> Result<(), Fault> {
         self.tag = self.out.len();
         self.key = begin(self.out, self.field.tag);
@@ -349,7 +400,7 @@ impl ser::SerializeMap for MapSer<'_> {
         Ok(())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         let field = &self.entry.fields[1];
         value.serialize(ValueSer::inside(self.plan, self.out, field, self.depth + 1))?;
@@ -365,11 +416,10 @@ impl ser::SerializeMap for MapSer<'_> {
         Ok(())
     }
 
-    #[inline]
+    #[inline(always)]
     fn end(mut self) -> Result<(), Fault> {
         self.sort();
         finish(self.out, self.wrapper);
         Ok(())
     }
 }
-

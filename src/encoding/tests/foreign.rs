@@ -53,8 +53,19 @@ struct Plain {
 fn plain() -> impl Strategy<Value = Plain> {
     // prost leaves zeros out, this encoding does not.
     let leaf = (
-        (1..u64::MAX, 1..i32::MAX, i64::MIN..0, 1..u32::MAX, 0.1..1e9, "[a-zé]{1,200}"),
-        (vec(any::<f64>(), 0..30), vec(any::<u64>(), 0..30), vec(".*", 0..4)),
+        (
+            1..u64::MAX,
+            1..i32::MAX,
+            i64::MIN..0,
+            1..u32::MAX,
+            0.1..1e9,
+            "[a-zé]{1,200}",
+        ),
+        (
+            vec(any::<f64>(), 0..30),
+            vec(any::<u64>(), 0..30),
+            vec(".*", 0..4),
+        ),
         proptest::option::of(any::<u32>()),
         // Keys of one length, since only those sort alike by text and by encoding; no value is
         // zero.
@@ -63,12 +74,37 @@ fn plain() -> impl Strategy<Value = Plain> {
     )
         .prop_map(|((a, b, c, d, e, h), (i, j, k), n, o, (p, q))| {
             let (f, g, l, m) = (e as f32, true, None, vec![]);
-            Plain { a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q }
+            Plain {
+                a,
+                b,
+                c,
+                d,
+                e,
+                f,
+                g,
+                h,
+                i,
+                j,
+                k,
+                l,
+                m,
+                n,
+                o,
+                p,
+                q,
+            }
         });
     leaf.prop_recursive(3, 8, 3, |inner| {
-        (inner.clone(), proptest::option::of(inner.clone()), vec(inner, 0..3)).prop_map(
-            |(plain, l, m)| Plain { l: l.map(Box::new), m, ..plain },
+        (
+            inner.clone(),
+            proptest::option::of(inner.clone()),
+            vec(inner, 0..3),
         )
+            .prop_map(|(plain, l, m)| Plain {
+                l: l.map(Box::new),
+                m,
+                ..plain
+            })
     })
 }
 
@@ -91,8 +127,13 @@ proptest! {
 
 #[test]
 fn the_descriptor_names_every_field() {
-    let order = Order::Goto { x: 1.5, note: Some("n".into()) };
-    let orders = Wrapper { inner: vec![Some(order), None, Some(Order::Inner(Mode::Drive))] };
+    let order = Order::Goto {
+        x: 1.5,
+        note: Some("n".into()),
+    };
+    let orders = Wrapper {
+        inner: vec![Some(order), None, Some(Order::Inner(Mode::Drive))],
+    };
     let schema = schema::<Wrapper<Vec<Option<Order>>>>();
     let json = serde_json::to_value(dynamic(&schema, &encode(&schema, &orders))).unwrap();
     let expected = serde_json::json!({ "inner": [
@@ -108,7 +149,10 @@ fn fields_have_the_promised_types() {
     let schema = schema::<Nested>();
     let pool = DescriptorPool::decode(schema.file_descriptor_set().as_slice()).unwrap();
     assert_eq!(pool.files().count(), 1);
-    assert_eq!(pool.files().next().unwrap().name(), "farside/msg/Nested.proto");
+    assert_eq!(
+        pool.files().next().unwrap().name(),
+        "farside/msg/Nested.proto"
+    );
     let message = pool.get_message_by_name("farside.msg.Nested").unwrap();
     let field = |name: &str| message.get_field_by_name(name).unwrap();
     assert!(field("lists").is_map());
@@ -146,6 +190,13 @@ fn another_file_can_import_the_root() {
     let mut set = schema.file_descriptor_set();
     put(&mut set, 1, &file);
     let pool = DescriptorPool::decode(set.as_slice()).unwrap();
-    let body = pool.get_message_by_name("Envelope").unwrap().get_field(1).unwrap();
-    assert_eq!(body.kind().as_message().unwrap().full_name(), "farside.msg.Order");
+    let body = pool
+        .get_message_by_name("Envelope")
+        .unwrap()
+        .get_field(1)
+        .unwrap();
+    assert_eq!(
+        body.kind().as_message().unwrap().full_name(),
+        "farside.msg.Order"
+    );
 }

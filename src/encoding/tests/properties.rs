@@ -13,7 +13,9 @@ fn order() -> impl Strategy<Value = Order> {
         any::<Option<u64>>().prop_map(Order::Maybe),
         mode().prop_map(Order::Inner),
     ];
-    leaf.prop_recursive(4, 8, 1, |inner| inner.prop_map(|one| Order::Again(Box::new(one))))
+    leaf.prop_recursive(4, 8, 1, |inner| {
+        inner.prop_map(|one| Order::Again(Box::new(one)))
+    })
 }
 
 fn mode() -> impl Strategy<Value = Mode> {
@@ -21,12 +23,21 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn meters() -> impl Strategy<Value = Meters> {
-    prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(-0.0), Just(f64::INFINITY)]
-        .prop_map(Meters)
+    prop_oneof![
+        any::<u64>().prop_map(f64::from_bits),
+        Just(-0.0),
+        Just(f64::INFINITY)
+    ]
+    .prop_map(Meters)
 }
 
 fn single() -> impl Strategy<Value = Single> {
-    prop_oneof![any::<u32>().prop_map(f32::from_bits), Just(-0.0), Just(f32::NAN)].prop_map(Single)
+    prop_oneof![
+        any::<u32>().prop_map(f32::from_bits),
+        Just(-0.0),
+        Just(f32::NAN)
+    ]
+    .prop_map(Single)
 }
 
 prop_compose! {
@@ -44,9 +55,17 @@ prop_compose! {
 fn all() -> impl Strategy<Value = All> {
     let option = proptest::option::of::<BoxedStrategy<Mode>>;
     let leaf = (
-        (numbers(), (meters(), single()), vec(single(), 0..40), vec(any::<String>(), 0..4)),
+        (
+            numbers(),
+            (meters(), single()),
+            vec(single(), 0..40),
+            vec(any::<String>(), 0..4),
+        ),
         vec(any::<u8>(), 0..200).prop_map(Raw),
-        (vec(proptest::option::of(order()), 0..4), proptest::option::of(order())),
+        (
+            vec(proptest::option::of(order()), 0..4),
+            proptest::option::of(order()),
+        ),
         (
             btree_map(any::<String>(), any::<i64>(), 0..5),
             btree_map(mode(), vec(meters(), 0..4), 0..3),
@@ -78,7 +97,10 @@ fn all() -> impl Strategy<Value = All> {
         });
     (vec(leaf, 1..4)).prop_map(|chain| {
         let link = |tail: Option<Box<All>>, one: All| Some(Box::new(All { tail, ..one }));
-        *chain.into_iter().fold(None, link).expect("the chain has a link")
+        *chain
+            .into_iter()
+            .fold(None, link)
+            .expect("the chain has a link")
     })
 }
 

@@ -159,7 +159,11 @@ impl TryFrom<u32> for Low {
     type Error = String;
 
     fn try_from(value: u32) -> Result<Low, String> {
-        if (1..10).contains(&value) { Ok(Low(value)) } else { Err(format!("{value} is not low")) }
+        if (1..10).contains(&value) {
+            Ok(Low(value))
+        } else {
+            Err(format!("{value} is not low"))
+        }
     }
 }
 
@@ -231,7 +235,9 @@ impl Serialize for Pairs {
 
 impl<'de> Deserialize<'de> for Pairs {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Pairs, D::Error> {
-        Ok(Pairs(BTreeMap::deserialize(deserializer)?.into_iter().collect()))
+        Ok(Pairs(
+            BTreeMap::deserialize(deserializer)?.into_iter().collect(),
+        ))
     }
 }
 
@@ -381,7 +387,9 @@ impl<'de> Deserialize<'de> for Picky {
         struct Inner {
             never: Never,
         }
-        Ok(Picky { never: Inner::deserialize(deserializer)?.never })
+        Ok(Picky {
+            never: Inner::deserialize(deserializer)?.never,
+        })
     }
 }
 

@@ -25,18 +25,29 @@ impl<'a> FieldAccess<'a> {
         context: (u64, u32, bool),
     ) -> FieldAccess<'a> {
         let container = &registry.containers[id];
-        let len = container.fields(variant).map_or(0, |fields| fields.formats().len());
+        let len = container
+            .fields(variant)
+            .map_or(0, |fields| fields.formats().len());
         let (first, aliases) = (&container.first, &container.aliases);
         let later = (0..len).filter(|at| !first.contains(at) && !aliases.contains(at));
         let order = first.iter().copied().chain(later).collect();
-        FieldAccess { registry, id, variant, context, order, next: 0 }
+        FieldAccess {
+            registry,
+            id,
+            variant,
+            context,
+            order,
+            next: 0,
+        }
     }
 
     /// Learns from a field that was refused because it came before.
     pub(super) fn duplicate(self, primary: &'static str) -> Halt {
         let last = self.order[self.next.min(self.order.len() - 1)];
         if self.variant.is_some() {
-            return self.registry.unsupported(primary, "aliases in a struct variant; drop them");
+            return self
+                .registry
+                .unsupported(primary, "aliases in a struct variant; drop them");
         }
         self.registry.alias(self.id, last, primary)
     }
@@ -44,7 +55,11 @@ impl<'a> FieldAccess<'a> {
     fn read<S: DeserializeSeed<'static>>(&mut self, seed: S) -> Result<S::Value, Halt> {
         let field = self.order[self.next];
         self.next += 1;
-        let slot = Slot { container: self.id, variant: self.variant, field };
+        let slot = Slot {
+            container: self.id,
+            variant: self.variant,
+            field,
+        };
         read_field(self.registry, slot, self.context, seed)
     }
 }
@@ -76,7 +91,11 @@ impl de::SeqAccess<'static> for FieldAccess<'_> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Halt> {
-        if self.next == self.order.len() { Ok(None) } else { self.read(seed).map(Some) }
+        if self.next == self.order.len() {
+            Ok(None)
+        } else {
+            self.read(seed).map(Some)
+        }
     }
 
     fn size_hint(&self) -> Option<usize> {
@@ -98,7 +117,12 @@ impl<'a> TupleAccess<'a> {
         slots: &'a mut [Format],
         context: (u64, u32, bool),
     ) -> TupleAccess<'a> {
-        TupleAccess { registry, slots, context, next: 0 }
+        TupleAccess {
+            registry,
+            slots,
+            context,
+            next: 0,
+        }
     }
 }
 
@@ -109,7 +133,9 @@ impl de::SeqAccess<'static> for TupleAccess<'_> {
         &mut self,
         seed: S,
     ) -> Result<Option<S::Value>, Halt> {
-        let Some(slot) = self.slots.get_mut(self.next) else { return Ok(None) };
+        let Some(slot) = self.slots.get_mut(self.next) else {
+            return Ok(None);
+        };
         self.next += 1;
         read_part(self.registry, slot, self.context, self.next as u64, seed).map(Some)
     }
@@ -137,7 +163,14 @@ impl<'a> CollectionAccess<'a> {
         context: (u64, u32, bool),
         left: usize,
     ) -> CollectionAccess<'a> {
-        CollectionAccess { registry, slots, context, left, step: 0, type_name: "" }
+        CollectionAccess {
+            registry,
+            slots,
+            context,
+            left,
+            step: 0,
+            type_name: "",
+        }
     }
 
     /// Says what type is being read, for the error about flattened structs.
@@ -148,7 +181,13 @@ impl<'a> CollectionAccess<'a> {
 
     fn read<S: DeserializeSeed<'static>>(&mut self, at: usize, seed: S) -> Result<S::Value, Halt> {
         self.step += 1;
-        read_part(self.registry, &mut self.slots[at], self.context, self.step, seed)
+        read_part(
+            self.registry,
+            &mut self.slots[at],
+            self.context,
+            self.step,
+            seed,
+        )
     }
 }
 
@@ -208,7 +247,9 @@ pub(super) struct VariantChoice<'a> {
 
 impl VariantChoice<'_> {
     fn set(&mut self, fields: Fields) -> Result<(), Halt> {
-        self.tracer.registry.set_variant(self.id, self.chosen, fields)
+        self.tracer
+            .registry
+            .set_variant(self.id, self.chosen, fields)
     }
 }
 
@@ -240,7 +281,11 @@ impl de::VariantAccess<'static> for VariantChoice<'_> {
         seed: S,
     ) -> Result<S::Value, Halt> {
         self.set(Fields::Newtype(unknown(1)))?;
-        let slot = Slot { container: self.id, variant: Some(self.chosen), field: 0 };
+        let slot = Slot {
+            container: self.id,
+            variant: Some(self.chosen),
+            field: 0,
+        };
         let context = (self.tracer.site, self.tracer.tries, self.cheap);
         read_field(self.tracer.registry, slot, context, seed)
     }
@@ -260,6 +305,7 @@ impl de::VariantAccess<'static> for VariantChoice<'_> {
         visitor: V,
     ) -> Result<V::Value, Halt> {
         self.set(Fields::Struct(fields, unknown(fields.len())))?;
-        self.tracer.struct_like(self.id, Some(self.chosen), self.cheap, visitor)
+        self.tracer
+            .struct_like(self.id, Some(self.chosen), self.cheap, visitor)
     }
 }
