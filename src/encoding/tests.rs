@@ -131,8 +131,7 @@ fn types_of_one_name_stay_apart() {
 }
 
 #[test]
-fn numbers_wait_for_text_nowhere() {
-    // Every NaN is one NaN.
+fn every_nan_is_written_as_one_nan() {
     let schema = schema::<Meters>();
     let odd = f64::from_bits(0xfff8_dead_beef_0001);
     assert_eq!(
