@@ -33,11 +33,11 @@ pub struct RoadmapSettings {
     pub cycles: usize,
     /// How many gates it has, where rovers enter and leave.
     pub gates: usize,
-    /// The radius of the ring of gates [m].
+    /// The radius of the ring of gates \[m\].
     pub gate_radius_m: f64,
-    /// The least distance between two places that may become vertices [m].
+    /// The least distance between two places that may become vertices \[m\].
     pub spacing_m: f64,
-    /// How far from hazards paths keep [m].
+    /// How far from hazards paths keep \[m\].
     pub margin_m: f64,
 }
 
@@ -52,8 +52,8 @@ impl RoadmapSettings {
     /// ```
     pub fn builtin(name: &str) -> Option<RoadmapSettings> {
         let (seed, vertices, cycles, gates, spacing_m) = match name {
-            "crater-dense" => (4, 228, 12, 28, 14.5),
-            "crater-sparse" => (4, 178, 6, 24, 16.5),
+            "crater-dense" => (2, 228, 12, 28, 14.5),
+            "crater-sparse" => (20, 178, 6, 24, 16.5),
             _ => return None,
         };
         Some(RoadmapSettings {

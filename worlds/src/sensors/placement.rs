@@ -74,14 +74,14 @@ impl SensorNetwork {
         })
     }
 
-    /// A radio radius [m] with which [`SensorNetwork::place`] finds a placement for (nearly) every
+    /// A radio radius \[m\] with which [`SensorNetwork::place`] finds a placement for (nearly) every
     /// seed: a fixed multiple of the nodes' mean spacing over the roadmap.
     pub fn default_radius_m(roadmap: &Roadmap, nodes: usize) -> f64 {
         libm::ceil(RADIUS_SPACINGS * mean_spacing_m(roadmap, nodes)).max(1.0)
     }
 }
 
-/// The spacing that so many nodes have when spread evenly over the roadmap's extent [m].
+/// The spacing that so many nodes have when spread evenly over the roadmap's extent \[m\].
 fn mean_spacing_m(roadmap: &Roadmap, nodes: usize) -> f64 {
     let (low, high) = extent_m(roadmap);
     let size = high - low;
