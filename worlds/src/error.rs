@@ -306,7 +306,7 @@ pub enum SensorError {
     /// The search for a random placement found none.
     #[error(
         "no placement of {nodes} nodes with a radius of {radius_m} m was found in {attempts} \
-         attempts (the last one: {last}); a radius of {suggested_m:.0} m should do"
+         attempts{}; the last one: {last}", advice(*radius_m, *suggested_m)
     )]
     NoPlacement {
         /// The nodes asked for.
@@ -329,6 +329,15 @@ fn list(edges: &[(VertexId, VertexId)]) -> String {
         .map(|(u, v)| format!("{} - {}", u.0, v.0))
         .collect();
     texts.join(", ")
+}
+
+/// What to do about a placement that was not found.
+fn advice(radius_m: f64, suggested_m: f64) -> String {
+    if radius_m < suggested_m {
+        format!(" (a radius of {suggested_m} m usually does)")
+    } else {
+        " (fewer nodes usually do)".to_owned()
+    }
 }
 
 /// `3, 7`.

@@ -209,3 +209,47 @@ impl<'a> Search<'a> {
         self.positions_m[b.0 as usize] -= step;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Placements are pinned: a change of the search changes every run that uses one.
+    #[test]
+    fn golden_placement() {
+        let map = Roadmap::builtin("crater-dense").unwrap();
+        let network = SensorNetwork::place(&map, 28, 145.0, 1).unwrap();
+        let p = network.position_m(NodeId(0));
+        assert_eq!((p.x, p.y), (55.309394100004056, 212.5978179787905));
+        let owned: Vec<usize> = network.nodes().map(|n| network.owned(n).len()).collect();
+        assert_eq!(
+            owned,
+            [
+                7, 9, 6, 10, 7, 10, 6, 12, 5, 10, 12, 5, 7, 20, 5, 12, 3, 2, 4, 17, 6, 10, 6, 5, 2,
+                9, 9, 12
+            ]
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_placed_is_an_error_with_advice() {
+        let map = Roadmap::builtin("crater-sparse").unwrap();
+        let small = SensorNetwork::place(&map, 14, 20.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(small.contains("a radius of 201 m usually does"), "{small}");
+        assert!(small.contains("no node covers"), "{small}");
+        let many = SensorNetwork::place(&map, 178, 1000.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(many.contains("fewer nodes"), "{many}");
+        let none = SensorNetwork::place(&map, 0, 100.0, 1).unwrap_err();
+        assert_eq!(
+            none,
+            SensorError::NodeCount {
+                vertices: 178,
+                actual: 0
+            }
+        );
+    }
+}
