@@ -11,8 +11,11 @@ use super::{NodeId, SensorNetwork, check_request, nearest};
 use crate::error::SensorError;
 use crate::roadmap::Roadmap;
 
-/// Placements tried before the search gives up.
+/// Placements tried before the search gives up, and fewer where each is dear.
 const ATTEMPTS: usize = 64;
+
+/// Nodes times vertices over all attempts, which bounds the time a hopeless search takes.
+const MOST_WORK: usize = 4_000_000;
 
 /// Repairs tried on each of them.
 const REPAIRS: usize = 64;
@@ -54,8 +57,9 @@ impl SensorNetwork {
         let key = RandomKey::new(seed)
             .text("sensor_placement")
             .number(nodes as u64);
+        let attempts = (MOST_WORK / (nodes * roadmap.len())).clamp(2, ATTEMPTS);
         let mut last = None;
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..attempts {
             let mut search = Search::new(roadmap, radius_m, key.number(attempt as u64).stream());
             search.throw_all(nodes);
             match search.repaired() {
@@ -68,7 +72,7 @@ impl SensorNetwork {
         Err(SensorError::NoPlacement {
             nodes,
             radius_m,
-            attempts: ATTEMPTS,
+            attempts,
             last,
             suggested_m,
         })
