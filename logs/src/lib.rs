@@ -1,1 +1,15 @@
 //! MCAP logs of Farside runs: write, read, verify, diff, recover.
+
+mod diff;
+mod error;
+mod info;
+mod recover;
+mod verify;
+mod writer;
+
+pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
+pub use error::LogError;
+pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
+pub use recover::{RecoverReport, recover};
+pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
+pub use writer::{Attachment, Compression, LogOptions, LogWriter};
