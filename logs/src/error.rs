@@ -91,6 +91,14 @@ pub enum LogError {
         /// What is wrong with it.
         reason: String,
     },
+    /// More topics than an MCAP file can have channels.
+    #[error("no channel is left for topic {topic}: a log has at most {limit}")]
+    TooManyTopics {
+        /// The topic.
+        topic: String,
+        /// The most channels that a log can have.
+        limit: u16,
+    },
     /// The result of a run was asked for before the run was over.
     #[error("{path}: the re-execution did not reach its end")]
     Unfinished {
