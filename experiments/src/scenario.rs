@@ -292,10 +292,7 @@ impl Scenario {
                 return Err(ScenarioError::Invalid {
                     place: self.source.place_of_key(&key),
                     key: key.join("."),
-                    message: format!(
-                        "{restart}: expected a time after the crash at {}",
-                        crash.at
-                    ),
+                    message: format!("{restart}: expected a time after the crash at {}", crash.at),
                 });
             }
         }
@@ -369,7 +366,10 @@ fn read(path: &Path, scenario: &str) -> Result<String, ScenarioError> {
 
 /// The value of `system`, which decides who reads the rest.
 fn system_name(source: &Source, root: &DeTable<'_>) -> Result<String, ScenarioError> {
-    match root.get("system").map(|value| (value.span(), value.get_ref())) {
+    match root
+        .get("system")
+        .map(|value| (value.span(), value.get_ref()))
+    {
         Some((_, DeValue::String(name))) => Ok(name.to_string()),
         Some((span, other)) => Err(ScenarioError::Invalid {
             place: source.place(span.start),
@@ -382,8 +382,9 @@ fn system_name(source: &Source, root: &DeTable<'_>) -> Result<String, ScenarioEr
         None => Err(ScenarioError::Invalid {
             place: source.place(0),
             key: "system".to_owned(),
-            message: "this key is missing: expected the name of a system, as in system = \"network\""
-                .to_owned(),
+            message:
+                "this key is missing: expected the name of a system, as in system = \"network\""
+                    .to_owned(),
         }),
     }
 }

@@ -33,10 +33,8 @@ pub trait System: Send + Sync {
     ///
     /// # Errors
     /// Those of serde; they become messages with file, line and column.
-    fn parse(
-        &self,
-        sections: toml::Deserializer<'_>,
-    ) -> Result<Box<dyn Settings>, toml::de::Error>;
+    fn parse(&self, sections: toml::Deserializer<'_>)
+    -> Result<Box<dyn Settings>, toml::de::Error>;
 }
 
 /// The settings of one scenario for one system.

@@ -1,5 +1,6 @@
 //! MCAP logs of Farside runs: write, read, verify, diff, recover.
 
+mod attachments;
 mod descriptors;
 mod diff;
 mod envelope;
@@ -11,6 +12,7 @@ mod verify;
 mod wire;
 mod writer;
 
+pub use attachments::attachments;
 pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;

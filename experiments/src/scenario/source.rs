@@ -265,9 +265,12 @@ fn descend_value(
 fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
     let span = value.span().start + base..value.span().end + base;
     let value = match value.into_inner() {
-        DeValue::Array(array) => {
-            DeValue::Array(array.into_iter().map(|entry| shifted(entry, base)).collect())
-        }
+        DeValue::Array(array) => DeValue::Array(
+            array
+                .into_iter()
+                .map(|entry| shifted(entry, base))
+                .collect(),
+        ),
         DeValue::Table(table) => {
             let mut moved = DeTable::new();
             for (key, value) in table {
@@ -373,10 +376,22 @@ mod tests {
             text: text.to_owned(),
         };
         let keys = |path: &str| -> Vec<String> { path.split('.').map(str::to_owned).collect() };
-        assert_eq!(source.place_of_key(&keys("team.röver")), file(2, 9, "röver = 5"));
-        assert_eq!(source.place_of_key(&keys("team.absent")), file(1, 1, "[team]"));
-        assert_eq!(source.place_of_key(&keys("seed")).to_string(), "--set seed=7");
-        assert_eq!(source.place_of_key(&keys("a.b.1")).to_string(), "--set a.b=[1, 2]");
+        assert_eq!(
+            source.place_of_key(&keys("team.röver")),
+            file(2, 9, "röver = 5")
+        );
+        assert_eq!(
+            source.place_of_key(&keys("team.absent")),
+            file(1, 1, "[team]")
+        );
+        assert_eq!(
+            source.place_of_key(&keys("seed")).to_string(),
+            "--set seed=7"
+        );
+        assert_eq!(
+            source.place_of_key(&keys("a.b.1")).to_string(),
+            "--set a.b=[1, 2]"
+        );
         assert_eq!(source.key_at(&(7..12)), "team.röver");
         assert_eq!(source.key_at(&(28..29)), "seed");
     }
@@ -390,6 +405,12 @@ mod tests {
         let error = into_number.document().unwrap_err().to_string();
         assert!(error.contains("integer has no keys of its own"), "{error}");
         let beyond = source("[[degrade]]\nat = '1s'", &["degrade.1.at=2s"]);
-        assert!(beyond.document().unwrap_err().to_string().contains("no such entry"));
+        assert!(
+            beyond
+                .document()
+                .unwrap_err()
+                .to_string()
+                .contains("no such entry")
+        );
     }
 }
