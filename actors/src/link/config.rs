@@ -370,19 +370,25 @@ impl LinkBuilder {
             Some(unused) => Err(LinkConfigError::NoSuchLink {
                 key: unused.key.clone(),
                 pattern: unused.text.clone(),
-                nearest: nearest(&self.names, &unused.text),
+                nearest: self.nearest(unused),
             }),
         }
     }
 }
 
-/// The link name, or the pattern that names with other numbers share, closest to `pattern`.
-fn nearest(names: &[String], pattern: &str) -> Option<String> {
-    let shapes: BTreeSet<String> = names.iter().map(|name| shape(name)).collect();
-    let candidates = shapes.iter().chain(names);
-    candidates
-        .min_by_key(|name| strsim::damerau_levenshtein(name, pattern))
-        .cloned()
+impl LinkBuilder {
+    /// The link name, or the pattern that names with other numbers share, closest to a pattern; in
+    /// `[links]` it may also have been meant for `default`.
+    fn nearest(&self, pattern: &Pattern) -> Option<String> {
+        let mut candidates: BTreeSet<String> = self.names.iter().map(|name| shape(name)).collect();
+        candidates.extend(self.names.iter().cloned());
+        if pattern.key[0] == "links" {
+            candidates.insert("default".to_owned());
+        }
+        candidates
+            .into_iter()
+            .min_by_key(|name| strsim::damerau_levenshtein(name, &pattern.text))
+    }
 }
 
 /// The name with `*` for each run of digits.

@@ -25,7 +25,8 @@ pub(crate) struct Args {
     #[arg(default_value = "network/crater-dense")]
     scenario: String,
     /// The seed that every random draw derives from, instead of the scenario's
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: Option<u64>,
     /// Where to write the log
     #[arg(long, value_name = "RUN.mcap", default_value = "run.mcap")]
@@ -37,7 +38,7 @@ pub(crate) struct Args {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     /// Stop at this virtual time, as in 90s
-    #[arg(long, value_name = "DURATION", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", value_parser = duration, allow_hyphen_values = true)]
     until: Option<SimDuration>,
     /// How to execute: the result is the same
     #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
@@ -84,6 +85,7 @@ struct Document<'a> {
     seed: u64,
     tie_seed: Option<u64>,
     executor: &'static str,
+    threads: usize,
     digest: String,
     end: &'static str,
     end_detail: String,
@@ -179,18 +181,21 @@ pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, start.elapsed().as_secs_f64())
 }
 
+fn threads(executor: Executor) -> usize {
+    match executor {
+        Executor::Inline => 1,
+        Executor::Kameo { threads } => threads,
+    }
+}
+
 fn log_options(
     scenario: &Scenario,
     assembled: &Assembled,
     executor: Executor,
 ) -> Result<LogOptions, CommandError> {
-    let threads = match executor {
-        Executor::Inline => 1,
-        Executor::Kameo { threads } => threads,
-    };
     let host = [
         ("executor", executor.name().to_owned()),
-        ("threads", threads.to_string()),
+        ("threads", threads(executor).to_string()),
         ("os", std::env::consts::OS.to_owned()),
         ("arch", std::env::consts::ARCH.to_owned()),
     ];
@@ -242,6 +247,7 @@ impl Outcome<'_> {
             seed: self.scenario.shared().seed,
             tie_seed: self.tie_seed,
             executor: self.executor.name(),
+            threads: threads(self.executor),
             digest: self.report.digest.to_string(),
             end: self.report.end.name(),
             end_detail: self.report.end.detail(),
@@ -292,7 +298,7 @@ fn ending(report: &Report) -> String {
         End::Completed => format!("completed at {at}, nothing was left to happen"),
         End::Stopped { by, reason } if by.starts_with('@') => format!("stopped at {at}: {reason}"),
         End::Stopped { by, reason } => format!("stopped at {at} by {by}: {reason}"),
-        End::Interrupted => format!("interrupted at {at}; the log is whole up to there"),
+        End::Interrupted => format!("interrupted at {at}; what is recorded ends there"),
         End::Fault(fault) => format!("FAILED at {at}: {fault}"),
         End::ObserverFailed(error) => {
             format!("FAILED at {at}: it can no longer be recorded: {error}")

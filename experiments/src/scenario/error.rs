@@ -145,7 +145,7 @@ impl ScenarioError {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.start);
         let key = source.key_at(&span);
-        let message = one_line(error.message());
+        let message = in_words(one_line(error.message()));
         let names = backticked(&message);
         let unknown = ["unknown field", "unknown variant"]
             .iter()
@@ -185,8 +185,47 @@ impl ScenarioError {
         ScenarioError::Invalid {
             place: source.place_of_key(&key),
             key: key.join("."),
-            message,
+            message: shortened(message),
         }
+    }
+}
+
+/// The most characters of a message from a system: worlds name everything that is wrong with them.
+const MAX_MESSAGE: usize = 400;
+
+fn shortened(message: String) -> String {
+    match message.char_indices().nth(MAX_MESSAGE) {
+        Some((end, _)) => format!("{} ... and so on", &message[..end]),
+        None => message,
+    }
+}
+
+/// Serde's message with words in place of Rust's types.
+fn in_words(message: String) -> String {
+    let words = [
+        ("u64", "a whole number from 0 on"),
+        ("u32", "a whole number from 0 on"),
+        ("u16", "a whole number from 0 on"),
+        ("usize", "a whole number from 0 on"),
+        ("f64", "a number"),
+        ("f32", "a number"),
+        ("a boolean", "true or false"),
+        ("a map", "a table"),
+        ("a sequence", "an array"),
+    ];
+    let Some((start, expected)) = message.rsplit_once("expected ") else {
+        return match message.strip_prefix("missing field ") {
+            Some(field) => format!("the key {field} is missing"),
+            None => message,
+        };
+    };
+    match words
+        .iter()
+        .find(|(rust, _)| expected == *rust || expected.starts_with("struct "))
+    {
+        Some(_) if expected.starts_with("struct ") => format!("{start}expected a table"),
+        Some((_, words)) => format!("{start}expected {words}"),
+        None => message,
     }
 }
 

@@ -368,7 +368,7 @@ mod tests {
 
     #[test]
     fn places_name_the_line_or_the_argument() {
-        let source = source("[team]\nröver = 5\n", &["seed=7", "a.b=[1, 2]"]);
+        let source = source("[team]\n\"röver\" = 5\n", &["seed=7", "a.b=[1, 2]"]);
         let file = |line, column, text: &str| Place::File {
             name: "x.toml".to_owned(),
             line,
@@ -378,7 +378,7 @@ mod tests {
         let keys = |path: &str| -> Vec<String> { path.split('.').map(str::to_owned).collect() };
         assert_eq!(
             source.place_of_key(&keys("team.röver")),
-            file(2, 9, "röver = 5")
+            file(2, 11, "\"röver\" = 5")
         );
         assert_eq!(
             source.place_of_key(&keys("team.absent")),
@@ -392,8 +392,8 @@ mod tests {
             source.place_of_key(&keys("a.b.1")).to_string(),
             "--set a.b=[1, 2]"
         );
-        assert_eq!(source.key_at(&(7..12)), "team.röver");
-        assert_eq!(source.key_at(&(28..29)), "seed");
+        assert_eq!(source.key_at(&(7..15)), "team.röver");
+        assert_eq!(source.key_at(&(26..27)), "seed");
     }
 
     #[test]
