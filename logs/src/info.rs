@@ -171,6 +171,7 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
         ..LogInfo::default()
     };
     let mut times = None;
+    let mut index = TopicIndex::new();
     // Which topic a channel counts for, by the channel's serial number.
     let mut topic_of: Vec<Option<usize>> = Vec::new();
     while let Some(item) = scanner.next()? {
@@ -188,7 +189,9 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 if topic_of.len() <= serial {
                     topic_of.resize(serial + 1, None);
                 }
-                let at = *topic_of[serial].get_or_insert_with(|| topic(&mut info.topics, message.channel));
+                let at = *topic_of[serial].get_or_insert_with(|| {
+                    topic(&mut info.topics, &mut index, message.channel)
+                });
                 info.add_message(&mut times, &message, at);
             }
             Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
@@ -215,14 +218,16 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
 /// How many damaged parts are named.
 const MISSING_LIMIT: usize = 20;
 
-fn topic(topics: &mut Vec<TopicInfo>, channel: &ChannelInfo) -> usize {
+/// Topics by name, schema and role.
+type TopicIndex = BTreeMap<(String, String, String), usize>;
+
+fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelInfo) -> usize {
     let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
-    let same = |known: &TopicInfo| {
-        known.topic == channel.topic && known.schema == schema && known.role == channel.role()
-    };
-    if let Some(at) = topics.iter().position(same) {
-        return at;
+    let key = (channel.topic.clone(), schema.to_owned(), channel.role().to_owned());
+    if let Some(at) = index.get(&key) {
+        return *at;
     }
+    index.insert(key, topics.len());
     topics.push(TopicInfo {
         topic: channel.topic.clone(),
         schema: schema.to_owned(),

@@ -4,6 +4,7 @@ mod descriptors;
 mod diff;
 mod envelope;
 mod error;
+mod fields;
 mod frames;
 mod info;
 mod log;
