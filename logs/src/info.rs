@@ -8,6 +8,8 @@ use farside::Counts;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::log::Head;
+use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
 
 /// What a Farside log says about its run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -101,15 +103,200 @@ pub struct LogInfo {
     pub metadata: BTreeMap<String, BTreeMap<String, String>>,
 }
 
-impl fmt::Display for LogInfo {
-    fn fmt(&self, _f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl LogInfo {
+    fn add_message(&mut self, times: &mut Option<(u64, u64)>, message: &ScannedMessage<'_>, at: usize) {
+        let time = message.head.log_time;
+        *times = Some(times.map_or((time, time), |(a, b)| (a.min(time), b.max(time))));
+        self.messages += 1;
+        self.topics[at].messages += 1;
+        self.topics[at].bytes += message.data.len() as u64;
+    }
+
+    fn finish(&mut self, times: Option<(u64, u64)>, path: &Path) -> Result<(), LogError> {
+        let Some(head) = self.metadata.get("farside") else {
+            self.set_times(times, 0);
+            return Ok(());
+        };
+        let head = Head::read(path, head)?;
+        self.set_times(times, head.epoch_ns);
+        let end = self.metadata.get("farside.end");
+        let text = |key: &str| end.and_then(|end| end.get(key)).cloned();
+        if end.is_none() && self.missing.is_empty() {
+            self.missing.push("no farside.end: the run did not end in this log".to_owned());
+        }
+        let checkpoints = self.topics.iter().filter(|topic| topic.role == "checkpoint");
+        self.run = Some(RunSummary {
+            digest: text("digest"),
+            end: text("end"),
+            end_detail: text("end_detail").unwrap_or_default(),
+            end_time_s: text("end_time_ns").and_then(|ns| ns.parse().ok()).map(seconds),
+            counts: text("counts").and_then(|counts| serde_json::from_str(&counts).ok()),
+            checkpoints: checkpoints.map(|topic| topic.messages).sum(),
+            format: head.format,
+            code_version: head.code_version,
+            seed: head.seed,
+            tie_seed: head.tie_seed,
+            scenario: head.scenario,
+            scenario_hash: head.scenario_hash,
+            exclude: head.exclude,
+        });
         Ok(())
     }
+
+    fn set_times(&mut self, times: Option<(u64, u64)>, epoch_ns: u64) {
+        if let Some((first, last)) = times {
+            self.start_s = Some(seconds(first.saturating_sub(epoch_ns)));
+            self.end_s = Some(seconds(last.saturating_sub(epoch_ns)));
+            self.duration_s = seconds(last - first);
+        }
+    }
+}
+
+/// Nanoseconds as seconds.
+pub(crate) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
 }
 
 /// Reads the whole of a log, and says what is in it. A cut or damaged file is read as far as it
 /// can be.
+///
+/// # Errors
+/// If the file cannot be read, is no MCAP file, or is a Farside log of a format not known here.
 pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
-    let _ = path.as_ref();
-    todo!()
+    let path = path.as_ref();
+    let mut scanner = Scanner::open(path)?;
+    let mut info = LogInfo {
+        path: path.display().to_string(),
+        bytes: scanner.length(),
+        ..LogInfo::default()
+    };
+    let mut times = None;
+    let mut index = TopicIndex::new();
+    // Which topic a channel counts for, by the channel's serial number.
+    let mut topic_of: Vec<Option<usize>> = Vec::new();
+    while let Some(item) = scanner.next()? {
+        match item {
+            Item::Header { profile, library } => {
+                info.profile = profile.to_owned();
+                info.library = library.to_owned();
+            }
+            Item::Chunk { compression } => {
+                let name = if compression.is_empty() { "none" } else { compression };
+                *info.chunks.entry(name.to_owned()).or_default() += 1;
+            }
+            Item::Message(message) => {
+                let serial = message.channel.serial as usize;
+                if topic_of.len() <= serial {
+                    topic_of.resize(serial + 1, None);
+                }
+                let at = *topic_of[serial].get_or_insert_with(|| {
+                    topic(&mut info.topics, &mut index, message.channel)
+                });
+                info.add_message(&mut times, &message, at);
+            }
+            Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
+                name: attachment.name.to_owned(),
+                media_type: attachment.media_type.to_owned(),
+                bytes: attachment.data.len() as u64,
+            }),
+            Item::Metadata(name, entries) => {
+                info.metadata.insert(name, entries);
+            }
+            Item::Damage { offset, what, .. } => {
+                if info.missing.len() < MISSING_LIMIT {
+                    info.missing.push(format!("damaged at byte {offset}: {what}"));
+                }
+            }
+            Item::Cut { offset, what } => info.missing.push(format!("cut at byte {offset}: {what}")),
+        }
+    }
+    info.finish(times, path)?;
+    info.topics.sort_by(|a, b| a.topic.cmp(&b.topic));
+    Ok(info)
+}
+
+/// How many damaged parts are named.
+const MISSING_LIMIT: usize = 20;
+
+/// Topics by name, schema and role.
+type TopicIndex = BTreeMap<(String, String, String), usize>;
+
+fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelInfo) -> usize {
+    let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
+    let key = (channel.topic.clone(), schema.to_owned(), channel.role().to_owned());
+    if let Some(at) = index.get(&key) {
+        return *at;
+    }
+    index.insert(key, topics.len());
+    topics.push(TopicInfo {
+        topic: channel.topic.clone(),
+        schema: schema.to_owned(),
+        encoding: channel.encoding.clone(),
+        role: channel.role().to_owned(),
+        messages: 0,
+        bytes: 0,
+    });
+    topics.len() - 1
+}
+
+impl fmt::Display for LogInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:<12} {} ({} bytes)", "file", self.path, self.bytes)?;
+        writeln!(f, "{:<12} {}", "written by", self.library)?;
+        if let Some(run) = &self.run {
+            write_run(f, run)?;
+        }
+        for missing in &self.missing {
+            writeln!(f, "{:<12} {missing}", "MISSING")?;
+        }
+        if let (Some(start), Some(end)) = (self.start_s, self.end_s) {
+            writeln!(f, "{:<12} {start:.3} s to {end:.3} s, {:.3} s long", "times", self.duration_s)?;
+        }
+        let chunks: Vec<_> = self.chunks.iter().map(|(name, n)| format!("{n} {name}")).collect();
+        writeln!(f, "{:<12} {}", "chunks", chunks.join(", "))?;
+        writeln!(f, "{:<12} {} on {} topics", "messages", self.messages, self.topics.len())?;
+        for topic in &self.topics {
+            let TopicInfo { topic, messages, bytes, schema, .. } = topic;
+            writeln!(f, "  {messages:>9}  {bytes:>12} B  {topic}  {schema}")?;
+        }
+        for attachment in &self.attachments {
+            let AttachmentInfo { name, media_type, bytes } = attachment;
+            writeln!(f, "{:<12} {name} ({media_type}, {bytes} bytes)", "attachment")?;
+        }
+        Ok(())
+    }
+}
+
+fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
+    writeln!(f, "{:<12} {}", "format", run.format)?;
+    writeln!(f, "{:<12} {} ({})", "scenario", run.scenario, run.scenario_hash)?;
+    writeln!(f, "{:<12} {}", "code", run.code_version)?;
+    writeln!(f, "{:<12} {}", "seed", run.seed)?;
+    if let Some(tie_seed) = run.tie_seed {
+        writeln!(f, "{:<12} {tie_seed}", "tie seed")?;
+    }
+    if !run.exclude.is_empty() {
+        writeln!(f, "{:<12} {}", "not written", run.exclude.join(", "))?;
+    }
+    if let Some(digest) = &run.digest {
+        writeln!(f, "{:<12} {digest}", "digest")?;
+    }
+    if let Some(end) = &run.end {
+        let colon = if run.end_detail.is_empty() { "" } else { ": " };
+        let at = run.end_time_s.unwrap_or_default();
+        writeln!(f, "{:<12} {end} at {at:.3} s{colon}{}", "end", run.end_detail)?;
+    }
+    if let Some(counts) = &run.counts {
+        let farside::Counts { sent, delivered, lost, duplicated, in_flight, events, .. } = counts;
+        writeln!(
+            f,
+            "{:<12} {events} events; {sent} messages sent, {delivered} delivered, {lost} lost, \
+             {duplicated} duplicated, {in_flight} in flight",
+            "counts"
+        )?;
+        for (reason, n) in &counts.lost_by_reason {
+            writeln!(f, "  {n:>9}  lost: {reason}")?;
+        }
+    }
+    Ok(())
 }
