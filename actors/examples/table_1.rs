@@ -6,7 +6,8 @@
 //!
 //! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
 //! `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `chains` (true, false), `cycle_limit`, `active_window`.
+//! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
+//! `factor`, `backtrack`, `leaf_wait`, `noise`.
 
 use std::sync::Arc;
 
@@ -94,6 +95,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "acceleration" => network.acceleration = value.parse()?,
             "factor" => network.longest_path_factor = value.parse()?,
             "backtrack" => network.backtrack_penalty = value.parse()?,
+            "leaf_wait" => network.leaf_wait_penalty = value.parse()?,
             "noise" => network.noise = value.parse()?,
             "priority" if value == "lowest_id" => network.priority = Priority::LowestId,
             "priority" => network.priority = Priority::LongestWait,

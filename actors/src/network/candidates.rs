@@ -11,7 +11,8 @@ use super::lng::LocalGraph;
 pub enum Destination {
     /// The rover's goal, where it leaves the roadmap: the path's end is free afterwards.
     Goal,
-    /// A leaf of the local neighbourhood graph. The path claims nothing after its end.
+    /// A leaf of the local neighbourhood graph. The path claims nothing after its end, unless the
+    /// rover is there already: then it waits, and holds its vertex.
     Leaf,
     /// The zero path: the rover stays, and holds its vertex for ever.
     Stay,
@@ -72,6 +73,10 @@ pub enum FirstStep {
 /// The candidates of a rover at `from`: first the goal, then the leaves, ascending, last the zero
 /// path, which is always there. Payoffs are zero; [`super::payoff`] fills them.
 ///
+/// A rover on a leaf has a path of length 0 to it: a pocket to let others pass from. Without it the
+/// zero path, worth so much less than any other, would be the only way to wait, and two rovers that
+/// meet at a pocket would drive each other into it and out of it for ever.
+///
 /// A path whose first vertex is `occupied` begins with a wait, so that no path enters an occupied
 /// vertex in the cycle to come (the rule that makes stopping safe, section 3.5).
 pub(crate) fn candidates(
@@ -82,7 +87,7 @@ pub(crate) fn candidates(
 ) -> Vec<CandidatePath> {
     let path = |destination, to| {
         let mut vertices = graph.path(from, to)?;
-        if occupied(*vertices.get(1)?) {
+        if vertices.get(1).is_some_and(|&first| occupied(first)) {
             vertices.insert(0, from);
         }
         let payoff = 0.0;
@@ -92,7 +97,7 @@ pub(crate) fn candidates(
             payoff,
         })
     };
-    let goal_path = path(Destination::Goal, goal);
+    let goal_path = path(Destination::Goal, goal).filter(|_| goal != from);
     let leaves = graph.leaves(from).filter(|&leaf| leaf != goal);
     let leaf_paths = leaves.filter_map(|leaf| path(Destination::Leaf, leaf));
     let stay = CandidatePath {

@@ -141,6 +141,11 @@ pub struct NetworkConfig {
     pub longest_path_factor: f64,
     /// What a path loses that leads back to the vertex just left [payoff].
     pub backtrack_penalty: f64,
+    /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait there
+    /// [payoff]. Below `backtrack_penalty`, rovers that face each other wait for ever; near C, none
+    /// ever waits in a pocket for another to pass, and two of them go round in circles. A very
+    /// high one leaves only the zero path to wait by.
+    pub leaf_wait_penalty: f64,
     /// The payoff of a collision in the cycle to come is minus this many C.
     pub collision_penalty_factor: f64,
     /// Payoffs get noise from [0, this), new in each cycle.
@@ -177,6 +182,7 @@ impl Default for NetworkConfig {
             traverse: SimDuration::from_millis(200),
             longest_path_factor: 20.0,
             backtrack_penalty: 40.0,
+            leaf_wait_penalty: 45.0,
             collision_penalty_factor: 10.0,
             noise: 0.1,
             convergence: 1e-3,
@@ -251,6 +257,7 @@ impl NetworkConfig {
         for (key, weight) in [
             ("longest_path_factor", self.longest_path_factor),
             ("backtrack_penalty", self.backtrack_penalty),
+            ("leaf_wait_penalty", self.leaf_wait_penalty),
             ("collision_penalty_factor", self.collision_penalty_factor),
             ("noise", self.noise),
             ("convergence", self.convergence),

@@ -61,10 +61,6 @@ impl LocalGraph {
         }
     }
 
-    pub(crate) fn contains(&self, v: VertexId) -> bool {
-        self.local[v.0 as usize] != NONE
-    }
-
     /// The fewest edges between two vertices of the graph on a path inside it; `None` if one is
     /// outside, or no such path exists.
     pub(crate) fn distance(&self, u: VertexId, v: VertexId) -> Option<u32> {
@@ -146,7 +142,6 @@ mod tests {
         assert_eq!(part.distance(v(0), v(3)), None);
         assert_eq!(part.path(v(0), v(7)), None);
         assert!(part.leaves(v(0)).all(|leaf| leaf != v(3)));
-        assert!(!part.contains(v(7)));
     }
 
     #[test]

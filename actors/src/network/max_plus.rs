@@ -277,6 +277,7 @@ mod tests {
         Payoffs {
             longest: 100.0,
             backtrack: 40.0,
+            leaf_wait: 45.0,
             imminent: -1000.0,
         }
     }

@@ -13,6 +13,8 @@ pub(crate) struct Payoffs {
     pub(crate) longest: f64,
     /// What a path loses whose first vertex is the one just left.
     pub(crate) backtrack: f64,
+    /// What the path of length 0 of a rover that stands on a leaf loses.
+    pub(crate) leaf_wait: f64,
     /// The payoff of a pair that collides in the cycle to come: "a highly negative constant".
     pub(crate) imminent: f64,
 }
@@ -23,6 +25,7 @@ impl Payoffs {
         Payoffs {
             longest,
             backtrack: config.backtrack_penalty,
+            leaf_wait: config.leaf_wait_penalty,
             imminent: -config.collision_penalty_factor * longest,
         }
     }
@@ -42,7 +45,9 @@ impl Payoffs {
             Destination::Stay => 0.0,
             Destination::Goal => self.longest - f64::from(path.length()),
             Destination::Leaf => {
-                self.longest - f64::from(path.length() + roadmap.distance(end, goal))
+                let waits = path.length() == 0;
+                let penalty = if waits { self.leaf_wait } else { 0.0 };
+                self.longest - f64::from(path.length() + roadmap.distance(end, goal)) - penalty
             }
         };
         let backtracks = previous.is_some() && path.next_vertex() == previous;
@@ -67,9 +72,10 @@ pub(crate) fn divisor(t: u32) -> f64 {
 }
 
 /// The first cycle, from 1, in which two paths collide: both at one vertex, or swapping along an
-/// edge. A zero path holds its vertex for ever; any other path claims nothing after its end.
+/// edge. A path of length 0 (the zero path, and the wait on a leaf) holds its vertex for ever; any
+/// other claims nothing after its end.
 pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
-    let stays = |path: &CandidatePath| path.destination == Destination::Stay;
+    let stays = |path: &CandidatePath| path.length() == 0;
     let (mut from_a, mut from_b) = (a.vertices[0], b.vertices[0]);
     let cycles = match (stays(a), stays(b)) {
         (true, true) => 1,
@@ -167,6 +173,10 @@ mod tests {
         assert_eq!(
             unary(&path(Destination::Leaf, &[3, 3, 2]), Some(v(2))),
             100.0 - 2.0 - 3.0 - 40.0
+        );
+        assert_eq!(
+            unary(&path(Destination::Leaf, &[0]), Some(v(1))),
+            100.0 - 5.0 - payoffs.leaf_wait as f32
         );
         assert_eq!(unary(&path(Destination::Stay, &[3]), Some(v(3))), 0.0);
     }
