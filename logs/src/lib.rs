@@ -1,6 +1,5 @@
 //! MCAP logs of Farside runs: write, read, verify, diff, recover.
 
-mod attachments;
 mod descriptors;
 mod diff;
 mod envelope;
@@ -17,7 +16,6 @@ mod verify;
 mod wire;
 mod writer;
 
-pub use attachments::attachments;
 pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;

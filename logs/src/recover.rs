@@ -31,7 +31,10 @@ impl fmt::Display for RecoverReport {
 }
 
 /// Writes every complete chunk and record of `broken` to a new file `out`.
-pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RecoverReport, LogError> {
+pub fn recover(
+    broken: impl AsRef<Path>,
+    out: impl AsRef<Path>,
+) -> Result<RecoverReport, LogError> {
     let _ = (broken.as_ref(), out.as_ref());
     todo!()
 }

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use farside::key::EventKey;
-use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::record::{
+    Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants,
+};
 use farside::{Kind, Report, RunInfo};
 use xxhash_rust::xxh3::xxh3_128;
 
@@ -329,11 +331,9 @@ impl Live {
                 let name = kind.map_or("", |kind| kind.name());
                 let role = topics::role(flow.class);
                 // Declarations precede everything that is still to be written.
-                let channel =
-                    self.channels
-                        .get(&mut self.batch, &flow.topic, role, name, || {
-                            schema_of(flow.class, kind)
-                        })?;
+                let channel = self.channels.get(&mut self.batch, &flow.topic, role, name, || {
+                    schema_of(flow.class, kind)
+                })?;
                 flow.channel = Some(channel);
                 channel
             }
@@ -346,11 +346,7 @@ impl Live {
             log_time: self.epoch_ns + self.last_ns,
             publish_time: self.epoch_ns + record.sent.as_nanos(),
         };
-        let batch = if at_end {
-            &mut self.at_end
-        } else {
-            &mut self.batch
-        };
+        let batch = if at_end { &mut self.at_end } else { &mut self.batch };
         if record.class == RecordClass::Sample {
             batch.message(header, |out| out.extend_from_slice(record.body));
         } else {
@@ -395,11 +391,7 @@ impl Live {
             put_text(out, 1, &checkpoint.digest.to_string());
             put_key(out, 2, &checkpoint.key, &source);
             put_number(out, 3, checkpoint.records);
-            let hashes: Vec<u8> = checkpoint
-                .hashes
-                .iter()
-                .flat_map(|h| h.to_le_bytes())
-                .collect();
+            let hashes: Vec<u8> = checkpoint.hashes.iter().flat_map(|h| h.to_le_bytes()).collect();
             put_bytes(out, 4, &hashes);
         };
         if !self.at_end.is_empty() {
@@ -476,8 +468,7 @@ impl Observer for LogWriter {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        self.with_live(|live| live.record(record))
-            .map(|()| Flow::Continue)
+        self.with_live(|live| live.record(record)).map(|()| Flow::Continue)
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), ObserverError> {
@@ -486,16 +477,11 @@ impl Observer for LogWriter {
 
     fn end(&mut self, report: &Report) -> Result<(), ObserverError> {
         match self.live.take() {
-            Some(live) => live
-                .end(report)
-                .map_err(|error| ObserverError(error.to_string())),
+            Some(live) => live.end(report).map_err(|error| ObserverError(error.to_string())),
             // The failure was reported when it happened, and is why the run ended.
             None => match &report.end {
                 farside::End::ObserverFailed(reason) => Err(ObserverError(reason.clone())),
-                _ => Err(ObserverError(format!(
-                    "{}: the log is closed",
-                    self.path.display()
-                ))),
+                _ => Err(ObserverError(format!("{}: the log is closed", self.path.display()))),
             },
         }
     }

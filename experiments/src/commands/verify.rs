@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::{Report, SimDuration};
-use farside_logs::{RunSummary, Verifier, VerifyOutcome};
+use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome};
 use serde::Serialize;
 
 use super::run::{ExecutorName, FILE_PREFIX, timed};
@@ -110,11 +110,11 @@ pub(super) fn scenario_of(
     };
     let mut text = None;
     let mut files = BTreeMap::new();
-    for attachment in farside_logs::attachments(path)? {
+    for attachment in Log::open(path)?.attachments() {
         if attachment.name == SCENARIO {
-            text = Some(attachment.bytes);
+            text = Some(attachment.bytes.clone());
         } else if let Some(name) = attachment.name.strip_prefix(FILE_PREFIX) {
-            files.insert(name.to_owned(), attachment.bytes);
+            files.insert(name.to_owned(), attachment.bytes.clone());
         }
     }
     let text = text.ok_or_else(|| not_repeatable(format!("it holds no {SCENARIO}")))?;
