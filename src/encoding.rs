@@ -1,47 +1,75 @@
-//! Message encoding. For the moment bodies are JSON, so that the kernel can be built against the
-//! interface that the protobuf encoding will fill.
+//! Message encoding: any serde type in, protobuf out, with a descriptor that others can read.
+//!
+//! A message type derives `Serialize` and `Deserialize` and nothing else. [`Schema::of`] traces
+//! its shape once, by deserializing it from samples; the schema then encodes values in a single
+//! pass, decodes them to equal values, and describes itself as a protobuf file, so that log viewers
+//! and other languages read every field.
+//!
+//! ```
+//! use farside::encoding::Schema;
+//! use serde::{Deserialize, Serialize};
+//!
+//! #[derive(Serialize, Deserialize, PartialEq, Debug)]
+//! enum Order {
+//!     Stop,
+//!     Drive { speed_m_s: f64, via: Vec<(i32, i32)> },
+//! }
+//!
+//! let schema = Schema::of::<Order>()?;
+//! let order = Order::Drive { speed_m_s: 0.5, via: vec![(1, 2), (3, 4)] };
+//! let mut bytes = Vec::new();
+//! schema.encode(&order, &mut bytes)?;
+//! assert_eq!(schema.decode::<Order>(&bytes)?, order);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What becomes what
+//!
+//! | serde | protobuf (proto3) |
+//! |---|---|
+//! | struct, tuple struct, tuple of mixed types | message; fields numbered in order from 1 |
+//! | `bool`, `i8` to `i32`, `i64`, `u8` to `u32`, `u64`, `f32`, `f64` | `bool`, `int32`, `int64`, `uint32`, `uint64`, `float`, `double`; always written, also when zero |
+//! | `char`, strings | `string` |
+//! | `serialize_bytes` | `bytes` |
+//! | `i128`, `u128` | `bytes`: 16, little-endian |
+//! | enum without data | enum; values prefixed with its name, numbered from 0 |
+//! | enum with data | message with a `oneof` |
+//! | `Option` | `optional` |
+//! | `Vec`, arrays, tuples of one type | `repeated`, packed where protobuf can |
+//! | maps | `map` where the key allows it, else repeated entries; sorted by encoded key |
+//! | `Option<Option<_>>`, `Vec<Vec<_>>`, `Option<Vec<_>>` and the like | a helper message around the inner one |
+//! | newtype structs | what they hold; the root, and one that contains itself, are messages |
+//!
+//! Every NaN is written as the same NaN. Recursive types work; values may nest up to 96 messages,
+//! since common readers stop at 100.
+//!
+//! # What is refused
+//!
+//! Types whose shape depends on the data (`flatten`, `untagged`, internally and adjacently tagged
+//! enums), hash maps and hash sets, roots that are no struct or enum, and types whose `Serialize`
+//! writes what their `Deserialize` does not read. [`Schema::of`] names the type and the reason.
+//!
+//! # What is not kept
+//!
+//! On the wire `None`, an empty collection and a field left out by `skip_serializing_if` are all
+//! "absent". An `Option` or collection that is skipped for any *other* value would not come back.
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use thiserror::Error;
+mod decode;
+mod descriptor;
+mod encode;
+mod error;
+mod format;
+mod lower;
+mod names;
+mod plan;
+mod registry;
+mod samples;
+mod schema;
+mod trace;
+mod wire;
 
-/// A type that cannot be described.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct SchemaError(pub String);
-/// A value that cannot be written.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct EncodeError(pub String);
-/// Bytes that cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{0}")]
-pub struct DecodeError(pub String);
+#[cfg(test)]
+mod tests;
 
-/// How one message type is written.
-#[derive(Clone, Debug)]
-pub struct Schema {
-    name: String,
-}
-
-impl Schema {
-    /// Traces `T`.
-    pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
-        let full = std::any::type_name::<T>();
-        Ok(Schema {
-            name: full.rsplit("::").next().unwrap_or(full).to_owned(),
-        })
-    }
-    /// The kind.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-    /// Appends the encoded value.
-    pub fn encode<T: Serialize>(&self, value: &T, out: &mut Vec<u8>) -> Result<(), EncodeError> {
-        serde_json::to_writer(out, value).map_err(|e| EncodeError(e.to_string()))
-    }
-    /// Reads a value back.
-    pub fn decode<T: DeserializeOwned>(&self, bytes: &[u8]) -> Result<T, DecodeError> {
-        serde_json::from_slice(bytes).map_err(|e| DecodeError(e.to_string()))
-    }
-}
+pub use error::{DecodeError, EncodeError, SchemaError};
+pub use schema::{PACKAGE, Schema};

@@ -1,0 +1,577 @@
+//! A serde `Serializer` that writes protobuf in one pass, straight into the caller's buffer.
+//!
+//! The plan is walked beside the value: each call of `Serialize` finds its field by position, so
+//! that nothing is looked up and nothing is allocated. A nested message gets one byte for its
+//! length, which is widened once the length is known to need more.
+
+use serde::ser::{self, Serialize};
+
+use super::error::EncodeError;
+use super::plan::{Card, Field, Key, Kind, MAX_DEPTH, Message, Plan, Shape};
+use super::wire::{self, Tag};
+
+mod compound;
+
+use compound::{Compound, MapSer, SeqSer, TupleSer};
+
+/// Boxed, so that the `Result` of every call fits a register.
+type Fault = Box<EncodeError>;
+
+impl ser::Error for Fault {
+    fn custom<T: std::fmt::Display>(message: T) -> Self {
+        Box::new(EncodeError::Custom(message.to_string()))
+    }
+}
+
+/// Appends `value` to `out`; on an error `out` is left as it was.
+pub(super) fn encode<T: Serialize + ?Sized>(
+    plan: &Plan,
+    value: &T,
+    out: &mut Vec<u8>,
+) -> Result<(), EncodeError> {
+    let start = out.len();
+    let root = ValueSer {
+        plan,
+        out,
+        field: &plan.root,
+        first: plan.root.first,
+        position: Position::Root,
+        depth: 0,
+    };
+    match value.serialize(root) {
+        Ok(()) => Ok(()),
+        Err(fault) => {
+            out.truncate(start);
+            Err(*fault)
+        }
+    }
+}
+
+/// What goes before a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Position {
+    /// Neither tag nor length.
+    Root,
+    /// A tag, and a length where the wire type has one.
+    Tagged,
+    /// No tag: one of many in a packed field.
+    Packed,
+}
+
+/// Stands for "nothing is open here" among offsets.
+const NONE: usize = usize::MAX;
+
+/// Writes one value of one field.
+struct ValueSer<'a> {
+    plan: &'a Plan,
+    out: &'a mut Vec<u8>,
+    field: &'a Field,
+    /// What may come at once: the field's own `first`, or its kind inside an option or sequence.
+    first: Kind,
+    position: Position,
+    depth: u32,
+}
+
+impl<'a> ValueSer<'a> {
+    /// A value of the field at `index` in a message that is open in `out`.
+    #[inline(always)]
+    fn inside(plan: &'a Plan, out: &'a mut Vec<u8>, field: &'a Field, depth: u32) -> ValueSer<'a> {
+        ValueSer {
+            plan,
+            out,
+            field,
+            first: field.first,
+            position: Position::Tagged,
+            depth,
+        }
+    }
+
+    #[inline(always)]
+    fn tag(&self) -> Tag {
+        match self.position {
+            Position::Tagged => self.field.tag,
+            Position::Root | Position::Packed => Tag::NONE,
+        }
+    }
+
+    #[inline(always)]
+    fn is(&self, kind: Kind) -> bool {
+        self.first == kind
+    }
+
+    /// The cardinality that must come first.
+    #[inline(always)]
+    fn expect(&self) -> Card {
+        if self.first == Kind::Pending {
+            self.field.card
+        } else {
+            Card::Single
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn mismatch<T>(&self, actual: impl std::fmt::Display) -> Result<T, Fault> {
+        Err(Box::new(EncodeError::Mismatch {
+            place: self.field.place.clone(),
+            expected: self.plan.describe(self.field, self.expect()),
+            actual: actual.to_string(),
+        }))
+    }
+
+    #[inline(always)]
+    fn varint(self, kind: Kind, value: u64) -> Result<(), Fault> {
+        if !self.is(kind) {
+            return self.mismatch(format_args!("{kind:?}"));
+        }
+        if self.position == Position::Packed {
+            wire::put_packed_varint(self.out, value);
+        } else {
+            wire::put_varint(self.out, self.field.tag, value);
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn bytes(self, kind: Kind, bytes: &[u8]) -> Result<(), Fault> {
+        if !self.is(kind) {
+            return self.mismatch(format_args!("{kind:?}"));
+        }
+        wire::put_bytes(self.out, self.tag(), bytes);
+        Ok(())
+    }
+
+    /// Writes a variant of a plain enum.
+    #[inline]
+    fn number(self, index: u32, variant: &'static str) -> Result<(), Fault> {
+        let Kind::Enum(id) = self.first else {
+            return self.mismatch("a unit variant");
+        };
+        let enumeration = &self.plan.enums[id];
+        match position(&enumeration.values, |value| &value.key, index, variant) {
+            Some(number) => self.varint(Kind::Enum(id), number as u64),
+            None => Err(unknown_variant(&enumeration.name, variant)),
+        }
+    }
+
+    /// The message that a value of this field is, if one must come now.
+    #[inline(always)]
+    fn message(&self) -> Option<&'a Message> {
+        match self.first {
+            Kind::Message(id) => Some(&self.plan.messages[id]),
+            _ => None,
+        }
+    }
+
+    /// Opens the message that this value is.
+    #[inline(always)]
+    fn open(self, shape: Shape) -> Result<Compound<'a>, Fault> {
+        let message = match self.message() {
+            Some(message) if message.shape == shape => message,
+            _ => return self.mismatch(shape),
+        };
+        if self.depth >= MAX_DEPTH {
+            return Err(too_deep());
+        }
+        let start = match self.position {
+            Position::Root => NONE,
+            _ => begin(self.out, self.field.tag),
+        };
+        Ok(Compound {
+            plan: self.plan,
+            out: self.out,
+            message,
+            rest: &message.fields,
+            start,
+            outer: NONE,
+            depth: self.depth + 1,
+        })
+    }
+
+    /// Opens the helper that stands around an option or collection here.
+    fn open_wrapper(self, actual: &'static str) -> Result<Compound<'a>, Fault> {
+        match self.message() {
+            Some(message) if message.shape == Shape::Wrapper => self.open(Shape::Wrapper),
+            _ => self.mismatch(actual),
+        }
+    }
+
+    /// Opens the oneof message of a data enum; its one field is the variant's.
+    #[inline]
+    fn open_variant(
+        self,
+        index: u32,
+        variant: &'static str,
+    ) -> Result<(Compound<'a>, &'a Field), Fault> {
+        let oneof = self.open(Shape::Oneof)?;
+        let fields = &oneof.message.fields;
+        let found = position(fields, |field| &field.key, index, variant);
+        let Some(found) = found else {
+            return Err(unknown_variant(&oneof.message.name, variant));
+        };
+        Ok((oneof, &fields[found]))
+    }
+
+    /// Opens a variant's own content within the oneof.
+    #[inline]
+    fn open_content(
+        self,
+        index: u32,
+        variant: &'static str,
+        shape: Shape,
+    ) -> Result<Compound<'a>, Fault> {
+        let (oneof, field) = self.open_variant(index, variant)?;
+        let Compound {
+            plan,
+            out,
+            start,
+            depth,
+            ..
+        } = oneof;
+        let mut content = ValueSer::inside(plan, out, field, depth).open(shape)?;
+        content.outer = start;
+        Ok(content)
+    }
+}
+
+/// The position of a variant. `Serialize` counts variants that `Deserialize` skips, and
+/// `Deserialize` lists aliases: the name decides, the index is where to look first.
+#[inline(always)]
+fn position<T>(
+    all: &[T],
+    key: impl Fn(&T) -> &Key,
+    index: u32,
+    variant: &'static str,
+) -> Option<usize> {
+    let index = index as usize;
+    match all.get(index) {
+        Some(one) if key(one).is(variant) => Some(index),
+        _ => all.iter().position(|one| key(one).name == variant),
+    }
+}
+
+#[cold]
+fn too_deep() -> Fault {
+    Box::new(EncodeError::TooDeep { limit: MAX_DEPTH })
+}
+
+#[cold]
+fn unknown_variant(name: &str, variant: &str) -> Fault {
+    Box::new(EncodeError::UnknownVariant {
+        name: name.to_owned(),
+        variant: variant.to_owned(),
+    })
+}
+
+/// Writes a tag and keeps one byte for a length; the answer goes to [`finish`].
+#[inline(always)]
+fn begin(out: &mut Vec<u8>, tag: Tag) -> usize {
+    wire::put_varint(out, tag, 0);
+    out.len()
+}
+
+/// Writes the length of what follows `start`.
+#[inline(always)]
+fn finish(out: &mut Vec<u8>, start: usize) {
+    if start == NONE {
+        return;
+    }
+    let len = out.len() - start;
+    if len < 0x80 {
+        out[start - 1] = len as u8;
+    } else {
+        widen(out, start, 1, len);
+    }
+}
+
+/// Makes room for a longer (or shorter) length than the `kept` bytes before `start`, and writes it.
+#[inline(never)]
+fn widen(out: &mut Vec<u8>, start: usize, kept: usize, len: usize) {
+    let needed = wire::varint_len(len as u64);
+    let end = start + len;
+    let moved = start - kept + needed;
+    if moved > start {
+        out.resize(end + (moved - start), 0);
+    }
+    out.copy_within(start..end, moved);
+    out.truncate(moved + len);
+    let mut rest = len;
+    for (at, byte) in out[start - kept..moved].iter_mut().enumerate() {
+        let more = if at + 1 < needed { 0x80 } else { 0 };
+        *byte = (rest & 0x7f) as u8 | more;
+        rest >>= 7;
+    }
+}
+
+/// The bits of the one NaN that is ever written, or of `value`.
+#[inline(always)]
+fn canonical64(value: f64) -> u64 {
+    if value.is_nan() {
+        0x7ff8_0000_0000_0000
+    } else {
+        value.to_bits()
+    }
+}
+
+#[inline(always)]
+fn canonical32(value: f32) -> u32 {
+    if value.is_nan() {
+        0x7fc0_0000
+    } else {
+        value.to_bits()
+    }
+}
+
+impl<'a> ser::Serializer for ValueSer<'a> {
+    type Ok = ();
+    type Error = Fault;
+    type SerializeSeq = SeqSer<'a>;
+    type SerializeTuple = TupleSer<'a>;
+    type SerializeTupleStruct = Compound<'a>;
+    type SerializeTupleVariant = Compound<'a>;
+    type SerializeMap = MapSer<'a>;
+    type SerializeStruct = Compound<'a>;
+    type SerializeStructVariant = Compound<'a>;
+
+    fn is_human_readable(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn serialize_bool(self, v: bool) -> Result<(), Fault> {
+        self.varint(Kind::Bool, u64::from(v))
+    }
+
+    #[inline(always)]
+    fn serialize_i8(self, v: i8) -> Result<(), Fault> {
+        self.varint(Kind::I32, i64::from(v) as u64)
+    }
+
+    #[inline(always)]
+    fn serialize_i16(self, v: i16) -> Result<(), Fault> {
+        self.varint(Kind::I32, i64::from(v) as u64)
+    }
+
+    #[inline(always)]
+    fn serialize_i32(self, v: i32) -> Result<(), Fault> {
+        self.varint(Kind::I32, i64::from(v) as u64)
+    }
+
+    #[inline(always)]
+    fn serialize_i64(self, v: i64) -> Result<(), Fault> {
+        self.varint(Kind::I64, v as u64)
+    }
+
+    fn serialize_i128(self, v: i128) -> Result<(), Fault> {
+        self.bytes(Kind::I128, &v.to_le_bytes())
+    }
+
+    #[inline(always)]
+    fn serialize_u8(self, v: u8) -> Result<(), Fault> {
+        self.varint(Kind::U32, u64::from(v))
+    }
+
+    #[inline(always)]
+    fn serialize_u16(self, v: u16) -> Result<(), Fault> {
+        self.varint(Kind::U32, u64::from(v))
+    }
+
+    #[inline(always)]
+    fn serialize_u32(self, v: u32) -> Result<(), Fault> {
+        self.varint(Kind::U32, u64::from(v))
+    }
+
+    #[inline(always)]
+    fn serialize_u64(self, v: u64) -> Result<(), Fault> {
+        self.varint(Kind::U64, v)
+    }
+
+    fn serialize_u128(self, v: u128) -> Result<(), Fault> {
+        self.bytes(Kind::U128, &v.to_le_bytes())
+    }
+
+    #[inline(always)]
+    fn serialize_f32(self, v: f32) -> Result<(), Fault> {
+        if !self.is(Kind::F32) {
+            return self.mismatch("f32");
+        }
+        wire::put_fixed32(self.out, self.tag(), canonical32(v));
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn serialize_f64(self, v: f64) -> Result<(), Fault> {
+        if !self.is(Kind::F64) {
+            return self.mismatch("f64");
+        }
+        wire::put_fixed64(self.out, self.tag(), canonical64(v));
+        Ok(())
+    }
+
+    fn serialize_char(self, v: char) -> Result<(), Fault> {
+        self.bytes(Kind::Char, v.encode_utf8(&mut [0; 4]).as_bytes())
+    }
+
+    #[inline(always)]
+    fn serialize_str(self, v: &str) -> Result<(), Fault> {
+        self.bytes(Kind::Str, v.as_bytes())
+    }
+
+    #[inline(always)]
+    fn serialize_bytes(self, v: &[u8]) -> Result<(), Fault> {
+        self.bytes(Kind::Bytes, v)
+    }
+
+    fn serialize_none(self) -> Result<(), Fault> {
+        if self.expect() == Card::Optional {
+            return Ok(());
+        }
+        let wrapper = self.open_wrapper("an option")?;
+        if wrapper.message.fields[0].card != Card::Optional {
+            return wrapper.inner().mismatch("an option");
+        }
+        wrapper.close()
+    }
+
+    #[inline(always)]
+    fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Result<(), Fault> {
+        if self.expect() == Card::Optional {
+            return value.serialize(ValueSer {
+                first: self.field.kind,
+                ..self
+            });
+        }
+        let mut wrapper = self.open_wrapper("an option")?;
+        let inner = wrapper.reborrow_inner();
+        if inner.expect() != Card::Optional {
+            return inner.mismatch("an option");
+        }
+        value.serialize(ValueSer {
+            first: inner.field.kind,
+            ..inner
+        })?;
+        wrapper.close()
+    }
+
+    fn serialize_unit(self) -> Result<(), Fault> {
+        self.open(Shape::Unit)?.close()
+    }
+
+    fn serialize_unit_struct(self, _name: &'static str) -> Result<(), Fault> {
+        self.open(Shape::Unit)?.close()
+    }
+
+    #[inline(always)]
+    fn serialize_unit_variant(
+        self,
+        _name: &'static str,
+        index: u32,
+        variant: &'static str,
+    ) -> Result<(), Fault> {
+        if self
+            .message()
+            .is_some_and(|message| message.shape == Shape::Wrapper)
+        {
+            // A plain enum at the root: a message must stand around it.
+            let mut wrapper = self.open(Shape::Wrapper)?;
+            wrapper.reborrow_inner().number(index, variant)?;
+            return wrapper.close();
+        }
+        if let Kind::Enum(_) = self.field.kind {
+            return self.number(index, variant);
+        }
+        self.open_content(index, variant, Shape::Unit)?.close()
+    }
+
+    #[inline(always)]
+    fn serialize_newtype_struct<T: ?Sized + Serialize>(
+        self,
+        _name: &'static str,
+        value: &T,
+    ) -> Result<(), Fault> {
+        if self
+            .message()
+            .is_some_and(|message| message.shape == Shape::Newtype)
+        {
+            let mut newtype = self.open(Shape::Newtype)?;
+            value.serialize(newtype.reborrow_inner())?;
+            return newtype.close();
+        }
+        // Other newtype structs are what they hold.
+        value.serialize(self)
+    }
+
+    #[inline(always)]
+    fn serialize_newtype_variant<T: ?Sized + Serialize>(
+        self,
+        _name: &'static str,
+        index: u32,
+        variant: &'static str,
+        value: &T,
+    ) -> Result<(), Fault> {
+        let (oneof, field) = self.open_variant(index, variant)?;
+        value.serialize(ValueSer::inside(
+            oneof.plan,
+            &mut *oneof.out,
+            field,
+            oneof.depth,
+        ))?;
+        oneof.close()
+    }
+
+    #[inline(always)]
+    fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'a>, Fault> {
+        SeqSer::open(self, len)
+    }
+
+    #[inline(always)]
+    fn serialize_tuple(self, len: usize) -> Result<TupleSer<'a>, Fault> {
+        match self.message() {
+            Some(message) if message.shape == Shape::Tuple => {
+                Ok(TupleSer::Mixed(self.open(Shape::Tuple)?))
+            }
+            _ => Ok(TupleSer::Alike(SeqSer::open(self, Some(len))?)),
+        }
+    }
+
+    #[inline]
+    fn serialize_tuple_struct(
+        self,
+        _name: &'static str,
+        _len: usize,
+    ) -> Result<Compound<'a>, Fault> {
+        self.open(Shape::Tuple)
+    }
+
+    #[inline]
+    fn serialize_tuple_variant(
+        self,
+        _name: &'static str,
+        index: u32,
+        variant: &'static str,
+        _len: usize,
+    ) -> Result<Compound<'a>, Fault> {
+        self.open_content(index, variant, Shape::Tuple)
+    }
+
+    #[inline]
+    fn serialize_map(self, _len: Option<usize>) -> Result<MapSer<'a>, Fault> {
+        MapSer::open(self)
+    }
+
+    #[inline(always)]
+    fn serialize_struct(self, _name: &'static str, _len: usize) -> Result<Compound<'a>, Fault> {
+        self.open(Shape::Struct)
+    }
+
+    #[inline(always)]
+    fn serialize_struct_variant(
+        self,
+        _name: &'static str,
+        index: u32,
+        variant: &'static str,
+        _len: usize,
+    ) -> Result<Compound<'a>, Fault> {
+        self.open_content(index, variant, Shape::Struct)
+    }
+}

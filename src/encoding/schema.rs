@@ -1,0 +1,143 @@
+//! The schema of one message kind, as the rest of the world uses it.
+
+use std::any::type_name;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::error::{DecodeError, EncodeError, SchemaError};
+use super::plan::Plan;
+use super::{decode, descriptor, encode, lower, trace, wire};
+
+/// The protobuf package of every message kind.
+pub const PACKAGE: &str = "farside.msg";
+
+/// How one message kind is written as protobuf: traced from its serde type.
+///
+/// A schema is immutable and made once for each kind; share it by [`Arc`](std::sync::Arc).
+///
+/// ```
+/// use farside::encoding::Schema;
+/// use serde::{Deserialize, Serialize};
+///
+/// #[derive(Serialize, Deserialize, PartialEq, Debug)]
+/// struct Ping {
+///     count: u32,
+///     note: Option<String>,
+/// }
+///
+/// let schema = Schema::of::<Ping>()?;
+/// assert_eq!(schema.name(), "Ping");
+/// assert_eq!(schema.full_name(), "farside.msg.Ping");
+///
+/// let mut bytes = Vec::new();
+/// let ping = Ping { count: 7, note: None };
+/// schema.encode(&ping, &mut bytes)?;
+/// assert_eq!(bytes, [0x08, 7]);
+/// assert_eq!(schema.decode::<Ping>(&bytes)?, ping);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Schema {
+    name: &'static str,
+    plan: Plan,
+}
+
+impl Schema {
+    /// Traces the type and decides its form in protobuf.
+    ///
+    /// ```
+    /// use farside::encoding::{Schema, SchemaError};
+    ///
+    /// let error = Schema::of::<u32>().unwrap_err();
+    /// assert!(matches!(error, SchemaError::NotAContainer { .. }));
+    /// ```
+    pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
+        let traced = trace::trace::<T>()?;
+        let plan = lower::lower(&traced.registry.containers, traced.root);
+        let schema = Schema {
+            name: traced.registry.containers[traced.root].name,
+            plan,
+        };
+        let asymmetric = |reason: String| SchemaError::Asymmetric {
+            type_name: type_name::<T>().to_owned(),
+            reason,
+        };
+        let mut bytes = Vec::new();
+        for value in &traced.values {
+            bytes.clear();
+            match schema.encode(value, &mut bytes) {
+                Ok(()) => {}
+                // A sample may be a value that the type itself refuses to write.
+                Err(EncodeError::Custom(_)) => continue,
+                Err(error) => return Err(asymmetric(error.to_string())),
+            }
+            if let Err(error) = schema.decode::<T>(&bytes) {
+                return Err(asymmetric(error.to_string()));
+            }
+        }
+        Ok(schema)
+    }
+
+    /// The message kind: the serde name of the type.
+    pub fn name(&self) -> &str {
+        self.name
+    }
+
+    /// The fully qualified protobuf name of the root message.
+    pub fn full_name(&self) -> String {
+        format!("{PACKAGE}.{}", self.plan.messages[0].name)
+    }
+
+    /// The name of the protobuf file that declares the root message, for another file to import.
+    ///
+    /// ```
+    /// # use farside::encoding::Schema;
+    /// #[derive(serde::Serialize, serde::Deserialize)]
+    /// struct Ping(u32);
+    ///
+    /// assert_eq!(Schema::of::<Ping>()?.file_name(), "farside/msg/Ping.proto");
+    /// # Ok::<(), farside::encoding::SchemaError>(())
+    /// ```
+    pub fn file_name(&self) -> String {
+        format!(
+            "{}/{}.proto",
+            PACKAGE.replace('.', "/"),
+            self.plan.messages[0].name
+        )
+    }
+
+    /// The declaration as an encoded `google.protobuf.FileDescriptorProto`.
+    ///
+    /// Its first and only top-level message is the root; every type that it uses is nested inside
+    /// it, so that the helper types of two kinds never collide.
+    pub fn file_descriptor(&self) -> Vec<u8> {
+        descriptor::file(&self.plan, &self.file_name(), PACKAGE)
+    }
+
+    /// The declaration as an encoded `google.protobuf.FileDescriptorSet` of that one file.
+    ///
+    /// A set is its files one after the other, so that appending another set adds its files.
+    pub fn file_descriptor_set(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        let tag = wire::Tag::new(1, wire::Wire::Bytes);
+        wire::put_bytes(&mut out, tag, &self.file_descriptor());
+        out
+    }
+
+    /// Appends the value to `out`; on an error `out` is as it was.
+    #[inline]
+    pub fn encode<T: Serialize + ?Sized>(
+        &self,
+        value: &T,
+        out: &mut Vec<u8>,
+    ) -> Result<(), EncodeError> {
+        encode::encode(&self.plan, value, out)
+    }
+
+    /// Reads a value. Unknown fields are skipped; a field that is absent reads as its serde
+    /// default, or as protobuf's zero where the type has none.
+    pub fn decode<T: DeserializeOwned>(&self, bytes: &[u8]) -> Result<T, DecodeError> {
+        decode::decode(&self.plan, bytes)
+    }
+}
