@@ -173,3 +173,121 @@ fn a_reader_who_has_seen_enough_is_no_error() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
 }
+
+#[test]
+fn a_log_is_verified_by_running_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [
+        "--set",
+        "links.default.duplicate=0.1",
+        "--tie-seed",
+        "3",
+        "--seed",
+        "5",
+    ];
+    let run = json(&farside(
+        folder.path(),
+        &small(&[&["--json"], &sets[..]].concat()),
+    ));
+    let verified = farside(folder.path(), &["verify", "run.mcap", "--json"]);
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        text(&verified.stderr)
+    );
+    let verified = json(&verified);
+    assert_eq!(verified["result"], "same");
+    assert_eq!(verified["digest"], run["digest"]);
+    let said = farside(
+        folder.path(),
+        &["verify", "run.mcap", "--executor", "inline"],
+    );
+    assert!(text(&said.stdout).starts_with("run.mcap: the same: "));
+    let info = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
+    assert_eq!(info["run"]["seed"], 5);
+    assert_eq!(info["run"]["digest"], run["digest"]);
+}
+
+#[test]
+fn a_roadmap_of_ones_own_travels_in_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = "name = 'ring'\nboundary = [0, 2]\nedges = [[0, 1], [1, 2], [2, 3], [0, 3]]\n\
+        positions_m = [[0, 0], [50, 0], [50, 50], [0, 50]]";
+    std::fs::write(folder.path().join("ring.toml"), map).unwrap();
+    let scenario = "system = 'network'\nuntil = '30s'\nworld.roadmap = 'ring.toml'\n\
+        world.nodes = 2\nteam.rovers = 2";
+    std::fs::write(folder.path().join("mine.toml"), scenario).unwrap();
+    let run = farside(folder.path(), &["run", "mine.toml", "--json"]);
+    assert_eq!(run.status.code(), Some(0), "{}", text(&run.stderr));
+    std::fs::remove_file(folder.path().join("ring.toml")).unwrap();
+    std::fs::remove_file(folder.path().join("mine.toml")).unwrap();
+    let verified = farside(folder.path(), &["verify", "run.mcap"]);
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        text(&verified.stderr)
+    );
+}
+
+#[test]
+fn what_is_no_log_of_ours_is_trouble() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("x.mcap"), "not an MCAP file").unwrap();
+    std::fs::write(folder.path().join("empty.mcap"), "").unwrap();
+    for command in ["verify", "info"] {
+        for log in ["x.mcap", "empty.mcap", "missing.mcap", "."] {
+            let output = farside(folder.path(), &[command, log]);
+            assert_eq!(output.status.code(), Some(2), "{command} {log}");
+            assert!(text(&output.stderr).starts_with("error: "));
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_run_leaves_a_whole_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let child = Command::new(env!("CARGO_BIN_EXE_farside"))
+        // Far more than a second's work on any machine.
+        .args(["run", "--set", "team.rovers=150", "--set", "world.nodes=14"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let log = folder.path().join("run.mcap");
+    while !log.metadata().is_ok_and(|metadata| metadata.len() > 50_000) {
+        std::thread::yield_now();
+    }
+    let process = child.id().to_string();
+    let killed = Command::new("kill").args(["-TERM", &process]).status();
+    assert!(killed.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert!(text(&output.stdout).contains("interrupted at"));
+    let info = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
+    assert_eq!(info["run"]["end"], "interrupted");
+    assert_eq!(info["missing"].as_array().map(Vec::len), Some(0));
+    let verified = farside(folder.path(), &["verify", "run.mcap"]);
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        text(&verified.stdout)
+    );
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_fails_the_run_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = farside(folder.path(), &small(&["--out", "/dev/full", "--json"]));
+    assert_eq!(output.status.code(), Some(3));
+    assert_eq!(json(&output)["end"], "observer_failed");
+    assert!(
+        text(&output.stderr).contains("No space left"),
+        "{}",
+        text(&output.stderr)
+    );
+}

@@ -1,6 +1,7 @@
 //! `farside run`: run a scenario, log every message, say what came of it.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
@@ -159,6 +160,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     };
     // The exit code must tell of a failure even where nobody reads the output.
     let printed = if args.json {
+        if outcome.exit() == Exit::Failed {
+            let ending = ending(&report);
+            // The document says so too; if stderr is gone, that must do.
+            let _ = writeln!(std::io::stderr(), "error: {ending}");
+        }
         print_json(&outcome.document())
     } else {
         print(outcome.text())

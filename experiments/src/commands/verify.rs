@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use farside::{Report, SimDuration};
+use farside::SimDuration;
 use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome};
 use serde::Serialize;
 
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
             notes: &notes,
         })?;
     } else {
-        print(text(path, &outcome, &report, &notes))?;
+        print(text(path, &outcome, &notes))?;
     }
     Ok(match outcome {
         VerifyOutcome::Same { .. } | VerifyOutcome::Prefix { .. } => Exit::Done,
@@ -149,7 +149,7 @@ fn notes(summary: &RunSummary) -> Vec<String> {
     notes
 }
 
-fn text(path: &Path, outcome: &VerifyOutcome, report: &Report, notes: &[String]) -> String {
+fn text(path: &Path, outcome: &VerifyOutcome, notes: &[String]) -> String {
     let path = path.display();
     let mut text = match outcome {
         VerifyOutcome::Same {
@@ -167,9 +167,8 @@ fn text(path: &Path, outcome: &VerifyOutcome, report: &Report, notes: &[String])
         } => {
             let last = SimDuration::from_secs_f64(last_s.unwrap_or(0.0));
             format!(
-                "{path}: the same as far as it goes: {records} records, up to {last} of {}; \
-                 the log lacks {missing}\n",
-                report.end_time
+                "{path}: the same as far as it goes: {records} records, up to {last}\n  \
+                 {missing}\n"
             )
         }
         VerifyOutcome::Different { records, first } => {
