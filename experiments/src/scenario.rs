@@ -175,11 +175,11 @@ impl Scenario {
             )
         };
         let scenario = Scenario {
-            name: Path::new(name)
-                .extension()
-                .is_none_or(|extension| extension != "toml")
-                .then(|| name.to_owned())
-                .unwrap_or_else(|| stem(name)),
+            name: if builtin_text(name).is_some() {
+                name.to_owned()
+            } else {
+                stem(name)
+            },
             shared,
             settings,
             source,
@@ -187,6 +187,13 @@ impl Scenario {
         };
         scenario.check_crashes()?;
         Ok(scenario)
+    }
+
+    /// The scenario under another name, as the log of a run has it.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        self.name = name.to_owned();
+        self
     }
 
     /// The built-in name, or the file's name without its ending.

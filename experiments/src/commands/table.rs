@@ -57,10 +57,10 @@ pub(super) fn clock(report: &Report, wall_s: f64) -> Group {
     Group {
         title: "clock",
         lines: vec![
-            ("virtual time".to_owned(), report.end_time.to_string()),
+            ("virtual time".to_owned(), format!("{sim_s:.3}s")),
             (
                 "wall time".to_owned(),
-                format!("{wall_s:.2}s, {:.0} times as fast", per_wall(sim_s)),
+                format!("{wall_s:.2}s, {:.0} times real time", per_wall(sim_s)),
             ),
             (
                 "events".to_owned(),

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::run::{ExecutorName, FILE_PREFIX, timed};
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, ScenarioError};
 use crate::system::{Files, Registry};
 
 /// The attachment that holds the resolved scenario.
@@ -120,9 +120,22 @@ pub(super) fn scenario_of(
     let text = text.ok_or_else(|| not_repeatable(format!("it holds no {SCENARIO}")))?;
     let text = String::from_utf8(text)
         .map_err(|_| not_repeatable(format!("its {SCENARIO} is not UTF-8")))?;
-    let parsed = Scenario::parse(&summary.scenario, text, &[], registry, Files::kept(files));
+    let label = format!("{SCENARIO} in the log");
+    let parsed = Scenario::parse(&label, text, &[], registry, Files::kept(files));
+    let parsed = parsed.map(|scenario| scenario.named(&summary.scenario));
     parsed.map_err(|error| {
-        let mut reason = error.to_string();
+        let mut reason = match &error {
+            ScenarioError::UnknownValue {
+                key,
+                found,
+                expected,
+                ..
+            } if key == "system" => format!(
+                "its system is {found:?}, which this binary does not know; expected {expected}. \
+                 The binary that wrote the log can run it again"
+            ),
+            error => error.to_string(),
+        };
         for note in notes(summary) {
             reason.push_str("\n  ");
             reason.push_str(&note);

@@ -59,7 +59,7 @@ pub enum ScenarioError {
     #[error("{place}: not TOML: {message}{}", quoted(.place))]
     Syntax {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// What the TOML reader found and expected.
         message: String,
     },
@@ -70,7 +70,7 @@ pub enum ScenarioError {
     )]
     UnknownKey {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// The key.
         found: String,
         /// The table it is in, as ` in name`.
@@ -87,7 +87,7 @@ pub enum ScenarioError {
     )]
     UnknownValue {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// The key.
         key: String,
         /// Its value.
@@ -101,7 +101,7 @@ pub enum ScenarioError {
     #[error("{place}: {key}: {message}{}", quoted(.place))]
     Invalid {
         /// Where.
-        place: Place,
+        place: Box<Place>,
         /// The key.
         key: String,
         /// What was found and expected.

@@ -149,11 +149,11 @@ impl Source {
     }
 
     /// Where the byte `offset` of all positions stands.
-    pub(crate) fn place(&self, offset: usize) -> Place {
+    pub(crate) fn place(&self, offset: usize) -> Box<Place> {
         if let Some(set) = self.sets.iter().rev().find(|set| set.base <= offset) {
-            return Place::Set {
+            return Box::new(Place::Set {
                 argument: set.argument.clone(),
-            };
+            });
         }
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
@@ -161,17 +161,17 @@ impl Source {
         }
         let before = &self.text[..offset];
         let start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Place::File {
+        Box::new(Place::File {
             name: self.name.clone(),
             line: before.matches('\n').count() + 1,
             column: before[start..].chars().count() + 1,
             text: self.text[start..].lines().next().unwrap_or("").to_owned(),
-        }
+        })
     }
 
     /// Where the value of a key stands, given from the top, entries of arrays by number; or the
     /// nearest table above it that is there.
-    pub(crate) fn place_of_key(&self, keys: &[String]) -> Place {
+    pub(crate) fn place_of_key(&self, keys: &[String]) -> Box<Place> {
         let Ok(root) = self.document() else {
             return self.place(0);
         };
@@ -369,11 +369,13 @@ mod tests {
     #[test]
     fn places_name_the_line_or_the_argument() {
         let source = source("[team]\n\"röver\" = 5\n", &["seed=7", "a.b=[1, 2]"]);
-        let file = |line, column, text: &str| Place::File {
-            name: "x.toml".to_owned(),
-            line,
-            column,
-            text: text.to_owned(),
+        let file = |line, column, text: &str| {
+            Box::new(Place::File {
+                name: "x.toml".to_owned(),
+                line,
+                column,
+                text: text.to_owned(),
+            })
         };
         let keys = |path: &str| -> Vec<String> { path.split('.').map(str::to_owned).collect() };
         assert_eq!(
