@@ -149,6 +149,50 @@ fn map_key(key: &MapKey) -> String {
     }
 }
 
+/// The first place in which two JSON documents differ.
+pub(crate) fn json(a: &[u8], b: &[u8], tolerance: f64) -> Option<FieldDiff> {
+    if a == b {
+        return None;
+    }
+    let parse = |bytes| serde_json::from_slice::<serde_json::Value>(bytes).ok();
+    match (parse(a), parse(b)) {
+        (Some(x), Some(y)) => json_values("data", &x, &y, tolerance),
+        _ => Some(raw("data", a, b)),
+    }
+}
+
+fn json_values(
+    path: &str,
+    a: &serde_json::Value,
+    b: &serde_json::Value,
+    tolerance: f64,
+) -> Option<FieldDiff> {
+    use serde_json::Value;
+    let same = match (a, b) {
+        (Value::Number(x), Value::Number(y)) => match (x.as_f64(), y.as_f64()) {
+            (Some(x), Some(y)) if tolerance > 0.0 => near(x, y, tolerance),
+            _ => x == y,
+        },
+        (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+            let mut pairs = x.iter().zip(y).enumerate();
+            return pairs
+                .find_map(|(at, (x, y))| json_values(&format!("{path}[{at}]"), x, y, tolerance));
+        }
+        (Value::Object(x), Value::Object(y)) => {
+            let mut keys: Vec<_> = x.keys().chain(y.keys()).collect();
+            keys.sort();
+            keys.dedup();
+            return keys.into_iter().find_map(|key| {
+                let absent = Value::Null;
+                let (x, y) = (x.get(key).unwrap_or(&absent), y.get(key).unwrap_or(&absent));
+                json_values(&format!("{path}.{key}"), x, y, tolerance)
+            });
+        }
+        (a, b) => a == b,
+    };
+    (!same).then(|| FieldDiff::new(path, shorten(a.to_string()), shorten(b.to_string())))
+}
+
 /// A value in a few words.
 fn show(value: &Value) -> String {
     let text = match value {
@@ -166,6 +210,10 @@ fn show(value: &Value) -> String {
         Value::List(list) => format!("{} values", list.len()),
         Value::Map(map) => format!("{} entries", map.len()),
     };
+    shorten(text)
+}
+
+fn shorten(text: String) -> String {
     match text.char_indices().nth(SHOWN) {
         Some((at, _)) => format!("{}...", &text[..at]),
         None => text,

@@ -52,7 +52,6 @@ pub struct ChannelInfo {
     pub schema: Option<Arc<SchemaInfo>>,
     /// What else it says: `role` and `kind` in Farside's logs.
     pub metadata: BTreeMap<String, String>,
-    pub(crate) id: u16,
     pub(crate) schema_id: u16,
 }
 
@@ -447,7 +446,6 @@ fn declare(
             encoding: channel.encoding.to_owned(),
             schema: schemas.get(&channel.schema_id).cloned(),
             metadata: channel.metadata,
-            id: channel.id,
             schema_id: channel.schema_id,
         }));
     }

@@ -22,6 +22,7 @@ use crate::descriptors::{self, SchemaOf};
 use crate::envelope::{Encoder, put_key};
 use crate::topics::{self, CHECKPOINT, Topics};
 use crate::wire::{put_bytes, put_number, put_text};
+pub(crate) use thread::options as mcap_options;
 use thread::{Batch, Declaration, File, Header, Worker};
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
