@@ -229,9 +229,9 @@ impl FixedDelay {
     }
 }
 
-/// [`FixedDelay`] takes no changes: this type has no values.
+/// The change of a link that has nothing to change.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub enum NoChange {}
+pub struct NoChange;
 
 impl Carrier for FixedDelay {
     type Change = NoChange;
@@ -244,7 +244,5 @@ impl Carrier for FixedDelay {
         verdicts.deliver(self.delay);
     }
 
-    fn change(&mut self, change: NoChange, _now: SimTime) {
-        match change {}
-    }
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::digest::Digest;
-use crate::engine::{Head, Sink, hash_if_wanted};
+use crate::engine::{Head, InFlight, Sink, hash_if_wanted};
 use crate::key::{EntityId, EventKey};
 use crate::plan::{Kind, Plan};
 use crate::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
@@ -76,7 +76,7 @@ impl Committer {
         mut self,
         end: End,
         end_time: SimTime,
-        mut in_flight: Vec<(EventKey, Head, Vec<u8>)>,
+        mut in_flight: Vec<InFlight>,
     ) -> Report {
         in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
         let plan = self.plan.clone();
@@ -229,12 +229,7 @@ impl Batch {
 
     /// The messages that the uncommitted records from `at` on had taken from their way, though
     /// committed events before `fault` sent them.
-    pub(crate) fn undone(
-        &self,
-        at: usize,
-        fault: EventKey,
-        plan: &Plan,
-    ) -> Vec<(EventKey, Head, Vec<u8>)> {
+    pub(crate) fn undone(&self, at: usize, fault: EventKey, plan: &Plan) -> Vec<InFlight> {
         let mut found = Vec::new();
         let mut unit: Option<(EventKey, RecordClass)> = None;
         for kept in &self.kept[at..] {
@@ -249,7 +244,7 @@ impl Batch {
                 RecordClass::Lost => first,
                 _ => false,
             };
-            if message && record.cause.is_some_and(|cause| cause < fault) {
+            if message && record.scheduled_by.is_some_and(|by| by < fault) {
                 let head = Head {
                     sender: record.sender,
                     receiver: record.receiver,
@@ -260,6 +255,7 @@ impl Batch {
                     match_key: record.match_key,
                     sent: record.sent,
                     cause: record.cause,
+                    scheduled_by: record.scheduled_by,
                     ..Head::of_entity(record.sender, record.sent)
                 };
                 found.push((record.key, head, self.bytes[kept.body.clone()].to_vec()));

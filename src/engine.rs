@@ -52,6 +52,10 @@ pub(crate) struct Pending {
     pub(crate) letter: Option<Sealed>,
 }
 
+/// A message still on its way: the key its next event would have had, what is known of it, and its
+/// encoded body.
+pub(crate) type InFlight = (EventKey, Head, Vec<u8>);
+
 /// What is known of a message besides its content.
 #[derive(Clone, Copy)]
 pub(crate) struct Head {
@@ -103,6 +107,7 @@ impl Head {
             class,
             key,
             cause: self.cause,
+            scheduled_by: self.scheduled_by,
             sender: self.sender,
             receiver: self.receiver,
             link: self.link,
@@ -248,68 +253,77 @@ impl Engine {
             letter,
         } = self.parts.take(entry.slot);
         let key = entry.key();
+        if class == Class::Void || self.died_with_its_incarnation(class, &head) {
+            return Ok(());
+        }
+        if let Err(fault) = self.parts.begin(key, letter.as_ref(), head.kind) {
+            self.parts.note_unfinished(key, class, head);
+            return Err(fault);
+        }
         if key.step > self.parts.plan.step_limit {
-            return Err(self.step_limit_fault(key, &head));
+            return Err(self.step_limit_fault(key, class, &head));
         }
         match class {
             Class::Void => Ok(()),
-            Class::Start => self.run_handler(RecordClass::Start, key, head, None, sink),
-            Class::Message | Class::Timer => self.deliver(class, key, head, letter, sink),
+            Class::Start => self.run_handler(class, RecordClass::Start, key, head, None, sink),
+            Class::Timer => self.run_handler(class, RecordClass::Timer, key, head, letter, sink),
+            Class::Message if self.is_crashed(head.receiver) => {
+                let head = Head {
+                    reason: "crashed",
+                    ..head
+                };
+                self.commit(RecordClass::Lost, key, &head, sink);
+                Ok(())
+            }
+            Class::Message => {
+                self.run_handler(class, RecordClass::Delivered, key, head, letter, sink)
+            }
             Class::HandOver => self.hand_over(key, head, letter, sink),
             Class::LateLoss => {
-                self.parts.begin(key, letter.as_ref(), head.kind)?;
                 self.commit(RecordClass::Lost, key, &head, sink);
                 Ok(())
             }
         }
     }
 
-    fn deliver(
-        &mut self,
-        class: Class,
-        key: EventKey,
-        mut head: Head,
-        letter: Option<Sealed>,
-        sink: &mut impl Sink,
-    ) -> Result<(), Box<Fault>> {
-        let cell = &self.actors[self.parts.plan.place(head.receiver).local as usize];
-        let crashed = cell.actor.is_none();
-        if class == Class::Timer {
-            if crashed || head.incarnation != cell.state.incarnation {
-                return Ok(());
-            }
-            return self.run_handler(RecordClass::Timer, key, head, letter, sink);
+    fn cell(&self, actor: EntityId) -> &ActorCell {
+        &self.actors[self.parts.plan.place(actor).local as usize]
+    }
+
+    fn is_crashed(&self, actor: EntityId) -> bool {
+        self.cell(actor).actor.is_none()
+    }
+
+    /// True for a start or a timer whose actor has crashed or was restarted since.
+    fn died_with_its_incarnation(&self, class: Class, head: &Head) -> bool {
+        if !matches!(class, Class::Start | Class::Timer) {
+            return false;
         }
-        if crashed {
-            head.reason = "crashed";
-            self.parts.begin(key, letter.as_ref(), head.kind)?;
-            self.commit(RecordClass::Lost, key, &head, sink);
-            return Ok(());
-        }
-        self.run_handler(RecordClass::Delivered, key, head, letter, sink)
+        let cell = self.cell(head.receiver);
+        cell.actor.is_none() || head.incarnation != cell.state.incarnation
     }
 
     /// Runs one handler, and commits the event if it did not fail.
     fn run_handler(
         &mut self,
-        class: RecordClass,
+        class: Class,
+        record: RecordClass,
         key: EventKey,
         head: Head,
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        self.parts.begin(key, letter.as_ref(), head.kind)?;
         let cell = &mut self.actors[self.parts.plan.place(head.receiver).local as usize];
         let result = invoke(cell, &mut self.parts, key, letter);
         if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
             let kind = head.kind.map(|kind| self.parts.plan.kind(kind).name());
             let message =
                 kind.map(|kind| format!("{kind} from {}", self.parts.plan.name(head.sender)));
-            self.parts.note_unfinished(key, head);
+            self.parts.note_unfinished(key, class, head);
             let blamed = self.parts.carrying.unwrap_or(head.receiver);
             return Err(self.parts.fault_at(key, blamed, message, cause));
         }
-        self.commit(class, key, &head, sink);
+        self.commit(record, key, &head, sink);
         Ok(())
     }
 
@@ -320,7 +334,6 @@ impl Engine {
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        self.parts.begin(key, letter.as_ref(), head.kind)?;
         let (Some(link), Some(letter)) = (head.link, letter) else {
             unreachable!("a message is handed over with its letter, to a link");
         };
@@ -328,7 +341,7 @@ impl Engine {
         let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter)));
         let result = carried.map_err(|payload| FaultCause::Panic(panic_text(&*payload)));
         if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
-            self.parts.note_unfinished(key, head);
+            self.parts.note_unfinished(key, Class::HandOver, head);
             let message = format!("a message from {}", self.parts.plan.name(head.sender));
             return Err(self.parts.fault_at(key, link, Some(message), cause));
         }
@@ -347,10 +360,10 @@ impl Engine {
         let mut head = Head::of_entity(entity, key.time);
         head.sender = EntityId::CONTROL;
         let local = self.parts.plan.place(entity).local as usize;
+        self.parts.begin(key, None, None)?;
         match action {
             Action::Crash => {
                 self.actors[local].actor = None;
-                self.parts.begin(key, None, None)?;
                 self.commit(RecordClass::Crash, key, &head, sink);
                 Ok(())
             }
@@ -368,7 +381,7 @@ impl Engine {
                         return Err(self.parts.fault_at(key, entity, None, cause));
                     }
                 }
-                self.run_handler(RecordClass::Restart, key, head, None, sink)
+                self.run_handler(Class::Start, RecordClass::Restart, key, head, None, sink)
             }
             Action::Change(change) => {
                 head.kind = self
@@ -377,7 +390,6 @@ impl Engine {
                     .links
                     .get(&entity)
                     .map(|link| link.change_kind);
-                self.parts.begin(key, None, None)?;
                 self.parts.apply_change(local, key, head.kind, change);
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
@@ -396,7 +408,7 @@ impl Engine {
         }
     }
 
-    fn step_limit_fault(&mut self, key: EventKey, head: &Head) -> Box<Fault> {
+    fn step_limit_fault(&mut self, key: EventKey, class: Class, head: &Head) -> Box<Fault> {
         // The hops that follow would show the same loop: name the ones still waiting here.
         let plan = self.parts.plan.clone();
         let hop = |head: &Head| {
@@ -415,7 +427,7 @@ impl Engine {
             }
             self.parts.insert(at, waiting);
         }
-        self.parts.note_unfinished(key, *head);
+        self.parts.note_unfinished(key, class, *head);
         let cause = FaultCause::StepLimit {
             limit: plan.step_limit,
             chain,

@@ -142,6 +142,8 @@ pub(crate) struct Plan {
     pub(crate) name_hashes: Vec<u64>,
     /// From the number in an address to the entity.
     pub(crate) declared: Vec<EntityId>,
+    /// From the entity to the number in its address, if it is an actor.
+    pub(crate) address_numbers: Vec<Option<u32>>,
     /// From the number in an address to the Rust type of the actor.
     pub(crate) actor_types: Vec<(TypeId, &'static str)>,
     pub(crate) places: Vec<Place>,
@@ -205,9 +207,8 @@ impl Plan {
             name: name.to_owned(),
         };
         let entity = self.info.entity(name).ok_or_else(unknown)?;
-        let declared = self.declared.iter().position(|known| *known == entity);
-        let declared = declared.ok_or_else(unknown)?;
-        let (type_id, actual) = self.actor_types[declared];
+        let declared = self.address_numbers[entity.index()].ok_or_else(unknown)?;
+        let (type_id, actual) = self.actor_types[declared as usize];
         if type_id != TypeId::of::<B>() {
             let expected = std::any::type_name::<B>();
             return Err(LookupError::WrongType {
@@ -216,7 +217,7 @@ impl Plan {
                 actual,
             });
         }
-        Ok(Address::new(declared as u32))
+        Ok(Address::new(declared))
     }
 
     /// True if records, and so encoded bodies, are needed at all.

@@ -79,6 +79,8 @@ pub struct Record<'a> {
     pub key: EventKey,
     /// The key of the event that caused this one, where one did.
     pub cause: Option<EventKey>,
+    /// The event that put this one on its way: the cause, or behind a shared link the hand-over.
+    pub scheduled_by: Option<EventKey>,
     /// Who sent the message; for other events, who they happen to.
     pub sender: EntityId,
     /// Who the message is for; for other events, who they happen to.

@@ -285,7 +285,7 @@ impl Simulation {
     /// When the simulation cannot start. What goes wrong later is in [`Report::end`].
     pub fn run(self, executor: Executor) -> Result<Report, BuildError> {
         let split = matches!(executor, Executor::Kameo { .. });
-        executor::run(self.assemble(split && false)?, executor)
+        executor::run(self.assemble(split)?, executor)
     }
 
     /// The least delay that any link declares, zero if there are none: how far hosts may run ahead

@@ -1,1 +1,3 @@
 //! The tests that cross crates, one module for each behaviour.
+
+mod determinism;

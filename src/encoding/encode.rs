@@ -141,6 +141,19 @@ impl<'a> ValueSer<'a> {
         Ok(())
     }
 
+    /// Writes a variant of a plain enum.
+    #[inline]
+    fn number(self, index: u32, variant: &'static str) -> Result<(), Fault> {
+        let Kind::Enum(id) = self.first else {
+            return self.mismatch("a unit variant");
+        };
+        let enumeration = &self.plan.enums[id];
+        match position(&enumeration.values, |value| &value.key, index, variant) {
+            Some(number) => self.varint(Kind::Enum(id), number as u64),
+            None => Err(unknown_variant(&enumeration.name, variant)),
+        }
+    }
+
     /// The message that a value of this field is, if one must come now.
     #[inline(always)]
     fn message(&self) -> Option<&'a Message> {
@@ -451,28 +464,21 @@ impl<'a> ser::Serializer for ValueSer<'a> {
     #[inline(always)]
     fn serialize_unit_variant(
         self,
-        name: &'static str,
+        _name: &'static str,
         index: u32,
         variant: &'static str,
     ) -> Result<(), Fault> {
-        if let Kind::Enum(id) = self.field.kind {
-            let enumeration = &self.plan.enums[id];
-            return match position(&enumeration.values, |value| &value.key, index, variant) {
-                Some(number) => self.varint(Kind::Enum(id), number as u64),
-                None => Err(unknown_variant(&enumeration.name, variant)),
-            };
-        }
         if self
             .message()
             .is_some_and(|message| message.shape == Shape::Wrapper)
         {
             // A plain enum at the root: a message must stand around it.
             let mut wrapper = self.open(Shape::Wrapper)?;
-            let inner = wrapper.reborrow_inner();
-            return match inner.field.kind {
-                Kind::Enum(_) => inner.serialize_unit_variant(name, index, variant),
-                _ => inner.mismatch("a unit variant"),
-            };
+            wrapper.reborrow_inner().number(index, variant)?;
+            return wrapper.close();
+        }
+        if let Kind::Enum(_) = self.field.kind {
+            return self.number(index, variant);
         }
         self.open_content(index, variant, Shape::Unit)?.close()
     }

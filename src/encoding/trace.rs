@@ -331,7 +331,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         let Format::Option(inner) = &*self.slot else {
             return Err(Halt::Again);
         };
-        if self.count(&[inner]) % 2 == 0 {
+        if self.count(&[inner]).is_multiple_of(2) {
             return visitor.visit_none();
         }
         let Format::Option(inner) = self.slot else {

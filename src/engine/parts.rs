@@ -9,7 +9,8 @@ use std::sync::Arc;
 use slab::Slab;
 
 use super::{
-    CellState, Class, Flow, Head, LinkCell, Outbound, Outgoing, Pending, Sink, hash_if_wanted,
+    CellState, Class, Flow, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink,
+    hash_if_wanted,
 };
 use crate::carrier::{Parcel, SealedChange, Verdict, Verdicts};
 use crate::context::TimerId;
@@ -60,7 +61,7 @@ pub(crate) struct Parts {
     /// The first request to stop: at which event, by whom, why.
     pub(crate) stop: Option<(EventKey, EntityId, String)>,
     /// The event whose handler failed, so that its message can be counted as in flight.
-    pub(crate) unfinished: Option<(EventKey, Head)>,
+    pub(crate) unfinished: Option<(EventKey, Class, Head)>,
     /// The last kind looked up: handlers tend to send one kind at a time.
     last_kind: Option<(TypeId, KindIndex)>,
 }
@@ -159,8 +160,8 @@ impl Parts {
         })
     }
 
-    pub(crate) fn note_unfinished(&mut self, key: EventKey, head: Head) {
-        self.unfinished = Some((key, head));
+    pub(crate) fn note_unfinished(&mut self, key: EventKey, class: Class, head: Head) {
+        self.unfinished = Some((key, class, head));
     }
 
     pub(crate) fn send(&mut self, state: &mut CellState, me: EntityId, outbound: Outbound) {
@@ -518,54 +519,56 @@ impl Parts {
 
     /// Takes every message still on its way, with the key its next event would have had. `until`
     /// leaves out what events at or after that key sent: a fault undid them.
-    pub(crate) fn take_in_flight(
-        &mut self,
-        until: Option<EventKey>,
-    ) -> Vec<(EventKey, Head, Vec<u8>)> {
+    pub(crate) fn take_in_flight(&mut self, until: Option<EventKey>) -> Vec<InFlight> {
         let mut found = Vec::new();
-        if let Some((key, head)) = self.unfinished.take() {
-            if head.kind.is_some() && head.sender != head.receiver {
-                found.push((key, head, self.body.clone()));
-            }
+        if let Some((key, class, head)) = self.unfinished.take()
+            && head.in_flight(class, until)
+        {
+            found.push((key, head, std::mem::take(&mut self.body)));
         }
         for entry in self.queue.drain_sorted() {
-            let Pending {
-                class,
-                head,
-                letter,
-            } = self.take(entry.slot);
-            found.extend(self.in_flight(entry.key(), class, head, letter, until));
+            let pending = self.take(entry.slot);
+            found.extend(pending.in_flight(&self.plan, entry.key(), until));
         }
         for Outgoing { key, pending, .. } in std::mem::take(&mut self.outgoing) {
-            let Pending {
-                class,
-                head,
-                letter,
-            } = pending;
-            found.extend(self.in_flight(key, class, head, letter, until));
+            found.extend(pending.in_flight(&self.plan, key, until));
         }
         found
     }
+}
 
-    fn in_flight(
-        &self,
+impl Head {
+    /// True for a message that was sent before `until`, which a fault left of the run.
+    fn in_flight(&self, class: Class, until: Option<EventKey>) -> bool {
+        let undone = until.is_some_and(|until| self.scheduled_by.is_none_or(|by| by >= until));
+        matches!(class, Class::Message | Class::HandOver | Class::LateLoss) && !undone
+    }
+}
+
+impl Pending {
+    /// The message that this event would have delivered, lost or handed over, if there is one.
+    pub(crate) fn in_flight(
+        self,
+        plan: &Plan,
         key: EventKey,
-        class: Class,
-        head: Head,
-        letter: Option<Sealed>,
         until: Option<EventKey>,
-    ) -> Option<(EventKey, Head, Vec<u8>)> {
-        let message = matches!(class, Class::Message | Class::HandOver | Class::LateLoss);
-        let undone = until.is_some_and(|until| head.scheduled_by.is_none_or(|by| by >= until));
-        if !message || undone {
+    ) -> Option<InFlight> {
+        if !self.head.in_flight(self.class, until) {
             return None;
         }
         let mut body = Vec::new();
-        if let (Some(letter), Some(kind), true) = (letter, head.kind, self.plan.recording()) {
+        if let (Some(letter), Some(kind), true) = (self.letter, self.head.kind, plan.recording()) {
             // It will never be handled; what cannot be encoded is recorded empty.
-            let _ = letter.0.encode(self.plan.kind(kind).schema(), &mut body);
+            let _ = letter.0.encode(plan.kind(kind).schema(), &mut body);
         }
-        Some((key, Head { reason: "", ..head }, body))
+        Some((
+            key,
+            Head {
+                reason: "",
+                ..self.head
+            },
+            body,
+        ))
     }
 }
 

@@ -56,6 +56,10 @@ impl Simulation {
             .iter()
             .map(|observer| observer.wants())
             .collect();
+        let mut address_numbers = vec![None; ranked.entities.len()];
+        for (declared, entity) in ranked.actors.iter().enumerate() {
+            address_numbers[entity.index()] = Some(declared as u32);
+        }
         let plan = Arc::new(Plan {
             seed: self.seed,
             name_hashes: ranked
@@ -64,6 +68,7 @@ impl Simulation {
                 .map(|entity| name_hash(&entity.name))
                 .collect(),
             declared: ranked.actors.clone(),
+            address_numbers,
             actor_types: self
                 .actors
                 .iter()

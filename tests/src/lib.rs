@@ -1,1 +1,4 @@
-//! What crosses Farside's crates: determinism, replay, properties, the command line.
+//! What Farside's tests share: models that exercise every part of the kernel's contract, built from
+//! a description that proptest can shrink. Nothing depends on this crate.
+
+pub mod chatter;

@@ -18,24 +18,24 @@ mod relief;
 pub struct CraterSettings {
     /// The seed of all draws.
     pub seed: u64,
-    /// The mean radius of the rim's crest [m]; over 0, at most 2000.
+    /// The mean radius of the rim's crest \[m\]; over 0, at most 2000.
     pub rim_radius_m: f64,
-    /// The floor's depth below the plain [m]; over 0, at most the rim's radius.
+    /// The floor's depth below the plain \[m\]; over 0, at most the rim's radius.
     pub depth_m: f64,
-    /// The crest's height over the plain [m]; over 0, at most the rim's radius.
+    /// The crest's height over the plain \[m\]; over 0, at most the rim's radius.
     pub rim_height_m: f64,
-    /// Half the side of the square of terrain, which has the crater in its middle [m]; over the
+    /// Half the side of the square of terrain, which has the crater in its middle \[m\]; over the
     /// rim's radius, at most 4000.
     pub half_side_m: f64,
-    /// The distance between height samples [m]; over 0.1, at most half the rim's radius.
+    /// The distance between height samples \[m\]; over 0.1, at most half the rim's radius.
     pub resolution_m: f64,
     /// The share of the ground covered by rocks (Golombek and Rapp's k); over 0, at most 1.
     pub rock_abundance: f64,
-    /// The diameter of the smallest rocks drawn [m].
+    /// The diameter of the smallest rocks drawn \[m\].
     pub rock_least_m: f64,
-    /// The diameter from which a rock is a boulder, which a rover must go round [m].
+    /// The diameter from which a rock is a boulder, which a rover must go round \[m\].
     pub boulder_least_m: f64,
-    /// The slope from which ground is too steep [rad].
+    /// The slope from which ground is too steep \[rad\].
     pub slope_limit_rad: f64,
 }
 
@@ -128,7 +128,7 @@ impl Crater {
         &self.rocks
     }
 
-    /// What is wrong with the place at (x, y) [m], judged by the nearest sample.
+    /// What is wrong with the place at (x, y) \[m\], judged by the nearest sample.
     pub fn hazard(&self, x_m: f64, y_m: f64) -> Hazard {
         self.hazards[nearest_sample(&self.terrain, x_m, y_m)]
     }

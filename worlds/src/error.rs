@@ -72,15 +72,15 @@ pub enum TerrainError {
     /// The resolution is not a positive finite number.
     #[error("the resolution must be a positive number of metres; it is {actual_m}")]
     Resolution {
-        /// The resolution found [m].
+        /// The resolution found \[m\].
         actual_m: f64,
     },
     /// The origin is not finite.
     #[error("the origin must be finite; it is ({x_m} m, {y_m} m)")]
     Origin {
-        /// Its x [m].
+        /// Its x \[m\].
         x_m: f64,
-        /// Its y [m].
+        /// Its y \[m\].
         y_m: f64,
     },
     /// A height is not finite.
@@ -90,7 +90,7 @@ pub enum TerrainError {
         column: usize,
         /// The sample's row, from the south.
         row: usize,
-        /// The height found [m].
+        /// The height found \[m\].
         height_m: f64,
     },
     /// A setting of the crater is out of its range.
@@ -114,9 +114,9 @@ pub enum TerrainError {
     /// The least diameter of the rocks to draw is out of range.
     #[error("the smallest rocks must be of 0.01 m to {limit_m} m; they are of {actual_m} m")]
     RockDiameter {
-        /// The diameter found [m].
+        /// The diameter found \[m\].
         actual_m: f64,
-        /// The largest rock there is [m].
+        /// The largest rock there is \[m\].
         limit_m: f64,
     },
     /// More rocks would be drawn than a field may hold.
@@ -168,11 +168,11 @@ pub enum RoadmapError {
     Position {
         /// The vertex.
         vertex: VertexId,
-        /// Its x [m].
+        /// Its x \[m\].
         x_m: f64,
-        /// Its y [m].
+        /// Its y \[m\].
         y_m: f64,
-        /// The largest magnitude of a coordinate [m].
+        /// The largest magnitude of a coordinate \[m\].
         limit_m: f64,
     },
     /// A height is not a finite number within the limit.
@@ -180,9 +180,9 @@ pub enum RoadmapError {
     Height {
         /// The vertex.
         vertex: VertexId,
-        /// Its height [m].
+        /// Its height \[m\].
         height_m: f64,
-        /// The largest magnitude of a height [m].
+        /// The largest magnitude of a height \[m\].
         limit_m: f64,
     },
     /// Two vertices lie at the same place.
@@ -259,7 +259,7 @@ pub enum SensorError {
     /// The radio radius is not a positive finite number.
     #[error("the radio radius must be a positive number of metres; it is {actual_m}")]
     Radius {
-        /// The radius found [m].
+        /// The radius found \[m\].
         actual_m: f64,
     },
     /// A node's position is not a finite number within the limit.
@@ -267,11 +267,11 @@ pub enum SensorError {
     Position {
         /// The node.
         node: NodeId,
-        /// Its x [m].
+        /// Its x \[m\].
         x_m: f64,
-        /// Its y [m].
+        /// Its y \[m\].
         y_m: f64,
-        /// The largest magnitude of a coordinate [m].
+        /// The largest magnitude of a coordinate \[m\].
         limit_m: f64,
     },
     /// A node is nearest to no vertex.
@@ -288,7 +288,7 @@ pub enum SensorError {
     Uncovered {
         /// All such vertices, sorted.
         vertices: Vec<VertexId>,
-        /// The radio radius [m].
+        /// The radio radius \[m\].
         radius_m: f64,
     },
     /// Owners of the ends of an edge are out of each other's radio range, so that no rover could be
@@ -300,24 +300,24 @@ pub enum SensorError {
     InconsistentEdges {
         /// All such edges, in the roadmap's order.
         edges: Vec<(VertexId, VertexId)>,
-        /// The radio radius [m].
+        /// The radio radius \[m\].
         radius_m: f64,
     },
     /// The search for a random placement found none.
     #[error(
         "no placement of {nodes} nodes with a radius of {radius_m} m was found in {attempts} \
-         attempts (the last one: {last}); a radius of {suggested_m:.0} m should do"
+         attempts{}; the last one: {last}", advice(*radius_m, *suggested_m)
     )]
     NoPlacement {
         /// The nodes asked for.
         nodes: usize,
-        /// The radio radius [m].
+        /// The radio radius \[m\].
         radius_m: f64,
         /// The placements tried.
         attempts: usize,
         /// What was wrong with the last one.
         last: Box<SensorError>,
-        /// A radius that usually works [m].
+        /// A radius that usually works \[m\].
         suggested_m: f64,
     },
 }
@@ -329,6 +329,15 @@ fn list(edges: &[(VertexId, VertexId)]) -> String {
         .map(|(u, v)| format!("{} - {}", u.0, v.0))
         .collect();
     texts.join(", ")
+}
+
+/// What to do about a placement that was not found.
+fn advice(radius_m: f64, suggested_m: f64) -> String {
+    if radius_m < suggested_m {
+        format!(" (a radius of {suggested_m} m usually does)")
+    } else {
+        " (fewer nodes usually do)".to_owned()
+    }
 }
 
 /// `3, 7`.

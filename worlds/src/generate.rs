@@ -33,11 +33,11 @@ pub struct RoadmapSettings {
     pub cycles: usize,
     /// How many gates it has, where rovers enter and leave.
     pub gates: usize,
-    /// The radius of the ring of gates [m].
+    /// The radius of the ring of gates \[m\].
     pub gate_radius_m: f64,
-    /// The least distance between two places that may become vertices [m].
+    /// The least distance between two places that may become vertices \[m\].
     pub spacing_m: f64,
-    /// How far from hazards paths keep [m].
+    /// How far from hazards paths keep \[m\].
     pub margin_m: f64,
 }
 
@@ -52,8 +52,8 @@ impl RoadmapSettings {
     /// ```
     pub fn builtin(name: &str) -> Option<RoadmapSettings> {
         let (seed, vertices, cycles, gates, spacing_m) = match name {
-            "crater-dense" => (4, 228, 12, 28, 14.5),
-            "crater-sparse" => (4, 178, 6, 24, 16.5),
+            "crater-dense" => (2, 228, 12, 28, 14.5),
+            "crater-sparse" => (20, 178, 6, 24, 16.5),
             _ => return None,
         };
         Some(RoadmapSettings {
@@ -124,8 +124,15 @@ pub fn builtin_file(name: &str) -> Result<String, WorldError> {
         return Roadmap::builtin(name).map(|roadmap| roadmap.to_toml());
     };
     let crater = Crater::generate(&CraterSettings::default())?;
-    generate(&crater, &settings).map(|roadmap| roadmap.to_toml())
+    let roadmap = generate(&crater, &settings)?;
+    Ok(format!("{HEADER}{}", roadmap.to_toml()))
 }
+
+/// The first lines of a generated file.
+const HEADER: &str = "\
+# Generated: change the generator, not this file.
+# cargo run -p farside-worlds --example generate_roadmaps
+";
 
 /// Rounded to whole centimetres, so that files are short and the same everywhere.
 fn centimetres(metres: f64) -> f64 {
@@ -143,11 +150,12 @@ mod tests {
     #[test]
     fn the_files_are_what_the_generator_makes() {
         for name in Roadmap::builtin_names() {
-            let file = Roadmap::builtin(name).unwrap().to_toml();
-            assert_eq!(
-                builtin_file(name).unwrap(),
-                file,
-                "regenerate worlds/data/{name}.toml"
+            let path = format!("{}/data/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+            let file = std::fs::read_to_string(path).unwrap();
+            let anew = builtin_file(name).unwrap();
+            assert!(
+                anew == file,
+                "worlds/data/{name}.toml is not what the generator makes"
             );
         }
     }

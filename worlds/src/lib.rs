@@ -2,7 +2,8 @@
 //!
 //! A world is what rovers drive on and what radio nodes stand in: it holds no time, sends no
 //! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
-//! a [`SensorNetwork`] over it.
+//! a [`SensorNetwork`] over it. Both lie in a generated [`Crater`], whose [`HeightField`] tells a
+//! radio link what the ground hides.
 //!
 //! ```
 //! use farside_worlds::{Roadmap, SensorNetwork};

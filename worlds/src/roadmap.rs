@@ -1,8 +1,8 @@
 //! Roadmaps: undirected, connected graphs embedded in the plane, on which rovers move.
 //!
-//! This file holds the graph, its checks and its distances. The file format is in
-//! [`file`]; who owns which vertex is the
-//! sensor network's affair ([`crate::sensors`]).
+//! This file holds the graph and its distances; its checks are in `check`, the file format in `file`.
+//! The built-in maps are made by [`crate::generate`]; who owns which vertex is the affair of
+//! [`crate::sensors`].
 
 mod check;
 mod endpoints;
@@ -32,7 +32,7 @@ pub struct VertexId(pub u32);
 /// The most vertices a roadmap may have (its distance table then takes 8 MB).
 pub const MAX_VERTICES: usize = 2048;
 
-/// The largest magnitude of a coordinate or height [m].
+/// The largest magnitude of a coordinate or height \[m\].
 pub const MAX_COORDINATE_M: f64 = 1.0e6;
 
 /// A roadmap of safe paths (*network-guided*, section 2): an undirected connected graph, embedded
@@ -65,7 +65,7 @@ pub struct Roadmap {
 }
 
 impl Roadmap {
-    /// A roadmap of vertices at `positions_m` [m], joined by `edges`, with entries and exits at
+    /// A roadmap of vertices at `positions_m` \[m\], joined by `edges`, with entries and exits at
     /// `boundary` (in any order). Edges are kept as (lower, higher), sorted.
     ///
     /// ```
@@ -119,7 +119,7 @@ impl Roadmap {
         })
     }
 
-    /// The same roadmap with the terrain's height at each vertex [m], for viewers and radio links.
+    /// The same roadmap with the terrain's height at each vertex \[m\], for viewers and radio links.
     ///
     /// # Errors
     /// When there is not one finite height for each vertex.
@@ -168,12 +168,12 @@ impl Roadmap {
         self.neighbors(u).binary_search(&v).is_ok()
     }
 
-    /// Where `v` lies in the plane, x to the east and y to the north [m].
+    /// Where `v` lies in the plane, x to the east and y to the north \[m\].
     pub fn position_m(&self, v: VertexId) -> Point2<f64> {
         self.positions_m[v.0 as usize]
     }
 
-    /// The terrain's height at `v` [m]; 0 where no terrain was given.
+    /// The terrain's height at `v` \[m\]; 0 where no terrain was given.
     pub fn height_m(&self, v: VertexId) -> f64 {
         self.heights_m[v.0 as usize]
     }

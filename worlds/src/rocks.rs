@@ -8,7 +8,7 @@ use nalgebra::Point2;
 
 use crate::error::TerrainError;
 
-/// The largest rock that is drawn [m]; larger ones are parts of the terrain.
+/// The largest rock that is drawn \[m\]; larger ones are parts of the terrain.
 pub const MAX_DIAMETER_M: f64 = 5.0;
 
 /// The most rocks that a field may be expected to hold.
@@ -17,16 +17,16 @@ pub const MAX_ROCKS: f64 = 1.0e6;
 /// A rock on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rock {
-    /// Where its centre lies [m].
+    /// Where its centre lies \[m\].
     pub position_m: Point2<f64>,
-    /// Its diameter [m].
+    /// Its diameter \[m\].
     pub diameter_m: f64,
 }
 
 /// The size-frequency distribution of rocks at a site, known by the share of the ground that rocks
 /// cover: 0.02 at Phoenix, 0.03 at InSight, 0.05 at Spirit's site, 0.19 at Pathfinder's.
 ///
-/// The cumulative share of area covered by rocks of diameter D [m] or more is
+/// The cumulative share of area covered by rocks of diameter D \[m\] or more is
 /// `F(D) = k exp(-q D)` with `q = 1.79 + 0.152 / k` (Golombek and Rapp 1997).
 ///
 /// ```
@@ -57,18 +57,18 @@ impl RockAbundance {
         })
     }
 
-    /// The share of the ground covered by rocks of this diameter [m] or more.
+    /// The share of the ground covered by rocks of this diameter \[m\] or more.
     pub fn area_fraction(&self, diameter_m: f64) -> f64 {
         self.covered * libm::exp(-self.decay_per_m * diameter_m)
     }
 
-    /// Rocks of just this diameter [m], for each square metre of ground and metre of diameter.
+    /// Rocks of just this diameter \[m\], for each square metre of ground and metre of diameter.
     pub fn density_per_m3(&self, diameter_m: f64) -> f64 {
         let area_m2 = std::f64::consts::FRAC_PI_4 * diameter_m * diameter_m;
         self.decay_per_m * self.area_fraction(diameter_m) / area_m2
     }
 
-    /// Rocks of this diameter [m] up to [`MAX_DIAMETER_M`], for each square metre of ground.
+    /// Rocks of this diameter \[m\] up to [`MAX_DIAMETER_M`], for each square metre of ground.
     pub fn per_m2(&self, diameter_m: f64) -> f64 {
         // Simpson's rule in the logarithm of the diameter, in which the density is smooth.
         const STEPS: usize = 512;
@@ -88,7 +88,7 @@ impl RockAbundance {
         sum * step / 3.0
     }
 
-    /// The diameter [m] of a rock drawn from those of `least_m` up to [`MAX_DIAMETER_M`].
+    /// The diameter \[m\] of a rock drawn from those of `least_m` up to [`MAX_DIAMETER_M`].
     pub fn draw_diameter_m(&self, least_m: f64, stream: &mut Stream) -> f64 {
         loop {
             // The density is 1/D^2, drawn by inversion, thinned by the exponential.
@@ -121,8 +121,7 @@ impl RockAbundance {
         }
         let size = high_m - low_m;
         let expected = self.per_m2(least_m) * size.x * size.y;
-        // Written so that a NaN fails.
-        if !(expected <= MAX_ROCKS) {
+        if expected.is_nan() || expected > MAX_ROCKS {
             return Err(TerrainError::TooManyRocks {
                 limit: MAX_ROCKS,
                 expected,

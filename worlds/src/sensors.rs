@@ -1,7 +1,7 @@
 //! Sensor networks: static radio nodes that divide a roadmap among themselves.
 //!
 //! This file holds a network, its checks and who owns what; the search for a random one is in
-//! [`placement`]. What the nodes compute and send is no affair of this crate, and neither is the
+//! `placement`. What the nodes compute and send is no affair of this crate, and neither is the
 //! radio: here two nodes are neighbours when they are within one radius of each other.
 
 mod placement;
@@ -51,7 +51,7 @@ pub struct SensorNetwork {
 }
 
 impl SensorNetwork {
-    /// The network with nodes at `positions_m` [m] and radio radius `radius_m` [m].
+    /// The network with nodes at `positions_m` \[m\] and radio radius `radius_m` \[m\].
     ///
     /// ```
     /// use farside_worlds::{Roadmap, SensorError, SensorNetwork, VertexId};
@@ -164,7 +164,7 @@ impl SensorNetwork {
         (0..self.positions_m.len() as u32).map(NodeId)
     }
 
-    /// Where the node stands [m].
+    /// Where the node stands \[m\].
     ///
     /// # Panics
     /// When `n` is not in the network, here and below: a bug in the caller.
@@ -172,7 +172,7 @@ impl SensorNetwork {
         self.positions_m[n.0 as usize]
     }
 
-    /// The radio radius of every node [m].
+    /// The radio radius of every node \[m\].
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }

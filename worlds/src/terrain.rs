@@ -11,7 +11,7 @@ use crate::error::TerrainError;
 /// The most samples a height field may have (it then takes 128 MB).
 pub const MAX_SAMPLES: usize = 1 << 24;
 
-/// A grid of heights [m], bilinear between its samples and level beyond its edges: outside, the
+/// A grid of heights \[m\], bilinear between its samples and level beyond its edges: outside, the
 /// height is that of the nearest point of the edge.
 ///
 /// ```
@@ -57,7 +57,7 @@ impl HeightField {
                 actual: samples,
             });
         }
-        if columns < 2 || samples < 2 * columns || samples % columns != 0 {
+        if columns < 2 || samples / columns < 2 || !samples.is_multiple_of(columns) {
             return Err(TerrainError::Shape { columns, samples });
         }
         if !(resolution_m > 0.0 && resolution_m.is_finite()) {
@@ -89,12 +89,12 @@ impl HeightField {
         })
     }
 
-    /// The position of the south-western sample [m].
+    /// The position of the south-western sample \[m\].
     pub fn origin_m(&self) -> Point2<f64> {
         self.origin_m
     }
 
-    /// The distance between neighbouring samples [m].
+    /// The distance between neighbouring samples \[m\].
     pub fn resolution_m(&self) -> f64 {
         self.resolution_m
     }
@@ -109,18 +109,18 @@ impl HeightField {
         self.rows
     }
 
-    /// All samples [m], row by row from the south, each from west to east.
+    /// All samples \[m\], row by row from the south, each from west to east.
     pub fn heights_m(&self) -> &[f64] {
         &self.heights_m
     }
 
-    /// The position of a sample [m].
+    /// The position of a sample \[m\].
     pub fn sample_position_m(&self, column: usize, row: usize) -> Point2<f64> {
         let offset = Vector2::new(column as f64, row as f64) * self.resolution_m;
         self.origin_m + offset
     }
 
-    /// The terrain's height at (x, y) [m].
+    /// The terrain's height at (x, y) \[m\].
     pub fn height_m(&self, x_m: f64, y_m: f64) -> f64 {
         let (column, east) = self.cell((x_m - self.origin_m.x) / self.resolution_m, self.columns);
         let (row, north) = self.cell((y_m - self.origin_m.y) / self.resolution_m, self.rows);
@@ -138,7 +138,7 @@ impl HeightField {
         (cell, inside - cell as f64)
     }
 
-    /// The rise to the east and to the north [m/m], by central differences over one resolution to
+    /// The rise to the east and to the north \[m/m\], by central differences over one resolution to
     /// either side.
     pub fn gradient(&self, x_m: f64, y_m: f64) -> Vector2<f64> {
         let step = self.resolution_m;
@@ -147,13 +147,13 @@ impl HeightField {
         Vector2::new(east, north) / (2.0 * step)
     }
 
-    /// The angle of the steepest ascent at (x, y) [rad], 0 where it is level.
+    /// The angle of the steepest ascent at (x, y) \[rad\], 0 where it is level.
     pub fn slope_rad(&self, x_m: f64, y_m: f64) -> f64 {
         let gradient = self.gradient(x_m, y_m);
         libm::atan(libm::hypot(gradient.x, gradient.y))
     }
 
-    /// The point of an antenna `mast_m` above the ground at (x, y) [m].
+    /// The point of an antenna `mast_m` above the ground at (x, y) \[m\].
     pub fn antenna_m(&self, x_m: f64, y_m: f64, mast_m: f64) -> Point3<f64> {
         Point3::new(x_m, y_m, self.height_m(x_m, y_m) + mast_m)
     }
@@ -163,7 +163,7 @@ impl HeightField {
         self.clearance_m(from_m, to_m) >= 0.0
     }
 
-    /// The least height of the straight line between two points over the ground below it [m];
+    /// The least height of the straight line between two points over the ground below it \[m\];
     /// negative where the ground is in the way. Exact for the bilinear surface.
     pub fn clearance_m(&self, from_m: Point3<f64>, to_m: Point3<f64>) -> f64 {
         let way = to_m - from_m;

@@ -126,6 +126,32 @@ proptest! {
 }
 
 #[test]
+fn lengths_are_as_short_as_prosts() {
+    #[derive(Serialize, Deserialize, PartialEq, Clone, Message)]
+    struct Inner {
+        #[prost(string, tag = "1")]
+        text: String,
+    }
+    #[derive(Serialize, Deserialize, PartialEq, Clone, Message)]
+    struct Around {
+        #[prost(message, required, tag = "1")]
+        inner: Inner,
+        #[prost(uint32, repeated, tag = "2")]
+        small: Vec<u32>,
+    }
+    let schema = schema::<Around>();
+    for len in (1..300).chain(16_370..16_400) {
+        let text = "x".repeat(len);
+        let small = vec![if len % 2 == 0 { 1 } else { 300 }; len];
+        let value = Around {
+            inner: Inner { text },
+            small,
+        };
+        assert_eq!(encode(&schema, &value), value.encode_to_vec(), "{len}");
+    }
+}
+
+#[test]
 fn the_descriptor_names_every_field() {
     let order = Order::Goto {
         x: 1.5,
@@ -166,6 +192,12 @@ fn fields_have_the_promised_types() {
     let message = pool.get_message_by_name("farside.msg.Plain").unwrap();
     assert!(message.get_field_by_name("n").unwrap().supports_presence());
     assert!(!message.get_field_by_name("a").unwrap().supports_presence());
+    let oneof = message
+        .get_field_by_name("n")
+        .unwrap()
+        .containing_oneof()
+        .unwrap();
+    assert!(oneof.is_synthetic());
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! The message types that the tests encode.
 
+// The hash collections among them are there to be refused.
+#![allow(clippy::disallowed_types)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroU32;
 
@@ -350,13 +353,11 @@ pub(super) struct HasAdjacent {
 
 #[derive(Serialize, Deserialize, Debug)]
 pub(super) struct HasHashMap {
-    #[allow(clippy::disallowed_types)] // It is here to be refused.
     pub(super) map: std::collections::HashMap<u32, u32>,
 }
 
 #[derive(Serialize, Deserialize, Debug)]
 pub(super) struct HasHashSet {
-    #[allow(clippy::disallowed_types)] // It is here to be refused.
     pub(super) set: std::collections::HashSet<u32>,
 }
 

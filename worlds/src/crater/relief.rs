@@ -10,7 +10,7 @@ use crate::terrain::{HeightField, MAX_SAMPLES};
 /// Waves of the outline round the rim, as (times round, share of the radius).
 const OUTLINE: [(f64, f64); 4] = [(2.0, 0.025), (3.0, 0.02), (5.0, 0.012), (9.0, 0.006)];
 
-/// Octaves of roughness, as (length [m], amplitude [m]).
+/// Octaves of roughness, as (length \[m\], amplitude \[m\]).
 const ROUGHNESS: [(f64, f64); 4] = [(90.0, 2.6), (40.0, 1.4), (18.0, 0.6), (8.0, 0.22)];
 
 /// How many smaller craters there are.

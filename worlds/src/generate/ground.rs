@@ -30,7 +30,7 @@ pub(super) struct Ground {
     pub(super) gates: usize,
     /// For each place the places it can be joined to, with the cost.
     pub(super) links: Vec<Vec<(usize, f64)>>,
-    /// The least distance between two places [m].
+    /// The least distance between two places \[m\].
     pub(super) spacing_m: f64,
 }
 

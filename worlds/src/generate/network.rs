@@ -19,6 +19,9 @@ const LOOP_ADDS: std::ops::RangeInclusive<usize> = 1..=9;
 /// What each vertex that a loop adds counts against it.
 const LOOP_COST: f64 = 12.0;
 
+/// The most vertices of a spur.
+const SPUR_MOST: usize = 6;
+
 /// How much dearer a step next to the network is, so that paths keep apart.
 const CROWDING: f64 = 3.0;
 
@@ -126,7 +129,7 @@ impl<'a> Network<'a> {
             .loops_m
             .iter()
             .map(|p| (p - middle).norm())
-            .fold(150.0, |a, b| f64::min(a, b));
+            .fold(150.0, f64::min);
         nearest_m + 2.0 * hops.min(30) as f64 - LOOP_COST * path.len() as f64
     }
 
@@ -147,7 +150,7 @@ impl<'a> Network<'a> {
                 .map(|v| (gap_m(v), v))
                 .collect();
             gaps.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            let path = gaps.iter().find_map(|&(_, v)| self.path_to_network(v));
+            let path = gaps.iter().find_map(|&(_, v)| self.spur_to(v));
             let mut path = path.ok_or("the safe ground is full")?;
             // From the network outwards, as far as vertices are left.
             path.reverse();
@@ -204,6 +207,15 @@ impl<'a> Network<'a> {
         self.cheapest(from, |v| {
             self.chosen[v] && v >= self.ground.gates && self.joined[v].len() < MOST_JOINED
         })
+    }
+
+    /// The cheapest path from a place outside the network to a vertex of it that is no dead end, if
+    /// that is not long.
+    fn spur_to(&self, from: usize) -> Option<Vec<usize>> {
+        let path = self.cheapest(from, |v| {
+            self.chosen[v] && (2..MOST_JOINED).contains(&self.joined[v].len())
+        });
+        path.filter(|path| path.len() <= SPUR_MOST + 1)
     }
 
     /// The cheapest path over unchosen places from `from` to one where `ends` holds (Dijkstra).

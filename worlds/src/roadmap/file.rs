@@ -41,7 +41,7 @@ struct RoadmapFile {
 impl Roadmap {
     /// The built-in roadmap of this name: `crater-sparse` (178 vertices, 183 edges) or
     /// `crater-dense` (228 and 239), the sizes of *network-guided*, section 4. The paper's own maps
-    /// are not published; these are generated.
+    /// are not published; these are generated (see [`crate::generate`]).
     ///
     /// ```
     /// use farside_worlds::{Roadmap, WorldError};
@@ -74,7 +74,7 @@ impl Roadmap {
         &[BUILTIN[0].0, BUILTIN[1].0]
     }
 
-    /// Reads a roadmap file: `name`, `positions_m` (x and y of each vertex [m]), `edges`,
+    /// Reads a roadmap file: `name`, `positions_m` (x and y of each vertex \[m\]), `edges`,
     /// `boundary` and, if there are any, `heights_m`.
     ///
     /// ```

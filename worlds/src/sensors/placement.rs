@@ -11,8 +11,11 @@ use super::{NodeId, SensorNetwork, check_request, nearest};
 use crate::error::SensorError;
 use crate::roadmap::Roadmap;
 
-/// Placements tried before the search gives up.
+/// Placements tried before the search gives up, and fewer where each is dear.
 const ATTEMPTS: usize = 64;
+
+/// Nodes times vertices over all attempts, which bounds the time a hopeless search takes.
+const MOST_WORK: usize = 4_000_000;
 
 /// Repairs tried on each of them.
 const REPAIRS: usize = 64;
@@ -54,8 +57,9 @@ impl SensorNetwork {
         let key = RandomKey::new(seed)
             .text("sensor_placement")
             .number(nodes as u64);
+        let attempts = (MOST_WORK / (nodes * roadmap.len())).clamp(2, ATTEMPTS);
         let mut last = None;
-        for attempt in 0..ATTEMPTS {
+        for attempt in 0..attempts {
             let mut search = Search::new(roadmap, radius_m, key.number(attempt as u64).stream());
             search.throw_all(nodes);
             match search.repaired() {
@@ -68,20 +72,20 @@ impl SensorNetwork {
         Err(SensorError::NoPlacement {
             nodes,
             radius_m,
-            attempts: ATTEMPTS,
+            attempts,
             last,
             suggested_m,
         })
     }
 
-    /// A radio radius [m] with which [`SensorNetwork::place`] finds a placement for (nearly) every
+    /// A radio radius \[m\] with which [`SensorNetwork::place`] finds a placement for (nearly) every
     /// seed: a fixed multiple of the nodes' mean spacing over the roadmap.
     pub fn default_radius_m(roadmap: &Roadmap, nodes: usize) -> f64 {
         libm::ceil(RADIUS_SPACINGS * mean_spacing_m(roadmap, nodes)).max(1.0)
     }
 }
 
-/// The spacing that so many nodes have when spread evenly over the roadmap's extent [m].
+/// The spacing that so many nodes have when spread evenly over the roadmap's extent \[m\].
 fn mean_spacing_m(roadmap: &Roadmap, nodes: usize) -> f64 {
     let (low, high) = extent_m(roadmap);
     let size = high - low;
@@ -207,5 +211,49 @@ impl<'a> Search<'a> {
         let step = (to - from) * (0.5 * excess_m / apart_m);
         self.positions_m[a.0 as usize] += step;
         self.positions_m[b.0 as usize] -= step;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Placements are pinned: a change of the search changes every run that uses one.
+    #[test]
+    fn golden_placement() {
+        let map = Roadmap::builtin("crater-dense").unwrap();
+        let network = SensorNetwork::place(&map, 28, 145.0, 1).unwrap();
+        let p = network.position_m(NodeId(0));
+        assert_eq!((p.x, p.y), (55.309394100004056, 212.5978179787905));
+        let owned: Vec<usize> = network.nodes().map(|n| network.owned(n).len()).collect();
+        assert_eq!(
+            owned,
+            [
+                7, 9, 6, 10, 7, 10, 6, 12, 5, 10, 12, 5, 7, 20, 5, 12, 3, 2, 4, 17, 6, 10, 6, 5, 2,
+                9, 9, 12
+            ]
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_placed_is_an_error_with_advice() {
+        let map = Roadmap::builtin("crater-sparse").unwrap();
+        let small = SensorNetwork::place(&map, 14, 20.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(small.contains("a radius of 201 m usually does"), "{small}");
+        assert!(small.contains("no node covers"), "{small}");
+        let many = SensorNetwork::place(&map, 178, 1000.0, 1)
+            .unwrap_err()
+            .to_string();
+        assert!(many.contains("fewer nodes"), "{many}");
+        let none = SensorNetwork::place(&map, 0, 100.0, 1).unwrap_err();
+        assert_eq!(
+            none,
+            SensorError::NodeCount {
+                vertices: 178,
+                actual: 0
+            }
+        );
     }
 }
