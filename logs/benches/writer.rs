@@ -32,7 +32,16 @@ impl Actor for Rover {
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         let next = ctx.lookup::<Rover>(&format!("rover_{}", self.next))?;
-        ctx.send(next, Pose { x_m: 0.0, y_m: 0.0, heading_rad: 0.0, battery: 1.0, goal: None });
+        ctx.send(
+            next,
+            Pose {
+                x_m: 0.0,
+                y_m: 0.0,
+                heading_rad: 0.0,
+                battery: 1.0,
+                goal: None,
+            },
+        );
         Ok(())
     }
 }
@@ -76,7 +85,11 @@ struct Keeper(Arc<Mutex<Tape>>);
 
 impl Observer for Keeper {
     fn wants(&self) -> Wants {
-        Wants { bodies: true, samples: true, checkpoints: true }
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: true,
+        }
     }
 
     fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
@@ -88,14 +101,23 @@ impl Observer for Keeper {
         let kept = Kept {
             kind: record.kind.cloned(),
             body: record.body.to_vec(),
-            record: Record { kind: None, body: &[], ..*record },
+            record: Record {
+                kind: None,
+                body: &[],
+                ..*record
+            },
         };
         self.0.lock().unwrap().told.push(Told::Record(kept));
         Ok(Flow::Continue)
     }
 
     fn checkpoint(&mut self, point: &Checkpoint<'_>) -> Result<(), ObserverError> {
-        let told = Told::Checkpoint(point.records, point.key, point.digest, point.hashes.to_vec());
+        let told = Told::Checkpoint(
+            point.records,
+            point.key,
+            point.digest,
+            point.hashes.to_vec(),
+        );
         self.0.lock().unwrap().told.push(told);
         Ok(())
     }
@@ -107,16 +129,25 @@ fn simulate(observer: impl Observer + 'static, seconds: u64) -> Report {
     for rover in 0..rovers {
         let host = sim.host(&format!("host_{rover}"));
         let next = (rover + 1) % rovers;
-        sim.actor(host, &format!("rover_{rover}"), move |_| Rover { next, rovers });
+        sim.actor(host, &format!("rover_{rover}"), move |_| Rover {
+            next,
+            rovers,
+        });
         let delay = FixedDelay::new(SimDuration::from_millis(5 + u64::from(rover)));
         sim.uplink(host, &format!("radio_{rover}"), delay);
     }
-    sim.stop_at(SimTime::ZERO + SimDuration::from_secs(seconds), "long enough");
+    sim.stop_at(
+        SimTime::ZERO + SimDuration::from_secs(seconds),
+        "long enough",
+    );
     sim.observe(observer);
     sim.run(Executor::Inline).unwrap()
 }
 
-#[allow(clippy::disallowed_types, reason = "a benchmark measures the wall clock")]
+#[allow(
+    clippy::disallowed_types,
+    reason = "a benchmark measures the wall clock"
+)]
 fn timed(work: impl FnOnce()) -> f64 {
     let start = std::time::Instant::now();
     work();
@@ -130,11 +161,21 @@ fn write_log(path: &Path, tape: &Tape, report: &Report) {
         match told {
             Told::Record(kept) => {
                 let kind = kept.kind.as_ref();
-                writer.record(&Record { kind, body: &kept.body, ..kept.record }).unwrap();
+                writer
+                    .record(&Record {
+                        kind,
+                        body: &kept.body,
+                        ..kept.record
+                    })
+                    .unwrap();
             }
             Told::Checkpoint(records, key, digest, hashes) => {
-                let point =
-                    Checkpoint { records: *records, key: *key, digest: *digest, hashes };
+                let point = Checkpoint {
+                    records: *records,
+                    key: *key,
+                    digest: *digest,
+                    hashes,
+                };
                 writer.checkpoint(&point).unwrap();
             }
         }
@@ -146,31 +187,54 @@ fn write_log(path: &Path, tape: &Tape, report: &Report) {
 fn write_bare(path: &Path, messages: &[(mcap::records::MessageHeader, Vec<u8>)], like: &[u8]) {
     let summary = mcap::Summary::read(like).unwrap().unwrap();
     let file = BufWriter::new(std::fs::File::create(path).unwrap());
-    let mut writer = mcap::WriteOptions::new().compression_threads(0).create(file).unwrap();
+    let mut writer = mcap::WriteOptions::new()
+        .compression_threads(0)
+        .create(file)
+        .unwrap();
     let mut ids = std::collections::BTreeMap::new();
     for (id, channel) in &summary.channels {
         let schema = channel.schema.as_ref().unwrap();
-        let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data).unwrap();
-        let added =
-            writer.add_channel(schema, &channel.topic, "protobuf", &channel.metadata).unwrap();
+        let schema = writer
+            .add_schema(&schema.name, &schema.encoding, &schema.data)
+            .unwrap();
+        let added = writer
+            .add_channel(schema, &channel.topic, "protobuf", &channel.metadata)
+            .unwrap();
         ids.insert(*id, added);
     }
     for (header, data) in messages {
-        let header = mcap::records::MessageHeader { channel_id: ids[&header.channel_id], ..*header };
+        let header = mcap::records::MessageHeader {
+            channel_id: ids[&header.channel_id],
+            ..*header
+        };
         writer.write_to_known_channel(&header, data).unwrap();
     }
     writer.finish().unwrap();
-    writer.into_inner().into_inner().unwrap().sync_all().unwrap();
+    writer
+        .into_inner()
+        .into_inner()
+        .unwrap()
+        .sync_all()
+        .unwrap();
 }
 
 fn main() {
     let folder = tempfile::tempdir().unwrap();
-    let (ours, bare) = (folder.path().join("ours.mcap"), folder.path().join("bare.mcap"));
+    let (ours, bare) = (
+        folder.path().join("ours.mcap"),
+        folder.path().join("bare.mcap"),
+    );
     let tape = Arc::new(Mutex::new(Tape::default()));
     let report = simulate(Keeper(tape.clone()), 200);
     let tape = tape.lock().unwrap();
     write_log(&ours, &tape, &report);
-    assert!(Log::open(&ours).unwrap().records().unwrap().all(|record| record.is_ok()));
+    assert!(
+        Log::open(&ours)
+            .unwrap()
+            .records()
+            .unwrap()
+            .all(|record| record.is_ok())
+    );
     let like = std::fs::read(&ours).unwrap();
     let messages: Vec<_> = mcap::MessageStream::new(&like)
         .unwrap()
@@ -186,7 +250,11 @@ fn main() {
         })
         .collect();
     let bytes: usize = messages.iter().map(|(_, data)| data.len()).sum();
-    println!("{} messages, {bytes} bytes, {} in the file", messages.len(), like.len());
+    println!(
+        "{} messages, {bytes} bytes, {} in the file",
+        messages.len(),
+        like.len()
+    );
     let (mut best_ours, mut best_bare) = (f64::MAX, f64::MAX);
     // Alternating, and the best of several: other work on the machine must not decide.
     for _ in 0..7 {

@@ -29,13 +29,20 @@ impl Handler<Tick> for Clock {
         if tick.count % 100_000 == 0 {
             println!("{}", tick.count);
         }
-        ctx.timer(SimDuration::from_millis(1), Tick { count: tick.count + 1 });
+        ctx.timer(
+            SimDuration::from_millis(1),
+            Tick {
+                count: tick.count + 1,
+            },
+        );
         Ok(())
     }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args().nth(1).ok_or("say where to write the log")?;
+    let path = std::env::args()
+        .nth(1)
+        .ok_or("say where to write the log")?;
     let mut sim = Simulation::new(1);
     let host = sim.host("moon");
     sim.actor(host, "clock", |_| Clock);

@@ -150,7 +150,11 @@ pub fn diff(
     let (a, b) = (a.as_ref(), b.as_ref());
     let ignore = Topics::new(&options.ignore)?;
     let farside = (index::is_farside(a)?, index::is_farside(b)?);
-    let mode = if farside == (true, true) { Mode::Farside } else { Mode::Any };
+    let mode = if farside == (true, true) {
+        Mode::Farside
+    } else {
+        Mode::Any
+    };
     let mut names = Names::default();
     let mut comparison = Comparison {
         a: Index::build(a, mode, &ignore, &mut names)?,
@@ -203,7 +207,9 @@ impl Comparison {
                     notes.push(format!("{name} is cut at byte {offset}: {what}"));
                 }
                 (None, None) if self.mode == Mode::Farside => {
-                    notes.push(format!("{name} has no farside.end: its run did not end in the log"));
+                    notes.push(format!(
+                        "{name} has no farside.end: its run did not end in the log"
+                    ));
                 }
                 _ => {}
             }
@@ -212,9 +218,21 @@ impl Comparison {
             let pairs = [
                 ("seeds", a.seed.to_string(), b.seed.to_string()),
                 ("scenarios", a.scenario.clone(), b.scenario.clone()),
-                ("resolved scenarios", a.scenario_hash.clone(), b.scenario_hash.clone()),
-                ("code versions", a.code_version.clone(), b.code_version.clone()),
-                ("filtered topics", a.exclude.join(", "), b.exclude.join(", ")),
+                (
+                    "resolved scenarios",
+                    a.scenario_hash.clone(),
+                    b.scenario_hash.clone(),
+                ),
+                (
+                    "code versions",
+                    a.code_version.clone(),
+                    b.code_version.clone(),
+                ),
+                (
+                    "filtered topics",
+                    a.exclude.join(", "),
+                    b.exclude.join(", "),
+                ),
             ];
             let differing = pairs.into_iter().filter(|(_, a, b)| a != b);
             notes.extend(differing.map(|(what, a, b)| format!("{what} differ: {a:?} and {b:?}")));
@@ -233,7 +251,15 @@ impl Comparison {
         let entry = &index.entries[at as usize];
         let source = names.name(entry.source);
         let actor = source != "@control";
-        (entry.time_ns, entry.step, actor, source, entry.count, !entry.event, at)
+        (
+            entry.time_ns,
+            entry.step,
+            actor,
+            source,
+            entry.count,
+            !entry.event,
+            at,
+        )
     }
 
     /// When a difference shows: the earlier of its two records.
@@ -248,7 +274,9 @@ impl Comparison {
     }
 
     fn found(&mut self, found: Found) {
-        let earlier = self.earliest.is_none_or(|known| self.when(found) < self.when(known));
+        let earlier = self
+            .earliest
+            .is_none_or(|known| self.when(found) < self.when(known));
         if earlier {
             self.earliest = Some(found);
         }
@@ -335,7 +363,9 @@ impl Comparison {
         let differing = |topic: &TopicDiff| topic.differences() > 0;
         self.report.topics = self.topics.into_values().filter(differing).collect();
         self.report.topics.sort_by(|a, b| {
-            b.differences().cmp(&a.differences()).then_with(|| a.topic.cmp(&b.topic))
+            b.differences()
+                .cmp(&a.differences())
+                .then_with(|| a.topic.cmp(&b.topic))
         });
         Ok(self.report)
     }
@@ -395,9 +425,17 @@ impl fmt::Display for DiffReport {
         let Some(first) = &self.first else {
             return writeln!(f, "identical: {} records compared", self.records_a);
         };
-        write!(f, "first difference at {:.9} s on {}", first.time_s, first.topic)?;
+        write!(
+            f,
+            "first difference at {:.9} s on {}",
+            first.time_s, first.topic
+        )?;
         if !first.sender.is_empty() {
-            write!(f, ": {} to {}, message {}", first.sender, first.receiver, first.ordinal)?;
+            write!(
+                f,
+                ": {} to {}, message {}",
+                first.sender, first.receiver, first.ordinal
+            )?;
         }
         if let Some(key) = &first.match_key {
             write!(f, ", key {key}")?;
@@ -421,8 +459,18 @@ impl fmt::Display for DiffReport {
             self.records_b
         )?;
         for topic in &self.topics {
-            let TopicDiff { topic, changed, only_in_a, only_in_b, reordered, .. } = topic;
-            writeln!(f, "  {changed:>8} ~ {only_in_a:>8} < {only_in_b:>8} > {reordered:>8} ^  {topic}")?;
+            let TopicDiff {
+                topic,
+                changed,
+                only_in_a,
+                only_in_b,
+                reordered,
+                ..
+            } = topic;
+            writeln!(
+                f,
+                "  {changed:>8} ~ {only_in_a:>8} < {only_in_b:>8} > {reordered:>8} ^  {topic}"
+            )?;
         }
         Ok(())
     }
@@ -442,8 +490,18 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
             let omitted = first.causes_omitted + (count - 1 - CAUSES_SHOWN) as u64;
             writeln!(f, "  ... {omitted} more ...")?;
         }
-        let Cause { time_s, topic, sender, receiver, ordinal, fate } = cause;
-        writeln!(f, "  because {time_s:.9} s {fate} {topic} ({sender} to {receiver}, {ordinal})")?;
+        let Cause {
+            time_s,
+            topic,
+            sender,
+            receiver,
+            ordinal,
+            fate,
+        } = cause;
+        writeln!(
+            f,
+            "  because {time_s:.9} s {fate} {topic} ({sender} to {receiver}, {ordinal})"
+        )?;
     }
     Ok(())
 }

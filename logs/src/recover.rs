@@ -55,7 +55,11 @@ impl fmt::Display for RecoverReport {
             writeln!(f, "  lost: {lost}")?;
         }
         if self.losses > self.lost.len() as u64 {
-            writeln!(f, "  and {} losses more", self.losses - self.lost.len() as u64)?;
+            writeln!(
+                f,
+                "  and {} losses more",
+                self.losses - self.lost.len() as u64
+            )?;
         }
         match self.bytes_lost {
             0 => writeln!(f, "nothing that was in the file is lost"),
@@ -75,10 +79,7 @@ impl fmt::Display for RecoverReport {
 ///
 /// # Errors
 /// If `broken` does not even start like an MCAP file, or `out` cannot be written.
-pub fn recover(
-    broken: impl AsRef<Path>,
-    out: impl AsRef<Path>,
-) -> Result<RecoverReport, LogError> {
+pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<RecoverReport, LogError> {
     let (broken, out) = (broken.as_ref(), out.as_ref());
     let mut scanner = Scanner::open(broken)?;
     if let (Ok(from), Ok(to)) = (broken.canonicalize(), out.canonicalize())
@@ -97,14 +98,24 @@ pub fn recover(
                 saved.add(item, &mut report)?;
                 None
             }
-            Err(LogError::TooLarge { offset, what, actual, .. }) => {
-                Some((offset, format!("a {what} of {actual} bytes, too large to be read")))
-            }
+            Err(LogError::TooLarge {
+                offset,
+                what,
+                actual,
+                ..
+            }) => Some((
+                offset,
+                format!("a {what} of {actual} bytes, too large to be read"),
+            )),
             Err(error) => return Err(error),
         };
         if let Some((offset, what)) = behind {
             let found = scanner.resume(offset + 1)?;
-            let end = if found { scanner.offset() } else { scanner.length() };
+            let end = if found {
+                scanner.offset()
+            } else {
+                scanner.length()
+            };
             report.lose(end - offset, format!("{what}, at byte {offset}"));
             if !found {
                 break;
@@ -143,7 +154,11 @@ impl<'a> Saved<'a> {
             let file = std::fs::File::create(self.path)
                 .map_err(|error| LogError::io(self.path, "create", error))?;
             let (profile, library) = std::mem::take(&mut self.header);
-            let library = if library.is_empty() { "unknown".to_owned() } else { library };
+            let library = if library.is_empty() {
+                "unknown".to_owned()
+            } else {
+                library
+            };
             let recovered = match library.ends_with("(recovered)") {
                 true => library,
                 false => format!("{library} (recovered)"),
@@ -158,7 +173,9 @@ impl<'a> Saved<'a> {
         }
         match &mut self.writer {
             Some(writer) => Ok(writer),
-            None => Err(LogError::Unfinished { path: self.path.to_owned() }),
+            None => Err(LogError::Unfinished {
+                path: self.path.to_owned(),
+            }),
         }
     }
 
@@ -187,7 +204,11 @@ impl<'a> Saved<'a> {
                 self.writer()?.write_metadata(&metadata).map_err(refused)?;
                 report.metadata += 1;
             }
-            Item::Damage { offset, bytes, what } => {
+            Item::Damage {
+                offset,
+                bytes,
+                what,
+            } => {
                 report.lose(bytes, format!("{what}, at byte {offset}"));
             }
             Item::Cut { .. } => {}
@@ -257,10 +278,16 @@ impl<'a> Saved<'a> {
     fn finish(mut self) -> Result<(), LogError> {
         let path = self.path;
         let io = |error| LogError::io(path, "write", error);
-        self.writer()?.finish().map_err(|error| LogError::mcap(path, error))?;
-        let Some(writer) = self.writer else { return Ok(()) };
+        self.writer()?
+            .finish()
+            .map_err(|error| LogError::mcap(path, error))?;
+        let Some(writer) = self.writer else {
+            return Ok(());
+        };
         let buffered = writer.into_inner();
-        let file = buffered.into_inner().map_err(|error| io(error.into_error()))?;
+        let file = buffered
+            .into_inner()
+            .map_err(|error| io(error.into_error()))?;
         file.sync_all().map_err(io)
     }
 }

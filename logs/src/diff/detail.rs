@@ -30,7 +30,10 @@ pub(super) fn pair(
     Ok(match mode {
         Mode::Any => any(&message_a, &message_b, tolerance),
         Mode::Farside => {
-            match (RecordRef::read(message_a.data), RecordRef::read(message_b.data)) {
+            match (
+                RecordRef::read(message_a.data),
+                RecordRef::read(message_b.data),
+            ) {
                 (Some(x), Some(y)) => {
                     let body_a = body_descriptor(message_a.channel);
                     let body_b = body_descriptor(message_b.channel);
@@ -72,9 +75,15 @@ fn any(a: &ScannedMessage<'_>, b: &ScannedMessage<'_>, tolerance: f64) -> Option
         ("json", "json") => fields::json(a.data, b.data, tolerance),
         _ => (a.data != b.data).then(|| fields::raw("data", a.data, b.data)),
     };
-    data.or_else(|| times("log_time", a.head.log_time, b.head.log_time, tolerance)).or_else(|| {
-        times("publish_time", a.head.publish_time, b.head.publish_time, tolerance)
-    })
+    data.or_else(|| times("log_time", a.head.log_time, b.head.log_time, tolerance))
+        .or_else(|| {
+            times(
+                "publish_time",
+                a.head.publish_time,
+                b.head.publish_time,
+                tolerance,
+            )
+        })
 }
 
 fn times(field: &str, a_ns: u64, b_ns: u64, tolerance: f64) -> Option<FieldDiff> {
@@ -112,7 +121,9 @@ pub(super) fn describe(
     first.sender = record.sender.to_owned();
     first.receiver = record.receiver.to_owned();
     first.ordinal = record.ordinal;
-    first.match_key = record.match_key.map(|bits| MatchKey::from_bits(bits).to_string());
+    first.match_key = record
+        .match_key
+        .map(|bits| MatchKey::from_bits(bits).to_string());
     first.link = record.link.to_owned();
     first.reason = record.reason.to_owned();
     let cause = record.cause.map(|key| owned(&key));
@@ -149,7 +160,9 @@ fn trace(
             count: key.count,
         };
         // A cause comes before its effect: a log that says otherwise is damaged.
-        let found = index.event(&key, names).filter(|at| *at < before && steps < CHAIN_LIMIT);
+        let found = index
+            .event(&key, names)
+            .filter(|at| *at < before && steps < CHAIN_LIMIT);
         let Some(at) = found else {
             origin = Some(Cause {
                 time_s: seconds(key.time_ns),
@@ -162,7 +175,9 @@ fn trace(
         };
         before = at;
         let message = index.scanner.message_at(index.entries[at].position)?;
-        let Some(record) = RecordRef::read(message.data) else { break };
+        let Some(record) = RecordRef::read(message.data) else {
+            break;
+        };
         let cause = Cause {
             time_s: seconds(record.key.time_ns),
             topic: message.channel.topic.clone(),

@@ -125,7 +125,13 @@ impl Index {
             }
         }
         let entries = builder.entries;
-        Ok(Index { scanner, entries, head, end, cut })
+        Ok(Index {
+            scanner,
+            entries,
+            head,
+            end,
+            cut,
+        })
     }
 
     /// The order of the run's events: the entry of the event with this key.
@@ -138,8 +144,12 @@ impl Index {
             count: entry.count,
         };
         let from = self.entries.partition_point(|entry| key_of(entry) < *key);
-        let same = self.entries[from..].iter().take_while(|entry| key_of(entry) == *key);
-        same.enumerate().find(|(_, entry)| entry.event).map(|(at, _)| from + at)
+        let same = self.entries[from..]
+            .iter()
+            .take_while(|entry| key_of(entry) == *key);
+        same.enumerate()
+            .find(|(_, entry)| entry.event)
+            .map(|(at, _)| from + at)
     }
 }
 
@@ -212,8 +222,10 @@ impl Builder<'_> {
         let identity = xxh3_64(message.channel.topic.as_bytes());
         let ordinal = self.place(identity);
         self.scratch.clear();
-        self.scratch.extend_from_slice(&message.head.log_time.to_le_bytes());
-        self.scratch.extend_from_slice(&message.head.publish_time.to_le_bytes());
+        self.scratch
+            .extend_from_slice(&message.head.log_time.to_le_bytes());
+        self.scratch
+            .extend_from_slice(&message.head.publish_time.to_le_bytes());
         self.scratch.extend_from_slice(message.data);
         Entry {
             identity,
@@ -276,7 +288,11 @@ impl Builder<'_> {
             out.push(0);
         }
         // Whatever becomes of a message, it is the same message.
-        let class = if record.class.is_fate() { RecordClass::Delivered } else { record.class };
+        let class = if record.class.is_fate() {
+            RecordClass::Delivered
+        } else {
+            record.class
+        };
         out.push(class as u8);
         out.extend_from_slice(&record.copy.to_le_bytes());
         let counted = class == RecordClass::Delivered

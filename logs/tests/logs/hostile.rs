@@ -11,7 +11,11 @@ use crate::common::{Plan, logged};
 fn small_log() -> &'static [u8] {
     static LOG: OnceLock<Vec<u8>> = OnceLock::new();
     LOG.get_or_init(|| {
-        let (_folder, path, _) = logged(&Plan { rovers: 2, cycles: 6, ..Plan::default() });
+        let (_folder, path, _) = logged(&Plan {
+            rovers: 2,
+            cycles: 6,
+            ..Plan::default()
+        });
         fs::read(path).unwrap()
     })
 }
@@ -27,7 +31,14 @@ fn read_all(bytes: &[u8]) {
     if let Ok(info) = &told {
         let _ = info.to_string();
     }
-    if let Ok(report) = diff(&good, &bad, &DiffOptions { tolerance: 1e-9, ..Default::default() }) {
+    if let Ok(report) = diff(
+        &good,
+        &bad,
+        &DiffOptions {
+            tolerance: 1e-9,
+            ..Default::default()
+        },
+    ) {
         let _ = report.to_string();
     }
     let _ = diff(&bad, &bad, &DiffOptions::default());
@@ -41,7 +52,9 @@ fn read_all(bytes: &[u8]) {
     match recover(&bad, &out) {
         // Whatever is saved is a whole file.
         Ok(report) => {
-            let saved = mcap::MessageStream::new(&fs::read(&out).unwrap()).unwrap().count() as u64;
+            let saved = mcap::MessageStream::new(&fs::read(&out).unwrap())
+                .unwrap()
+                .count() as u64;
             assert_eq!(saved, report.messages);
         }
         Err(error) => assert!(!error.to_string().is_empty()),

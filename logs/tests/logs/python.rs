@@ -41,17 +41,26 @@ with open(sys.argv[1], "rb") as f:
 
 #[test]
 fn python_reads_every_field() {
-    let packages = Command::new("python3").args(["-c", "import mcap, mcap_protobuf"]).output();
+    let packages = Command::new("python3")
+        .args(["-c", "import mcap, mcap_protobuf"])
+        .output();
     if !packages.is_ok_and(|output| output.status.success()) {
         println!("skipped: python3 with mcap and mcap-protobuf-support is not installed");
         return;
     }
     let (_folder, path, report) = logged(&Plan::default());
-    let output = Command::new("python3").args(["-c", SCRIPT]).arg(&path).output().unwrap();
+    let output = Command::new("python3")
+        .args(["-c", SCRIPT])
+        .arg(&path)
+        .output()
+        .unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
     let numbers = String::from_utf8_lossy(&output.stdout);
-    let numbers: Vec<u64> = numbers.split_whitespace().map(|n| n.parse().unwrap()).collect();
+    let numbers: Vec<u64> = numbers
+        .split_whitespace()
+        .map(|n| n.parse().unwrap())
+        .collect();
     assert_eq!((numbers[2], numbers[3]), (report.counts.lost, 5));
     assert!(numbers[1] > 10);
 }

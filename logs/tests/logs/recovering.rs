@@ -7,7 +7,11 @@ use farside_logs::{DiffOptions, diff, info, recover};
 use crate::common::{Plan, logged};
 
 fn long() -> Plan {
-    Plan { rovers: 8, cycles: 1500, ..Plan::default() }
+    Plan {
+        rovers: 8,
+        cycles: 1500,
+        ..Plan::default()
+    }
 }
 
 #[test]
@@ -15,8 +19,16 @@ fn a_whole_log_is_saved_whole() {
     let (folder, path, _) = logged(&Plan::default());
     let out = folder.path().join("out.mcap");
     let report = recover(&path, &out).unwrap();
-    assert_eq!((report.bytes_lost, report.losses, report.attachments), (0, 0, 2), "{report}");
-    assert!(diff(&path, &out, &DiffOptions::default()).unwrap().identical);
+    assert_eq!(
+        (report.bytes_lost, report.losses, report.attachments),
+        (0, 0, 2),
+        "{report}"
+    );
+    assert!(
+        diff(&path, &out, &DiffOptions::default())
+            .unwrap()
+            .identical
+    );
     let (before, after) = (info(&path).unwrap(), info(&out).unwrap());
     assert_eq!((&before.run, &before.topics), (&after.run, &after.topics));
     assert_eq!(after.missing, Vec::<String>::new());
@@ -36,10 +48,16 @@ fn a_cut_log_is_saved_up_to_its_last_chunk() {
         assert_eq!(report.messages, before.messages);
         let after = info(&out).unwrap();
         assert_eq!(after.messages, before.messages);
-        assert_eq!(after.missing, ["no farside.end: the run did not end in this log"]);
+        assert_eq!(
+            after.missing,
+            ["no farside.end: the run did not end in this log"]
+        );
         saved.push(report.messages);
     }
-    assert!(saved.windows(2).all(|two| two[0] <= two[1]) && saved[3] > 8000, "{saved:?}");
+    assert!(
+        saved.windows(2).all(|two| two[0] <= two[1]) && saved[3] > 8000,
+        "{saved:?}"
+    );
 }
 
 #[test]
@@ -47,8 +65,10 @@ fn a_damaged_chunk_is_left_out_and_the_rest_is_saved() {
     let (folder, path, _) = logged(&long());
     let mut bytes = fs::read(&path).unwrap();
     let messages = info(&path).unwrap().messages;
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 0xff;
+    // Far enough apart to hit chunks and not only what lies between them.
+    for at in (bytes.len() * 2 / 5..bytes.len() * 3 / 5).step_by(5000) {
+        bytes[at] ^= 0xff;
+    }
     fs::write(&path, &bytes).unwrap();
     let out = folder.path().join("out.mcap");
     let report = recover(&path, &out).unwrap();
