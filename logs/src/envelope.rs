@@ -202,7 +202,14 @@ impl KeyRef<'_> {
     fn order(&self) -> (u64, u32, u32, bool, &str, u64) {
         // `@control` comes first, also before names that begin with a digit.
         let actor = self.source != "@control";
-        (self.time_ns, self.step, self.tie, actor, self.source, self.count)
+        (
+            self.time_ns,
+            self.step,
+            self.tie,
+            actor,
+            self.source,
+            self.count,
+        )
     }
 }
 

@@ -44,7 +44,9 @@ pub enum LogError {
         what: String,
     },
     /// A part of the file is larger than this crate is willing to hold in memory.
-    #[error("{path}: the {what} at byte {offset} has {actual} bytes, more than the {limit} allowed")]
+    #[error(
+        "{path}: the {what} at byte {offset} has {actual} bytes, more than the {limit} allowed"
+    )]
     TooLarge {
         /// The file.
         path: PathBuf,

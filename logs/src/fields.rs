@@ -59,13 +59,23 @@ pub(crate) fn raw(prefix: &str, a: &[u8], b: &[u8]) -> FieldDiff {
     let at = a.iter().zip(b).position(|(x, y)| x != y);
     let at = at.unwrap_or(a.len().min(b.len()));
     let show = |bytes: &[u8]| {
-        let shown: String = bytes.iter().skip(at).take(16).map(|b| format!("{b:02x}")).collect();
+        let shown: String = bytes
+            .iter()
+            .skip(at)
+            .take(16)
+            .map(|b| format!("{b:02x}"))
+            .collect();
         format!("{} bytes, from byte {at}: {shown}", bytes.len())
     };
     FieldDiff::new(prefix, show(a), show(b))
 }
 
-fn messages(prefix: &str, a: &DynamicMessage, b: &DynamicMessage, tolerance: f64) -> Option<FieldDiff> {
+fn messages(
+    prefix: &str,
+    a: &DynamicMessage,
+    b: &DynamicMessage,
+    tolerance: f64,
+) -> Option<FieldDiff> {
     let path = |name: &str| match prefix {
         "" => name.to_owned(),
         prefix => format!("{prefix}.{name}"),
@@ -73,11 +83,21 @@ fn messages(prefix: &str, a: &DynamicMessage, b: &DynamicMessage, tolerance: f64
     for field in a.descriptor().fields() {
         let name = field.name();
         let Some(other) = b.descriptor().get_field_by_name(name) else {
-            return Some(FieldDiff::new(path(name), show(&a.get_field(&field)), "no such field"));
+            return Some(FieldDiff::new(
+                path(name),
+                show(&a.get_field(&field)),
+                "no such field",
+            ));
         };
         let (has_a, has_b) = (a.has_field(&field), b.has_field(&other));
         if field.supports_presence() && has_a != has_b {
-            let text = |has: bool, value: &Value| if has { show(value) } else { "absent".to_owned() };
+            let text = |has: bool, value: &Value| {
+                if has {
+                    show(value)
+                } else {
+                    "absent".to_owned()
+                }
+            };
             let (x, y) = (a.get_field(&field), b.get_field(&other));
             return Some(FieldDiff::new(path(name), text(has_a, &x), text(has_b, &y)));
         }
@@ -89,7 +109,13 @@ fn messages(prefix: &str, a: &DynamicMessage, b: &DynamicMessage, tolerance: f64
     let added = b.descriptor().fields().find(|field| {
         b.has_field(field) && a.descriptor().get_field_by_name(field.name()).is_none()
     });
-    added.map(|field| FieldDiff::new(path(field.name()), "no such field", show(&b.get_field(&field))))
+    added.map(|field| {
+        FieldDiff::new(
+            path(field.name()),
+            "no such field",
+            show(&b.get_field(&field)),
+        )
+    })
 }
 
 fn values(path: &str, a: &Value, b: &Value, tolerance: f64) -> Option<FieldDiff> {
@@ -99,7 +125,8 @@ fn values(path: &str, a: &Value, b: &Value, tolerance: f64) -> Option<FieldDiff>
         (Value::Message(x), Value::Message(y)) => return messages(path, x, y, tolerance),
         (Value::List(x), Value::List(y)) => {
             let mut pairs = x.iter().zip(y).enumerate();
-            let found = pairs.find_map(|(at, (x, y))| values(&format!("{path}[{at}]"), x, y, tolerance));
+            let found =
+                pairs.find_map(|(at, (x, y))| values(&format!("{path}[{at}]"), x, y, tolerance));
             if found.is_some() {
                 return found;
             }
@@ -149,6 +176,50 @@ fn map_key(key: &MapKey) -> String {
     }
 }
 
+/// The first place in which two JSON documents differ.
+pub(crate) fn json(a: &[u8], b: &[u8], tolerance: f64) -> Option<FieldDiff> {
+    if a == b {
+        return None;
+    }
+    let parse = |bytes| serde_json::from_slice::<serde_json::Value>(bytes).ok();
+    match (parse(a), parse(b)) {
+        (Some(x), Some(y)) => json_values("data", &x, &y, tolerance),
+        _ => Some(raw("data", a, b)),
+    }
+}
+
+fn json_values(
+    path: &str,
+    a: &serde_json::Value,
+    b: &serde_json::Value,
+    tolerance: f64,
+) -> Option<FieldDiff> {
+    use serde_json::Value;
+    let same = match (a, b) {
+        (Value::Number(x), Value::Number(y)) => match (x.as_f64(), y.as_f64()) {
+            (Some(x), Some(y)) if tolerance > 0.0 => near(x, y, tolerance),
+            _ => x == y,
+        },
+        (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+            let mut pairs = x.iter().zip(y).enumerate();
+            return pairs
+                .find_map(|(at, (x, y))| json_values(&format!("{path}[{at}]"), x, y, tolerance));
+        }
+        (Value::Object(x), Value::Object(y)) => {
+            let mut keys: Vec<_> = x.keys().chain(y.keys()).collect();
+            keys.sort();
+            keys.dedup();
+            return keys.into_iter().find_map(|key| {
+                let absent = Value::Null;
+                let (x, y) = (x.get(key).unwrap_or(&absent), y.get(key).unwrap_or(&absent));
+                json_values(&format!("{path}.{key}"), x, y, tolerance)
+            });
+        }
+        (a, b) => a == b,
+    };
+    (!same).then(|| FieldDiff::new(path, shorten(a.to_string()), shorten(b.to_string())))
+}
+
 /// A value in a few words.
 fn show(value: &Value) -> String {
     let text = match value {
@@ -166,6 +237,10 @@ fn show(value: &Value) -> String {
         Value::List(list) => format!("{} values", list.len()),
         Value::Map(map) => format!("{} entries", map.len()),
     };
+    shorten(text)
+}
+
+fn shorten(text: String) -> String {
     match text.char_indices().nth(SHOWN) {
         Some((at, _)) => format!("{}...", &text[..at]),
         None => text,
@@ -210,7 +285,12 @@ pub(crate) fn envelopes(a: &RecordRef<'_>, b: &RecordRef<'_>) -> Option<FieldDif
 /// The cause of two envelopes, if it differs.
 pub(crate) fn causes(a: &RecordRef<'_>, b: &RecordRef<'_>) -> Option<FieldDiff> {
     let show = |record: &RecordRef<'_>| match record.cause {
-        Some(key) => format!("{} s from {} #{}", seconds(key.time_ns), key.source, key.count),
+        Some(key) => format!(
+            "{} s from {} #{}",
+            seconds(key.time_ns),
+            key.source,
+            key.count
+        ),
         None => "absent".to_owned(),
     };
     (a.cause != b.cause).then(|| FieldDiff::new("cause", show(a), show(b)))

@@ -66,7 +66,11 @@ impl Frames {
             return Err(LogError::NotMcap {
                 path: path.to_owned(),
                 expected: hex(&MAGIC),
-                actual: if magic.is_empty() { "nothing".to_owned() } else { hex(&magic) },
+                actual: if magic.is_empty() {
+                    "nothing".to_owned()
+                } else {
+                    hex(&magic)
+                },
             });
         }
         Ok(Frames {
@@ -127,7 +131,9 @@ impl Frames {
             return cut("the file ends without a footer".to_owned());
         }
         if remaining < HEAD_BYTES || !self.read(HEAD_BYTES)? {
-            return cut(format!("{remaining} bytes of a record's head, then the file ends"));
+            return cut(format!(
+                "{remaining} bytes of a record's head, then the file ends"
+            ));
         }
         let opcode = self.content[0];
         let mut length = [0; 8];
@@ -139,7 +145,9 @@ impl Frames {
         let available = remaining - HEAD_BYTES;
         if length > available {
             let what = describe(opcode);
-            return cut(format!("{what} of {length} bytes, of which {available} are there"));
+            return cut(format!(
+                "{what} of {length} bytes, of which {available} are there"
+            ));
         }
         self.offset = offset + HEAD_BYTES + length;
         if skipped(opcode) {
@@ -202,11 +210,20 @@ fn looks_like_chunk(bytes: &[u8], available: u64) -> bool {
         let word = bytes.get(at..at + 8)?;
         Some(u64::from_le_bytes(word.try_into().ok()?))
     };
-    let Some(length) = number(1) else { return false };
-    let Some(name) = bytes.get(37..41) else { return false };
+    let Some(length) = number(1) else {
+        return false;
+    };
+    let Some(name) = bytes.get(37..41) else {
+        return false;
+    };
     let name = u32::from_le_bytes([name[0], name[1], name[2], name[3]]) as usize;
-    let known = matches!(bytes.get(41..41 + name.min(8)), Some(b"" | b"lz4" | b"zstd"));
-    let Some(size) = number(41 + name.min(8)) else { return false };
+    let known = matches!(
+        bytes.get(41..41 + name.min(8)),
+        Some(b"" | b"lz4" | b"zstd")
+    );
+    let Some(size) = number(41 + name.min(8)) else {
+        return false;
+    };
     // Head of the chunk: two times, two sizes, a checksum, the compression's name.
     known && length <= available - HEAD_BYTES && size.checked_add(40 + name as u64) == Some(length)
 }

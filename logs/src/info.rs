@@ -104,7 +104,12 @@ pub struct LogInfo {
 }
 
 impl LogInfo {
-    fn add_message(&mut self, times: &mut Option<(u64, u64)>, message: &ScannedMessage<'_>, at: usize) {
+    fn add_message(
+        &mut self,
+        times: &mut Option<(u64, u64)>,
+        message: &ScannedMessage<'_>,
+        at: usize,
+    ) {
         let time = message.head.log_time;
         *times = Some(times.map_or((time, time), |(a, b)| (a.min(time), b.max(time))));
         self.messages += 1;
@@ -122,14 +127,20 @@ impl LogInfo {
         let end = self.metadata.get("farside.end");
         let text = |key: &str| end.and_then(|end| end.get(key)).cloned();
         if end.is_none() && self.missing.is_empty() {
-            self.missing.push("no farside.end: the run did not end in this log".to_owned());
+            self.missing
+                .push("no farside.end: the run did not end in this log".to_owned());
         }
-        let checkpoints = self.topics.iter().filter(|topic| topic.role == "checkpoint");
+        let checkpoints = self
+            .topics
+            .iter()
+            .filter(|topic| topic.role == "checkpoint");
         self.run = Some(RunSummary {
             digest: text("digest"),
             end: text("end"),
             end_detail: text("end_detail").unwrap_or_default(),
-            end_time_s: text("end_time_ns").and_then(|ns| ns.parse().ok()).map(seconds),
+            end_time_s: text("end_time_ns")
+                .and_then(|ns| ns.parse().ok())
+                .map(seconds),
             counts: text("counts").and_then(|counts| serde_json::from_str(&counts).ok()),
             checkpoints: checkpoints.map(|topic| topic.messages).sum(),
             format: head.format,
@@ -181,7 +192,11 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 info.library = library.to_owned();
             }
             Item::Chunk { compression } => {
-                let name = if compression.is_empty() { "none" } else { compression };
+                let name = if compression.is_empty() {
+                    "none"
+                } else {
+                    compression
+                };
                 *info.chunks.entry(name.to_owned()).or_default() += 1;
             }
             Item::Message(message) => {
@@ -189,9 +204,8 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 if topic_of.len() <= serial {
                     topic_of.resize(serial + 1, None);
                 }
-                let at = *topic_of[serial].get_or_insert_with(|| {
-                    topic(&mut info.topics, &mut index, message.channel)
-                });
+                let at = *topic_of[serial]
+                    .get_or_insert_with(|| topic(&mut info.topics, &mut index, message.channel));
                 info.add_message(&mut times, &message, at);
             }
             Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
@@ -204,10 +218,13 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
             }
             Item::Damage { offset, what, .. } => {
                 if info.missing.len() < MISSING_LIMIT {
-                    info.missing.push(format!("damaged at byte {offset}: {what}"));
+                    info.missing
+                        .push(format!("damaged at byte {offset}: {what}"));
                 }
             }
-            Item::Cut { offset, what } => info.missing.push(format!("cut at byte {offset}: {what}")),
+            Item::Cut { offset, what } => {
+                info.missing.push(format!("cut at byte {offset}: {what}"))
+            }
         }
     }
     info.finish(times, path)?;
@@ -223,7 +240,11 @@ type TopicIndex = BTreeMap<(String, String, String), usize>;
 
 fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelInfo) -> usize {
     let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
-    let key = (channel.topic.clone(), schema.to_owned(), channel.role().to_owned());
+    let key = (
+        channel.topic.clone(),
+        schema.to_owned(),
+        channel.role().to_owned(),
+    );
     if let Some(at) = index.get(&key) {
         return *at;
     }
@@ -250,18 +271,46 @@ impl fmt::Display for LogInfo {
             writeln!(f, "{:<12} {missing}", "MISSING")?;
         }
         if let (Some(start), Some(end)) = (self.start_s, self.end_s) {
-            writeln!(f, "{:<12} {start:.3} s to {end:.3} s, {:.3} s long", "times", self.duration_s)?;
+            writeln!(
+                f,
+                "{:<12} {start:.3} s to {end:.3} s, {:.3} s long",
+                "times", self.duration_s
+            )?;
         }
-        let chunks: Vec<_> = self.chunks.iter().map(|(name, n)| format!("{n} {name}")).collect();
+        let chunks: Vec<_> = self
+            .chunks
+            .iter()
+            .map(|(name, n)| format!("{n} {name}"))
+            .collect();
         writeln!(f, "{:<12} {}", "chunks", chunks.join(", "))?;
-        writeln!(f, "{:<12} {} on {} topics", "messages", self.messages, self.topics.len())?;
+        writeln!(
+            f,
+            "{:<12} {} on {} topics",
+            "messages",
+            self.messages,
+            self.topics.len()
+        )?;
         for topic in &self.topics {
-            let TopicInfo { topic, messages, bytes, schema, .. } = topic;
+            let TopicInfo {
+                topic,
+                messages,
+                bytes,
+                schema,
+                ..
+            } = topic;
             writeln!(f, "  {messages:>9}  {bytes:>12} B  {topic}  {schema}")?;
         }
         for attachment in &self.attachments {
-            let AttachmentInfo { name, media_type, bytes } = attachment;
-            writeln!(f, "{:<12} {name} ({media_type}, {bytes} bytes)", "attachment")?;
+            let AttachmentInfo {
+                name,
+                media_type,
+                bytes,
+            } = attachment;
+            writeln!(
+                f,
+                "{:<12} {name} ({media_type}, {bytes} bytes)",
+                "attachment"
+            )?;
         }
         Ok(())
     }
@@ -269,7 +318,11 @@ impl fmt::Display for LogInfo {
 
 fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
     writeln!(f, "{:<12} {}", "format", run.format)?;
-    writeln!(f, "{:<12} {} ({})", "scenario", run.scenario, run.scenario_hash)?;
+    writeln!(
+        f,
+        "{:<12} {} ({})",
+        "scenario", run.scenario, run.scenario_hash
+    )?;
     writeln!(f, "{:<12} {}", "code", run.code_version)?;
     writeln!(f, "{:<12} {}", "seed", run.seed)?;
     if let Some(tie_seed) = run.tie_seed {
@@ -284,10 +337,22 @@ fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
     if let Some(end) = &run.end {
         let colon = if run.end_detail.is_empty() { "" } else { ": " };
         let at = run.end_time_s.unwrap_or_default();
-        writeln!(f, "{:<12} {end} at {at:.3} s{colon}{}", "end", run.end_detail)?;
+        writeln!(
+            f,
+            "{:<12} {end} at {at:.3} s{colon}{}",
+            "end", run.end_detail
+        )?;
     }
     if let Some(counts) = &run.counts {
-        let farside::Counts { sent, delivered, lost, duplicated, in_flight, events, .. } = counts;
+        let farside::Counts {
+            sent,
+            delivered,
+            lost,
+            duplicated,
+            in_flight,
+            events,
+            ..
+        } = counts;
         writeln!(
             f,
             "{:<12} {events} events; {sent} messages sent, {delivered} delivered, {lost} lost, \

@@ -34,11 +34,16 @@ impl Head {
         };
         let number = |key: &str| text(key).parse::<u64>().map_err(|_| missing(key));
         let format = text("format");
-        let major = format.split('.').next().and_then(|major| major.parse::<u32>().ok());
+        let major = format
+            .split('.')
+            .next()
+            .and_then(|major| major.parse::<u32>().ok());
         if major != Some(FORMAT_MAJOR) {
             return Err(LogError::Format {
                 path: path.to_owned(),
-                expected: format!("{FORMAT_MAJOR}.0 and what is compatible, up to {FORMAT_MAJOR}.{FORMAT_MINOR} fully"),
+                expected: format!(
+                    "{FORMAT_MAJOR}.0 and what is compatible, up to {FORMAT_MAJOR}.{FORMAT_MINOR} fully"
+                ),
                 actual: format,
             });
         }
@@ -113,7 +118,12 @@ impl Log {
             });
         };
         let head = Head::read(&path, head)?;
-        Ok(Log { path, head, metadata, attachments })
+        Ok(Log {
+            path,
+            head,
+            metadata,
+            attachments,
+        })
     }
 
     /// The file.
@@ -143,7 +153,10 @@ impl Log {
 
     /// The resolved scenario; none if the log is cut before it.
     pub fn scenario(&self) -> Option<&str> {
-        let found = self.attachments.iter().find(|a| a.name == SCENARIO_ATTACHMENT)?;
+        let found = self
+            .attachments
+            .iter()
+            .find(|a| a.name == SCENARIO_ATTACHMENT)?;
         std::str::from_utf8(&found.bytes).ok()
     }
 
@@ -291,12 +304,20 @@ impl Records {
         let time_ns = message.head.log_time.saturating_sub(self.epoch_ns);
         let record = RecordRef {
             class: RecordClass::Sample,
-            key: KeyRef { time_ns, source: sender, ..KeyRef::default() },
+            key: KeyRef {
+                time_ns,
+                source: sender,
+                ..KeyRef::default()
+            },
             cause: None,
             sender,
             receiver: sender,
             link: "",
-            kind: message.channel.metadata.get("kind").map_or("", String::as_str),
+            kind: message
+                .channel
+                .metadata
+                .get("kind")
+                .map_or("", String::as_str),
             ordinal: u64::from(message.head.sequence),
             copy: 0,
             match_key: None,
@@ -319,7 +340,8 @@ impl Iterator for Records {
 
     fn next(&mut self) -> Option<Self::Item> {
         let next = self.next_ref();
-        next.map(|found| found.map(|(record, channel)| LoggedRecord::of(&record, channel))).transpose()
+        next.map(|found| found.map(|(record, channel)| LoggedRecord::of(&record, channel)))
+            .transpose()
     }
 }
 
@@ -394,7 +416,9 @@ impl LoggedRecord {
             cause: record.cause.as_ref().map(LoggedKey::of),
             sender: record.sender.to_owned(),
             receiver: record.receiver.to_owned(),
-            link: Some(record.link).filter(|link| !link.is_empty()).map(str::to_owned),
+            link: Some(record.link)
+                .filter(|link| !link.is_empty())
+                .map(str::to_owned),
             kind: record.kind.to_owned(),
             ordinal: record.ordinal,
             copy: record.copy,

@@ -201,7 +201,10 @@ impl<'a> ChunkRecord<'a> {
         use std::io::Read;
         out.clear();
         if self.size > limit {
-            return Err(format!("a chunk of {} bytes, more than the {limit} allowed", self.size));
+            return Err(format!(
+                "a chunk of {} bytes, more than the {limit} allowed",
+                self.size
+            ));
         }
         let size = self.size as usize;
         match self.compression {
@@ -218,10 +221,17 @@ impl<'a> ChunkRecord<'a> {
                 let done = decoder.take(self.size.saturating_add(1)).read_to_end(out);
                 done.map_err(|error| format!("a chunk that does not decompress: {error}"))?;
             }
-            other => return Err(format!("a chunk compressed as {other:?}, not as zstd or lz4")),
+            other => {
+                return Err(format!(
+                    "a chunk compressed as {other:?}, not as zstd or lz4"
+                ));
+            }
         }
         if out.len() != size {
-            return Err(format!("a chunk of {} bytes that declares {size}", out.len()));
+            return Err(format!(
+                "a chunk of {} bytes that declares {size}",
+                out.len()
+            ));
         }
         if self.sum != 0 && crc32fast::hash(out) != self.sum {
             return Err("a chunk whose checksum does not match".to_owned());

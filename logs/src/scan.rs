@@ -52,7 +52,6 @@ pub struct ChannelInfo {
     pub schema: Option<Arc<SchemaInfo>>,
     /// What else it says: `role` and `kind` in Farside's logs.
     pub metadata: BTreeMap<String, String>,
-    pub(crate) id: u16,
     pub(crate) schema_id: u16,
 }
 
@@ -87,15 +86,27 @@ pub(crate) struct ScannedMessage<'a> {
 
 /// Something in the file.
 pub(crate) enum Item<'a> {
-    Header { profile: &'a str, library: &'a str },
-    Chunk { compression: &'a str },
+    Header {
+        profile: &'a str,
+        library: &'a str,
+    },
+    Chunk {
+        compression: &'a str,
+    },
     Message(ScannedMessage<'a>),
     Attachment(AttachmentRecord<'a>),
     Metadata(String, BTreeMap<String, String>),
     /// Something that cannot be read; what comes behind it can.
-    Damage { offset: u64, bytes: u64, what: String },
+    Damage {
+        offset: u64,
+        bytes: u64,
+        what: String,
+    },
     /// Nothing behind this byte can be read.
-    Cut { offset: u64, what: String },
+    Cut {
+        offset: u64,
+        what: String,
+    },
 }
 
 /// What to yield once the borrow of the buffers is settled.
@@ -167,7 +178,11 @@ impl Scanner {
                         let bytes = (self.chunk.len() - self.next_inner) as u64;
                         self.next_inner = self.chunk.len();
                         let offset = self.chunk_frame;
-                        return Ok(Some(Item::Damage { offset, bytes, what }));
+                        return Ok(Some(Item::Damage {
+                            offset,
+                            bytes,
+                            what,
+                        }));
                     }
                 }
             }
@@ -185,7 +200,10 @@ impl Scanner {
                 }
                 // What follows the data repeats it.
                 Frame::Record { .. } if self.data_ended => {}
-                Frame::Record { opcode: op::DATA_END, .. } => self.data_ended = true,
+                Frame::Record {
+                    opcode: op::DATA_END,
+                    ..
+                } => self.data_ended = true,
                 Frame::Record { opcode, offset } => match self.top(opcode, offset) {
                     Ok(Some(Found::Other)) | Err(None) => {}
                     Ok(Some(Found::Message(head, position))) => {
@@ -195,7 +213,11 @@ impl Scanner {
                     Ok(None) => return Ok(Some(self.item(opcode))),
                     Err(Some(what)) => {
                         let bytes = self.frames.offset() - offset;
-                        return Ok(Some(Item::Damage { offset, bytes, what }));
+                        return Ok(Some(Item::Damage {
+                            offset,
+                            bytes,
+                            what,
+                        }));
                     }
                 },
             }
@@ -235,7 +257,10 @@ impl Scanner {
 
     /// Opens the frame at `position` again, and gives the message there. For a scanner that has
     /// read the file once, and so knows its channels.
-    pub(crate) fn message_at(&mut self, position: Position) -> Result<ScannedMessage<'_>, LogError> {
+    pub(crate) fn message_at(
+        &mut self,
+        position: Position,
+    ) -> Result<ScannedMessage<'_>, LogError> {
         const GONE: &str = "the file changed while it was read";
         if self.chunk_frame != position.frame || self.chunk.is_empty() {
             self.frames.seek(position.frame)?;
@@ -286,7 +311,10 @@ impl Scanner {
             op::MESSAGE => {
                 let head = MessageHead::parse(self.frames.content()).ok_or_else(malformed)?;
                 self.check_channel(head.channel).map_err(Some)?;
-                let position = Position { frame: offset, inner: 0 };
+                let position = Position {
+                    frame: offset,
+                    inner: 0,
+                };
                 Ok(Some(Found::Message(head, position)))
             }
             op::ATTACHMENT => match AttachmentRecord::parse(self.frames.content()) {
@@ -354,7 +382,9 @@ impl Scanner {
         let mut parser = Parser::new(&self.chunk[start..]);
         let mut head = || Some((parser.u8()?, parser.u64()?));
         let (opcode, length) = head().ok_or("a chunk that ends within a record")?;
-        let content = parser.bytes(length).ok_or("a chunk that ends within a record")?;
+        let content = parser
+            .bytes(length)
+            .ok_or("a chunk that ends within a record")?;
         self.next_inner = start + 9 + content.len();
         let malformed = || format!("a {} in a chunk that is malformed", describe(opcode));
         match opcode {
@@ -362,7 +392,10 @@ impl Scanner {
                 let head = MessageHead::parse(content).ok_or_else(malformed)?;
                 self.check_channel(head.channel)?;
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
-                let position = Position { frame: self.chunk_frame, inner };
+                let position = Position {
+                    frame: self.chunk_frame,
+                    inner,
+                };
                 Ok(Found::Message(head, position))
             }
             op::SCHEMA | op::CHANNEL => {
@@ -405,7 +438,12 @@ impl Scanner {
         position: Position,
     ) -> Option<ScannedMessage<'a>> {
         let channel = self.channel(head.channel)?;
-        Some(ScannedMessage { channel, head, data, position })
+        Some(ScannedMessage {
+            channel,
+            head,
+            data,
+            position,
+        })
     }
 }
 
@@ -439,7 +477,10 @@ fn declare(
     if channels.len() <= at {
         channels.resize(at + 1, None);
     }
-    if !channels[at].as_ref().is_some_and(|known| known.says_the_same(&channel)) {
+    if !channels[at]
+        .as_ref()
+        .is_some_and(|known| known.says_the_same(&channel))
+    {
         *serials += 1;
         channels[at] = Some(Arc::new(ChannelInfo {
             serial: *serials - 1,
@@ -447,7 +488,6 @@ fn declare(
             encoding: channel.encoding.to_owned(),
             schema: schemas.get(&channel.schema_id).cloned(),
             metadata: channel.metadata,
-            id: channel.id,
             schema_id: channel.schema_id,
         }));
     }

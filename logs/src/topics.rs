@@ -38,7 +38,8 @@ pub(crate) fn snake_case(name: &str) -> String {
     let mut out = String::with_capacity(name.len() + 4);
     for (at, letter) in letters.iter().enumerate() {
         if letter.is_uppercase() {
-            let after_lower = at > 0 && (letters[at - 1].is_lowercase() || letters[at - 1].is_numeric());
+            let after_lower =
+                at > 0 && (letters[at - 1].is_lowercase() || letters[at - 1].is_numeric());
             let before_lower = at > 0
                 && letters[at - 1].is_uppercase()
                 && letters.get(at + 1).is_some_and(|next| next.is_lowercase());
@@ -71,7 +72,9 @@ impl Topics {
             let built = GlobBuilder::new(glob).literal_separator(true).build();
             set.add(built.map_err(|error| refuse(glob, error))?);
         }
-        let globs = set.build().map_err(|error| refuse(&globs.join(", "), error))?;
+        let globs = set
+            .build()
+            .map_err(|error| refuse(&globs.join(", "), error))?;
         Ok(Topics { globs })
     }
 

@@ -228,7 +228,9 @@ impl Verifier {
     }
 
     fn compare(&mut self, record: &Record<'_>) -> Result<(), LogError> {
-        let Some(encoder) = &mut self.encoder else { return Ok(()) };
+        let Some(encoder) = &mut self.encoder else {
+            return Ok(());
+        };
         let index = encoder.flow(record);
         let seen = Seen {
             flow: index,
@@ -293,7 +295,10 @@ impl Verifier {
     }
 
     fn at(&self, seen: Seen, diff: FieldDiff) -> Mismatch {
-        let flow = self.encoder.as_ref().map(|encoder| &encoder.flows[seen.flow]);
+        let flow = self
+            .encoder
+            .as_ref()
+            .map(|encoder| &encoder.flows[seen.flow]);
         let text = |text: Option<&String>| text.cloned().unwrap_or_default();
         Mismatch {
             time_s: seconds(seen.time_ns),
@@ -383,10 +388,15 @@ impl Verifier {
             (Some((_, mismatch)), None) => mismatch,
             (Some((at, mismatch)), Some((hash_at, ..))) if at <= hash_at => mismatch,
             (_, Some((at, logged, rerun))) => {
-                let hash = |hash: Option<u32>| hash.map_or("nothing".to_owned(), |h| format!("{h:08x}"));
+                let hash =
+                    |hash: Option<u32>| hash.map_or("nothing".to_owned(), |h| format!("{h:08x}"));
                 let diff = FieldDiff::new("digest", hash(logged), hash(Some(rerun)));
                 let seen = self.window.get(at).copied().or(self.window.last().copied());
-                let seen = seen.unwrap_or(Seen { flow: 0, time_ns: 0, ordinal: 0 });
+                let seen = seen.unwrap_or(Seen {
+                    flow: 0,
+                    time_ns: 0,
+                    ordinal: 0,
+                });
                 self.at(seen, diff)
             }
             (None, None) => Mismatch {
@@ -427,7 +437,11 @@ impl Verifier {
         });
         let mut found = differing.next();
         if further && found.is_none() {
-            found = Some(FieldDiff::new("presence", "a further record", "the run is over"));
+            found = Some(FieldDiff::new(
+                "presence",
+                "a further record",
+                "the run is over",
+            ));
         }
         match found {
             None => {

@@ -25,7 +25,8 @@ impl<'a> Value<'a> {
     }
 
     pub(crate) fn text(self) -> Option<&'a str> {
-        self.bytes().and_then(|bytes| std::str::from_utf8(bytes).ok())
+        self.bytes()
+            .and_then(|bytes| std::str::from_utf8(bytes).ok())
     }
 }
 

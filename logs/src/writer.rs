@@ -11,9 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use farside::key::EventKey;
-use farside::record::{
-    Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants,
-};
+use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{Kind, Report, RunInfo};
 use xxhash_rust::xxh3::xxh3_128;
 
@@ -22,6 +20,7 @@ use crate::descriptors::{self, SchemaOf};
 use crate::envelope::{Encoder, put_key};
 use crate::topics::{self, CHECKPOINT, Topics};
 use crate::wire::{put_bytes, put_number, put_text};
+pub(crate) use thread::options as mcap_options;
 use thread::{Batch, Declaration, File, Header, Worker};
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
@@ -331,9 +330,11 @@ impl Live {
                 let name = kind.map_or("", |kind| kind.name());
                 let role = topics::role(flow.class);
                 // Declarations precede everything that is still to be written.
-                let channel = self.channels.get(&mut self.batch, &flow.topic, role, name, || {
-                    schema_of(flow.class, kind)
-                })?;
+                let channel =
+                    self.channels
+                        .get(&mut self.batch, &flow.topic, role, name, || {
+                            schema_of(flow.class, kind)
+                        })?;
                 flow.channel = Some(channel);
                 channel
             }
@@ -343,10 +344,14 @@ impl Live {
         let header = Header {
             channel,
             sequence: record.ordinal as u32,
-            log_time: self.epoch_ns + self.last_ns,
-            publish_time: self.epoch_ns + record.sent.as_nanos(),
+            log_time: self.epoch_ns.saturating_add(self.last_ns),
+            publish_time: self.epoch_ns.saturating_add(record.sent.as_nanos()),
         };
-        let batch = if at_end { &mut self.at_end } else { &mut self.batch };
+        let batch = if at_end {
+            &mut self.at_end
+        } else {
+            &mut self.batch
+        };
         if record.class == RecordClass::Sample {
             batch.message(header, |out| out.extend_from_slice(record.body));
         } else {
@@ -382,8 +387,8 @@ impl Live {
         let header = Header {
             channel: self.checkpoint_channel,
             sequence: self.checkpoints,
-            log_time: self.epoch_ns + self.last_ns,
-            publish_time: self.epoch_ns + self.last_ns,
+            log_time: self.epoch_ns.saturating_add(self.last_ns),
+            publish_time: self.epoch_ns.saturating_add(self.last_ns),
         };
         self.checkpoints += 1;
         let source = self.encoder.name(&checkpoint.key).to_owned();
@@ -391,7 +396,11 @@ impl Live {
             put_text(out, 1, &checkpoint.digest.to_string());
             put_key(out, 2, &checkpoint.key, &source);
             put_number(out, 3, checkpoint.records);
-            let hashes: Vec<u8> = checkpoint.hashes.iter().flat_map(|h| h.to_le_bytes()).collect();
+            let hashes: Vec<u8> = checkpoint
+                .hashes
+                .iter()
+                .flat_map(|h| h.to_le_bytes())
+                .collect();
             put_bytes(out, 4, &hashes);
         };
         if !self.at_end.is_empty() {
@@ -407,7 +416,7 @@ impl Live {
     fn end(mut self, report: &Report) -> Result<(), LogError> {
         let end_ns = report.end_time.as_nanos().max(self.last_ns);
         let mut at_end = std::mem::take(&mut self.at_end);
-        at_end.set_log_times(self.epoch_ns + end_ns);
+        at_end.set_log_times(self.epoch_ns.saturating_add(end_ns));
         self.hand_over()?;
         self.worker.send(at_end)?;
         let mut end = BTreeMap::new();
@@ -468,7 +477,8 @@ impl Observer for LogWriter {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        self.with_live(|live| live.record(record)).map(|()| Flow::Continue)
+        self.with_live(|live| live.record(record))
+            .map(|()| Flow::Continue)
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), ObserverError> {
@@ -477,11 +487,16 @@ impl Observer for LogWriter {
 
     fn end(&mut self, report: &Report) -> Result<(), ObserverError> {
         match self.live.take() {
-            Some(live) => live.end(report).map_err(|error| ObserverError(error.to_string())),
+            Some(live) => live
+                .end(report)
+                .map_err(|error| ObserverError(error.to_string())),
             // The failure was reported when it happened, and is why the run ended.
             None => match &report.end {
                 farside::End::ObserverFailed(reason) => Err(ObserverError(reason.clone())),
-                _ => Err(ObserverError(format!("{}: the log is closed", self.path.display()))),
+                _ => Err(ObserverError(format!(
+                    "{}: the log is closed",
+                    self.path.display()
+                ))),
             },
         }
     }

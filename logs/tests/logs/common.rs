@@ -70,7 +70,9 @@ impl Handler<Ask> for Rover {
             note: (ask.cycle % 2 == 0).then(|| format!("cycle {}", ask.cycle)),
             terrain: match ask.cycle % 3 {
                 0 => Terrain::Flat,
-                rocks => Terrain::Rocky { rocks_per_m2: f64::from(rocks) },
+                rocks => Terrain::Rocky {
+                    rocks_per_m2: f64::from(rocks),
+                },
             },
         };
         ctx.sample(&Pose { x: distance_m });
@@ -103,7 +105,11 @@ impl Handler<Minute> for Base {
         }
         for rover in 1..=self.rovers {
             let rover = ctx.lookup::<Rover>(&format!("rover_{rover}"))?;
-            ctx.send_keyed(rover, MatchKey::new(self.cycle, 1), Ask { cycle: self.cycle });
+            ctx.send_keyed(
+                rover,
+                MatchKey::new(self.cycle, 1),
+                Ask { cycle: self.cycle },
+            );
         }
         ctx.timer(SimDuration::from_secs(60), Minute);
         Ok(())
@@ -149,7 +155,7 @@ impl Carrier for Lossy {
     }
 
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        let draw = parcel.random(1, 0, 0).hash() as f64 / u64::MAX as f64;
+        let draw = parcel.random(1, 0, 0).uniform();
         if draw < self.loss {
             verdicts.lose("loss");
         } else {
@@ -193,20 +199,31 @@ pub(crate) fn build(plan: &Plan) -> Simulation {
     let earth = sim.host("earth");
     let cycles = plan.cycles;
     let rovers = plan.rovers;
-    let base = sim.actor(earth, "base", move |_| Base { rovers, cycle: 0, cycles });
+    let base = sim.actor(earth, "base", move |_| Base {
+        rovers,
+        cycle: 0,
+        cycles,
+    });
     sim.actor(earth, "recorder", |_| Recorder);
     let slip = plan.slip;
     for rover in 1..=plan.rovers {
         let host = sim.host(&format!("moon_{rover}"));
         let name = format!("rover_{rover}");
         let address = sim.actor(host, &name, move |_| Rover { base, slip });
-        let link = || Lossy { loss: plan.loss, delay: SimDuration::from_millis(1300) };
+        let link = || Lossy {
+            loss: plan.loss,
+            delay: SimDuration::from_millis(1300),
+        };
         let up = sim.link(earth, host, &format!("up_{rover}"), link());
         sim.link(host, earth, &format!("down_{rover}"), link());
         if plan.crash && rover == 1 {
             sim.crash_at(SimTime::ZERO + SimDuration::from_secs(300), address);
             sim.restart_at(SimTime::ZERO + SimDuration::from_secs(500), address);
-            sim.change_at(SimTime::ZERO + SimDuration::from_secs(600), up, NewLoss { loss: 0.5 });
+            sim.change_at(
+                SimTime::ZERO + SimDuration::from_secs(600),
+                up,
+                NewLoss { loss: 0.5 },
+            );
         }
     }
     sim
