@@ -41,9 +41,7 @@ impl Carrier for Radio {
         verdicts.deliver(self.latency + SimDuration::from_nanos(share as u64));
     }
 
-    fn change(&mut self, change: NoChange, _now: SimTime) {
-        match change {}
-    }
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
 }
 
 struct Options {

@@ -55,7 +55,7 @@ mod safety;
 #[cfg(test)]
 mod testing;
 
-pub use assemble::{Network, NetworkError, assemble};
+pub use assemble::{Connect, Network, NetworkError, assemble};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};

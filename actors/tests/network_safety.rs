@@ -63,9 +63,7 @@ impl Carrier for Bad {
         }
     }
 
-    fn change(&mut self, change: NoChange, _now: SimTime) {
-        match change {}
-    }
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
 }
 
 /// A small world and what goes wrong in it. All small numbers, so that it shrinks well.
@@ -314,21 +312,22 @@ fn a_rover_that_is_gone_for_good_is_named() {
 /// The monitor notices if a rule is broken: owners that grant an occupied vertex now and then.
 #[test]
 fn granting_an_occupied_vertex_is_noticed() {
-    assert!(collisions_with(Sabotage::GrantOccupied(0.05)) > 0);
+    assert!(collides_with(Sabotage::GrantOccupied(0.05)));
 }
 
 /// And rovers that move without a grant.
 #[test]
 fn moving_without_a_grant_is_noticed() {
-    assert!(collisions_with(Sabotage::MoveUnbidden(0.05)) > 0);
+    assert!(collides_with(Sabotage::MoveUnbidden(0.05)));
 }
 
-fn collisions_with(sabotage: Sabotage) -> u32 {
-    let collisions = |seed| {
+/// Whether one of a hundred small runs with this fault shows a collision.
+fn collides_with(sabotage: Sabotage) -> bool {
+    let collides = |seed| {
         let mut scenario = plain(seed);
-        scenario.rovers = 8;
+        scenario.rovers = 12;
         scenario.network.sabotage = sabotage;
-        run(&scenario).0.collisions
+        run(&scenario).0.collisions > 0
     };
-    (1..=5).map(collisions).sum()
+    (1..=100).any(collides)
 }

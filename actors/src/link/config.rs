@@ -188,6 +188,16 @@ pub enum LinkConfigError {
         /// When it ends.
         until: String,
     },
+    /// More entries than anyone means.
+    #[error("{actual} entries: expected at most {limit}")]
+    TooMany {
+        /// Where in the scenario.
+        key: Vec<String>,
+        /// How many there are.
+        actual: usize,
+        /// The most there may be.
+        limit: usize,
+    },
     /// A degradation that leaves everything as it is.
     #[error(
         "it changes nothing: expected at least one of latency, jitter, jitter_shape, loss, duplicate, outage"
@@ -209,6 +219,7 @@ impl LinkConfigError {
             LinkConfigError::BadPattern { key, .. }
             | LinkConfigError::NoSuchLink { key, .. }
             | LinkConfigError::EndsBeforeItBegins { key, .. }
+            | LinkConfigError::TooMany { key, .. }
             | LinkConfigError::ChangesNothing { key } => key,
         }
     }
@@ -271,7 +282,20 @@ pub struct LinkBuilder {
     overrides: Vec<(Pattern, LinkOverrides)>,
     degrades: Vec<(Pattern, Degrade)>,
     names: Vec<String>,
+    /// What links were given before: most of them share a base and the degradations they meet.
+    timelines: Vec<Timeline>,
 }
+
+/// The changes of all links with one base and one set of degradations.
+struct Timeline {
+    base: LinkParams,
+    /// Indices into the degradations.
+    degrades: Vec<usize>,
+    changes: Vec<(SimDuration, LinkParams)>,
+}
+
+/// The most patterns, and the most degradations.
+const MAX_ENTRIES: usize = 1000;
 
 impl LinkBuilder {
     /// A builder for links with these parameters and changes.
@@ -279,11 +303,22 @@ impl LinkBuilder {
     /// # Errors
     /// When a pattern cannot be read, or a degradation makes no sense by itself.
     pub fn new(links: &LinksConfig, degrades: &[Degrade]) -> Result<Self, LinkConfigError> {
+        for (key, actual) in [("links", links.patterns.len()), ("degrade", degrades.len())] {
+            // Each is matched with each link's name.
+            if actual > MAX_ENTRIES {
+                return Err(LinkConfigError::TooMany {
+                    key: vec![key.to_owned()],
+                    actual,
+                    limit: MAX_ENTRIES,
+                });
+            }
+        }
         let mut builder = LinkBuilder {
             default: links.default.clone(),
             overrides: Vec::new(),
             degrades: Vec::new(),
             names: Vec::new(),
+            timelines: Vec::new(),
         };
         for (text, over) in &links.patterns {
             let key = vec!["links".to_owned(), text.clone()];
@@ -323,39 +358,51 @@ impl LinkBuilder {
                 base = base.with(over);
             }
         }
-        let changes = self.changes(&name, &base);
-        let link = Link::new(base);
+        let mut degrades = Vec::new();
+        for (index, (pattern, _)) in self.degrades.iter_mut().enumerate() {
+            if pattern.matches(&name) {
+                degrades.push(index);
+            }
+        }
+        let changes = &self.timeline(&base, degrades).changes;
         let link = changes
             .iter()
-            .fold(link, |link, (_, params)| link.may_become(params));
+            .fold(Link::new(base), |link, (_, params)| link.may_become(params));
         let id = sim.link(from_host, to_host, &name, link);
         for (at, params) in changes {
-            sim.change_at(SimTime::ZERO + at, id, params.into());
+            sim.change_at(SimTime::ZERO + *at, id, params.clone().into());
         }
         self.names.push(name);
         id
     }
 
-    /// What the link has from each instant on at which a degradation begins or ends.
-    fn changes(&mut self, name: &str, base: &LinkParams) -> Vec<(SimDuration, LinkParams)> {
-        let mut mine = Vec::new();
-        for (pattern, degrade) in &mut self.degrades {
-            if pattern.matches(name) {
-                mine.push(&*degrade);
-            }
+    /// What such a link has from each instant on at which a degradation begins or ends.
+    fn timeline(&mut self, base: &LinkParams, degrades: Vec<usize>) -> &Timeline {
+        let known = |known: &Timeline| known.base == *base && known.degrades == degrades;
+        if let Some(at) = self.timelines.iter().position(known) {
+            return &self.timelines[at];
         }
+        let mine: Vec<(&Degrade, LinkOverrides)> = degrades
+            .iter()
+            .map(|&index| &self.degrades[index].1)
+            .map(|degrade| (degrade, degrade.overrides()))
+            .collect();
         let instants: BTreeSet<SimDuration> = mine
             .iter()
-            .flat_map(|degrade| [Some(degrade.at), degrade.until])
+            .flat_map(|(degrade, _)| [Some(degrade.at), degrade.until])
             .flatten()
             .collect();
         let params_at = |at: SimDuration| {
-            let active = mine.iter().filter(|degrade| degrade.is_active(at));
-            active.fold(base.clone(), |params, degrade| {
-                params.with(&degrade.overrides())
-            })
+            let active = mine.iter().filter(|(degrade, _)| degrade.is_active(at));
+            active.fold(base.clone(), |params, (_, over)| params.with(over))
         };
-        instants.into_iter().map(|at| (at, params_at(at))).collect()
+        let changes = instants.into_iter().map(|at| (at, params_at(at))).collect();
+        self.timelines.push(Timeline {
+            base: base.clone(),
+            degrades,
+            changes,
+        });
+        &self.timelines[self.timelines.len() - 1]
     }
 
     /// Checks that every pattern has matched some link.

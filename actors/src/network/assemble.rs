@@ -84,6 +84,9 @@ pub struct Network {
     score: Arc<Mutex<Score>>,
 }
 
+/// Makes one link: from the host (and name) given first to the one given second.
+pub type Connect<'a> = dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)) + 'a;
+
 /// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
 /// node and `rover_01`, ... for each rover; the links that `connect` makes, one way each, called for
 /// both directions between neighbouring nodes and between each node and each rover; and the
@@ -104,7 +107,7 @@ pub fn assemble(
     team: &TeamConfig,
     network: &NetworkConfig,
     seed: u64,
-    connect: &mut dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)),
+    connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
     network.check()?;
     let missions = missions(world, &roadmap, team, seed)?;
@@ -214,11 +217,7 @@ fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>>
         .collect()
 }
 
-fn declare_links(
-    sim: &mut Simulation,
-    site: &Site,
-    connect: &mut dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)),
-) {
+fn declare_links(sim: &mut Simulation, site: &Site, connect: &mut Connect<'_>) {
     let mut hosts =
         |names: &[String]| -> Vec<HostId> { names.iter().map(|name| sim.host(name)).collect() };
     let (node_hosts, rover_hosts) = (hosts(&site.node_names), hosts(&site.rover_names));

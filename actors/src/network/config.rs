@@ -22,7 +22,7 @@ pub struct WorldConfig {
     pub roadmap: String,
     /// How many sensor nodes; at least 1.
     pub nodes: u32,
-    /// The radio radius of each [m]; by default one that nearly every placement can do with.
+    /// The radio radius of each, in metres; by default one that nearly every placement can do with.
     #[serde(
         rename = "radius",
         with = "units::length_m::option",
@@ -139,10 +139,10 @@ pub struct NetworkConfig {
     pub traverse: SimDuration,
     /// C, the estimate of the longest path, in diameters of the roadmap.
     pub longest_path_factor: f64,
-    /// What a path loses that leads back to the vertex just left [payoff].
+    /// What a path loses that leads back to the vertex just left.
     pub backtrack_penalty: f64,
-    /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait there
-    /// [payoff]. Below `backtrack_penalty`, rovers that face each other wait for ever; near C, none
+    /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait there.
+    /// Below `backtrack_penalty`, rovers that face each other wait for ever; near C, none
     /// ever waits in a pocket for another to pass, and two of them go round in circles. A very
     /// high one leaves only the zero path to wait by.
     pub leaf_wait_penalty: f64,

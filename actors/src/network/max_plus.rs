@@ -251,7 +251,9 @@ impl Edge {
         let rows = self.payoffs.chunks_exact(self.fresh.len());
         for (worth, row) in base.iter().zip(rows) {
             for (best, payoff) in self.fresh.iter_mut().zip(row) {
-                *best = best.max(worth + payoff);
+                let value = worth + payoff;
+                // Unlike `f32::max`, this compiles to one vector instruction: nothing is NaN here.
+                *best = if value > *best { value } else { *best };
             }
         }
         let mean = self.fresh.iter().sum::<f32>() / self.fresh.len() as f32;

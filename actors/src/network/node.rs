@@ -53,8 +53,7 @@ struct Neighbor {
 
 /// The parts of a planning cycle, in order. A timer begins each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[doc(hidden)]
-pub enum Phase {
+pub(crate) enum Phase {
     /// Beacons arrive; the entry queues are served.
     Listen,
     /// Step 1: locations are exchanged.

@@ -145,7 +145,7 @@ impl ScenarioError {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.start);
         let key = source.key_at(&span);
-        let message = in_words(one_line(error.message()));
+        let message = in_words(shortened(one_line(error.message())));
         let names = backticked(&message);
         let unknown = ["unknown field", "unknown variant"]
             .iter()

@@ -10,6 +10,12 @@ use toml::de::{DeString, DeTable, DeValue};
 
 use super::ScenarioError;
 
+/// The most characters of a `--set` argument that a message repeats.
+const MAX_SHOWN: usize = 80;
+
+/// The most keys in a path; scenarios have at most four. Tables are dropped recursively.
+const MAX_DEPTH: usize = 16;
+
 /// Where something stands: in a file, or in a `--set` argument.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -37,7 +43,15 @@ impl std::fmt::Display for Place {
             Place::File {
                 name, line, column, ..
             } => write!(f, "{name}:{line}:{column}"),
-            Place::Set { argument } => write!(f, "--set {argument}"),
+            Place::Set { argument } => {
+                let shown: String = argument.chars().take(MAX_SHOWN).collect();
+                let dots = if shown.len() < argument.len() {
+                    "..."
+                } else {
+                    ""
+                };
+                write!(f, "--set {shown}{dots}")
+            }
         }
     }
 }
@@ -98,7 +112,14 @@ impl Source {
         let base = set.base + set.value_at;
         let value = match DeValue::parse(raw) {
             Ok(value) => shifted(value, base),
-            // What is no TOML value is a string: `--set links.default.latency=5ms`.
+            // Nobody means a string that begins like this.
+            Err(error) if raw.trim_start().starts_with(['[', '{', '"', '\'']) => {
+                return Err(ScenarioError::Syntax {
+                    place: self.place(set.base),
+                    message: one_line(error.message()),
+                });
+            }
+            // What else is no TOML value is a string: `--set links.default.latency=5ms`.
             Err(_) => Spanned::new(base..base + raw.len(), DeValue::String(raw.into())),
         };
         let Some((last, tables)) = set.keys.split_last() else {
@@ -288,7 +309,7 @@ fn shifted(value: Spanned<DeValue<'_>>, base: usize) -> Spanned<DeValue<'_>> {
 /// may hold dots and equals signs.
 fn split_set(argument: &str) -> Result<(Vec<String>, usize), ScenarioError> {
     let wrong = |message: &'static str| ScenarioError::BadSet {
-        argument: argument.to_owned(),
+        argument: argument.chars().take(MAX_SHOWN).collect(),
         message,
     };
     let mut keys = Vec::new();
@@ -302,6 +323,9 @@ fn split_set(argument: &str) -> Result<(Vec<String>, usize), ScenarioError> {
             (None, '=') => {
                 keys.push(key);
                 let keys: Vec<String> = keys.iter().map(|key| key.trim().to_owned()).collect();
+                if keys.len() > MAX_DEPTH {
+                    return Err(wrong("the key has more than 16 parts"));
+                }
                 if keys.iter().any(String::is_empty) {
                     return Err(wrong("a part of the key is empty"));
                 }
@@ -400,12 +424,15 @@ mod tests {
 
     #[test]
     fn rubbish_is_refused() {
-        for argument in ["", "=", "a", "a..b=1", ".a=1", "\"a=1"] {
+        let deep = format!("{}=1", ["a"; 100_000].join("."));
+        for argument in [&deep, "", "=", "a", "a..b=1", ".a=1", "\"a=1"] {
             assert!(split_set(argument).is_err(), "{argument}");
         }
         let into_number = source("seed = 1", &["seed.x=2"]);
         let error = into_number.document().unwrap_err().to_string();
         assert!(error.contains("integer has no keys of its own"), "{error}");
+        let array = source("", &["links=[1, "]).document().unwrap_err();
+        assert!(array.to_string().starts_with("--set links=[1, : not TOML"));
         let beyond = source("[[degrade]]\nat = '1s'", &["degrade.1.at=2s"]);
         assert!(
             beyond
