@@ -239,7 +239,7 @@ impl<'a, 'i> Slot<'a, 'i> {
             }
             Slot::Array(array) => {
                 let at: usize = key.parse().ok()?;
-                array.iter_mut().nth(at).map(Spanned::get_mut)
+                array.get_mut(at).map(Spanned::get_mut)
             }
         }
     }
