@@ -192,7 +192,9 @@ fn write_bare(path: &Path, messages: &[(mcap::records::MessageHeader, Vec<u8>)],
         .create(file)
         .unwrap();
     let mut ids = std::collections::BTreeMap::new();
-    for (id, channel) in &summary.channels {
+    let mut channels: Vec<_> = summary.channels.values().collect();
+    channels.sort_by_key(|channel| channel.id);
+    for channel in channels {
         let schema = channel.schema.as_ref().unwrap();
         let schema = writer
             .add_schema(&schema.name, &schema.encoding, &schema.data)
@@ -200,7 +202,7 @@ fn write_bare(path: &Path, messages: &[(mcap::records::MessageHeader, Vec<u8>)],
         let added = writer
             .add_channel(schema, &channel.topic, "protobuf", &channel.metadata)
             .unwrap();
-        ids.insert(*id, added);
+        ids.insert(channel.id, added);
     }
     for (header, data) in messages {
         let header = mcap::records::MessageHeader {

@@ -26,7 +26,7 @@ impl Actor for Clock {
 
 impl Handler<Tick> for Clock {
     fn handle(&mut self, tick: Tick, ctx: &mut Context<'_, Self>) -> Outcome {
-        if tick.count % 100_000 == 0 {
+        if tick.count.is_multiple_of(100_000) {
             println!("{}", tick.count);
         }
         ctx.timer(

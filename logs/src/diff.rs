@@ -128,7 +128,8 @@ pub struct DiffReport {
 /// Farside's logs are aligned by the identity of each message: sender, receiver, kind, and the
 /// match key where the protocol gave one, or else the ordinal. Other MCAP files are aligned by
 /// topic and place on the topic; protobuf and JSON are compared field by field, anything else by
-/// its bytes. State samples and what depends on the machine are never compared.
+/// its bytes. State samples, what depends on the machine, and topics that one of the logs does
+/// not have because they were filtered are never compared.
 ///
 /// ```no_run
 /// use farside_logs::{DiffOptions, diff};
@@ -148,13 +149,18 @@ pub fn diff(
     options: &DiffOptions,
 ) -> Result<DiffReport, LogError> {
     let (a, b) = (a.as_ref(), b.as_ref());
-    let ignore = Topics::new(&options.ignore)?;
-    let farside = (index::is_farside(a)?, index::is_farside(b)?);
-    let mode = if farside == (true, true) {
-        Mode::Farside
-    } else {
-        Mode::Any
+    // A glob that makes no sense is told before anything is read.
+    Topics::new(&options.ignore)?;
+    let heads = [index::head(a)?, index::head(b)?];
+    let mode = match heads.iter().flatten().count() {
+        2 => Mode::Farside,
+        _ => Mode::Any,
     };
+    // What one of them did not write is no difference.
+    let filtered = heads.iter().flatten().flat_map(|head| &head.exclude);
+    let ignore: Vec<String> = options.ignore.iter().chain(filtered).cloned().collect();
+    let ignore = Topics::new(&ignore)?;
+    let strangers = heads.iter().filter(|head| head.is_none()).count();
     let mut names = Names::default();
     let mut comparison = Comparison {
         a: Index::build(a, mode, &ignore, &mut names)?,
@@ -166,7 +172,7 @@ pub fn diff(
         earliest: None,
         names,
     };
-    comparison.note(farside);
+    comparison.note(strangers);
     comparison.compare()?;
     comparison.finish()
 }
@@ -196,9 +202,9 @@ struct Comparison {
 type Order<'a> = (u64, u32, bool, &'a str, u64, bool, u32);
 
 impl Comparison {
-    fn note(&mut self, farside: (bool, bool)) {
+    fn note(&mut self, strangers: usize) {
         let notes = &mut self.report.notes;
-        if farside.0 != farside.1 {
+        if strangers == 1 {
             notes.push("only one of the two is a Farside log: compared by topic".to_owned());
         }
         for (name, index) in [("a", &self.a), ("b", &self.b)] {

@@ -9,7 +9,7 @@ use prost_reflect::{DescriptorPool, MessageDescriptor};
 use serde::Serialize;
 
 use crate::LogError;
-use crate::envelope::{Encoder, RecordRef};
+use crate::envelope::{CheckpointRef, Encoder, RecordRef};
 use crate::fields::{self, FieldDiff};
 use crate::info::seconds;
 use crate::log::{Log, Records, Step};
@@ -103,6 +103,8 @@ pub struct Verifier {
     window: Vec<Seen>,
     /// A difference, and its place in the window; a filtered record before it may differ too.
     candidate: Option<(usize, Mismatch)>,
+    /// A checkpoint of the log that came where the re-execution has another record.
+    early_checkpoint: Option<Vec<u8>>,
     compared: u64,
     checkpoints: u64,
     last_ns: Option<u64>,
@@ -156,6 +158,7 @@ impl Verifier {
             envelope: Vec::new(),
             window: Vec::new(),
             candidate: None,
+            early_checkpoint: None,
             compared: 0,
             checkpoints: 0,
             last_ns: None,
@@ -270,6 +273,14 @@ impl Verifier {
                 }
             },
             Step::Checkpoint | Step::Sample => {
+                // The last checkpoint of a run that was interrupted, or one that comes too early.
+                self.early_checkpoint = Some(self.records.message()?.data.to_vec());
+                self.peeked = None;
+                let over = self.peek()? == Step::End;
+                if let Some(missing) = self.missing().filter(|_| over) {
+                    self.prefix(missing);
+                    return Ok(());
+                }
                 let diff = FieldDiff::new("presence", "a checkpoint", "a further record");
                 let mismatch = self.at(seen, diff);
                 self.candidate = Some((self.window.len() - 1, mismatch));
@@ -372,12 +383,15 @@ impl Verifier {
     /// Finds the first record since the last checkpoint whose hash differs: it may be one that
     /// was filtered, and then it comes before what was found so far.
     fn narrow(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), LogError> {
-        while matches!(self.peek()?, Step::Record | Step::Sample) {
+        let mut held = self.early_checkpoint.take();
+        while held.is_none() && matches!(self.peek()?, Step::Record | Step::Sample) {
             self.peeked = None;
         }
+        if held.is_none() && self.peek()? == Step::Checkpoint {
+            held = Some(self.records.message()?.data.to_vec());
+        }
         let mut earliest = None;
-        if self.peek()? == Step::Checkpoint {
-            let logged = self.records.checkpoint()?;
+        if let Some(logged) = held.as_deref().and_then(CheckpointRef::read) {
             let differs = |(at, hash): (usize, &u32)| {
                 let other = logged.hash(at);
                 (other != Some(*hash)).then_some((at, other, *hash))

@@ -75,11 +75,11 @@ pub(super) enum Mode {
     Any,
 }
 
-/// True if the file is a Farside log, of a format that can be read.
-pub(super) fn is_farside(path: &Path) -> Result<bool, LogError> {
+/// What a Farside log says at its start; none for any other file.
+pub(super) fn head(path: &Path) -> Result<Option<Head>, LogError> {
     match crate::log::Log::open(path) {
-        Ok(_) => Ok(true),
-        Err(LogError::NotFarside { .. } | LogError::Damaged { .. }) => Ok(false),
+        Ok(log) => Ok(Some(log.head().clone())),
+        Err(LogError::NotFarside { .. } | LogError::Damaged { .. }) => Ok(None),
         Err(error) => Err(error),
     }
 }

@@ -67,7 +67,10 @@ impl Handler<Ask> for Rover {
         let odometry = Odometry {
             distance_m,
             path: vec![(0.0, 0.0), (distance_m, 0.5)],
-            note: (ask.cycle % 2 == 0).then(|| format!("cycle {}", ask.cycle)),
+            note: ask
+                .cycle
+                .is_multiple_of(2)
+                .then(|| format!("cycle {}", ask.cycle)),
             terrain: match ask.cycle % 3 {
                 0 => Terrain::Flat,
                 rocks => Terrain::Rocky {

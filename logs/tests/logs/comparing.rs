@@ -165,6 +165,30 @@ fn ignored_topics_do_not_differ() {
 }
 
 #[test]
+fn topics_that_one_log_filtered_do_not_differ() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    log_to(&a, &Plan::default(), options());
+    let exclude = vec!["/**/odometry".to_owned()];
+    log_to(
+        &b,
+        &Plan::default(),
+        LogOptions {
+            exclude,
+            ..options()
+        },
+    );
+    let report = diff(&a, &b, &DiffOptions::default()).unwrap();
+    assert!(report.identical, "{report}");
+    assert!(
+        report
+            .notes
+            .iter()
+            .any(|note| note.contains("filtered topics differ"))
+    );
+}
+
+#[test]
 fn a_longer_run_has_more_messages() {
     let longer = Plan {
         cycles: 22,

@@ -2,10 +2,14 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use farside_logs::{LogOptions, Mismatch, Verifier, VerifyOutcome};
+use farside::Executor;
+use farside::record::{Flow, Observer, ObserverError, Record};
+use farside_logs::{LogOptions, LogWriter, Mismatch, Verifier, VerifyOutcome};
 
-use crate::common::{Plan, Slip, log_to, logged, options, run_with};
+use crate::common::{Plan, Slip, build, log_to, logged, options, run_with};
 
 fn verify(path: &Path, plan: &Plan) -> VerifyOutcome {
     let verifier = Verifier::open(path).unwrap();
@@ -142,4 +146,39 @@ fn a_run_that_goes_on_is_told() {
         },
     ));
     assert!(!first.field.is_empty());
+}
+
+/// Raises the interrupt flag after some records, as Ctrl-C does.
+struct Interrupter {
+    flag: Arc<AtomicBool>,
+    left: u32,
+}
+
+impl Observer for Interrupter {
+    fn record(&mut self, _record: &Record<'_>) -> Result<Flow, ObserverError> {
+        self.left = self.left.saturating_sub(1);
+        if self.left == 0 {
+            self.flag.store(true, Ordering::Relaxed);
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+#[test]
+fn an_interrupted_run_is_the_same_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    // Where it stops, with messages on their way or without.
+    for left in [20, 50, 51, 52, 53, 54, 55, 80] {
+        let mut sim = build(&Plan::default());
+        let flag = sim.interrupt();
+        sim.observe(LogWriter::create(&path, options()).unwrap());
+        sim.observe(Interrupter { flag, left });
+        let report = sim.run(Executor::Inline).unwrap();
+        assert_eq!(report.end.name(), "interrupted");
+        match verify(&path, &Plan::default()) {
+            VerifyOutcome::Prefix { missing, .. } => assert!(missing.contains("interrupted")),
+            other => panic!("{other:?}"),
+        }
+    }
 }
