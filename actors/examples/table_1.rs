@@ -5,7 +5,7 @@
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
 //! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
+//! `digest` (true, false), `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
 //! `factor`, `backtrack`, `leaf_wait`, `noise`.
 
@@ -50,6 +50,7 @@ struct Options {
     nodes: Vec<u32>,
     rovers: Vec<u32>,
     radio: Radio,
+    digest: bool,
     endpoints: Endpoints,
     network: NetworkConfig,
 }
@@ -65,6 +66,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             jitter: SimDuration::ZERO,
             loss: 0.0,
         },
+        digest: false,
         endpoints: Endpoints::default(),
         network: NetworkConfig::default(),
     };
@@ -86,6 +88,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "loss" => options.radio.loss = value.parse()?,
             "latency_ms" => options.radio.latency = SimDuration::from_millis(value.parse()?),
             "jitter_ms" => options.radio.jitter = SimDuration::from_millis(value.parse()?),
+            "digest" => options.digest = value.parse()?,
             "iterations" => network.max_iterations = value.parse()?,
             "cycle_limit" => network.cycle_limit = value.parse()?,
             "active_window" => network.active_window = value.parse()?,
@@ -127,7 +130,9 @@ fn run(
     let sensors = Arc::new(world.place(&roadmap, seed)?);
     let team = TeamConfig { rovers };
     let mut sim = Simulation::new(seed);
-    sim.without_digest();
+    if !options.digest {
+        sim.without_digest();
+    }
     let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
         sim.link(a, b, &format!("{from}-{to}"), options.radio.clone());
     };

@@ -33,9 +33,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Readings
+//!
+//! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
+//! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
+//! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
+//! team of 50 comes to a standstill. And a rover that stands on a leaf of its node's local
+//! neighbourhood graph has a path of length 0 to that leaf
+//! ([`leaf_wait_penalty`](NetworkConfig::leaf_wait_penalty)): without it two rovers that meet at a
+//! pocket push each other in and out of it for ever, because the zero path is worth nothing.
+//!
+//! The paper's step 5 and its request to the owner of the next vertex are one message here
+//! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that comes
+//! too late to be weighed against others is granted if the vertex is free.
+//!
 //! # Where what is
 //!
-//! The algorithm, without messages: [`lng`](self) (the local neighbourhood graph), `candidates`,
+//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`,
 //! `payoff`, `max_plus`, `assignment`. The protocol: [`messages`], `safety` (what owners and rovers
 //! keep, and why no two rovers meet), `node` and `rover` (the actors). Outside both: `monitor`.
 

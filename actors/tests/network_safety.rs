@@ -1,6 +1,7 @@
 //! No collision, whatever the links and the faults: random roadmaps, teams and seeds, loss from
 //! 0 to 100 %, latency of several cycles, duplicates, reordering, degradations, crashes and restarts.
-//! And that the test can fail: with a rule of the safety protocol broken, the monitor turns red.
+//! And that the test can fail: with a rule of the safety protocol broken, the monitor turns red
+//! (the last two tests; setting `network.sabotage` in `scenario` shows a shrunk case).
 
 use std::sync::Arc;
 
@@ -163,6 +164,10 @@ fn roadmap(columns: u32, rows: u32, cuts: u64) -> Roadmap {
 }
 
 fn run(scenario: &Scenario) -> (NetworkMetrics, Report) {
+    run_on(scenario, Executor::Inline)
+}
+
+fn run_on(scenario: &Scenario, executor: Executor) -> (NetworkMetrics, Report) {
     let map = Arc::new(roadmap(scenario.columns, scenario.rows, scenario.cuts));
     let world = WorldConfig {
         nodes: scenario.nodes.min(map.len() as u32),
@@ -175,7 +180,6 @@ fn run(scenario: &Scenario) -> (NetworkMetrics, Report) {
         rovers: scenario.rovers,
     };
     let mut sim = Simulation::new(scenario.seed);
-    sim.without_digest();
     let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
         sim.link(a, b, &format!("{from}-{to}"), scenario.link.clone());
     };
@@ -209,7 +213,7 @@ fn run(scenario: &Scenario) -> (NetworkMetrics, Report) {
             )
             .unwrap();
     }
-    let report = sim.run(Executor::Inline).unwrap();
+    let report = sim.run(executor).unwrap();
     assert_eq!(report.end.name(), "stopped", "{}", report.end.detail());
     (network.metrics(), report)
 }
@@ -307,6 +311,23 @@ fn a_rover_that_is_gone_for_good_is_named() {
         "{}",
         report.end.detail()
     );
+}
+
+#[test]
+fn threads_change_nothing() {
+    let mut scenario = plain(7);
+    scenario.rovers = 12;
+    scenario.link = Bad {
+        jitter_ms: 30,
+        loss: 0.1,
+        duplicates: 0.1,
+        ..Bad::good()
+    };
+    scenario.crashes = vec![(2, 30, 1), (4, 15, 6)];
+    let (metrics, report) = run(&scenario);
+    assert_eq!(run(&scenario), (metrics.clone(), report.clone()));
+    let threads = Executor::Kameo { threads: 2 };
+    assert_eq!(run_on(&scenario, threads), (metrics, report));
 }
 
 /// The monitor notices if a rule is broken: owners that grant an occupied vertex now and then.
