@@ -1,1 +1,3 @@
 //! Links, rovers, sensor nodes and planners for Farside.
+
+pub mod network;
