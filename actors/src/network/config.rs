@@ -6,6 +6,8 @@ use farside::SimDuration;
 use farside_worlds::{Endpoints, Roadmap, SensorError, SensorNetwork};
 use serde::{Deserialize, Serialize};
 
+use crate::units;
+
 /// Where rovers drive: the roadmap and the sensor nodes over it.
 ///
 /// ```
@@ -21,10 +23,16 @@ pub struct WorldConfig {
     /// How many sensor nodes; at least 1.
     pub nodes: u32,
     /// The radio radius of each, in metres; by default one that nearly every placement can do with.
+    #[serde(
+        rename = "radius",
+        with = "units::length_m::option",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub radius_m: Option<f64>,
     /// Which boundary vertices are entries, and which exits.
     pub endpoints: Endpoints,
     /// The seed of the nodes' places; by default the run's seed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub placement_seed: Option<u64>,
 }
 
@@ -113,16 +121,21 @@ pub struct NetworkConfig {
     /// Who decides which rover asks for which vertex.
     pub policy: Policy,
     /// The length of a planning cycle: at most one move of each rover.
+    #[serde(with = "units::duration")]
     pub cycle: SimDuration,
     /// How long each exchange of step 1, 3 and 5 may take, and the rovers' beacons before them.
+    #[serde(with = "units::duration")]
     pub exchange: SimDuration,
     /// The cycle's time for max-plus (the paper: 500 ms).
+    #[serde(with = "units::duration")]
     pub optimisation: SimDuration,
     /// The most iterations of max-plus in a cycle (the paper: 100).
     pub max_iterations: u32,
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
+    #[serde(with = "units::duration")]
     pub iteration_timeout: SimDuration,
     /// How long a rover takes along an edge.
+    #[serde(with = "units::duration")]
     pub traverse: SimDuration,
     /// C, the estimate of the longest path, in diameters of the roadmap.
     pub longest_path_factor: f64,
