@@ -291,3 +291,47 @@ fn a_full_disk_fails_the_run_and_says_so() {
         text(&output.stderr)
     );
 }
+
+#[test]
+fn two_runs_are_compared_and_a_cut_log_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    farside(folder.path(), &small(&["--out", "a.mcap"]));
+    farside(folder.path(), &small(&["--out", "b.mcap"]));
+    let worse = ["--out", "c.mcap", "--set", "links.default.loss=0.2"];
+    farside(folder.path(), &small(&worse));
+    let same = farside(folder.path(), &["diff", "a.mcap", "b.mcap", "--json"]);
+    assert_eq!(same.status.code(), Some(0), "{}", text(&same.stdout));
+    assert_eq!(json(&same)["identical"], true);
+    let different = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--json"]);
+    assert_eq!(different.status.code(), Some(1));
+    let different = json(&different);
+    for key in [
+        "time_s", "topic", "sender", "receiver", "ordinal", "field", "a", "b", "causes",
+    ] {
+        assert!(!different["first"][key].is_null(), "{key}");
+    }
+    let trouble = farside(folder.path(), &["diff", "a.mcap", "missing.mcap"]);
+    assert_eq!(trouble.status.code(), Some(2));
+
+    let whole = std::fs::read(folder.path().join("a.mcap")).unwrap();
+    std::fs::write(
+        folder.path().join("cut.mcap"),
+        &whole[..whole.len() * 3 / 4],
+    )
+    .unwrap();
+    let saved = farside(
+        folder.path(),
+        &["recover", "cut.mcap", "--out", "saved.mcap"],
+    );
+    assert_eq!(saved.status.code(), Some(0), "{}", text(&saved.stderr));
+    for log in ["cut.mcap", "saved.mcap"] {
+        let verified = farside(folder.path(), &["verify", log]);
+        assert_eq!(
+            verified.status.code(),
+            Some(0),
+            "{}",
+            text(&verified.stderr)
+        );
+        assert!(text(&verified.stdout).contains("as far as it goes"));
+    }
+}
