@@ -1,7 +1,7 @@
 //! The kameo executor: engines as kameo actors on tokio's threads.
 //!
-//! A run with one engine moves into one kameo actor and stays there. With several, time advances
-//! in windows no longer than the look-ahead: within a window no engine can hear from another, so
+//! A run moves into one kameo actor and stays there if it has one engine. With several, each is an
+//! actor, and time advances in windows no longer than the look-ahead: within a window no engine can hear from another, so
 //! all run side by side; then shared links take what was handed to them; then everything is
 //! committed in key order. kameo's own identities, supervision and streams stay out of it.
 
@@ -36,26 +36,18 @@ pub(super) fn run(
         .thread_name("farside")
         .build()
         .map_err(|error| BuildError::Threads(error.to_string()))?;
+    let run = Run {
+        plan,
+        engines,
+        schedule,
+        committer,
+    };
     let report = runtime.block_on(async move {
-        if engines.len() == 1 {
-            let alone = RunAlone {
-                plan,
-                engines,
-                schedule,
-                committer,
-            };
-            let solo = Solo::spawn(Solo);
-            *solo
-                .ask(alone)
-                .await
-                .unwrap_or_else(|error| lost_worker(&error))
-        } else {
-            window::Coordinator::new(plan, engines, schedule, committer)
-                .run()
-                .await
-        }
+        let leader = Leader::spawn(Leader);
+        let report = leader.ask(run).await;
+        report.unwrap_or_else(|error| lost_worker(&error))
     });
-    Ok(report)
+    Ok(*report)
 }
 
 /// Handlers' panics are caught in the engine; a worker that is gone is a bug of this executor.
@@ -63,18 +55,20 @@ fn lost_worker<T>(error: &dyn std::fmt::Display) -> T {
     panic!("a kameo worker did not answer: {error}")
 }
 
-/// The actor of a run that has a single engine.
-struct Solo;
+/// The actor that leads a run: the engine itself if there is only one, or who tells the others.
+/// As an actor it lives on the pool's threads. On the calling thread it would need a processor of
+/// its own, and two switches of threads for each engine and window.
+struct Leader;
 
 /// A whole run.
-struct RunAlone {
+struct Run {
     plan: Arc<Plan>,
     engines: Vec<Engine>,
     schedule: Schedule,
     committer: Committer,
 }
 
-impl Actor for Solo {
+impl Actor for Leader {
     type Args = Self;
     type Error = Infallible;
 
@@ -83,17 +77,21 @@ impl Actor for Solo {
     }
 }
 
-impl Message<RunAlone> for Solo {
+impl Message<Run> for Leader {
     type Reply = Box<Report>;
 
-    async fn handle(&mut self, run: RunAlone, _: &mut Context<Self, Self::Reply>) -> Self::Reply {
-        let RunAlone {
+    async fn handle(&mut self, run: Run, _: &mut Context<Self, Self::Reply>) -> Self::Reply {
+        let Run {
             plan,
             engines,
             schedule,
             committer,
         } = run;
-        Box::new(inline::run(plan, engines, schedule, committer))
+        if engines.len() == 1 {
+            return Box::new(inline::run(plan, engines, schedule, committer));
+        }
+        let coordinator = window::Coordinator::new(plan, engines, schedule, committer);
+        Box::new(coordinator.run().await)
     }
 }
 
