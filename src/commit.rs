@@ -107,26 +107,22 @@ impl Committer {
         report
     }
 
-    fn count(&mut self, record: &Record<'_>) {
+    fn count(&mut self, class: RecordClass, copy: u32, reason: &'static str, sends: u32) {
         let counts = &mut self.counts;
-        counts.sent += u64::from(record.sends);
-        if record.class.is_fate() && record.copy > 0 {
+        counts.sent += u64::from(sends);
+        if class.is_fate() && copy > 0 {
             counts.duplicated += 1;
         }
-        match record.class {
+        match class {
             RecordClass::Delivered => {
                 counts.delivered += 1;
                 counts.events += 1;
             }
             RecordClass::Lost => {
                 counts.lost += 1;
-                match self
-                    .reasons
-                    .iter_mut()
-                    .find(|(reason, _)| *reason == record.reason)
-                {
+                match self.reasons.iter_mut().find(|(known, _)| *known == reason) {
                     Some((_, n)) => *n += 1,
-                    None => self.reasons.push((record.reason, 1)),
+                    None => self.reasons.push((reason, 1)),
                 }
             }
             RecordClass::InFlight => counts.in_flight += 1,
@@ -158,7 +154,7 @@ impl Committer {
 
 impl Sink for Committer {
     fn commit(&mut self, record: &Record<'_>, hash: u128) {
-        self.count(record);
+        self.count(record.class, record.copy, record.reason, record.sends);
         self.last = record.key;
         for (wants, observer) in &mut self.observers {
             if record.class == RecordClass::Sample && !wants.samples {
@@ -183,6 +179,11 @@ impl Sink for Committer {
                 self.checkpoint();
             }
         }
+    }
+
+    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32) {
+        self.count(class, head.copy, head.reason, sends);
+        self.last = key;
     }
 
     fn paused(&self) -> bool {
@@ -255,7 +256,6 @@ impl Batch {
                     match_key: record.match_key,
                     sent: record.sent,
                     cause: record.cause,
-                    scheduled_by: record.scheduled_by,
                     ..Head::of_entity(record.sender, record.sent)
                 };
                 found.push((record.key, head, self.bytes[kept.body.clone()].to_vec()));
@@ -279,6 +279,28 @@ impl Sink for Batch {
             body: start..self.bytes.len(),
             hash,
         });
+    }
+
+    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32) {
+        // A window's events are merged by key before they count, so they are kept all the same.
+        let record = Record {
+            class,
+            key,
+            cause: head.cause,
+            scheduled_by: head.cause,
+            sender: head.sender,
+            receiver: head.receiver,
+            link: head.link,
+            kind: None,
+            ordinal: head.ordinal,
+            copy: head.copy,
+            match_key: head.match_key,
+            sent: head.sent,
+            reason: head.reason,
+            body: &[],
+            sends,
+        };
+        self.commit(&record, 0);
     }
 
     fn paused(&self) -> bool {

@@ -6,6 +6,7 @@
 mod parts;
 
 use std::any::Any;
+use std::num::NonZeroU64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -27,6 +28,8 @@ pub(crate) use parts::Parts;
 /// Where an engine commits what happened, in key order.
 pub(crate) trait Sink {
     fn commit(&mut self, record: &Record<'_>, hash: u128);
+    /// Commits an event of which nobody wants a record: it is only counted.
+    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32);
     /// True once the run must not go on without its driver having a look.
     fn paused(&self) -> bool;
 }
@@ -71,8 +74,9 @@ pub(crate) struct Head {
     pub(crate) sent: SimTime,
     /// The event in whose handler the message was sent.
     pub(crate) cause: Option<EventKey>,
-    /// The event that scheduled the next hop: `cause`, or the hand-over to a shared link.
-    pub(crate) scheduled_by: Option<EventKey>,
+    /// The count in the key of the hand-over to a shared link, once it has happened. The rest of
+    /// that key follows from `cause`.
+    pub(crate) handed_over: Option<NonZeroU64>,
     pub(crate) incarnation: u32,
     pub(crate) reason: &'static str,
 }
@@ -90,10 +94,18 @@ impl Head {
             match_key: None,
             sent: now,
             cause: None,
-            scheduled_by: None,
+            handed_over: None,
             incarnation: 0,
             reason: "",
         }
+    }
+
+    /// The event that scheduled the next hop: the cause, or the hand-over to a shared link.
+    pub(crate) fn scheduled_by(&self, plan: &Plan) -> Option<EventKey> {
+        let (cause, Some(count)) = (self.cause?, self.handed_over) else {
+            return self.cause;
+        };
+        Some(plan.key(cause.time, cause.step + 1, self.sender, count.get()))
     }
 
     pub(crate) fn record<'a>(
@@ -107,7 +119,7 @@ impl Head {
             class,
             key,
             cause: self.cause,
-            scheduled_by: self.scheduled_by,
+            scheduled_by: self.scheduled_by(plan),
             sender: self.sender,
             receiver: self.receiver,
             link: self.link,
@@ -231,7 +243,7 @@ impl Engine {
     }
 
     /// Time and step of the next event.
-    pub(crate) fn peek(&self) -> Option<Bound> {
+    pub(crate) fn peek(&mut self) -> Option<Bound> {
         self.parts.queue.peek()
     }
 
@@ -265,8 +277,8 @@ impl Engine {
         }
         match class {
             Class::Void => Ok(()),
-            Class::Start => self.run_handler(class, RecordClass::Start, key, head, None, sink),
-            Class::Timer => self.run_handler(class, RecordClass::Timer, key, head, letter, sink),
+            Class::Start => self.run_handler(class, RecordClass::Start, key, &head, None, sink),
+            Class::Timer => self.run_handler(class, RecordClass::Timer, key, &head, letter, sink),
             Class::Message if self.is_crashed(head.receiver) => {
                 let head = Head {
                     reason: "crashed",
@@ -276,7 +288,7 @@ impl Engine {
                 Ok(())
             }
             Class::Message => {
-                self.run_handler(class, RecordClass::Delivered, key, head, letter, sink)
+                self.run_handler(class, RecordClass::Delivered, key, &head, letter, sink)
             }
             Class::HandOver => self.hand_over(key, head, letter, sink),
             Class::LateLoss => {
@@ -309,22 +321,36 @@ impl Engine {
         class: Class,
         record: RecordClass,
         key: EventKey,
-        head: Head,
+        head: &Head,
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
         let cell = &mut self.actors[self.parts.plan.place(head.receiver).local as usize];
         let result = invoke(cell, &mut self.parts, key, letter);
-        if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
-            let kind = head.kind.map(|kind| self.parts.plan.kind(kind).name());
-            let message =
-                kind.map(|kind| format!("{kind} from {}", self.parts.plan.name(head.sender)));
-            self.parts.note_unfinished(key, class, head);
-            let blamed = self.parts.carrying.unwrap_or(head.receiver);
-            return Err(self.parts.fault_at(key, blamed, message, cause));
+        if result.is_err() || self.parts.fault.is_some() {
+            return Err(self.handler_fault(class, key, head, result));
         }
-        self.commit(record, key, &head, sink);
+        self.commit(record, key, head, sink);
         Ok(())
+    }
+
+    #[cold]
+    fn handler_fault(
+        &mut self,
+        class: Class,
+        key: EventKey,
+        head: &Head,
+        result: Result<(), Box<FaultCause>>,
+    ) -> Box<Fault> {
+        let kernels_own = self.parts.fault.take();
+        let Some(cause) = result.err().or(kernels_own) else {
+            unreachable!("called with a fault at hand");
+        };
+        let kind = head.kind.map(|kind| self.parts.plan.kind(kind).name());
+        let message = kind.map(|kind| format!("{kind} from {}", self.parts.plan.name(head.sender)));
+        self.parts.note_unfinished(key, class, *head);
+        let blamed = self.parts.carrying.unwrap_or(head.receiver);
+        self.parts.fault_at(key, blamed, message, *cause)
     }
 
     fn hand_over(
@@ -339,11 +365,11 @@ impl Engine {
         };
         let parts = &mut self.parts;
         let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter)));
-        let result = carried.map_err(|payload| FaultCause::Panic(panic_text(&*payload)));
+        let result = carried.map_err(|payload| Box::new(FaultCause::Panic(panic_text(&*payload))));
         if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
             self.parts.note_unfinished(key, Class::HandOver, head);
             let message = format!("a message from {}", self.parts.plan.name(head.sender));
-            return Err(self.parts.fault_at(key, link, Some(message), cause));
+            return Err(self.parts.fault_at(key, link, Some(message), *cause));
         }
         self.commit(RecordClass::HandOver, key, &head, sink);
         Ok(())
@@ -381,7 +407,7 @@ impl Engine {
                         return Err(self.parts.fault_at(key, entity, None, cause));
                     }
                 }
-                self.run_handler(Class::Start, RecordClass::Restart, key, head, None, sink)
+                self.run_handler(Class::Start, RecordClass::Restart, key, &head, None, sink)
             }
             Action::Change(change) => {
                 head.kind = self
@@ -400,9 +426,13 @@ impl Engine {
     /// Commits the event just handled, then what happened in it.
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
-        let mut record = head.record(&parts.plan, class, key, &parts.body);
-        record.sends = parts.sends;
-        sink.commit(&record, hash_if_wanted(&parts.plan, &record));
+        if parts.plan.recording() {
+            let mut record = head.record(&parts.plan, class, key, &parts.body);
+            record.sends = parts.sends;
+            sink.commit(&record, hash_if_wanted(&parts.plan, &record));
+        } else {
+            sink.count_event(class, key, head, parts.sends);
+        }
         if !parts.effects.is_empty() {
             parts.commit_effects(sink);
         }
@@ -449,7 +479,7 @@ fn invoke(
     parts: &mut Parts,
     key: EventKey,
     letter: Option<Sealed>,
-) -> Result<(), FaultCause> {
+) -> Result<(), Box<FaultCause>> {
     let Some(actor) = cell.actor.as_deref_mut() else {
         unreachable!("handlers run on living actors only");
     };
@@ -465,8 +495,8 @@ fn invoke(
     }));
     match outcome {
         Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(FaultCause::Error(error.to_string())),
-        Err(payload) => Err(FaultCause::Panic(panic_text(&*payload))),
+        Ok(Err(error)) => Err(Box::new(FaultCause::Error(error.to_string()))),
+        Err(payload) => Err(Box::new(FaultCause::Panic(panic_text(&*payload)))),
     }
 }
 

@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use smallbox::SmallBox;
-use smallbox::space::S8;
+use smallbox::space::S4;
 
 use crate::actor::{Actor, Handler};
 use crate::context::{Context, Core};
@@ -165,9 +165,10 @@ impl<M: Message> Target<M> for Recipient<M> {
     }
 }
 
-/// A message on its way, with what it takes to deliver, encode and copy it.
+/// A message on its way, with what it takes to deliver, encode and copy it. Messages of up to 24
+/// bytes (32, if they have a spare bit pattern) travel without an allocation.
 #[doc(hidden)]
-pub struct Sealed(pub(crate) SmallBox<dyn Letter, S8>);
+pub struct Sealed(pub(crate) SmallBox<dyn Letter, S4>);
 
 /// What the engine can do with a message whose type it does not know.
 pub(crate) trait Letter: Send {

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use crate::actor::{Accepts, Actor, AnyActor, Factory, KindEntry};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
 use crate::executor::{self, Executor};
-use crate::fault::BuildError;
+use crate::fault::{BuildError, LookupError};
 use crate::message::Address;
 use crate::record::Observer;
 use crate::report::Report;
@@ -231,6 +231,39 @@ impl Simulation {
     /// Restarts an actor at `time`, crashed or not: a new one is built, in a new incarnation.
     pub fn restart_at<A>(&mut self, time: SimTime, actor: Address<A>) {
         self.control(time, Some(Target::Actor(actor.declared)), Planned::Restart);
+    }
+
+    /// The names of all actors declared so far, in order of declaration.
+    pub fn actor_names(&self) -> impl Iterator<Item = &str> {
+        self.actors.iter().map(|actor| actor.name.as_str())
+    }
+
+    /// [`Simulation::crash_at`] for the actor of this name, as scenarios give it.
+    ///
+    /// # Errors
+    /// When no actor declared so far has the name.
+    pub fn crash_named_at(&mut self, time: SimTime, actor: &str) -> Result<(), LookupError> {
+        let target = self.target_named(actor)?;
+        self.control(time, Some(target), Planned::Crash);
+        Ok(())
+    }
+
+    /// [`Simulation::restart_at`] for the actor of this name.
+    ///
+    /// # Errors
+    /// When no actor declared so far has the name.
+    pub fn restart_named_at(&mut self, time: SimTime, actor: &str) -> Result<(), LookupError> {
+        let target = self.target_named(actor)?;
+        self.control(time, Some(target), Planned::Restart);
+        Ok(())
+    }
+
+    fn target_named(&self, name: &str) -> Result<Target, LookupError> {
+        let at = self.actor_names().position(|known| known == name);
+        let at = at.ok_or_else(|| LookupError::Unknown {
+            name: name.to_owned(),
+        })?;
+        Ok(Target::Actor(at as u32))
     }
 
     /// Changes a link at `time`.

@@ -1,1 +1,5 @@
 //! Links, rovers, sensor nodes and planners for Farside.
+
+pub mod link;
+pub mod network;
+pub mod units;

@@ -1,1 +1,68 @@
 //! MCAP logs of Farside runs: write, read, verify, diff, recover.
+//!
+//! This is the only crate that names `mcap`. It knows runs, records and messages; it does not know
+//! rovers, radios or terrain.
+//!
+//! - [`LogWriter`] is an observer that writes a run while it goes on.
+//! - [`info`] says what is in a log, or in any MCAP file, whole or cut.
+//! - [`Log`] and [`Records`] read a log's records one after the other.
+//! - [`Verifier`] is an observer that compares a re-execution with a log.
+//! - [`diff`] says which messages of two logs differ, which one first, and what caused it.
+//! - [`recover`] makes a whole file of a broken one.
+//!
+//! # The format, version 1.0
+//!
+//! One MCAP message for each record of a run, in the order in which they were committed.
+//!
+//! | topic | what | `log_time` | `publish_time` |
+//! |---|---|---|---|
+//! | `/{sender}/{kind}` | a message was delivered | delivered | sent |
+//! | `/lost/{sender}/{kind}` | a message was lost | lost | sent |
+//! | `/in_flight/{sender}/{kind}` | a message was on its way when the run ended | the end | sent |
+//! | `/hand_over/{sender}/{kind}` | a message reached a shared link | reached | sent |
+//! | `/timer/{actor}/{kind}` | a timer fired | fired | set |
+//! | `/event/{start,crash,restart}/{actor}` | what happened to an actor | when | when |
+//! | `/event/change/{link}` | a link was changed | when | when |
+//! | `/event/stop` | the run was stopped | when | when |
+//! | `/state/{actor}/{kind}` | a state sample; never compared | when | when |
+//! | `farside/checkpoint` | digest, and a 32-bit hash of each record since the last one | when | when |
+//!
+//! `kind` is the serde name of the message's type in `snake_case`. Each message is an envelope, the
+//! protobuf message `farside.record.{Kind}`: `sender`, `receiver`, `link`, `kind`, `fate`, `reason`,
+//! `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`), `sent_ns`,
+//! `cause`, `match_key` and `body`. What has no body is a `farside.log.Event`. State samples are
+//! their own type, without an envelope.
+//!
+//! `role` in a channel's metadata is `message`, `event`, `state` or `checkpoint`; readers skip the
+//! roles that they do not know. Metadata: `farside` (format, code version, seed, scenario),
+//! `farside.run`, `farside.host` (what may differ between machines), and at the end `farside.end`
+//! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
+//! scenario as `scenario.toml`, and the files that it read.
+//!
+//! A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
+
+mod descriptors;
+mod diff;
+mod envelope;
+mod error;
+mod fields;
+mod frames;
+mod info;
+mod log;
+mod parse;
+mod recover;
+mod scan;
+mod topics;
+mod verify;
+mod wire;
+mod writer;
+
+pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
+pub use envelope::{KeyRef, RecordRef};
+pub use error::LogError;
+pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
+pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
+pub use recover::{RecoverReport, recover};
+pub use scan::{ChannelInfo, SchemaInfo};
+pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
+pub use writer::{Attachment, Compression, LogOptions, LogWriter};

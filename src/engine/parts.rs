@@ -3,6 +3,7 @@
 
 use std::any::TypeId;
 use std::cell::Cell;
+use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -55,7 +56,8 @@ pub(crate) struct Parts {
     effect_bytes: Vec<u8>,
     verdicts: Verdicts,
     pub(crate) sends: u32,
-    pub(crate) fault: Option<FaultCause>,
+    /// Boxed: it is looked at after every event, and nearly always empty.
+    pub(crate) fault: Option<Box<FaultCause>>,
     /// The link that was deciding a fate when a handler failed.
     pub(crate) carrying: Option<EntityId>,
     /// The first request to stop: at which event, by whom, why.
@@ -90,6 +92,7 @@ impl Parts {
         }
     }
 
+    #[inline]
     pub(crate) fn insert(&mut self, key: EventKey, pending: Pending) -> u32 {
         let slot =
             u32::try_from(self.pending.insert(pending)).expect("fewer than 2^32 events wait");
@@ -97,6 +100,7 @@ impl Parts {
         slot
     }
 
+    #[inline]
     pub(crate) fn take(&mut self, slot: u32) -> Pending {
         let pending = self.pending.remove(slot as usize);
         if pending.class == Class::Void {
@@ -106,6 +110,7 @@ impl Parts {
     }
 
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
+    #[inline]
     pub(crate) fn begin(
         &mut self,
         key: EventKey,
@@ -140,7 +145,7 @@ impl Parts {
 
     /// Keeps the first fault of the event in hand.
     pub(crate) fn raise(&mut self, cause: FaultCause) {
-        self.fault.get_or_insert(cause);
+        self.fault.get_or_insert_with(|| Box::new(cause));
     }
 
     pub(crate) fn fault_at(
@@ -187,7 +192,6 @@ impl Parts {
             repeat,
             match_key,
             cause: Some(self.key),
-            scheduled_by: Some(self.key),
             ..Head::of_entity(me, self.key.time)
         };
         self.sends += 1;
@@ -221,6 +225,7 @@ impl Parts {
     }
 
     /// The key that `source` gives an event `delay` from now.
+    #[inline]
     fn later_key(&self, source: EntityId, count: &mut u64, delay: SimDuration) -> EventKey {
         let own = *count;
         *count += 1;
@@ -231,6 +236,7 @@ impl Parts {
         }
     }
 
+    #[inline]
     fn schedule(&mut self, engine: u32, key: EventKey, class: Class, head: Head, letter: Sealed) {
         let pending = Pending {
             class,
@@ -292,10 +298,13 @@ impl Parts {
         verdicts: &Verdicts,
     ) {
         let mut letter = Some(letter);
+        // Only a hand-over is an event of its own between the cause and this.
+        let handed_over = head.cause.filter(|cause| *cause != self.key);
+        let handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
         for (copy, verdict) in verdicts.list.iter().enumerate() {
             let head = Head {
                 copy: copy as u32,
-                scheduled_by: Some(self.key),
+                handed_over,
                 ..head
             };
             let last = copy + 1 == verdicts.list.len();
@@ -522,7 +531,7 @@ impl Parts {
     pub(crate) fn take_in_flight(&mut self, until: Option<EventKey>) -> Vec<InFlight> {
         let mut found = Vec::new();
         if let Some((key, class, head)) = self.unfinished.take()
-            && head.in_flight(class, until)
+            && head.in_flight(&self.plan, class, until)
         {
             found.push((key, head, std::mem::take(&mut self.body)));
         }
@@ -539,8 +548,9 @@ impl Parts {
 
 impl Head {
     /// True for a message that was sent before `until`, which a fault left of the run.
-    fn in_flight(&self, class: Class, until: Option<EventKey>) -> bool {
-        let undone = until.is_some_and(|until| self.scheduled_by.is_none_or(|by| by >= until));
+    fn in_flight(&self, plan: &Plan, class: Class, until: Option<EventKey>) -> bool {
+        let undone =
+            until.is_some_and(|until| self.scheduled_by(plan).is_none_or(|by| by >= until));
         matches!(class, Class::Message | Class::HandOver | Class::LateLoss) && !undone
     }
 }
@@ -553,7 +563,7 @@ impl Pending {
         key: EventKey,
         until: Option<EventKey>,
     ) -> Option<InFlight> {
-        if !self.head.in_flight(self.class, until) {
+        if !self.head.in_flight(plan, self.class, until) {
             return None;
         }
         let mut body = Vec::new();

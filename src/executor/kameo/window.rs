@@ -57,7 +57,7 @@ impl Coordinator {
         let shared = plan.links.iter().find(|(_, link)| link.shared);
         let shared = shared.map(|(link, _)| plan.place(*link).engine as usize);
         let look_ahead = plan.info.look_ahead;
-        let seat = |engine: Engine| Seat {
+        let seat = |mut engine: Engine| Seat {
             next: engine.peek(),
             worker: Worker::spawn(Worker { engine }),
             inbox: Vec::new(),

@@ -38,9 +38,9 @@ fn rate(size: Size, hold: impl Fn(Size) -> u64) -> f64 {
     (long_events - short_events) / (long_s - short_s)
 }
 
-/// `profile SIZE-INDEX`: one long run of Farside alone, for a profiler.
+/// `profile SIZE-INDEX EVENTS`: one run of Farside alone, for a profiler.
 fn profile(size: Size) {
-    farside_hold::inline(Size { events: 20 * size.events, ..size }, false);
+    farside_hold::inline(size, false);
 }
 
 const SIZES: [Size; 3] = [
@@ -52,8 +52,11 @@ const SIZES: [Size; 3] = [
 fn main() {
     let mut arguments = std::env::args().skip(1);
     if arguments.next().as_deref() == Some("profile") {
-        let index = arguments.next().and_then(|at| at.parse().ok()).unwrap_or(0);
-        return profile(SIZES[index]);
+        let mut number = |default| arguments.next().and_then(|at| at.parse().ok()).unwrap_or(default);
+        let index = number(0);
+        let size = SIZES[index];
+        let events = number(size.events as usize) as u64;
+        return profile(Size { events, ..size });
     }
     let rounds: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(5);
     println!("PHOLD, million events/s, best of {rounds} rounds");

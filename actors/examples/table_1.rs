@@ -1,0 +1,209 @@
+//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside it:
+//! 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that lose
+//! nothing unless told to.
+//!
+//!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
+//!
+//! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
+//! `digest` (true, false), `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
+//! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
+//! `factor`, `backtrack`, `leaf_wait`, `noise`.
+
+use std::sync::Arc;
+
+use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
+use farside::prelude::*;
+use farside_actors::network::{
+    Deadlock, NetworkConfig, NetworkMetrics, Priority, TeamConfig, WorldConfig, assemble,
+};
+use farside_worlds::{Endpoints, Roadmap};
+
+/// A link with uniform jitter and independent loss.
+#[derive(Clone)]
+struct Radio {
+    latency: SimDuration,
+    jitter: SimDuration,
+    loss: f64,
+}
+
+impl Carrier for Radio {
+    type Change = NoChange;
+
+    fn min_delay(&self) -> SimDuration {
+        self.latency
+    }
+
+    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        if parcel.random(0, 0, 0).uniform() < self.loss {
+            return verdicts.lose("loss");
+        }
+        let share = parcel.random(1, 0, 0).uniform() * self.jitter.as_nanos() as f64;
+        verdicts.deliver(self.latency + SimDuration::from_nanos(share as u64));
+    }
+
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+}
+
+struct Options {
+    seeds: u64,
+    maps: Vec<String>,
+    nodes: Vec<u32>,
+    rovers: Vec<u32>,
+    radio: Radio,
+    digest: bool,
+    endpoints: Endpoints,
+    network: NetworkConfig,
+}
+
+fn options() -> Result<Options, Box<dyn std::error::Error>> {
+    let mut options = Options {
+        seeds: 16,
+        maps: vec!["crater-dense".into(), "crater-sparse".into()],
+        nodes: vec![14, 21, 28],
+        rovers: vec![25, 50, 75, 100],
+        radio: Radio {
+            latency: SimDuration::from_millis(5),
+            jitter: SimDuration::ZERO,
+            loss: 0.0,
+        },
+        digest: false,
+        endpoints: Endpoints::default(),
+        network: NetworkConfig::default(),
+    };
+    let numbers = |text: &str| {
+        text.split(',')
+            .map(str::parse)
+            .collect::<Result<Vec<u32>, _>>()
+    };
+    for argument in std::env::args().skip(1) {
+        let Some((key, value)) = argument.split_once('=') else {
+            options.seeds = argument.parse()?;
+            continue;
+        };
+        let network = &mut options.network;
+        match key {
+            "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
+            "nodes" => options.nodes = numbers(value)?,
+            "rovers" => options.rovers = numbers(value)?,
+            "loss" => options.radio.loss = value.parse()?,
+            "latency_ms" => options.radio.latency = SimDuration::from_millis(value.parse()?),
+            "jitter_ms" => options.radio.jitter = SimDuration::from_millis(value.parse()?),
+            "digest" => options.digest = value.parse()?,
+            "iterations" => network.max_iterations = value.parse()?,
+            "cycle_limit" => network.cycle_limit = value.parse()?,
+            "active_window" => network.active_window = value.parse()?,
+            "chains" => network.acceleration_chains = value.parse()?,
+            "acceleration" => network.acceleration = value.parse()?,
+            "factor" => network.longest_path_factor = value.parse()?,
+            "backtrack" => network.backtrack_penalty = value.parse()?,
+            "leaf_wait" => network.leaf_wait_penalty = value.parse()?,
+            "noise" => network.noise = value.parse()?,
+            "priority" if value == "lowest_id" => network.priority = Priority::LowestId,
+            "priority" => network.priority = Priority::LongestWait,
+            "endpoints" => {
+                options.endpoints = match value {
+                    "any-to-any" => Endpoints::AnyToAny,
+                    "west-to-east" => Endpoints::WestToEast,
+                    _ => Endpoints::Alternating,
+                }
+            }
+            _ => return Err(format!("unknown key {key}").into()),
+        }
+    }
+    Ok(options)
+}
+
+fn run(
+    options: &Options,
+    map: &str,
+    nodes: u32,
+    rovers: u32,
+    seed: u64,
+) -> Result<(NetworkMetrics, Report), Box<dyn std::error::Error>> {
+    let world = WorldConfig {
+        roadmap: map.to_owned(),
+        nodes,
+        endpoints: options.endpoints,
+        ..WorldConfig::default()
+    };
+    let roadmap = Arc::new(Roadmap::builtin(map)?);
+    let sensors = Arc::new(world.place(&roadmap, seed)?);
+    let team = TeamConfig { rovers };
+    let mut sim = Simulation::new(seed);
+    if !options.digest {
+        sim.without_digest();
+    }
+    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+        sim.link(a, b, &format!("{from}-{to}"), options.radio.clone());
+    };
+    let network = assemble(
+        &mut sim,
+        &world,
+        roadmap,
+        sensors,
+        &team,
+        &options.network,
+        seed,
+        &mut connect,
+    )?;
+    let report = sim.run(Executor::Inline)?;
+    if let Some(fault) = report.fault() {
+        return Err(fault.to_string().into());
+    }
+    Ok((network.metrics(), report))
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let options = options()?;
+    println!(
+        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  coll",
+        "map"
+    );
+    for map in &options.maps {
+        for &nodes in &options.nodes {
+            for &rovers in &options.rovers {
+                let results =
+                    (1..=options.seeds).map(|seed| run(&options, map, nodes, rovers, seed));
+                let results = results.collect::<Result<Vec<_>, _>>()?;
+                print_cell(map, nodes, rovers, &results);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Means over all seeds; path figures over the runs in which all arrived, as in the paper.
+fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Report)]) {
+    let n = results.len() as f64;
+    let percent = |test: &dyn Fn(&NetworkMetrics) -> bool| {
+        100.0 * results.iter().filter(|(m, _)| test(m)).count() as f64 / n
+    };
+    let complete: Vec<_> = results
+        .iter()
+        .filter(|(m, _)| m.arrived == m.rovers)
+        .collect();
+    let mean = |value: &dyn Fn(&NetworkMetrics) -> f64| {
+        complete.iter().map(|(m, _)| value(m)).sum::<f64>() / complete.len() as f64
+    };
+    let all = |value: &dyn Fn(&(NetworkMetrics, Report)) -> f64| {
+        results.iter().map(value).sum::<f64>() / n
+    };
+    println!(
+        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:4.0}",
+        percent(&|m| m.deadlock != Deadlock::None),
+        percent(&|m| m.deadlock == Deadlock::Passive),
+        percent(&|m| m.deadlock == Deadlock::Active),
+        percent(&|m| m.deadlock == Deadlock::None && m.arrived < m.rovers),
+        all(&|(m, _)| f64::from(m.arrived)),
+        mean(&|m| m.path_ratio),
+        mean(&|m| m.time_ratio),
+        mean(&|m| m.mean_steps),
+        mean(&|m| m.mean_stops),
+        mean(&|m| m.mean_backtracks),
+        all(&|(m, _)| 100.0 * m.intervention_rate),
+        all(&|(m, _)| m.max_plus_iterations),
+        mean(&|m| f64::from(m.cycles)),
+        all(&|(m, r)| r.counts.sent as f64 / f64::from(m.cycles)),
+        all(&|(m, _)| f64::from(m.collisions)),
+    );
+}

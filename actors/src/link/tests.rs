@@ -1,0 +1,272 @@
+//! What links promise, against closed forms: rates, bounds, coupling, and changes in time.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+
+use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use proptest::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::*;
+
+#[derive(Serialize, Deserialize)]
+struct Probe;
+
+#[derive(Serialize, Deserialize)]
+struct Tick;
+
+struct Sink;
+
+impl Actor for Sink {
+    type Accepts = (Probe,);
+}
+
+impl Handler<Probe> for Sink {
+    fn handle(&mut self, _probe: Probe, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+/// Sends one probe each 10 ms.
+struct Source {
+    sink: Address<Sink>,
+    left: u32,
+}
+
+impl Actor for Source {
+    type Accepts = (Tick,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.handle(Tick, ctx)
+    }
+}
+
+impl Handler<Tick> for Source {
+    fn handle(&mut self, _tick: Tick, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.send(self.sink, Probe);
+        self.left -= 1;
+        if self.left > 0 {
+            ctx.timer(SimDuration::from_millis(10), Tick);
+        }
+        Ok(())
+    }
+}
+
+/// The fate of one copy.
+#[derive(Clone, Debug)]
+struct Fate {
+    ordinal: u64,
+    sent: SimTime,
+    delay: SimDuration,
+    reason: &'static str,
+}
+
+struct Fates(Arc<Mutex<Vec<Fate>>>);
+
+impl Observer for Fates {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        if matches!(record.class, RecordClass::Delivered | RecordClass::Lost) {
+            self.0.lock().unwrap().push(Fate {
+                ordinal: record.ordinal,
+                sent: record.sent,
+                delay: record.time().since(record.sent),
+                reason: record.reason,
+            });
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+/// Sends `count` probes over a link built from this scenario text.
+fn fates(seed: u64, count: u32, links: &str, degrades: &str) -> Vec<Fate> {
+    #[derive(Deserialize)]
+    struct Degrades {
+        #[serde(default)]
+        degrade: Vec<Degrade>,
+    }
+    let links: LinksConfig = toml::from_str(links).unwrap();
+    let degrades: Degrades = toml::from_str(degrades).unwrap();
+    let mut sim = Simulation::new(seed);
+    let (a, b) = (sim.host("a"), sim.host("b"));
+    let sink = sim.actor(b, "sink", |_| Sink);
+    sim.actor(a, "source", move |_| Source { sink, left: count });
+    let mut builder = LinkBuilder::new(&links, &degrades.degrade).unwrap();
+    builder.connect(&mut sim, (a, "a"), (b, "b"));
+    builder.finish().unwrap();
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    sim.observe(Fates(seen.clone()));
+    let report = sim.run(Executor::Inline).unwrap();
+    assert_eq!(report.end.name(), "completed", "{}", report.end.detail());
+    Arc::into_inner(seen).unwrap().into_inner().unwrap()
+}
+
+fn lost(fates: &[Fate]) -> BTreeSet<u64> {
+    let lost = fates.iter().filter(|fate| fate.reason == LOSS);
+    lost.map(|fate| fate.ordinal).collect()
+}
+
+#[test]
+fn loss_and_duplication_meet_their_rates() {
+    let n = 20_000;
+    let seen = fates(1, n, "default = { loss = 0.2, duplicate = 0.1 }", "");
+    let copies = seen.len() as f64;
+    // Three standard deviations of a binomial.
+    let duplicated = copies - f64::from(n);
+    assert!((duplicated - 2_000.0).abs() < 3.0 * (2_000.0f64 * 0.9).sqrt());
+    let share = seen.iter().filter(|fate| fate.reason == LOSS).count() as f64 / copies;
+    assert!(
+        (share - 0.2).abs() < 3.0 * (0.2 * 0.8 / copies).sqrt(),
+        "{share}"
+    );
+}
+
+#[test]
+fn uniform_jitter_fills_its_interval_and_no_more() {
+    let seen = fates(
+        2,
+        20_000,
+        "default = { latency = '50ms', jitter = '20ms' }",
+        "",
+    );
+    let delays_ms: Vec<f64> = seen.iter().map(|f| f.delay.as_secs_f64() * 1e3).collect();
+    let mean = delays_ms.iter().sum::<f64>() / delays_ms.len() as f64;
+    assert!(delays_ms.iter().all(|d| (30.0..=70.0).contains(d)));
+    assert!(delays_ms.iter().any(|d| *d < 30.1) && delays_ms.iter().any(|d| *d > 69.9));
+    // The standard deviation of the mean is 20 / sqrt(3 n).
+    assert!((mean - 50.0).abs() < 0.25, "{mean}");
+}
+
+#[test]
+fn normal_jitter_has_its_moments_and_is_cut() {
+    let links = "default = { latency = '50ms', jitter = '10ms', jitter_shape = 'normal' }";
+    let seen = fates(3, 20_000, links, "");
+    let delays_ms: Vec<f64> = seen.iter().map(|f| f.delay.as_secs_f64() * 1e3).collect();
+    let mean = delays_ms.iter().sum::<f64>() / delays_ms.len() as f64;
+    let variance = delays_ms
+        .iter()
+        .map(|d| (d - mean) * (d - mean))
+        .sum::<f64>()
+        / delays_ms.len() as f64;
+    assert!(delays_ms.iter().all(|d| (20.0..=80.0).contains(d)));
+    assert!((mean - 50.0).abs() < 0.3, "{mean}");
+    assert!((variance.sqrt() - 10.0).abs() < 0.3, "{variance}");
+}
+
+#[test]
+fn a_floor_holds_against_wide_jitter() {
+    let links = "default = { latency = '5ms', jitter = '9ms', min_delay = '2ms' }";
+    let seen = fates(4, 2_000, links, "");
+    let floor = SimDuration::from_millis(2);
+    assert!(seen.iter().all(|fate| fate.delay >= floor));
+    assert!(seen.iter().any(|fate| fate.delay == floor));
+}
+
+#[test]
+fn degradations_begin_end_and_overlap() {
+    let degrades = "
+        [[degrade]]
+        at = '1s'
+        until = '3s'
+        links = 'a-*'
+        latency = '1ms'
+        [[degrade]]
+        at = '2s'
+        until = '4s'
+        links = '*'
+        outage = true
+        [[degrade]]
+        at = '2500ms'
+        until = '2600ms'
+        links = 'a-b'
+        outage = false
+    ";
+    let seen = fates(5, 500, "default = { latency = '5ms' }", degrades);
+    for fate in &seen {
+        let sent_ms = fate.sent.as_nanos() / 1_000_000;
+        let delay_ms = fate.delay.as_nanos() / 1_000_000;
+        let (reason, expected_ms) = match sent_ms {
+            1000..2000 | 2500..2600 => ("", 1),
+            2000..4000 => (OUTAGE, 0),
+            _ => ("", 5),
+        };
+        assert_eq!(
+            (fate.reason, delay_ms),
+            (reason, expected_ms),
+            "sent at {sent_ms} ms"
+        );
+    }
+}
+
+#[test]
+fn the_last_pattern_in_the_file_wins() {
+    let links = "
+        'a-b' = { loss = 1.0, latency = '7ms' }
+        '*-b' = { loss = 0.0 }
+    ";
+    let seen = fates(6, 10, links, "");
+    assert!(seen.iter().all(|fate| fate.reason.is_empty()));
+    assert!(
+        seen.iter()
+            .all(|fate| fate.delay == SimDuration::from_millis(7))
+    );
+}
+
+#[test]
+fn mistakes_are_refused_with_their_place() {
+    let build = |degrade: &str| {
+        let degrade: Degrade = toml::from_str(degrade).unwrap();
+        LinkBuilder::new(&LinksConfig::default(), &[degrade])
+            .err()
+            .unwrap()
+    };
+    let error = build("at = '9s'\nuntil = '3s'\nlinks = '*'\noutage = true");
+    assert_eq!(error.key(), ["degrade", "0", "until"]);
+    assert!(error.to_string().contains("expected a time after \"9s\""));
+    let error = build("at = '9s'\nlinks = '*'");
+    assert!(error.to_string().contains("changes nothing"));
+    let error = build("at = '9s'\nlinks = '[z-a'\nloss = 1");
+    assert_eq!(error.key(), ["degrade", "0", "links"]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn more_loss_loses_a_superset(seed: u64, p in 0.0..1.0f64, q in 0.0..1.0f64) {
+        let (low, high) = (p.min(q), p.max(q));
+        let at = |loss: f64| lost(&fates(seed, 200, &format!("default = {{ loss = {loss:?} }}"), ""));
+        prop_assert!(at(low).is_subset(&at(high)));
+    }
+
+    #[test]
+    fn no_delay_undercuts_what_the_link_declares(
+        seed: u64, latency in 0..5_000_000u64, jitter in 0..9_000_000u64, normal: bool,
+        floor in proptest::option::of(0..3_000_000u64),
+    ) {
+        let params = LinkParams {
+            latency: SimDuration::from_nanos(latency),
+            jitter: SimDuration::from_nanos(jitter),
+            jitter_shape: if normal { JitterShape::Normal } else { JitterShape::Uniform },
+            least_delay: floor.map(SimDuration::from_nanos),
+            ..LinkParams::default()
+        };
+        let links = LinksConfig { default: params.clone(), ..LinksConfig::default() };
+        // A delay below the declared one would be a fault, which `fates` refuses.
+        let seen = fates(seed, 50, &toml::to_string(&links).unwrap(), "");
+        prop_assert!(seen.iter().all(|fate| fate.delay >= params.min_delay()));
+    }
+
+    #[test]
+    fn a_links_table_prints_back_to_itself(loss in 0.0..=1.0f64, nanos: u64) {
+        let over = LinkOverrides {
+            loss: Some(loss),
+            latency: Some(SimDuration::from_nanos(nanos)),
+            ..LinkOverrides::default()
+        };
+        let patterns = ["z-*", "a-*"].map(|pattern| (pattern.to_owned(), over.clone()));
+        let links = LinksConfig { default: LinkParams::default(), patterns: patterns.to_vec() };
+        let text = toml::to_string(&links).unwrap();
+        prop_assert_eq!(toml::from_str::<LinksConfig>(&text).unwrap(), links);
+    }
+}

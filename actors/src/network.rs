@@ -1,0 +1,77 @@
+//! Network-guided navigation: sensor nodes plan the paths of rovers on a roadmap, with messages.
+//!
+//! The algorithm is that of Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning for
+//! Resource-Constrained Planetary Rovers*, here called *network-guided*. In each planning cycle the
+//! nodes exchange who is where, propose candidate paths, agree on an assignment by max-plus, and
+//! send rovers on by one vertex. The paper's messages arrive at once and in order, and its
+//! guarantee against collisions rests on that. Here they are late or lost, so that a safety
+//! protocol of its own stands below the algorithm: a rover enters a vertex only when the vertex's
+//! owner has granted it, and an owner grants only what is proved to be free.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use farside::prelude::*;
+//! use farside_actors::network::{NetworkConfig, TeamConfig, WorldConfig, assemble};
+//! use farside_worlds::Roadmap;
+//!
+//! let (world, seed) = (WorldConfig::default(), 1);
+//! let roadmap = Arc::new(Roadmap::builtin(&world.roadmap)?);
+//! let sensors = Arc::new(world.place(&roadmap, seed)?);
+//! let (team, network) = (TeamConfig { rovers: 3 }, NetworkConfig::default());
+//! let mut sim = Simulation::new(seed);
+//! let wire = FixedDelay::new(SimDuration::from_millis(5));
+//! let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+//!     sim.link(a, b, &format!("{from}-{to}"), wire.clone());
+//! };
+//! let system = assemble(
+//!     &mut sim, &world, roadmap, sensors, &team, &network, seed, &mut connect,
+//! )?;
+//! let report = sim.run(Executor::Inline)?;
+//! assert_eq!(report.end.detail(), "@control: all rovers have arrived");
+//! let metrics = system.metrics();
+//! assert_eq!((metrics.arrived, metrics.collisions), (3, 0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Readings
+//!
+//! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
+//! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
+//! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
+//! team of 50 comes to a standstill. And a rover that stands on a leaf of its node's local
+//! neighbourhood graph has a path of length 0 to that leaf
+//! ([`leaf_wait_penalty`](NetworkConfig::leaf_wait_penalty)): without it two rovers that meet at a
+//! pocket push each other in and out of it for ever, because the zero path is worth nothing.
+//!
+//! The paper's step 5 and its request to the owner of the next vertex are one message here
+//! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that comes
+//! too late to be weighed against others is granted if the vertex is free.
+//!
+//! # Where what is
+//!
+//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`,
+//! `payoff`, `max_plus`, `assignment`. The protocol: [`messages`], `safety` (what owners and rovers
+//! keep, and why no two rovers meet), `node` and `rover` (the actors). Outside both: `monitor`.
+
+mod assemble;
+mod assignment;
+mod candidates;
+mod config;
+mod lng;
+mod max_plus;
+pub mod messages;
+mod metrics;
+mod monitor;
+mod node;
+mod payoff;
+mod rover;
+mod safety;
+#[cfg(test)]
+mod testing;
+
+pub use assemble::{Connect, Network, NetworkError, assemble};
+pub use candidates::{CandidatePath, Destination, FirstStep};
+pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
+pub use metrics::{Deadlock, NetworkMetrics};
+pub use node::Node;
+pub use rover::Rover;

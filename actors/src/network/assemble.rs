@@ -1,0 +1,315 @@
+//! Assembling the network-guided system: hosts, actors, links, missions, the monitor.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use farside::prelude::*;
+use farside::random::RandomKey;
+use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+
+use super::config::{ConfigError, NetworkConfig, TeamConfig, WorldConfig};
+use super::lng::LocalGraph;
+use super::messages::RoverId;
+use super::metrics::NetworkMetrics;
+use super::monitor::{Monitor, Score};
+use super::node::Node;
+use super::payoff::Payoffs;
+use super::rover::Rover;
+
+/// Why a system could not be assembled, or has no such actor.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NetworkError {
+    /// A setting makes no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A team of none.
+    #[error("team.rovers is 0, must be at least 1")]
+    NoRovers,
+    /// No rover can enter at one place and leave at another.
+    #[error(
+        "the roadmap {roadmap} has {entries} entries and {exits} exits, too few to drive between"
+    )]
+    Endpoints {
+        /// The roadmap's name.
+        roadmap: String,
+        /// Its entries, as `world.endpoints` divides the boundary.
+        entries: usize,
+        /// Its exits.
+        exits: usize,
+    },
+    /// No actor has this name.
+    #[error("no node or rover is called {name}; there are {first} to {last}")]
+    UnknownActor {
+        /// The name asked for.
+        name: String,
+        /// The first name there is.
+        first: String,
+        /// The last.
+        last: String,
+    },
+}
+
+/// What all nodes and rovers of a run know from the start, and what does not change.
+pub(crate) struct Site {
+    pub(crate) roadmap: Arc<Roadmap>,
+    pub(crate) sensors: Arc<SensorNetwork>,
+    pub(crate) config: NetworkConfig,
+    pub(crate) payoffs: Payoffs,
+    pub(crate) node_names: Vec<String>,
+    pub(crate) rover_names: Vec<String>,
+    /// Each rover's entry and goal.
+    pub(crate) missions: Vec<(VertexId, VertexId)>,
+    /// Who waits at each entry, in order.
+    pub(crate) queues: Vec<(VertexId, Vec<RoverId>)>,
+}
+
+impl Site {
+    /// The planning cycle at `now`, from 0. Nodes' clocks are synchronous.
+    pub(crate) fn cycle_at(&self, now: SimTime) -> u32 {
+        u32::try_from(now.as_nanos() / self.config.cycle.as_nanos()).unwrap_or(u32::MAX)
+    }
+
+    /// From `now` to the start of the next cycle; never zero.
+    pub(crate) fn until_next_cycle(&self, now: SimTime) -> SimDuration {
+        let cycle = self.config.cycle.as_nanos();
+        SimDuration::from_nanos(cycle - now.as_nanos() % cycle)
+    }
+}
+
+/// An assembled system: its actors by name, and its score.
+pub struct Network {
+    site: Arc<Site>,
+    nodes: Vec<Address<Node>>,
+    rovers: Vec<Address<Rover>>,
+    score: Arc<Mutex<Score>>,
+}
+
+/// Makes one link: from the host (and name) given first to the one given second.
+pub type Connect<'a> = dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)) + 'a;
+
+/// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
+/// node and `rover_01`, ... for each rover; the links that `connect` makes, one way each, called for
+/// both directions between neighbouring nodes and between each node and each rover; and the
+/// monitor, which ends the run. `seed` decides entries and goals.
+///
+/// `roadmap` and `sensors` are what `world` describes; of `world` itself only the endpoints are
+/// read here.
+///
+/// # Errors
+/// When a setting makes no sense, the team is empty, or the roadmap's boundary has no two places to
+/// drive between.
+#[allow(clippy::too_many_arguments, reason = "each is a part of a scenario")]
+pub fn assemble(
+    sim: &mut Simulation,
+    world: &WorldConfig,
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    team: &TeamConfig,
+    network: &NetworkConfig,
+    seed: u64,
+    connect: &mut Connect<'_>,
+) -> Result<Network, NetworkError> {
+    network.check()?;
+    let missions = missions(world, &roadmap, team, seed)?;
+    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
+    for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
+        queues.entry(*entry).or_default().push(id);
+    }
+    let site = Arc::new(Site {
+        payoffs: Payoffs::new(network, &roadmap),
+        node_names: names("node", sensors.len()),
+        rover_names: names("rover", missions.len()),
+        config: network.clone(),
+        queues: queues.into_iter().collect(),
+        roadmap,
+        sensors,
+        missions,
+    });
+    let nodes = declare_nodes(sim, &site);
+    let rovers = declare_rovers(sim, &site);
+    declare_links(sim, &site, connect);
+    let (monitor, score) = Monitor::new(site.clone());
+    sim.observe(monitor);
+    Ok(Network {
+        site,
+        nodes,
+        rovers,
+        score,
+    })
+}
+
+/// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of
+/// names is that of numbers.
+fn names(kind: &str, count: usize) -> Vec<String> {
+    let digits = count.to_string().len().max(2);
+    (1..=count)
+        .map(|i| format!("{kind}_{i:0digits$}"))
+        .collect()
+}
+
+/// An entry and a goal for each rover, at random.
+fn missions(
+    world: &WorldConfig,
+    roadmap: &Roadmap,
+    team: &TeamConfig,
+    seed: u64,
+) -> Result<Vec<(VertexId, VertexId)>, NetworkError> {
+    if team.rovers == 0 {
+        return Err(NetworkError::NoRovers);
+    }
+    let (entries, exits) = world.endpoints.split(roadmap);
+    // With one entry that is the only exit there is nowhere to go.
+    let pairs = entries
+        .iter()
+        .flat_map(|a| exits.iter().map(move |b| (a, b)));
+    let starts: Vec<_> = entries
+        .iter()
+        .filter(|&&entry| exits.iter().any(|&exit| exit != entry))
+        .copied()
+        .collect();
+    if !pairs.into_iter().any(|(a, b)| a != b) {
+        return Err(NetworkError::Endpoints {
+            roadmap: roadmap.name().to_owned(),
+            entries: entries.len(),
+            exits: exits.len(),
+        });
+    }
+    let mission = |rover: u32| {
+        let key = RandomKey::new(seed).text("mission");
+        let mut draws = key.number(u64::from(rover)).stream();
+        let entry = *draws.choose(&starts).expect("there is a pair");
+        loop {
+            let goal = *draws.choose(&exits).expect("there is a pair");
+            if goal != entry {
+                return (entry, goal);
+            }
+        }
+    };
+    Ok((0..team.rovers).map(mission).collect())
+}
+
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
+    let declare = |(id, name): (NodeId, &String)| {
+        let host = sim.host(name);
+        sim.heavy(host);
+        let graph = Arc::new(LocalGraph::new(&site.roadmap, &site.sensors, id));
+        let site = site.clone();
+        let build = move |_: &str| Node::new(site.clone(), id, graph.clone());
+        sim.actor(host, name, build)
+    };
+    site.sensors
+        .nodes()
+        .zip(&site.node_names)
+        .map(declare)
+        .collect()
+}
+
+fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>> {
+    let declare = |(id, name): (RoverId, &String)| {
+        let host = sim.host(name);
+        let site = site.clone();
+        sim.actor(host, name, move |_| Rover::new(site.clone(), id))
+    };
+    (0..)
+        .map(RoverId)
+        .zip(&site.rover_names)
+        .map(declare)
+        .collect()
+}
+
+fn declare_links(sim: &mut Simulation, site: &Site, connect: &mut Connect<'_>) {
+    let mut hosts =
+        |names: &[String]| -> Vec<HostId> { names.iter().map(|name| sim.host(name)).collect() };
+    let (node_hosts, rover_hosts) = (hosts(&site.node_names), hosts(&site.rover_names));
+    for id in site.sensors.nodes() {
+        let node = (node_hosts[id.0 as usize], &*site.node_names[id.0 as usize]);
+        for other in site.sensors.neighbors(id) {
+            let at = other.0 as usize;
+            connect(sim, node, (node_hosts[at], &site.node_names[at]));
+        }
+        for (host, name) in rover_hosts.iter().zip(&site.rover_names) {
+            connect(sim, node, (*host, name));
+            connect(sim, (*host, name), node);
+        }
+    }
+}
+
+impl Network {
+    /// The score so far: after the run, its result.
+    pub fn metrics(&self) -> NetworkMetrics {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.metrics(&self.site)
+    }
+
+    /// The nodes' names, in order; hosts are called the same.
+    pub fn node_names(&self) -> &[String] {
+        &self.site.node_names
+    }
+
+    /// The rovers' names, in order; hosts are called the same.
+    pub fn rover_names(&self) -> &[String] {
+        &self.site.rover_names
+    }
+
+    /// Each rover's entry and goal, in the order of the names.
+    pub fn missions(&self) -> &[(VertexId, VertexId)] {
+        &self.site.missions
+    }
+
+    /// Crashes the node or rover called `actor` at `time`: it loses its plans, keeps what is
+    /// durable, and a rover stops where it is.
+    ///
+    /// # Errors
+    /// When there is no such actor.
+    pub fn crash_at(
+        &self,
+        sim: &mut Simulation,
+        time: SimTime,
+        actor: &str,
+    ) -> Result<(), NetworkError> {
+        match self.find(actor)? {
+            Found::Node(address) => sim.crash_at(time, address),
+            Found::Rover(address) => sim.crash_at(time, address),
+        }
+        Ok(())
+    }
+
+    /// Restarts the node or rover called `actor` at `time`.
+    ///
+    /// # Errors
+    /// When there is no such actor.
+    pub fn restart_at(
+        &self,
+        sim: &mut Simulation,
+        time: SimTime,
+        actor: &str,
+    ) -> Result<(), NetworkError> {
+        match self.find(actor)? {
+            Found::Node(address) => sim.restart_at(time, address),
+            Found::Rover(address) => sim.restart_at(time, address),
+        }
+        Ok(())
+    }
+
+    fn find(&self, actor: &str) -> Result<Found, NetworkError> {
+        let place = |names: &[String]| names.iter().position(|name| name == actor);
+        if let Some(at) = place(&self.site.node_names) {
+            return Ok(Found::Node(self.nodes[at]));
+        }
+        if let Some(at) = place(&self.site.rover_names) {
+            return Ok(Found::Rover(self.rovers[at]));
+        }
+        let (nodes, rovers) = (&self.site.node_names, &self.site.rover_names);
+        Err(NetworkError::UnknownActor {
+            name: actor.to_owned(),
+            first: nodes.first().cloned().unwrap_or_default(),
+            last: rovers.last().cloned().unwrap_or_default(),
+        })
+    }
+}
+
+/// An actor found by its name.
+enum Found {
+    Node(Address<Node>),
+    Rover(Address<Rover>),
+}

@@ -1,0 +1,194 @@
+//! Everything that nodes and rovers of the network-guided system say to each other, and what they
+//! record of their state. Plain serde types: the log describes them field by field.
+
+use farside_worlds::{NodeId, VertexId};
+use serde::{Deserialize, Serialize};
+
+use super::candidates::CandidatePath;
+
+/// The number of a rover, from 0; its actor is called `rover_` and the number plus one.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+#[serde(transparent)]
+pub struct RoverId(pub u32);
+
+/// Rover to node, each cycle and at each change: where it is. Cumulative: a later one replaces any
+/// that were lost. With `moving_to` it says LEAVING: the rover is irrevocably on its way, and its
+/// vertex is free.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Beacon {
+    /// Who, where, after how many steps.
+    pub whereabouts: Whereabouts,
+    /// The vertex it came from; none if it entered the roadmap here.
+    pub previous: Option<VertexId>,
+    /// Where it wants to go.
+    pub goal: VertexId,
+}
+
+/// A fact about a rover that stays true: at step `step` it is (or was) at `vertex`, and if
+/// `moving_to` is there, its next step leads (or led) to that vertex and to no other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Whereabouts {
+    /// The rover.
+    pub rover: RoverId,
+    /// Steps completed; 0 in the entry queue. Entering and leaving the roadmap are steps.
+    pub step: u32,
+    /// Where that step led; none before it entered and after it left.
+    pub vertex: Option<VertexId>,
+    /// The vertex it is on its way to, irrevocably.
+    pub moving_to: Option<VertexId>,
+}
+
+/// Node to rover: take step `step`, to a vertex that is now yours, or off the roadmap. Repeated
+/// each cycle until the step is heard done.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grant {
+    /// The node that grants, which owns the vertex.
+    pub node: NodeId,
+    /// The step that this permits, and no other.
+    pub step: u32,
+    /// Where to; none: leave the roadmap at your goal.
+    pub to: Option<VertexId>,
+}
+
+/// Node to node: a rover you may still hold a vertex for has gone on. Repeated each cycle until
+/// acknowledged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Departed {
+    /// The node that reports.
+    pub node: NodeId,
+    /// What it heard of the rover.
+    pub whereabouts: Whereabouts,
+}
+
+/// Node to node: a [`Departed`] was heard and is on record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DepartedAck {
+    /// The node that acknowledges.
+    pub node: NodeId,
+    /// The rover.
+    pub rover: RoverId,
+    /// The step that was reported.
+    pub step: u32,
+}
+
+/// Step 1 of a planning cycle, node to neighbours: who is, or may be, on the node's vertices.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Locations {
+    /// The node.
+    pub node: NodeId,
+    /// The planning cycle, from 0.
+    pub cycle: u32,
+    /// One for each of the node's vertices that is not free.
+    pub holdings: Vec<Holding>,
+}
+
+/// A vertex that is not free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Holding {
+    /// The vertex.
+    pub vertex: VertexId,
+    /// Who holds it: stands there, or was granted it and is not known to have come.
+    pub rover: RoverId,
+    /// The step with which the rover comes, or came.
+    pub step: u32,
+    /// Its goal, where the node has heard it.
+    pub goal: Option<VertexId>,
+}
+
+/// Step 3, node to neighbours: the candidate paths of its rovers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CandidatePaths {
+    /// The node.
+    pub node: NodeId,
+    /// The planning cycle.
+    pub cycle: u32,
+    /// Each rover's candidates.
+    pub rovers: Vec<RoverPaths>,
+}
+
+/// One rover's candidate paths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoverPaths {
+    /// The rover.
+    pub rover: RoverId,
+    /// Its candidates; a max-plus vector has one value for each, in this order.
+    pub paths: Vec<CandidatePath>,
+}
+
+/// Step 4, node to neighbour: the max-plus vectors that changed in one iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaxPlus {
+    /// The node.
+    pub node: NodeId,
+    /// The planning cycle.
+    pub cycle: u32,
+    /// The iteration, from 1.
+    pub iteration: u32,
+    /// Nothing changed at this node: it will say no more until it hears something new.
+    pub settled: bool,
+    /// The vectors.
+    pub vectors: Vec<Vector>,
+}
+
+/// The message of one rover to another in max-plus, mean subtracted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Vector {
+    /// The rover i that speaks, of the sending node.
+    pub from: RoverId,
+    /// The rover j that is spoken to, of the receiving node.
+    pub to: RoverId,
+    /// A value for each candidate path of j.
+    pub values: Vec<f32>,
+}
+
+/// Step 5, node to neighbours: the paths assigned to its rovers. To the owner of the vertex that a
+/// path enters first it is also the request to be admitted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Assignments {
+    /// The node.
+    pub node: NodeId,
+    /// The planning cycle.
+    pub cycle: u32,
+    /// One for each rover that is not told to stay.
+    pub rovers: Vec<Assignment>,
+}
+
+/// The path assigned to a rover.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Assignment {
+    /// The rover.
+    pub rover: RoverId,
+    /// The step it would take next.
+    pub step: u32,
+    /// For how many cycles it has stood where it stands.
+    pub waited: u32,
+    /// The path.
+    pub path: CandidatePath,
+}
+
+/// A rover's state as it records it at every change: the truth, not what a node believes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoverState {
+    /// Who, where, after how many steps. With `moving_to`, it is on the edge between the two
+    /// vertices.
+    pub whereabouts: Whereabouts,
+    /// The entry it waits at, or came through.
+    pub entry: VertexId,
+    /// Where it wants to go.
+    pub goal: VertexId,
+}
+
+/// What a node records of itself once in each cycle, when vertices are granted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NodeState {
+    /// The planning cycle.
+    pub cycle: u32,
+    /// Rovers it plans for.
+    pub rovers: u32,
+    /// Max-plus iterations in this cycle.
+    pub iterations: u32,
+    /// Rovers that it kept from a vertex that their paths enter in this cycle.
+    pub forced_stops: u32,
+}

@@ -1,0 +1,58 @@
+//! What a run of the network-guided system amounts to, in numbers: the paper's metrics (section 4)
+//! and what they leave out.
+
+use serde::Serialize;
+
+/// How a team came to a standstill.
+#[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Deadlock {
+    /// It did not.
+    #[default]
+    None,
+    /// No rover moved or entered for `network.passive_window` cycles.
+    Passive,
+    /// Rovers moved, and came no nearer to their goals for `network.active_window` cycles.
+    Active,
+}
+
+/// The result of a run. Means are over the rovers that arrived, and 0 if none did.
+///
+/// ```
+/// use farside_actors::network::{Deadlock, NetworkMetrics};
+/// let metrics = NetworkMetrics::default();
+/// assert_eq!((metrics.arrived, metrics.deadlock), (0, Deadlock::None));
+/// ```
+#[derive(Serialize, Clone, Debug, Default, PartialEq)]
+pub struct NetworkMetrics {
+    /// Rovers in the team.
+    pub rovers: u32,
+    /// Rovers that reached their goals.
+    pub arrived: u32,
+    /// Times a rover claimed a vertex that another one had, or took an edge against another.
+    pub collisions: u32,
+    /// How the team came to a standstill, if it did.
+    pub deadlock: Deadlock,
+    /// Cycles in which at least one rover was kept from a vertex that its path entered.
+    pub interventions: u32,
+    /// The same as a share of all cycles.
+    pub intervention_rate: f64,
+    /// Steps from entry to goal over the shortest path's length (the paper's path ratio; stops are
+    /// steps). Gamed by whatever holds rovers back before they enter: see `time_ratio`.
+    pub path_ratio: f64,
+    /// Cycles from the start of the run to the goal over the shortest path's length.
+    pub time_ratio: f64,
+    /// Cycles from entry to goal.
+    pub mean_steps: f64,
+    /// Cycles between entry and goal in which the rover did not set out.
+    pub mean_stops: f64,
+    /// Moves back to the vertex just left.
+    pub mean_backtracks: f64,
+    /// Cycles until the last rover arrived, or the run ended.
+    pub cycles: u32,
+    /// Max-plus iterations of a node that plans for rovers, in a cycle.
+    pub max_plus_iterations: f64,
+    /// Why rovers are still out, for a team that came to a standstill: how many, and where the
+    /// first of them stands.
+    pub standstill: Option<String>,
+}

@@ -1,0 +1,175 @@
+//! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
+//! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
+//! [`optimise`], admission in [`admit`].
+
+mod admit;
+mod cycle;
+mod optimise;
+
+use std::sync::Arc;
+
+use farside::prelude::*;
+use farside_worlds::{NodeId, VertexId};
+use serde::{Deserialize, Serialize};
+
+use super::assemble::Site;
+use super::assignment::Request;
+use super::lng::LocalGraph;
+use super::messages::{
+    Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
+};
+use super::rover::Rover;
+use super::safety::Ledger;
+use optimise::Optimiser;
+
+/// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
+/// cycle, and owns vertices by the safety protocol.
+///
+/// Its record of who holds its vertices is durable; what it plans is not.
+pub struct Node {
+    site: Arc<Site>,
+    id: NodeId,
+    graph: Arc<LocalGraph>,
+    neighbors: Vec<Neighbor>,
+    rovers: Vec<Address<Rover>>,
+    cycle: u32,
+    phase: Phase,
+    optimiser: Optimiser,
+    /// Requests for this node's vertices in this cycle.
+    requests: Vec<Request>,
+    /// Own rovers that leave their vertex in this cycle without accelerating.
+    leaving: Vec<VertexId>,
+    forced_stops: u32,
+}
+
+/// What a node knows of a neighbour.
+struct Neighbor {
+    id: NodeId,
+    address: Address<Node>,
+    /// The latest cycle in which it told its locations, and what it told.
+    located: Option<u32>,
+    holdings: Vec<Holding>,
+}
+
+/// The parts of a planning cycle, in order. A timer begins each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(crate) enum Phase {
+    /// Beacons arrive; the entry queues are served.
+    Listen,
+    /// Step 1: locations are exchanged.
+    Locate,
+    /// Steps 2 and 3: candidate paths.
+    Propose,
+    /// Step 4: max-plus.
+    Optimise,
+    /// Step 5: assignments are exchanged.
+    Assign,
+    /// Step 6: vertices are granted.
+    Admit,
+}
+
+/// Timer: a phase of the cycle begins.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct PhaseBegins {
+    phase: Phase,
+}
+
+/// Timer: neighbours' vectors are overdue.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct IterationOverdue;
+
+impl Node {
+    pub(crate) fn new(site: Arc<Site>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
+        Node {
+            site,
+            id,
+            graph,
+            neighbors: Vec::new(),
+            rovers: Vec::new(),
+            cycle: 0,
+            // A node that starts in the middle of a cycle waits for the next.
+            phase: Phase::Admit,
+            optimiser: Optimiser::default(),
+            requests: Vec::new(),
+            leaving: Vec::new(),
+            forced_stops: 0,
+        }
+    }
+
+    fn neighbor(&self, id: NodeId) -> Option<usize> {
+        self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
+    }
+
+    fn owns(&self, v: VertexId) -> bool {
+        self.site.sensors.owner(v) == self.id
+    }
+}
+
+impl Actor for Node {
+    type Accepts = (
+        Beacon,
+        Departed,
+        DepartedAck,
+        Locations,
+        CandidatePaths,
+        MaxPlus,
+        Assignments,
+        PhaseBegins,
+        IterationOverdue,
+    );
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for &id in self.site.sensors.neighbors(self.id) {
+            self.neighbors.push(Neighbor {
+                id,
+                address: ctx.lookup::<Node>(&self.site.node_names[id.0 as usize])?,
+                located: None,
+                holdings: Vec::new(),
+            });
+        }
+        for name in &self.site.rover_names {
+            self.rovers.push(ctx.lookup::<Rover>(name)?);
+        }
+        let owned = self.site.sensors.owned(self.id);
+        ctx.durable::<Ledger>().open(owned, self.rovers.len());
+        // The first cycle begins at once; after a restart, the next.
+        let delay = if ctx.now() == SimTime::ZERO {
+            SimDuration::ZERO
+        } else {
+            self.site.until_next_cycle(ctx.now())
+        };
+        let phase = Phase::Listen;
+        ctx.timer(delay, PhaseBegins { phase });
+        Ok(())
+    }
+}
+
+impl Handler<PhaseBegins> for Node {
+    fn handle(&mut self, timer: PhaseBegins, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.phase = timer.phase;
+        match timer.phase {
+            Phase::Listen => self.listen(ctx),
+            Phase::Locate => self.locate(ctx),
+            Phase::Propose => self.propose(ctx),
+            Phase::Optimise => self.optimise(ctx),
+            Phase::Assign => self.assign(ctx),
+            Phase::Admit => self.admit(ctx),
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Locations> for Node {
+    fn handle(&mut self, message: Locations, _ctx: &mut Context<'_, Self>) -> Outcome {
+        if let Some(at) = self.neighbor(message.node) {
+            let neighbor = &mut self.neighbors[at];
+            if neighbor.located.is_none_or(|cycle| cycle < message.cycle) {
+                neighbor.located = Some(message.cycle);
+                neighbor.holdings = message.holdings;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,154 @@
+//! The rover: stands, drives along an edge, says where it is. It decides nothing: without a valid
+//! command it holds, for ever if need be.
+
+use std::sync::Arc;
+
+use farside::prelude::*;
+use farside_worlds::{NodeId, VertexId};
+use serde::{Deserialize, Serialize};
+
+use super::assemble::Site;
+use super::config::Sabotage;
+use super::messages::{Beacon, Grant, RoverId, RoverState};
+use super::node::Node;
+use super::safety::{Answer, RoverMemory};
+
+/// A rover of the network-guided system.
+///
+/// It accepts [`Grant`]s, and answers with [`Beacon`]s: one a cycle to the owner of its vertex, one
+/// at each change, one to whoever grants a step that is done.
+pub struct Rover {
+    site: Arc<Site>,
+    id: RoverId,
+    entry: VertexId,
+    goal: VertexId,
+    nodes: Vec<Address<Node>>,
+}
+
+/// Timer: a planning cycle begins.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct CycleStarts;
+
+/// Timer: the end of the edge is reached.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct EdgeEnds;
+
+impl Rover {
+    pub(crate) fn new(site: Arc<Site>, id: RoverId) -> Self {
+        let (entry, goal) = site.missions[id.0 as usize];
+        Rover {
+            site,
+            id,
+            entry,
+            goal,
+            nodes: Vec::new(),
+        }
+    }
+
+    fn record(&self, ctx: &mut Context<'_, Self>) {
+        let whereabouts = ctx.durable::<RoverMemory>().whereabouts(self.id);
+        ctx.sample(&RoverState {
+            whereabouts,
+            entry: self.entry,
+            goal: self.goal,
+        });
+    }
+
+    fn beacon(&self, ctx: &mut Context<'_, Self>, to: NodeId) {
+        let memory = ctx.durable::<RoverMemory>();
+        let beacon = Beacon {
+            whereabouts: memory.whereabouts(self.id),
+            previous: memory.previous,
+            goal: self.goal,
+        };
+        ctx.send(self.nodes[to.0 as usize], beacon);
+    }
+
+    /// Tells the owner of the vertex that it stands on, or is leaving.
+    fn beacon_here(&self, ctx: &mut Context<'_, Self>) {
+        if let Some(here) = ctx.durable::<RoverMemory>().vertex {
+            self.beacon(ctx, self.site.sensors.owner(here));
+        }
+    }
+
+    /// Moves on without being told to: what [`Sabotage::MoveUnbidden`] is for.
+    fn misbehave(&self, ctx: &mut Context<'_, Self>, probability: f64) {
+        let unbidden = ctx.random("sabotage").chance(probability);
+        let memory = ctx.durable::<RoverMemory>();
+        let (Some(here), None, true) = (memory.vertex, memory.moving_to, unbidden) else {
+            return;
+        };
+        memory.moving_to = self.site.roadmap.neighbors(here).first().copied();
+        ctx.timer(self.site.config.traverse, EdgeEnds);
+        self.record(ctx);
+        self.beacon_here(ctx);
+    }
+}
+
+impl Actor for Rover {
+    type Accepts = (Grant, CycleStarts, EdgeEnds);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for name in &self.site.node_names {
+            self.nodes.push(ctx.lookup::<Node>(name)?);
+        }
+        // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
+        if ctx.durable::<RoverMemory>().moving_to.is_some() {
+            ctx.timer(self.site.config.traverse, EdgeEnds);
+        }
+        self.record(ctx);
+        ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
+        Ok(())
+    }
+}
+
+impl Handler<CycleStarts> for Rover {
+    fn handle(&mut self, _timer: CycleStarts, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.beacon_here(ctx);
+        if let Sabotage::MoveUnbidden(probability) = self.site.config.sabotage {
+            self.misbehave(ctx, probability);
+        }
+        let memory = ctx.durable::<RoverMemory>();
+        let has_left = memory.vertex.is_none() && memory.step > 0;
+        if !has_left {
+            ctx.timer(self.site.config.cycle, CycleStarts);
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Grant> for Rover {
+    fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
+        let roadmap = &self.site.roadmap;
+        let adjacent = |u, v| roadmap.are_adjacent(u, v);
+        let memory = ctx.durable::<RoverMemory>();
+        let answer = memory.obey(&grant, self.entry, self.goal, adjacent);
+        match answer {
+            Answer::Hold => return Ok(()),
+            Answer::Report => {}
+            Answer::SetOut => {
+                ctx.timer(self.site.config.traverse, EdgeEnds);
+                self.record(ctx);
+                // LEAVING goes to the owner of the vertex left, which is not the one that granted
+                // the next one.
+                self.beacon_here(ctx);
+                return Ok(());
+            }
+            Answer::Entered | Answer::Left => self.record(ctx),
+        }
+        self.beacon(ctx, grant.node);
+        Ok(())
+    }
+}
+
+impl Handler<EdgeEnds> for Rover {
+    fn handle(&mut self, _timer: EdgeEnds, ctx: &mut Context<'_, Self>) -> Outcome {
+        if ctx.durable::<RoverMemory>().arrive() {
+            self.record(ctx);
+            self.beacon_here(ctx);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,228 @@
+//! The modules for serde's `#[serde(with = "…")]`, one for each quantity. Parsing is next door.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use farside::SimDuration;
+use serde::de::{Error, Visitor};
+use serde::{Deserializer, Serializer};
+
+use super::{
+    DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, UnitError, check_fraction, parse_data_rate,
+    parse_data_size, parse_duration, parse_fraction, parse_length_m, print_data_rate,
+    print_data_size, print_length_m,
+};
+
+/// How one quantity is read, from a text or from a bare number.
+trait Readable {
+    type Value;
+    const EXPECTED: &'static str;
+    fn text(text: &str) -> Result<Self::Value, UnitError>;
+    fn number(number: f64) -> Result<Self::Value, UnitError>;
+}
+
+struct Reader<Q>(PhantomData<Q>);
+
+impl<Q: Readable> Visitor<'_> for Reader<Q> {
+    type Value = Q::Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(Q::EXPECTED)
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<Q::Value, E> {
+        Q::text(text).map_err(E::custom)
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<Q::Value, E> {
+        Q::number(number).map_err(E::custom)
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<Q::Value, E> {
+        self.visit_f64(number as f64)
+    }
+
+    fn visit_u64<E: Error>(self, number: u64) -> Result<Q::Value, E> {
+        self.visit_f64(number as f64)
+    }
+}
+
+/// Reads the field of an `Option`: absent is up to `#[serde(default)]`, present is a value.
+struct Present<Q>(PhantomData<Q>);
+
+impl<'de, Q: Readable> Visitor<'de> for Present<Q> {
+    type Value = Option<Q::Value>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(Q::EXPECTED)
+    }
+
+    fn visit_none<E: Error>(self) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_some<D: Deserializer<'de>>(self, inner: D) -> Result<Self::Value, D::Error> {
+        inner.deserialize_any(Reader::<Q>(PhantomData)).map(Some)
+    }
+}
+
+macro_rules! quantity {
+    (
+        $(#[$doc:meta])* $module:ident: $value:ty, $name:ident,
+        expected $expected:expr, text $text:expr, number $number:expr,
+        write |$v:ident, $s:ident| $write:expr
+    ) => {
+        pub(super) struct $name;
+
+        impl Readable for $name {
+            type Value = $value;
+            const EXPECTED: &'static str = $expected;
+            fn text(text: &str) -> Result<$value, UnitError> {
+                $text(text)
+            }
+            fn number(number: f64) -> Result<$value, UnitError> {
+                $number(number)
+            }
+        }
+
+        $(#[$doc])*
+        pub mod $module {
+            use super::*;
+
+            /// Writes the quantity.
+            ///
+            /// # Errors
+            /// When the serializer fails.
+            pub fn serialize<S: Serializer>($v: &$value, $s: S) -> Result<S::Ok, S::Error> {
+                $write
+            }
+
+            /// Reads the quantity.
+            ///
+            /// # Errors
+            /// When it is none, with what was found and what was expected.
+            pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<$value, D::Error> {
+                from.deserialize_any(Reader::<$name>(PhantomData))
+            }
+
+            /// The same for an `Option`; add `#[serde(default)]` so that the key may be absent.
+            pub mod option {
+                use super::*;
+
+                /// Writes the quantity, or nothing.
+                ///
+                /// # Errors
+                /// When the serializer fails.
+                pub fn serialize<S: Serializer>(
+                    value: &Option<$value>,
+                    $s: S,
+                ) -> Result<S::Ok, S::Error> {
+                    match value {
+                        Some($v) => $write,
+                        None => $s.serialize_none(),
+                    }
+                }
+
+                /// Reads the quantity.
+                ///
+                /// # Errors
+                /// When it is none, with what was found and what was expected.
+                pub fn deserialize<'de, D: Deserializer<'de>>(
+                    from: D,
+                ) -> Result<Option<$value>, D::Error> {
+                    from.deserialize_option(Present::<$name>(PhantomData))
+                }
+            }
+        }
+    };
+}
+
+quantity! {
+    /// Durations: `"250ms"` and a [`SimDuration`]. Bare numbers are refused.
+    duration: SimDuration, Duration,
+    expected DURATION.expected,
+    text parse_duration,
+    number |number: f64| Err(DURATION.no_unit(number)),
+    write |value, to| to.collect_str(value)
+}
+
+quantity! {
+    /// Lengths: `"1.5km"` and metres. Bare numbers are refused.
+    length_m: f64, LengthM,
+    expected LENGTH.expected,
+    text parse_length_m,
+    number |number: f64| Err(LENGTH.no_unit(number)),
+    write |value, to| to.collect_str(&print_length_m(*value))
+}
+
+quantity! {
+    /// Fractions from 0 to 1: `0.3`, `"0.3"` or `"30%"`; written as a number.
+    fraction: f64, Fraction,
+    expected FRACTION.expected,
+    text parse_fraction,
+    number check_fraction,
+    write |value, to| to.serialize_f64(*value)
+}
+
+quantity! {
+    /// Data rates: `"128kbit/s"` and bit/s. Bare numbers are refused.
+    data_rate_bit_per_s: u64, DataRate,
+    expected DATA_RATE.expected,
+    text parse_data_rate,
+    number |number: f64| Err(DATA_RATE.no_unit(number)),
+    write |value, to| to.collect_str(&print_data_rate(*value))
+}
+
+quantity! {
+    /// Data sizes: `"64kB"` and bytes. Bare numbers are refused.
+    data_size_bytes: u64, DataSize,
+    expected DATA_SIZE.expected,
+    text parse_data_size,
+    number |number: f64| Err(DATA_SIZE.no_unit(number)),
+    write |value, to| to.collect_str(&print_data_size(*value))
+}
+
+#[cfg(test)]
+mod tests {
+    use farside::SimDuration;
+    use serde::{Deserialize, Serialize};
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct All {
+        #[serde(with = "super::duration")]
+        latency: SimDuration,
+        #[serde(with = "super::length_m")]
+        range: f64,
+        #[serde(with = "super::fraction")]
+        loss: f64,
+        #[serde(default, with = "super::duration::option")]
+        at: Option<SimDuration>,
+        #[serde(default, with = "super::data_rate_bit_per_s::option")]
+        rate: Option<u64>,
+    }
+
+    #[test]
+    fn toml_carries_every_quantity_there_and_back() {
+        let text = "latency = \"2.6s\"\nrange = \"40m\"\nloss = \"2%\"\nrate = \"128kbit/s\"\n";
+        let all: All = toml::from_str(text).unwrap();
+        assert_eq!((all.loss, all.at, all.rate), (0.02, None, Some(128_000)));
+        let again: All = toml::from_str(&toml::to_string(&all).unwrap()).unwrap();
+        assert_eq!(again, all);
+    }
+
+    #[test]
+    fn a_bare_number_is_refused_where_it_stands() {
+        let text = "latency = 5\nrange = \"40m\"\nloss = 0\n";
+        let error = toml::from_str::<All>(text).unwrap_err();
+        assert_eq!(error.span(), Some(10..11));
+        assert_eq!(
+            error.message(),
+            "5: expected a duration such as \"250ms\" or \"2.6s\"; a bare number has no unit"
+        );
+    }
+}

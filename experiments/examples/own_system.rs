@@ -1,0 +1,196 @@
+//! A binary with a system of its own behind the `farside` command line: demonstrates in particular
+//! settings read from a scenario, links built by name, results taken from committed records, and
+//! the registry.
+//!
+//! ```text
+//!   base ──base-rover──▶ rover        ping, each interval
+//!        ◀─rover-base───              pong
+//! ```
+//!
+//! ```sh
+//! cat > ping.toml <<END
+//! system = "ping"
+//! ping.count = 100
+//! links.default = { latency = "1.3s", loss = 0.1 }
+//! END
+//! cargo run -p farside-experiments --example own_system -- run ping.toml
+//! cargo run -p farside-experiments --example own_system -- verify run.mcap
+//! ```
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside_actors::units;
+use farside_experiments::cli;
+use farside_experiments::system::{
+    Conclude, Registry, Results, Settings, Setup, SetupError, System,
+};
+use serde::{Deserialize, Serialize};
+
+#[derive(Serialize, Deserialize)]
+struct Ping {
+    number: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Pong {
+    number: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Interval;
+
+struct Rover;
+
+impl Actor for Rover {
+    type Accepts = (Ping,);
+}
+
+impl Handler<Ping> for Rover {
+    fn handle(&mut self, ping: Ping, ctx: &mut Context<'_, Self>) -> Outcome {
+        let base = ctx.lookup::<Base>("base")?;
+        ctx.send(
+            base,
+            Pong {
+                number: ping.number,
+            },
+        );
+        Ok(())
+    }
+}
+
+struct Base {
+    settings: PingSettings,
+    sent: u32,
+}
+
+impl Actor for Base {
+    type Accepts = (Interval, Pong);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.timer(self.settings.interval, Interval);
+        Ok(())
+    }
+}
+
+impl Handler<Interval> for Base {
+    fn handle(&mut self, _interval: Interval, ctx: &mut Context<'_, Self>) -> Outcome {
+        let rover = ctx.lookup::<Rover>("rover")?;
+        ctx.send(rover, Ping { number: self.sent });
+        self.sent += 1;
+        if self.sent < self.settings.count {
+            ctx.timer(self.settings.interval, Interval);
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Pong> for Base {
+    fn handle(&mut self, pong: Pong, _ctx: &mut Context<'_, Self>) -> Outcome {
+        if pong.number >= self.sent {
+            return Err(HandlerError::new("an answer to what was never asked"));
+        }
+        Ok(())
+    }
+}
+
+/// Counts what came back, from the committed records.
+struct Pongs(Arc<AtomicU32>);
+
+impl Observer for Pongs {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let is_pong = record.kind.is_some_and(|kind| kind.name() == "Pong");
+        if is_pong && record.class == RecordClass::Delivered {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+/// The `[ping]` table.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PingSettings {
+    count: u32,
+    #[serde(with = "units::duration")]
+    interval: SimDuration,
+}
+
+impl Default for PingSettings {
+    fn default() -> Self {
+        PingSettings {
+            count: 10,
+            interval: SimDuration::from_secs(1),
+        }
+    }
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct PingScenario {
+    #[serde(default)]
+    ping: PingSettings,
+}
+
+struct PingSystem;
+
+impl System for PingSystem {
+    fn name(&self) -> &str {
+        "ping"
+    }
+
+    fn sections(&self) -> &[&str] {
+        &["ping"]
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(PingScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for PingScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError> {
+        let settings = self.ping.clone();
+        let count = settings.count;
+        if count == 0 {
+            return Err(SetupError::value("ping.count", "0: expected at least 1"));
+        }
+        let sim = &mut *setup.sim;
+        let (base, rover) = (sim.host("base"), sim.host("rover"));
+        sim.actor(base, "base", move |_| Base {
+            settings: settings.clone(),
+            sent: 0,
+        });
+        sim.actor(rover, "rover", |_| Rover);
+        setup.links.connect(sim, (base, "base"), (rover, "rover"));
+        setup.links.connect(sim, (rover, "rover"), (base, "base"));
+        let pongs = Arc::new(AtomicU32::new(0));
+        sim.observe(Pongs(pongs.clone()));
+        Ok(Box::new(move |_report| {
+            let answered = pongs.load(Ordering::Relaxed);
+            let mut results = Results::default();
+            results
+                .metrics
+                .insert("answered".to_owned(), answered.into());
+            let line = format!("{answered} of {count}");
+            results.summary.push(("pings answered".to_owned(), line));
+            if answered == 0 {
+                results.violations.push("no ping was answered".to_owned());
+            }
+            results
+        }))
+    }
+}
+
+fn main() -> ExitCode {
+    cli::main(Registry::builtin().with(PingSystem))
+}

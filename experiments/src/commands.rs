@@ -1,0 +1,83 @@
+//! The commands, one file each, and what they share: errors and output.
+
+pub(crate) mod check;
+pub(crate) mod diff;
+pub(crate) mod info;
+mod interrupt;
+mod progress;
+pub(crate) mod recover;
+pub(crate) mod run;
+pub(crate) mod scenarios;
+mod table;
+pub(crate) mod verify;
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use farside::BuildError;
+use farside_logs::LogError;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::cli::Exit;
+use crate::scenario::ScenarioError;
+
+/// The version that logs are stamped with.
+pub(crate) const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Why a command could not do its work.
+#[derive(Debug, Error)]
+pub(crate) enum CommandError {
+    /// The scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A log that is read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A log whose run cannot be executed again.
+    #[error("{}: cannot be run again: {reason}", .path.display())]
+    NotRepeatable { path: PathBuf, reason: String },
+    /// The simulation could not start.
+    #[error("the run could not start: {0}")]
+    Build(#[from] BuildError),
+    /// Standard output.
+    #[error("cannot write to standard output: {0}")]
+    Output(#[source] std::io::Error),
+    /// A result that is no JSON.
+    #[error("cannot write the result as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+impl CommandError {
+    /// The exit code it deserves.
+    pub(crate) fn exit(&self) -> Exit {
+        match self {
+            CommandError::Scenario(_)
+            | CommandError::Log(_)
+            | CommandError::NotRepeatable { .. } => Exit::Wrong,
+            CommandError::Build(_) | CommandError::Output(_) | CommandError::Json(_) => {
+                Exit::Failed
+            }
+        }
+    }
+}
+
+pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), CommandError> {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(bytes).and_then(|()| out.flush());
+    written.map_err(CommandError::Output)
+}
+
+/// Prints a text, and a newline if it has none at its end.
+pub(crate) fn print(text: impl ToString) -> Result<(), CommandError> {
+    let mut text = text.to_string();
+    if !text.ends_with('\n') {
+        text.push('\n');
+    }
+    print_bytes(text.as_bytes())
+}
+
+/// Prints one JSON document.
+pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
+    print(serde_json::to_string_pretty(value)?)
+}

@@ -1,0 +1,23 @@
+//! `farside check`: read, check, print the resolved scenario.
+
+use super::{CommandError, print};
+use crate::cli::Exit;
+use crate::scenario::Scenario;
+use crate::system::Registry;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// A built-in scenario (see `farside scenarios`) or a TOML file
+    scenario: String,
+    /// Set a key of the scenario, as in links.default.loss=0.3; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+}
+
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
+    // Much of what can be wrong shows only in the world that is built.
+    scenario.assemble()?;
+    print(scenario.resolved()?)?;
+    Ok(Exit::Done)
+}

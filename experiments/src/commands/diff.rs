@@ -1,0 +1,52 @@
+//! `farside diff`: two logs, message by message.
+
+use std::path::PathBuf;
+
+use farside_logs::DiffOptions;
+
+use super::{CommandError, print, print_json};
+use crate::cli::Exit;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// One log
+    #[arg(value_name = "A.mcap")]
+    a: PathBuf,
+    /// The other
+    #[arg(value_name = "B.mcap")]
+    b: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Take numbers as equal that differ by at most this, absolutely or as a share
+    #[arg(long, value_name = "X", default_value = "0", value_parser = tolerance)]
+    tolerance: f64,
+    /// Leave out these topics; `*` does not match `/`, `**` does; may be repeated
+    #[arg(long, value_name = "GLOB")]
+    ignore: Vec<String>,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
+        _ => Err("expected a number from 0 on, such as 1e-6".to_owned()),
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+    let options = DiffOptions {
+        tolerance: args.tolerance,
+        ignore: args.ignore.clone(),
+    };
+    let report = farside_logs::diff(&args.a, &args.b, &options)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        print(&report)?;
+    }
+    Ok(if report.identical {
+        Exit::Done
+    } else {
+        Exit::Different
+    })
+}

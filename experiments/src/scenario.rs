@@ -1,0 +1,438 @@
+//! Scenarios: TOML files that say which system runs, in which world, over which links.
+//!
+//! The keys that every system shares are read here; `[world]`, `[team]` and whatever else a system
+//! has of its own are read by the system ([`crate::system::System`]). A mistake is one message
+//! with its place, what was found, what was expected and the nearest valid name.
+
+mod builtin;
+mod error;
+mod source;
+
+use std::path::{Path, PathBuf};
+
+use farside::{SimDuration, SimTime, Simulation};
+use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
+use farside_actors::units;
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::system::{Conclude, Files, Registry, Settings, Setup, SetupError};
+pub use builtin::{builtin_names, builtin_text};
+pub use error::ScenarioError;
+pub use source::Place;
+use source::Source;
+
+/// The most bytes of a scenario that are read.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// The keys that every system shares.
+const SHARED_KEYS: [&str; 8] = [
+    "system",
+    "description",
+    "seed",
+    "until",
+    "links",
+    "degrade",
+    "crash",
+    "log",
+];
+
+/// What every scenario has, whatever its system.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shared {
+    /// The name of the system that runs.
+    pub system: String,
+    /// One line about the scenario.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub description: String,
+    /// The run's seed. TOML's integers are signed, so it has 63 bits.
+    #[serde(default)]
+    pub seed: u64,
+    /// When the run stops, if the system does not stop it sooner.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub until: Option<SimDuration>,
+    /// The parameters of the links.
+    #[serde(default)]
+    pub links: LinksConfig,
+    /// When links are worse.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub degrade: Vec<Degrade>,
+    /// When actors crash.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub crash: Vec<Crash>,
+    /// What the log holds.
+    #[serde(default)]
+    pub log: LogSettings,
+}
+
+/// A `[[crash]]` entry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crash {
+    /// The actor's name.
+    pub actor: String,
+    /// When it crashes, from the start of the run.
+    #[serde(with = "units::duration")]
+    pub at: SimDuration,
+    /// When it is started again; without, it stays down.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub restart: Option<SimDuration>,
+}
+
+/// The `[log]` table.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogSettings {
+    /// Topics that are not written, as globs; `*` does not match `/`, `**` does.
+    pub exclude: Vec<String>,
+}
+
+/// A scenario, read and resolved.
+pub struct Scenario {
+    name: String,
+    shared: Shared,
+    settings: Box<dyn Settings>,
+    source: Source,
+    files: Files,
+}
+
+/// A simulation built from a scenario, ready to run.
+pub struct Assembled {
+    /// The simulation.
+    pub sim: Simulation,
+    /// Says what came of the run.
+    pub conclude: Conclude,
+    /// The files that were read, for the log.
+    pub files: Files,
+}
+
+impl Scenario {
+    /// Reads a built-in scenario or a file, with `--set` arguments laid over it.
+    ///
+    /// ```
+    /// use farside_experiments::{scenario::Scenario, system::Registry};
+    /// let sets = ["team.rovers=5".to_owned(), "links.default.loss=30%".to_owned()];
+    /// let scenario = Scenario::open("network/crater-dense", &sets, &Registry::builtin())?;
+    /// assert_eq!(scenario.shared().links.default.loss, 0.3);
+    /// # Ok::<(), farside_experiments::scenario::ScenarioError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When it cannot be found or read, or is wrong.
+    pub fn open(
+        scenario: &str,
+        sets: &[String],
+        registry: &Registry,
+    ) -> Result<Scenario, ScenarioError> {
+        if let Some(text) = builtin_text(scenario) {
+            let files = Files::on_disk(PathBuf::new());
+            return Self::parse(scenario, text.to_owned(), sets, registry, files);
+        }
+        let path = Path::new(scenario);
+        let text = read(path, scenario)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Self::parse(scenario, text, sets, registry, Files::on_disk(folder))
+    }
+
+    /// Reads a scenario's text; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// When it is wrong.
+    pub fn parse(
+        name: &str,
+        text: String,
+        sets: &[String],
+        registry: &Registry,
+        files: Files,
+    ) -> Result<Scenario, ScenarioError> {
+        let source = Source::new(name, text, sets)?;
+        let (shared, settings) = {
+            let document = source.document()?;
+            let system = registry.find(&system_name(&source, document.get_ref())?);
+            let system = system.map_err(|unknown| ScenarioError::UnknownValue {
+                place: source.place_of_key(&["system".to_owned()]),
+                key: "system".to_owned(),
+                found: unknown.found,
+                nearest: unknown.nearest,
+                expected: unknown.expected,
+            })?;
+            let (shared, own) = part(&source, document, system.sections())?;
+            let shared = Shared::deserialize(toml::Deserializer::from(shared));
+            let settings = system.parse(toml::Deserializer::from(own));
+            (
+                shared.map_err(|error| ScenarioError::from_toml(&source, &error))?,
+                settings.map_err(|error| ScenarioError::from_toml(&source, &error))?,
+            )
+        };
+        let scenario = Scenario {
+            name: if builtin_text(name).is_some() {
+                name.to_owned()
+            } else {
+                stem(name)
+            },
+            shared,
+            settings,
+            source,
+            files,
+        };
+        scenario.check_crashes()?;
+        Ok(scenario)
+    }
+
+    /// The scenario under another name, as the log of a run has it.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        self.name = name.to_owned();
+        self
+    }
+
+    /// The built-in name, or the file's name without its ending.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The keys that every system shares.
+    pub fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
+    /// Replaces the seed, as `--seed` does.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.shared.seed = seed;
+    }
+
+    /// Replaces the end, as `--until` does.
+    pub fn set_until(&mut self, until: SimDuration) {
+        self.shared.until = Some(until);
+    }
+
+    /// The scenario with everything that was left to defaults filled in, as TOML. Read again, it
+    /// gives the same run.
+    ///
+    /// # Errors
+    /// When a setting cannot be written as TOML.
+    pub fn resolved(&self) -> Result<String, ScenarioError> {
+        let unwritable = |error: toml::ser::Error| ScenarioError::Unwritable {
+            message: error.to_string(),
+        };
+        let mut table = toml::Table::try_from(&self.shared).map_err(unwritable)?;
+        let own = self.settings.resolved().map_err(unwritable)?;
+        let mut all = toml::Table::new();
+        // Plain values first; then the system's tables, and the shared ones after them.
+        let shared_tables = table.split_tables();
+        all.extend(table);
+        all.extend(own);
+        all.extend(shared_tables);
+        toml::to_string(&all).map_err(unwritable)
+    }
+
+    /// Builds the simulation.
+    ///
+    /// # Errors
+    /// When the settings cannot be: more nodes than vertices, a pattern that matches no link, a
+    /// crash of an actor that does not exist.
+    pub fn assemble(&self) -> Result<Assembled, ScenarioError> {
+        let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
+        let mut sim = Simulation::new(self.shared.seed);
+        let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
+            .map_err(|error| wrong(error.into()))?;
+        let mut files = self.files.clone();
+        let conclude = self.settings.assemble(&mut Setup {
+            seed: self.shared.seed,
+            sim: &mut sim,
+            links: &mut links,
+            files: &mut files,
+        });
+        let conclude = conclude.map_err(wrong)?;
+        links.finish().map_err(|error| wrong(error.into()))?;
+        for (index, crash) in self.shared.crash.iter().enumerate() {
+            self.plan_crash(&mut sim, index, crash)?;
+        }
+        if let Some(until) = self.shared.until {
+            sim.stop_at(SimTime::ZERO + until, &format!("until {until}"));
+        }
+        Ok(Assembled {
+            sim,
+            conclude,
+            files,
+        })
+    }
+
+    fn plan_crash(
+        &self,
+        sim: &mut Simulation,
+        index: usize,
+        crash: &Crash,
+    ) -> Result<(), ScenarioError> {
+        let key = ["crash".to_owned(), index.to_string(), "actor".to_owned()];
+        let planned = sim.crash_named_at(SimTime::ZERO + crash.at, &crash.actor);
+        let planned = planned.and_then(|()| match crash.restart {
+            Some(restart) => sim.restart_named_at(SimTime::ZERO + restart, &crash.actor),
+            None => Ok(()),
+        });
+        planned.map_err(|_unknown| {
+            let names: Vec<&str> = sim.actor_names().collect();
+            ScenarioError::UnknownValue {
+                place: self.source.place_of_key(&key),
+                key: key.join("."),
+                found: crash.actor.clone(),
+                nearest: nearest(&crash.actor, names.iter().copied()),
+                expected: format!("the name of one of {} actors", names.len()),
+            }
+        })
+    }
+
+    fn check_crashes(&self) -> Result<(), ScenarioError> {
+        for (index, crash) in self.shared.crash.iter().enumerate() {
+            if let Some(restart) = crash.restart.filter(|restart| *restart <= crash.at) {
+                let key = ["crash".to_owned(), index.to_string(), "restart".to_owned()];
+                return Err(ScenarioError::Invalid {
+                    place: self.source.place_of_key(&key),
+                    key: key.join("."),
+                    message: format!("{restart}: expected a time after the crash at {}", crash.at),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Takes the tables out of a table.
+trait SplitTables {
+    fn split_tables(&mut self) -> toml::Table;
+}
+
+impl SplitTables for toml::Table {
+    fn split_tables(&mut self) -> toml::Table {
+        let is_table = |value: &toml::Value| match value {
+            toml::Value::Table(_) => true,
+            toml::Value::Array(entries) => entries.iter().any(toml::Value::is_table),
+            _ => false,
+        };
+        let (tables, plain) = std::mem::take(self)
+            .into_iter()
+            .partition(|(_, value)| is_table(value));
+        *self = plain;
+        tables
+    }
+}
+
+fn stem(name: &str) -> String {
+    let stem = Path::new(name).file_stem();
+    stem.map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into())
+}
+
+/// Reads a scenario file.
+fn read(path: &Path, scenario: &str) -> Result<String, ScenarioError> {
+    let io = |source| ScenarioError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let size = match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_dir() => {
+            return Err(io(std::io::ErrorKind::IsADirectory.into()));
+        }
+        Ok(metadata) => metadata.len(),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let names = builtin_names();
+            return Err(ScenarioError::NotFound {
+                found: scenario.to_owned(),
+                nearest: nearest(scenario, names.iter().copied()),
+                known: names.join(", "),
+            });
+        }
+        Err(error) => return Err(io(error)),
+    };
+    if size > MAX_BYTES {
+        return Err(ScenarioError::TooLarge {
+            path: path.to_owned(),
+            actual_bytes: size,
+            limit_bytes: MAX_BYTES,
+        });
+    }
+    // A device or pipe has no size beforehand.
+    use std::io::Read as _;
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(io)?;
+    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
+    String::from_utf8(bytes).map_err(|error| ScenarioError::NotUtf8 {
+        path: path.to_owned(),
+        at_byte: error.utf8_error().valid_up_to(),
+    })
+}
+
+/// The value of `system`, which decides who reads the rest.
+fn system_name(source: &Source, root: &DeTable<'_>) -> Result<String, ScenarioError> {
+    match root
+        .get("system")
+        .map(|value| (value.span(), value.get_ref()))
+    {
+        Some((_, DeValue::String(name))) => Ok(name.to_string()),
+        Some((span, other)) => Err(ScenarioError::Invalid {
+            place: source.place(span.start),
+            key: "system".to_owned(),
+            message: format!(
+                "found {}: expected the name of a system, as in system = \"network\"",
+                other.type_str()
+            ),
+        }),
+        None => Err(ScenarioError::Invalid {
+            place: source.place(0),
+            key: "system".to_owned(),
+            message:
+                "this key is missing: expected the name of a system, as in system = \"network\""
+                    .to_owned(),
+        }),
+    }
+}
+
+type Parts<'i> = (Spanned<DeTable<'i>>, Spanned<DeTable<'i>>);
+
+/// Parts the document into the keys that all systems share and those of this one.
+fn part<'i>(
+    source: &Source,
+    document: Spanned<DeTable<'i>>,
+    sections: &[&str],
+) -> Result<Parts<'i>, ScenarioError> {
+    let span = document.span();
+    let (mut shared, mut own) = (DeTable::new(), DeTable::new());
+    for (key, value) in document.into_inner() {
+        let name = key.get_ref().as_ref();
+        if SHARED_KEYS.contains(&name) {
+            shared.insert(key, value);
+        } else if sections.contains(&name) {
+            own.insert(key, value);
+        } else {
+            let known = || SHARED_KEYS.iter().chain(sections).copied();
+            return Err(ScenarioError::UnknownKey {
+                place: source.place(key.span().start),
+                found: name.to_owned(),
+                nearest: nearest(name, known()),
+                expected: known().collect::<Vec<_>>().join(", "),
+                within: String::new(),
+            });
+        }
+    }
+    Ok((Spanned::new(span.clone(), shared), Spanned::new(span, own)))
+}
+
+/// The name closest to `found` in spelling, if any comes near.
+pub(crate) fn nearest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
+    let scored = names.map(|name| (strsim::damerau_levenshtein(found, name), name));
+    let (distance, name) = scored.min_by_key(|(distance, _)| *distance)?;
+    let limit = found.chars().count().max(name.chars().count()) / 2 + 1;
+    (distance <= limit).then(|| name.to_owned())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,35 @@
+//! The scenarios that are built in.
+
+/// Names and texts, sorted by name.
+const BUILTIN: [(&str, &str); 2] = [
+    (
+        "network/crater-dense",
+        include_str!("../../scenarios/network/crater-dense.toml"),
+    ),
+    (
+        "network/crater-sparse",
+        include_str!("../../scenarios/network/crater-sparse.toml"),
+    ),
+];
+
+/// The names of all built-in scenarios, sorted.
+///
+/// ```
+/// use farside_experiments::scenario::builtin_names;
+/// assert!(builtin_names().contains(&"network/crater-dense"));
+/// ```
+pub fn builtin_names() -> Vec<&'static str> {
+    BUILTIN.iter().map(|(name, _)| *name).collect()
+}
+
+/// The text of a built-in scenario.
+///
+/// ```
+/// use farside_experiments::scenario::builtin_text;
+/// assert!(builtin_text("network/crater-dense").unwrap().contains("rovers = 50"));
+/// assert_eq!(builtin_text("network/moon"), None);
+/// ```
+pub fn builtin_text(name: &str) -> Option<&'static str> {
+    let found = BUILTIN.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| *text)
+}

@@ -1,0 +1,200 @@
+//! What the reader of scenarios promises: one clear message for each mistake, and resolved
+//! scenarios that give the same run.
+
+use farside::Executor;
+
+use super::*;
+
+fn parse(text: &str, sets: &[&str]) -> Result<Scenario, ScenarioError> {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let files = Files::on_disk(PathBuf::new());
+    Scenario::parse(
+        "x.toml",
+        text.to_owned(),
+        &sets,
+        &Registry::builtin(),
+        files,
+    )
+}
+
+/// The message of a text that is wrong when it is read or when it is built.
+fn refused(text: &str, sets: &[&str]) -> String {
+    let built = parse(text, sets).and_then(|scenario| scenario.assemble().map(|_| ()));
+    built.expect_err("refused").to_string()
+}
+
+#[track_caller]
+fn check(text: &str, starts: &str, holds: &[&str]) {
+    let message = refused(text, &[]);
+    assert!(message.starts_with(starts), "{message}");
+    for part in holds {
+        assert!(message.contains(part), "{part:?} is not in {message}");
+    }
+}
+
+#[test]
+fn mistakes_have_a_place_and_the_nearest_name() {
+    let team = "system = 'network'\n[team]\nrovrs = 5\n";
+    check(
+        team,
+        "x.toml:3:1: ",
+        &["\"rovrs\" in team", "did you mean \"rovers\"?"],
+    );
+    check(
+        "system = 'netwrk'",
+        "x.toml:1:10: ",
+        &["did you mean \"network\"?"],
+    );
+    check(
+        "system = 'network'\nlniks = 3",
+        "x.toml:2:1: ",
+        &["did you mean \"links\"?"],
+    );
+    let priority = "system = 'network'\nnetwork.priority = 'lowest_di'";
+    check(
+        priority,
+        "x.toml:2:20: network.priority: ",
+        &["did you mean \"lowest_id\"?"],
+    );
+    let map = "system = 'network'\nworld.roadmap = 'crater-dens'";
+    check(
+        map,
+        "x.toml:2:17: world.roadmap: ",
+        &["did you mean \"crater-dense\"?"],
+    );
+    let link = "system = 'network'\nlinks.'rovr_*-node_*' = { loss = 1 }";
+    check(link, "x.toml:2:25: ", &["did you mean \"rover_*-node_*\"?"]);
+    let crash = "system = 'network'\n[[crash]]\nactor = 'node_3'\nat = '1s'";
+    check(
+        crash,
+        "x.toml:3:9: crash.0.actor: ",
+        &["did you mean \"node_03\"?"],
+    );
+}
+
+#[test]
+fn wrong_units_types_and_ranges_are_refused_where_they_stand() {
+    let latency = "system = 'network'\n[links.default]\nlatency = 5";
+    check(
+        latency,
+        "x.toml:3:11: links.default.latency: 5: ",
+        &["has no unit"],
+    );
+    let loss = "system = 'network'\n[links.default]\nloss = 1.5";
+    check(loss, "x.toml:3:8: ", &["from 0 to 1"]);
+    let rovers = "system = 'network'\nteam.rovers = 'many'";
+    check(
+        rovers,
+        "x.toml:2:15: ",
+        &["expected a whole number from 0 on"],
+    );
+    check(
+        "system = 'network'\nworld.nodes = 500",
+        "x.toml:2:15: ",
+        &["1 to 228 nodes"],
+    );
+    check(
+        "system = 'network'\nteam.rovers = 0",
+        "x.toml:2:15: ",
+        &["from 1 to"],
+    );
+    check(
+        "system = 'network'\nteam = 3",
+        "x.toml:2:8: team: ",
+        &["expected a table"],
+    );
+    let times = "system = 'network'\n[[degrade]]\nat='5s'\nuntil='3s'\nlinks='*'\nloss=1";
+    check(
+        times,
+        "x.toml:4:7: degrade.0.until: ",
+        &["expected a time after \"5s\""],
+    );
+    let missing = "system = 'network'\n[[degrade]]\nat='5s'";
+    check(
+        missing,
+        "x.toml:2:1: degrade.0: ",
+        &["the key `links` is missing"],
+    );
+    let restart = "system = 'network'\n[[crash]]\nactor='node_01'\nat='5s'\nrestart='5s'";
+    check(
+        restart,
+        "x.toml:5:9: crash.0.restart: ",
+        &["after the crash at 5s"],
+    );
+}
+
+#[test]
+fn a_set_is_blamed_by_name() {
+    let text = builtin_text("network/crater-dense").unwrap();
+    for (set, part) in [
+        ("links.default.loss=1.5", "from 0 to 1"),
+        ("links.defualt.loss=0.5", "did you mean \"default\"?"),
+        ("links.default.los=0.5", "did you mean \"loss\"?"),
+        ("team.rovers=0", "from 1 to"),
+        ("world.nodes=229", "1 to 228"),
+        ("tame.rovers=5", "did you mean \"team\"?"),
+    ] {
+        let message = refused(text, &[set]);
+        assert!(message.starts_with(&format!("--set {set}: ")), "{message}");
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn a_resolved_scenario_gives_the_same_run() {
+    let text = builtin_text("network/crater-dense").unwrap();
+    let sets = [
+        "team.rovers=4",
+        "links.rover_*-node_*.loss=0.2",
+        "links.*-rover_01.latency=9ms",
+        "degrade=[{ at = '2s', until = '4s', links = 'node_*-*', outage = true }]",
+        "crash=[{ actor = 'node_03', at = '1s', restart = '3s' }]",
+        "world.radius=150m",
+    ];
+    let mut first = parse(text, &sets).unwrap();
+    first.set_seed(7);
+    first.set_until(SimDuration::from_secs(6));
+    let resolved = first.resolved().unwrap();
+    let second = parse(&resolved, &[]).unwrap();
+    assert_eq!(second.shared(), first.shared());
+    assert_eq!(second.resolved().unwrap(), resolved);
+    let run = |scenario: &Scenario| scenario.assemble().unwrap().sim.run(Executor::Inline);
+    let (a, b) = (run(&first).unwrap(), run(&second).unwrap());
+    assert_eq!(a.digest, b.digest);
+    assert!(a.counts.lost_by_reason["outage"] > 0 && a.counts.lost_by_reason["crashed"] > 0);
+}
+
+#[test]
+fn built_in_scenarios_are_whole() {
+    for name in builtin_names() {
+        let scenario = Scenario::open(name, &[], &Registry::builtin()).unwrap();
+        assert!(!scenario.shared().description.is_empty());
+        assert_eq!(scenario.name(), name);
+        scenario.assemble().unwrap();
+    }
+}
+
+#[test]
+fn any_text_gives_a_scenario_or_an_error() {
+    let text = builtin_text("network/crater-dense").unwrap();
+    for end in (0..text.len()).step_by(3) {
+        let _ = parse(&text[..end], &[]);
+    }
+    for rubbish in [
+        "\0",
+        "[[[[",
+        "a = [1,",
+        "system = 1",
+        "[system]",
+        "\u{feff}",
+        "=",
+        "system",
+    ] {
+        assert!(parse(rubbish, &[]).is_err(), "{rubbish:?}");
+        let _ = parse("system = 'network'", &[rubbish]);
+        let _ = parse(
+            "system = 'network'",
+            &[&format!("links.x.{rubbish}={rubbish}")],
+        );
+    }
+}

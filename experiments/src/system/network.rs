@@ -1,0 +1,169 @@
+//! The network-guided system, as scenarios see it: `[world]`, `[team]`, `[network]`.
+
+use std::sync::Arc;
+
+use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
+use farside_worlds::{Roadmap, SensorError, WorldError};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Conclude, Files, Results, Settings, Setup, SetupError, System};
+
+/// The most bytes of a roadmap file that are read; the reader itself takes no more than 1 MiB.
+const MAX_ROADMAP_BYTES: u64 = 2 << 20;
+
+/// The most rovers: each has a link to and from each node, and memory is finite.
+const MAX_ROVERS: u32 = 10_000;
+
+pub(super) struct Network;
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct NetworkScenario {
+    world: WorldConfig,
+    team: TeamConfig,
+    network: NetworkConfig,
+}
+
+impl System for Network {
+    fn name(&self) -> &str {
+        "network"
+    }
+
+    fn sections(&self) -> &[&str] {
+        &["world", "team", "network"]
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(NetworkScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for NetworkScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError> {
+        if !(1..=MAX_ROVERS).contains(&self.team.rovers) {
+            let found = self.team.rovers;
+            let message = format!("{found}: expected from 1 to {MAX_ROVERS}");
+            return Err(SetupError::value("team.rovers", message));
+        }
+        let roadmap = Arc::new(roadmap(&self.world.roadmap, setup.files)?);
+        let sensors = self.world.place(&roadmap, setup.seed).map_err(|error| {
+            let key = match error {
+                SensorError::NodeCount { .. } => "world.nodes",
+                SensorError::Radius { .. } => "world.radius",
+                // Which of the two to change is the user's choice; the message suggests a radius.
+                _ if self.world.radius_m.is_some() => "world.radius",
+                _ => "world.nodes",
+            };
+            SetupError::value(key, error)
+        })?;
+        let (world, team, settings) = (&self.world, &self.team, &self.network);
+        let links = &mut *setup.links;
+        let system = network::assemble(
+            setup.sim,
+            world,
+            roadmap,
+            Arc::new(sensors),
+            team,
+            settings,
+            setup.seed,
+            &mut |sim, from, to| {
+                links.connect(sim, from, to);
+            },
+        );
+        let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
+        Ok(Box::new(move |_report| results(&system.metrics())))
+    }
+}
+
+/// The built-in roadmap, or the one in a file.
+fn roadmap(name: &str, files: &mut Files) -> Result<Roadmap, SetupError> {
+    let wrong = |message: String| SetupError::value("world.roadmap", message);
+    if !name.ends_with(".toml") {
+        return Roadmap::builtin(name).map_err(|error| match error {
+            WorldError::UnknownRoadmap { .. } => {
+                wrong(format!("{error} (a roadmap of your own is a .toml file)"))
+            }
+            other => wrong(other.to_string()),
+        });
+    }
+    let bytes = files.read(name, MAX_ROADMAP_BYTES).map_err(wrong)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        wrong(format!(
+            "{name}: byte {at} is not UTF-8; expected TOML text"
+        ))
+    })?;
+    Roadmap::from_toml(&text).map_err(|error| wrong(format!("{name}: {error}")))
+}
+
+/// The key to blame.
+fn key_of(error: &network::NetworkError) -> &'static str {
+    use network::{ConfigError, NetworkError};
+    match error {
+        NetworkError::NoRovers => "team.rovers",
+        NetworkError::Endpoints { .. } => "world.endpoints",
+        NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
+        NetworkError::Config(ConfigError::Range { key, .. }) => KEYS
+            .iter()
+            .find(|known| known.ends_with(&format!(".{key}")))
+            .unwrap_or(&"network"),
+        _ => "network",
+    }
+}
+
+/// The keys of `[network]` that have ranges.
+const KEYS: [&str; 12] = [
+    "network.cycle",
+    "network.exchange",
+    "network.iteration_timeout",
+    "network.traverse",
+    "network.longest_path_factor",
+    "network.backtrack_penalty",
+    "network.collision_penalty_factor",
+    "network.noise",
+    "network.convergence",
+    "network.passive_window",
+    "network.active_window",
+    "network.cycle_limit",
+];
+
+fn results(metrics: &NetworkMetrics) -> Results {
+    let mut results = Results::default();
+    // A struct of plain numbers and names is always a JSON object.
+    if let Ok(Value::Object(all)) = serde_json::to_value(metrics) {
+        results.metrics = all;
+    }
+    let mut line = |label: &str, text: String| {
+        results.summary.push((label.to_owned(), text));
+    };
+    line(
+        "rovers at their goals",
+        format!("{} of {}", metrics.arrived, metrics.rovers),
+    );
+    line("collisions", metrics.collisions.to_string());
+    let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
+    let deadlock = deadlock.unwrap_or("unknown").to_owned();
+    line("deadlock", deadlock);
+    line("planning cycles", metrics.cycles.to_string());
+    if metrics.arrived > 0 {
+        line("time ratio", format!("{:.2}", metrics.time_ratio));
+        line("path ratio", format!("{:.2}", metrics.path_ratio));
+        line("stops per rover", format!("{:.1}", metrics.mean_stops));
+    }
+    if let Some(standstill) = &metrics.standstill {
+        line("standstill", standstill.clone());
+    }
+    if metrics.collisions > 0 {
+        let count = metrics.collisions;
+        results.violations.push(format!("{count} collisions"));
+    }
+    results
+}

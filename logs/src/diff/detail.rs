@@ -1,0 +1,200 @@
+//! The details of one difference: its first field, and the chain of its causes.
+
+use farside::MatchKey;
+use prost_reflect::MessageDescriptor;
+
+use super::index::{Entry, Index, Mode, Names};
+use super::{Cause, FirstDifference};
+use crate::LogError;
+use crate::envelope::{KeyRef, RecordRef};
+use crate::fields::{self, FieldDiff, bodies, body_descriptor, near};
+use crate::info::seconds;
+use crate::log::LoggedKey;
+use crate::scan::ScannedMessage;
+
+/// Causes that are listed; beyond them only the last one is.
+const CAUSES_LISTED: usize = 50;
+
+/// Steps back along a chain before it is given up: a bound on damage, far above any real chain.
+const CHAIN_LIMIT: u64 = 10_000_000;
+
+/// The first field in which two records differ by more than the tolerance.
+pub(super) fn pair(
+    a: (&mut Index, &Entry),
+    b: (&mut Index, &Entry),
+    mode: Mode,
+    tolerance: f64,
+) -> Result<Option<FieldDiff>, LogError> {
+    let message_a = a.0.scanner.message_at(a.1.position)?;
+    let message_b = b.0.scanner.message_at(b.1.position)?;
+    Ok(match mode {
+        Mode::Any => any(&message_a, &message_b, tolerance),
+        Mode::Farside => {
+            match (
+                RecordRef::read(message_a.data),
+                RecordRef::read(message_b.data),
+            ) {
+                (Some(x), Some(y)) => {
+                    let body_a = body_descriptor(message_a.channel);
+                    let body_b = body_descriptor(message_b.channel);
+                    farside((&x, body_a.as_ref()), (&y, body_b.as_ref()), tolerance)
+                }
+                _ => Some(fields::raw("record", message_a.data, message_b.data)),
+            }
+        }
+    })
+}
+
+fn farside(
+    (a, body_a): (&RecordRef<'_>, Option<&MessageDescriptor>),
+    (b, body_b): (&RecordRef<'_>, Option<&MessageDescriptor>),
+    tolerance: f64,
+) -> Option<FieldDiff> {
+    let text = [
+        ("fate", a.class.name(), b.class.name()),
+        ("link", a.link, b.link),
+        ("reason", a.reason, b.reason),
+        ("note", a.note, b.note),
+    ];
+    let text = text.into_iter().find(|(_, a, b)| a != b);
+    text.map(|(field, a, b)| FieldDiff::new(field, a, b))
+        .or_else(|| bodies("body", (a.body, body_a), (b.body, body_b), tolerance))
+        .or_else(|| times("sent", a.sent_ns, b.sent_ns, tolerance))
+        .or_else(|| times("log_time", a.key.time_ns, b.key.time_ns, tolerance))
+}
+
+fn any(a: &ScannedMessage<'_>, b: &ScannedMessage<'_>, tolerance: f64) -> Option<FieldDiff> {
+    let data = match (a.channel.encoding.as_str(), b.channel.encoding.as_str()) {
+        ("protobuf", "protobuf") => {
+            let descriptor = |message: &ScannedMessage<'_>| {
+                message.channel.schema.as_ref()?.descriptor().cloned()
+            };
+            let (x, y) = (descriptor(a), descriptor(b));
+            bodies("", (a.data, x.as_ref()), (b.data, y.as_ref()), tolerance)
+        }
+        ("json", "json") => fields::json(a.data, b.data, tolerance),
+        _ => (a.data != b.data).then(|| fields::raw("data", a.data, b.data)),
+    };
+    data.or_else(|| times("log_time", a.head.log_time, b.head.log_time, tolerance))
+        .or_else(|| {
+            times(
+                "publish_time",
+                a.head.publish_time,
+                b.head.publish_time,
+                tolerance,
+            )
+        })
+}
+
+fn times(field: &str, a_ns: u64, b_ns: u64, tolerance: f64) -> Option<FieldDiff> {
+    let apart = seconds(a_ns.abs_diff(b_ns));
+    let same = a_ns == b_ns || (tolerance > 0.0 && (apart <= tolerance || near(apart, 0.0, 0.0)));
+    (!same).then(|| FieldDiff::new(field, exact(a_ns), exact(b_ns)))
+}
+
+/// Nanoseconds as seconds, with every digit.
+fn exact(ns: u64) -> String {
+    format!("{}.{:09} s", ns / 1_000_000_000, ns % 1_000_000_000)
+}
+
+/// Describes a record as a difference, and traces back what caused it.
+pub(super) fn describe(
+    index: &mut Index,
+    entry: &Entry,
+    mode: Mode,
+    names: &Names,
+    diff: FieldDiff,
+) -> Result<FirstDifference, LogError> {
+    let message = index.scanner.message_at(entry.position)?;
+    let mut first = FirstDifference {
+        time_s: seconds(entry.time_ns),
+        topic: message.channel.topic.clone(),
+        ordinal: entry.ordinal,
+        field: diff.field,
+        a: diff.a,
+        b: diff.b,
+        ..FirstDifference::default()
+    };
+    let Some(record) = RecordRef::read(message.data).filter(|_| mode == Mode::Farside) else {
+        return Ok(first);
+    };
+    first.sender = record.sender.to_owned();
+    first.receiver = record.receiver.to_owned();
+    first.ordinal = record.ordinal;
+    first.match_key = record
+        .match_key
+        .map(|bits| MatchKey::from_bits(bits).to_string());
+    first.link = record.link.to_owned();
+    first.reason = record.reason.to_owned();
+    let cause = record.cause.map(|key| owned(&key));
+    trace(index, names, cause, &mut first)?;
+    Ok(first)
+}
+
+fn owned(key: &KeyRef<'_>) -> LoggedKey {
+    LoggedKey {
+        time_ns: key.time_ns,
+        step: key.step,
+        tie: key.tie,
+        source: key.source.to_owned(),
+        count: key.count,
+    }
+}
+
+/// Follows the causes back to a start.
+fn trace(
+    index: &mut Index,
+    names: &Names,
+    mut next: Option<LoggedKey>,
+    first: &mut FirstDifference,
+) -> Result<(), LogError> {
+    let mut steps = 0;
+    let mut before = usize::MAX;
+    let mut origin = None;
+    while let Some(key) = next.take() {
+        let key = KeyRef {
+            time_ns: key.time_ns,
+            step: key.step,
+            tie: key.tie,
+            source: &key.source,
+            count: key.count,
+        };
+        // A cause comes before its effect: a log that says otherwise is damaged.
+        let found = index
+            .event(&key, names)
+            .filter(|at| *at < before && steps < CHAIN_LIMIT);
+        let Some(at) = found else {
+            origin = Some(Cause {
+                time_s: seconds(key.time_ns),
+                sender: key.source.to_owned(),
+                fate: "not in the log".to_owned(),
+                ..Cause::default()
+            });
+            steps += 1;
+            break;
+        };
+        before = at;
+        let message = index.scanner.message_at(index.entries[at].position)?;
+        let Some(record) = RecordRef::read(message.data) else {
+            break;
+        };
+        let cause = Cause {
+            time_s: seconds(record.key.time_ns),
+            topic: message.channel.topic.clone(),
+            sender: record.sender.to_owned(),
+            receiver: record.receiver.to_owned(),
+            ordinal: record.ordinal,
+            fate: record.class.name().to_owned(),
+        };
+        next = record.cause.map(|key| owned(&key));
+        steps += 1;
+        if first.causes.len() < CAUSES_LISTED {
+            first.causes.push(cause);
+        } else {
+            origin = Some(cause);
+        }
+    }
+    first.causes.extend(origin);
+    first.causes_omitted = steps - first.causes.len() as u64;
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! What can go wrong with a log: one error type for the crate.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// A log could not be written, read or compared.
+///
+/// ```
+/// let error = farside_logs::info("no/such/file.mcap").unwrap_err();
+/// assert!(error.to_string().contains("no/such/file.mcap"));
+/// ```
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The operating system refused.
+    #[error("{path}: cannot {action}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file does not start like an MCAP file.
+    #[error("{path}: not an MCAP file: it starts with {actual}, not with {expected}")]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+        /// The magic bytes, in hexadecimal.
+        expected: String,
+        /// What is there instead.
+        actual: String,
+    },
+    /// A part of the file is damaged.
+    #[error("{path}: damaged at byte {offset}: {what}")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where the damaged part starts.
+        offset: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A part of the file is larger than this crate is willing to hold in memory.
+    #[error(
+        "{path}: the {what} at byte {offset} has {actual} bytes, more than the {limit} allowed"
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
+        /// Where it starts.
+        offset: u64,
+        /// Its size, in bytes.
+        actual: u64,
+        /// The most that is accepted, in bytes.
+        limit: u64,
+    },
+    /// An MCAP file, but not one that Farside wrote.
+    #[error("{path}: an MCAP file, but not the log of a Farside run: {missing}")]
+    NotFarside {
+        /// The file.
+        path: PathBuf,
+        /// What a Farside log would have.
+        missing: String,
+    },
+    /// A log of a format that this version does not read.
+    #[error("{path}: log format {actual}, but this version reads {expected}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The formats that can be read.
+        expected: String,
+        /// The log's format.
+        actual: String,
+    },
+    /// The MCAP library refused a record.
+    #[error("{path}: {source}")]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: Box<mcap::McapError>,
+    },
+    /// A topic glob that cannot be read.
+    #[error("topic glob {glob:?}: {reason}")]
+    Glob {
+        /// The glob.
+        glob: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// More topics than an MCAP file can have channels.
+    #[error("no channel is left for topic {topic}: a log has at most {limit}")]
+    TooManyTopics {
+        /// The topic.
+        topic: String,
+        /// The most channels that a log can have.
+        limit: u16,
+    },
+    /// The result of a run was asked for before the run was over.
+    #[error("{path}: the re-execution did not reach its end")]
+    Unfinished {
+        /// The log it was to be compared with.
+        path: PathBuf,
+    },
+    /// The file to write is the file to read.
+    #[error("{path}: would be written over the file that is being read")]
+    SameFile {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl LogError {
+    pub(crate) fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
+        LogError::Io {
+            path: path.to_owned(),
+            action,
+            source,
+        }
+    }
+
+    pub(crate) fn mcap(path: &Path, source: mcap::McapError) -> Self {
+        match source {
+            mcap::McapError::Io(source) => LogError::io(path, "write", source),
+            source => LogError::Mcap {
+                path: path.to_owned(),
+                source: Box::new(source),
+            },
+        }
+    }
+
+    pub(crate) fn damaged(path: &Path, offset: u64, what: impl Into<String>) -> Self {
+        LogError::Damaged {
+            path: path.to_owned(),
+            offset,
+            what: what.into(),
+        }
+    }
+}

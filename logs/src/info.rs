@@ -1,0 +1,367 @@
+//! What is in a log, at a glance: for Farside's own logs and for any other MCAP file.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use farside::Counts;
+use serde::Serialize;
+
+use crate::LogError;
+use crate::log::Head;
+use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+
+/// What a Farside log says about its run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunSummary {
+    /// The version of the log format, `major.minor`.
+    pub format: String,
+    /// The version of the code that ran.
+    pub code_version: String,
+    /// The run's seed.
+    pub seed: u64,
+    /// The tie seed, if ties were shuffled.
+    pub tie_seed: Option<u64>,
+    /// The scenario's name.
+    pub scenario: String,
+    /// The hash of the resolved scenario.
+    pub scenario_hash: String,
+    /// Topics that were not written, as globs.
+    pub exclude: Vec<String>,
+    /// The digest; none if the log is cut.
+    pub digest: Option<String>,
+    /// Why the run ended, in one word; none if the log is cut.
+    pub end: Option<String>,
+    /// What there is to say about the end beyond that word.
+    pub end_detail: String,
+    /// The virtual time of the end, in seconds.
+    pub end_time_s: Option<f64>,
+    /// What the run counted.
+    pub counts: Option<Counts>,
+    /// The checkpoints in the log.
+    pub checkpoints: u64,
+}
+
+/// One topic of a log.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TopicInfo {
+    /// The topic.
+    pub topic: String,
+    /// The name of its schema; empty if it has none.
+    pub schema: String,
+    /// The encoding of its messages.
+    pub encoding: String,
+    /// What the topic is for, in Farside's logs: `message`, `event`, `state`, ...
+    pub role: String,
+    /// How many messages it has.
+    pub messages: u64,
+    /// Their size before compression, in bytes.
+    pub bytes: u64,
+}
+
+/// One attachment of a log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AttachmentInfo {
+    /// Its name.
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Its size, in bytes.
+    pub bytes: u64,
+}
+
+/// What is in a log.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LogInfo {
+    /// The file.
+    pub path: String,
+    /// Its size, in bytes.
+    pub bytes: u64,
+    /// The MCAP profile; empty if none is declared.
+    pub profile: String,
+    /// The library that wrote it.
+    pub library: String,
+    /// What a Farside log says about its run; none for other files.
+    pub run: Option<RunSummary>,
+    /// What is missing or damaged; empty for a whole log.
+    pub missing: Vec<String>,
+    /// How many messages there are on all topics.
+    pub messages: u64,
+    /// The earliest time of a message, in seconds.
+    pub start_s: Option<f64>,
+    /// The latest time of a message, in seconds.
+    pub end_s: Option<f64>,
+    /// From the earliest to the latest message, in seconds.
+    pub duration_s: f64,
+    /// How many chunks there are, by compression.
+    pub chunks: BTreeMap<String, u64>,
+    /// The topics, in name order.
+    pub topics: Vec<TopicInfo>,
+    /// The attachments, in file order.
+    pub attachments: Vec<AttachmentInfo>,
+    /// The metadata records, by name.
+    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+}
+
+impl LogInfo {
+    fn add_message(
+        &mut self,
+        times: &mut Option<(u64, u64)>,
+        message: &ScannedMessage<'_>,
+        at: usize,
+    ) {
+        let time = message.head.log_time;
+        *times = Some(times.map_or((time, time), |(a, b)| (a.min(time), b.max(time))));
+        self.messages += 1;
+        self.topics[at].messages += 1;
+        self.topics[at].bytes += message.data.len() as u64;
+    }
+
+    fn finish(&mut self, times: Option<(u64, u64)>, path: &Path) -> Result<(), LogError> {
+        let Some(head) = self.metadata.get("farside") else {
+            self.set_times(times, 0);
+            return Ok(());
+        };
+        let head = Head::read(path, head)?;
+        self.set_times(times, head.epoch_ns);
+        let end = self.metadata.get("farside.end");
+        let text = |key: &str| end.and_then(|end| end.get(key)).cloned();
+        if end.is_none() && self.missing.is_empty() {
+            self.missing
+                .push("no farside.end: the run did not end in this log".to_owned());
+        }
+        let checkpoints = self
+            .topics
+            .iter()
+            .filter(|topic| topic.role == "checkpoint");
+        self.run = Some(RunSummary {
+            digest: text("digest"),
+            end: text("end"),
+            end_detail: text("end_detail").unwrap_or_default(),
+            end_time_s: text("end_time_ns")
+                .and_then(|ns| ns.parse().ok())
+                .map(seconds),
+            counts: text("counts").and_then(|counts| serde_json::from_str(&counts).ok()),
+            checkpoints: checkpoints.map(|topic| topic.messages).sum(),
+            format: head.format,
+            code_version: head.code_version,
+            seed: head.seed,
+            tie_seed: head.tie_seed,
+            scenario: head.scenario,
+            scenario_hash: head.scenario_hash,
+            exclude: head.exclude,
+        });
+        Ok(())
+    }
+
+    fn set_times(&mut self, times: Option<(u64, u64)>, epoch_ns: u64) {
+        if let Some((first, last)) = times {
+            self.start_s = Some(seconds(first.saturating_sub(epoch_ns)));
+            self.end_s = Some(seconds(last.saturating_sub(epoch_ns)));
+            self.duration_s = seconds(last - first);
+        }
+    }
+}
+
+/// Nanoseconds as seconds.
+pub(crate) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}
+
+/// Reads the whole of a log, and says what is in it. A cut or damaged file is read as far as it
+/// can be.
+///
+/// # Errors
+/// If the file cannot be read, is no MCAP file, or is a Farside log of a format not known here.
+pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
+    let path = path.as_ref();
+    let mut scanner = Scanner::open(path)?;
+    let mut info = LogInfo {
+        path: path.display().to_string(),
+        bytes: scanner.length(),
+        ..LogInfo::default()
+    };
+    let mut times = None;
+    let mut index = TopicIndex::new();
+    // Which topic a channel counts for, by the channel's serial number.
+    let mut topic_of: Vec<Option<usize>> = Vec::new();
+    while let Some(item) = scanner.next()? {
+        match item {
+            Item::Header { profile, library } => {
+                info.profile = profile.to_owned();
+                info.library = library.to_owned();
+            }
+            Item::Chunk { compression } => {
+                let name = if compression.is_empty() {
+                    "none"
+                } else {
+                    compression
+                };
+                *info.chunks.entry(name.to_owned()).or_default() += 1;
+            }
+            Item::Message(message) => {
+                let serial = message.channel.serial as usize;
+                if topic_of.len() <= serial {
+                    topic_of.resize(serial + 1, None);
+                }
+                let at = *topic_of[serial]
+                    .get_or_insert_with(|| topic(&mut info.topics, &mut index, message.channel));
+                info.add_message(&mut times, &message, at);
+            }
+            Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
+                name: attachment.name.to_owned(),
+                media_type: attachment.media_type.to_owned(),
+                bytes: attachment.data.len() as u64,
+            }),
+            Item::Metadata(name, entries) => {
+                info.metadata.insert(name, entries);
+            }
+            Item::Damage { offset, what, .. } => {
+                if info.missing.len() < MISSING_LIMIT {
+                    info.missing
+                        .push(format!("damaged at byte {offset}: {what}"));
+                }
+            }
+            Item::Cut { offset, what } => {
+                info.missing.push(format!("cut at byte {offset}: {what}"))
+            }
+        }
+    }
+    info.finish(times, path)?;
+    info.topics.sort_by(|a, b| a.topic.cmp(&b.topic));
+    Ok(info)
+}
+
+/// How many damaged parts are named.
+const MISSING_LIMIT: usize = 20;
+
+/// Topics by name, schema and role.
+type TopicIndex = BTreeMap<(String, String, String), usize>;
+
+fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelInfo) -> usize {
+    let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
+    let key = (
+        channel.topic.clone(),
+        schema.to_owned(),
+        channel.role().to_owned(),
+    );
+    if let Some(at) = index.get(&key) {
+        return *at;
+    }
+    index.insert(key, topics.len());
+    topics.push(TopicInfo {
+        topic: channel.topic.clone(),
+        schema: schema.to_owned(),
+        encoding: channel.encoding.clone(),
+        role: channel.role().to_owned(),
+        messages: 0,
+        bytes: 0,
+    });
+    topics.len() - 1
+}
+
+impl fmt::Display for LogInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:<12} {} ({} bytes)", "file", self.path, self.bytes)?;
+        writeln!(f, "{:<12} {}", "written by", self.library)?;
+        if let Some(run) = &self.run {
+            write_run(f, run)?;
+        }
+        for missing in &self.missing {
+            writeln!(f, "{:<12} {missing}", "MISSING")?;
+        }
+        if let (Some(start), Some(end)) = (self.start_s, self.end_s) {
+            writeln!(
+                f,
+                "{:<12} {start:.3} s to {end:.3} s, {:.3} s long",
+                "times", self.duration_s
+            )?;
+        }
+        let chunks: Vec<_> = self
+            .chunks
+            .iter()
+            .map(|(name, n)| format!("{n} {name}"))
+            .collect();
+        writeln!(f, "{:<12} {}", "chunks", chunks.join(", "))?;
+        writeln!(
+            f,
+            "{:<12} {} on {} topics",
+            "messages",
+            self.messages,
+            self.topics.len()
+        )?;
+        for topic in &self.topics {
+            let TopicInfo {
+                topic,
+                messages,
+                bytes,
+                schema,
+                ..
+            } = topic;
+            writeln!(f, "  {messages:>9}  {bytes:>12} B  {topic}  {schema}")?;
+        }
+        for attachment in &self.attachments {
+            let AttachmentInfo {
+                name,
+                media_type,
+                bytes,
+            } = attachment;
+            writeln!(
+                f,
+                "{:<12} {name} ({media_type}, {bytes} bytes)",
+                "attachment"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
+    writeln!(f, "{:<12} {}", "format", run.format)?;
+    writeln!(
+        f,
+        "{:<12} {} ({})",
+        "scenario", run.scenario, run.scenario_hash
+    )?;
+    writeln!(f, "{:<12} {}", "code", run.code_version)?;
+    writeln!(f, "{:<12} {}", "seed", run.seed)?;
+    if let Some(tie_seed) = run.tie_seed {
+        writeln!(f, "{:<12} {tie_seed}", "tie seed")?;
+    }
+    if !run.exclude.is_empty() {
+        writeln!(f, "{:<12} {}", "not written", run.exclude.join(", "))?;
+    }
+    if let Some(digest) = &run.digest {
+        writeln!(f, "{:<12} {digest}", "digest")?;
+    }
+    if let Some(end) = &run.end {
+        let colon = if run.end_detail.is_empty() { "" } else { ": " };
+        let at = run.end_time_s.unwrap_or_default();
+        writeln!(
+            f,
+            "{:<12} {end} at {at:.3} s{colon}{}",
+            "end", run.end_detail
+        )?;
+    }
+    if let Some(counts) = &run.counts {
+        let farside::Counts {
+            sent,
+            delivered,
+            lost,
+            duplicated,
+            in_flight,
+            events,
+            ..
+        } = counts;
+        writeln!(
+            f,
+            "{:<12} {events} events; {sent} messages sent, {delivered} delivered, {lost} lost, \
+             {duplicated} duplicated, {in_flight} in flight",
+            "counts"
+        )?;
+        for (reason, n) in &counts.lost_by_reason {
+            writeln!(f, "  {n:>9}  lost: {reason}")?;
+        }
+    }
+    Ok(())
+}

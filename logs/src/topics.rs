@@ -1,0 +1,110 @@
+//! Topic names, what each is for, and globs over them.
+
+use farside::record::RecordClass;
+use globset::{GlobBuilder, GlobSet, GlobSetBuilder};
+
+use crate::LogError;
+
+/// The topic of the checkpoints.
+pub(crate) const CHECKPOINT: &str = "farside/checkpoint";
+
+/// What a channel is for: the value of `role` in its metadata.
+pub(crate) fn role(class: RecordClass) -> &'static str {
+    match class {
+        RecordClass::Sample => "state",
+        class if class.is_fate() => "message",
+        _ => "event",
+    }
+}
+
+/// The topic of a record.
+pub(crate) fn topic_of(class: RecordClass, sender: &str, receiver: &str, kind: &str) -> String {
+    let kind = snake_case(kind);
+    match class {
+        RecordClass::Delivered => format!("/{sender}/{kind}"),
+        RecordClass::Lost | RecordClass::InFlight | RecordClass::HandOver => {
+            format!("/{}/{sender}/{kind}", class.name())
+        }
+        RecordClass::Timer => format!("/timer/{receiver}/{kind}"),
+        RecordClass::Sample => format!("/state/{sender}/{kind}"),
+        RecordClass::Stop => "/event/stop".to_owned(),
+        _ => format!("/event/{}/{receiver}", class.name()),
+    }
+}
+
+/// The kind's name in topics: `MaxPlus` becomes `max_plus`, `GpsFIX2` becomes `gps_fix2`.
+pub(crate) fn snake_case(name: &str) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    let mut out = String::with_capacity(name.len() + 4);
+    for (at, letter) in letters.iter().enumerate() {
+        if letter.is_uppercase() {
+            let after_lower =
+                at > 0 && (letters[at - 1].is_lowercase() || letters[at - 1].is_numeric());
+            let before_lower = at > 0
+                && letters[at - 1].is_uppercase()
+                && letters.get(at + 1).is_some_and(|next| next.is_lowercase());
+            if after_lower || before_lower {
+                out.push('_');
+            }
+            out.extend(letter.to_lowercase());
+        } else if letter.is_alphanumeric() || *letter == '_' {
+            out.push(*letter);
+        } else {
+            out.push('_');
+        }
+    }
+    out
+}
+
+/// A set of topic globs.
+pub(crate) struct Topics {
+    globs: GlobSet,
+}
+
+impl Topics {
+    pub(crate) fn new(globs: &[String]) -> Result<Self, LogError> {
+        let refuse = |glob: &str, error: globset::Error| LogError::Glob {
+            glob: glob.to_owned(),
+            reason: error.kind().to_string(),
+        };
+        let mut set = GlobSetBuilder::new();
+        for glob in globs {
+            let built = GlobBuilder::new(glob).literal_separator(true).build();
+            set.add(built.map_err(|error| refuse(glob, error))?);
+        }
+        let globs = set
+            .build()
+            .map_err(|error| refuse(&globs.join(", "), error))?;
+        Ok(Topics { globs })
+    }
+
+    pub(crate) fn matches(&self, topic: &str) -> bool {
+        self.globs.is_match(topic)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_become_snake_case() {
+        for (kind, topic) in [
+            ("MaxPlus", "max_plus"),
+            ("Ask", "ask"),
+            ("GPSFix", "gps_fix"),
+            ("Scan2D", "scan2_d"),
+            ("already_snake", "already_snake"),
+        ] {
+            assert_eq!(snake_case(kind), topic);
+        }
+    }
+
+    #[test]
+    fn one_star_stays_within_a_level() {
+        let topics = Topics::new(&["/*/max_plus".to_owned(), "/lost/**".to_owned()]).unwrap();
+        assert!(topics.matches("/rover_1/max_plus"));
+        assert!(!topics.matches("/in_flight/rover_1/max_plus"));
+        assert!(topics.matches("/lost/team/rover_1/odometry"));
+    }
+}

@@ -1,0 +1,155 @@
+//! Files that are wrong in every way: a clear error or a result, never a panic.
+
+use std::fs;
+use std::sync::OnceLock;
+
+use farside_logs::{DiffOptions, Log, diff, info, recover};
+use proptest::prelude::*;
+
+use crate::common::{Plan, logged};
+
+fn small_log() -> &'static [u8] {
+    static LOG: OnceLock<Vec<u8>> = OnceLock::new();
+    LOG.get_or_init(|| {
+        let (_folder, path, _) = logged(&Plan {
+            rovers: 2,
+            cycles: 6,
+            ..Plan::default()
+        });
+        fs::read(path).unwrap()
+    })
+}
+
+/// Reads the bytes in every way that there is.
+fn read_all(bytes: &[u8]) {
+    let folder = tempfile::tempdir().unwrap();
+    let (good, bad) = (folder.path().join("good"), folder.path().join("bad"));
+    let out = folder.path().join("out");
+    fs::write(&good, small_log()).unwrap();
+    fs::write(&bad, bytes).unwrap();
+    let told = info(&bad);
+    if let Ok(info) = &told {
+        let _ = info.to_string();
+    }
+    if let Ok(report) = diff(
+        &good,
+        &bad,
+        &DiffOptions {
+            tolerance: 1e-9,
+            ..Default::default()
+        },
+    ) {
+        let _ = report.to_string();
+    }
+    let _ = diff(&bad, &bad, &DiffOptions::default());
+    if let Ok(log) = Log::open(&bad) {
+        for record in log.records().unwrap() {
+            if record.is_err() {
+                break;
+            }
+        }
+    }
+    match recover(&bad, &out) {
+        // Whatever is saved is a whole file.
+        Ok(report) => {
+            let saved = mcap::MessageStream::new(&fs::read(&out).unwrap())
+                .unwrap()
+                .count() as u64;
+            assert_eq!(saved, report.messages);
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+        read_all(&bytes);
+    }
+
+    #[test]
+    fn random_bytes_behind_the_magic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+        let mut file = b"\x89MCAP0\r\n".to_vec();
+        file.extend(bytes);
+        read_all(&file);
+    }
+
+    #[test]
+    fn flipped_bits(flips in proptest::collection::vec((any::<prop::sample::Index>(), 0u8..8), 1..6)) {
+        let mut file = small_log().to_vec();
+        for (at, bit) in flips {
+            let at = at.index(file.len());
+            file[at] ^= 1 << bit;
+        }
+        read_all(&file);
+    }
+
+    #[test]
+    fn cuts(at in any::<prop::sample::Index>()) {
+        read_all(&small_log()[..at.index(small_log().len())]);
+    }
+
+    #[test]
+    fn records_of_any_kind(
+        records in proptest::collection::vec(
+            (1u8..0x10, proptest::collection::vec(any::<u8>(), 0..60), -3i64..3), 0..12)
+    ) {
+        let mut file = b"\x89MCAP0\r\n".to_vec();
+        for (opcode, content, off) in records {
+            file.push(opcode);
+            file.extend((content.len() as i64 + off).to_le_bytes());
+            file.extend(content);
+        }
+        read_all(&file);
+    }
+}
+
+/// An uncompressed chunk of a file without checksums: damage reaches the records themselves.
+fn unchecked(inner: &[u8]) -> Vec<u8> {
+    let mut file = small_log()[..8].to_vec();
+    let mut chunk = Vec::new();
+    chunk.extend([0; 16]);
+    chunk.extend((inner.len() as u64).to_le_bytes());
+    chunk.extend([0; 4]);
+    chunk.extend(0u32.to_le_bytes());
+    chunk.extend((inner.len() as u64).to_le_bytes());
+    chunk.extend(inner);
+    file.push(6);
+    file.extend((chunk.len() as u64).to_le_bytes());
+    file.extend(chunk);
+    file
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damage_within_chunks(
+        records in proptest::collection::vec(
+            (1u8..8, proptest::collection::vec(0u8..6, 0..60)), 0..12)
+    ) {
+        let mut inner = Vec::new();
+        for (opcode, content) in records {
+            inner.push(opcode);
+            inner.extend((content.len() as u64).to_le_bytes());
+            inner.extend(content);
+        }
+        read_all(&unchecked(&inner));
+    }
+}
+
+#[test]
+fn sizes_that_lie_cost_no_memory() {
+    for claim in [u64::MAX, 1 << 40, 1 << 28] {
+        let mut file = unchecked(&[]);
+        // The uncompressed size, and a compression that must allocate for it.
+        let chunk = 8 + 9;
+        file[chunk + 16..chunk + 24].copy_from_slice(&claim.to_le_bytes());
+        read_all(&file);
+        // The length of the record.
+        file[9..17].copy_from_slice(&claim.to_le_bytes());
+        read_all(&file);
+    }
+}

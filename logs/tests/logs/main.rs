@@ -1,0 +1,10 @@
+//! Logs of small simulations, from the outside: written, read, verified, compared, recovered.
+
+mod common;
+mod comparing;
+mod hostile;
+mod python;
+mod reading;
+mod recovering;
+mod verifying;
+mod writing;

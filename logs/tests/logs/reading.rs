@@ -1,0 +1,84 @@
+//! Reading logs record by record.
+
+use farside::record::RecordClass;
+use farside_logs::{Log, LoggedRecord};
+use prost_reflect::DynamicMessage;
+
+use crate::common::{Odometry, Plan, logged};
+
+#[test]
+fn every_record_is_read_back() {
+    let (_folder, path, report) = logged(&Plan::default());
+    let log = Log::open(&path).unwrap();
+    assert_eq!(log.scenario(), Some("rovers = 3\n"));
+    assert_eq!(
+        (log.seed(), log.scenario_name()),
+        (7, "tests/base_and_rovers")
+    );
+    assert_eq!(log.attachments().len(), 2);
+    let records: Vec<LoggedRecord> = log.records().unwrap().map(Result::unwrap).collect();
+    let count = |class| records.iter().filter(|r| r.class == class).count() as u64;
+    assert_eq!(count(RecordClass::Delivered), report.counts.delivered);
+    assert_eq!(count(RecordClass::Lost), report.counts.lost);
+    assert_eq!(
+        (count(RecordClass::Crash), count(RecordClass::Restart)),
+        (1, 1)
+    );
+    assert_eq!(
+        (count(RecordClass::Change), count(RecordClass::Stop)),
+        (1, 1)
+    );
+    assert!(count(RecordClass::Sample) > 0 && count(RecordClass::Timer) > 0);
+    let stop = records
+        .iter()
+        .find(|r| r.class == RecordClass::Stop)
+        .unwrap();
+    assert_eq!(
+        (stop.note.as_str(), stop.sender.as_str()),
+        ("enough cycles", "base")
+    );
+    let sample = records
+        .iter()
+        .find(|r| r.class == RecordClass::Sample)
+        .unwrap();
+    assert!(sample.sender.starts_with("rover_") && sample.kind == "Pose");
+    for record in records.iter().filter(|r| r.class == RecordClass::Lost) {
+        assert!(record.topic.starts_with("/lost/") && !record.reason.is_empty());
+    }
+}
+
+#[test]
+fn bodies_decode_field_by_field_and_back_to_their_types() {
+    let (_folder, path, _) = logged(&Plan::default());
+    let schema = farside::encoding::Schema::of::<Odometry>().unwrap();
+    let mut records = Log::open(&path).unwrap().records().unwrap();
+    let mut seen = 0;
+    while let Some((record, channel)) = records.next_ref().unwrap() {
+        if record.kind != "Odometry" {
+            continue;
+        }
+        let typed: Odometry = schema.decode(record.body).unwrap();
+        let descriptor = channel.schema.as_ref().unwrap().descriptor().unwrap();
+        assert_eq!(descriptor.full_name(), "farside.record.Odometry");
+        let body = descriptor.get_field_by_name("body").unwrap();
+        let prost_reflect::Kind::Message(body) = body.kind() else {
+            panic!("no message")
+        };
+        let dynamic = DynamicMessage::decode(body, record.body).unwrap();
+        let distance = dynamic.get_field_by_name("distance_m").unwrap().as_f64();
+        assert_eq!(distance, Some(typed.distance_m));
+        seen += 1;
+    }
+    assert!(seen > 10);
+}
+
+#[test]
+fn times_in_the_file_never_decrease() {
+    let (_folder, path, _) = logged(&Plan::default());
+    let bytes = std::fs::read(&path).unwrap();
+    let times: Vec<u64> = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(|m| m.unwrap().log_time)
+        .collect();
+    assert!(times.windows(2).all(|two| two[0] <= two[1]));
+}

@@ -1,0 +1,135 @@
+//! What a writer leaves: the whole run, the same bytes each time, errors that are told.
+
+use farside::Executor;
+use farside_logs::{LogOptions, LogWriter, info};
+
+use crate::common::{Plan, build, log_to, logged, options};
+
+#[test]
+fn the_log_tells_what_the_report_tells() {
+    let (_folder, path, report) = logged(&Plan::default());
+    let info = info(&path).unwrap();
+    let run = info.run.clone().unwrap();
+    assert_eq!(info.missing, Vec::<String>::new(), "{info}");
+    assert_eq!(run.digest, Some(report.digest.to_string()));
+    assert_eq!(run.counts, Some(report.counts.clone()));
+    assert_eq!(run.end.as_deref(), Some("stopped"));
+    assert_eq!((run.seed, run.format.as_str()), (7, "1.0"));
+    let fates: u64 = info
+        .topics
+        .iter()
+        .filter(|t| t.role == "message")
+        .map(|t| t.messages)
+        .sum();
+    let counts = report.counts;
+    assert_eq!(fates, counts.delivered + counts.lost + counts.in_flight);
+    assert!(counts.lost > 0 && counts.duplicated > 0);
+    let topic = |name: &str| {
+        info.topics
+            .iter()
+            .find(|t| t.topic == name)
+            .map(|t| t.messages)
+    };
+    assert!(topic("/rover_1/odometry").is_some());
+    assert!(topic("/lost/rover_1/odometry").is_some());
+    assert!(topic("/base/heard").is_some());
+    assert!(topic("/state/rover_1/pose").is_some());
+    assert_eq!(topic("/event/crash/rover_1"), Some(1));
+    assert_eq!(info.attachments[0].name, "scenario.toml");
+    assert_eq!(info.attachments[1].bytes, 10);
+}
+
+#[test]
+fn logging_changes_nothing() {
+    let plan = Plan::default();
+    let bare = build(&plan).run(Executor::Inline).unwrap();
+    let (_folder, _path, report) = logged(&plan);
+    assert_eq!(report, bare);
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let (_a, first, _) = logged(&Plan::default());
+    let (_b, second, _) = logged(&Plan::default());
+    assert_eq!(
+        std::fs::read(first).unwrap(),
+        std::fs::read(second).unwrap()
+    );
+}
+
+#[test]
+fn an_epoch_shifts_what_is_written_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let epoch_ns = 2_000_000_000_000_000_000;
+    log_to(
+        &path,
+        &Plan::default(),
+        LogOptions {
+            epoch_ns,
+            ..options()
+        },
+    );
+    let info = info(&path).unwrap();
+    assert_eq!(info.start_s, Some(0.0));
+    assert!(info.end_s.unwrap() < 1e5);
+}
+
+#[test]
+fn what_is_filtered_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let exclude = vec!["/*/odometry".to_owned()];
+    let report = log_to(
+        &path,
+        &Plan::default(),
+        LogOptions {
+            exclude,
+            ..options()
+        },
+    );
+    let info = info(&path).unwrap();
+    assert!(
+        info.topics
+            .iter()
+            .all(|topic| topic.topic != "/rover_1/odometry")
+    );
+    assert!(
+        info.topics
+            .iter()
+            .any(|topic| topic.topic == "/lost/rover_1/odometry")
+    );
+    assert_eq!(info.run.unwrap().digest, Some(report.digest.to_string()));
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    let Ok(writer) = LogWriter::create("/dev/full", options()) else {
+        return;
+    };
+    let mut sim = build(&Plan::default());
+    sim.observe(writer);
+    // Small runs are only written when they end.
+    match sim.run(Executor::Inline) {
+        Ok(report) => {
+            assert_eq!(report.end.name(), "observer_failed");
+            assert!(
+                report.end.detail().contains("/dev/full"),
+                "{}",
+                report.end.detail()
+            );
+        }
+        Err(error) => assert!(error.to_string().contains("/dev/full")),
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_created_is_told() {
+    let error = LogWriter::create("/no/such/folder/run.mcap", options())
+        .err()
+        .unwrap();
+    assert!(
+        error.to_string().contains("/no/such/folder/run.mcap"),
+        "{error}"
+    );
+}
