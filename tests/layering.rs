@@ -9,7 +9,7 @@ use std::process::Command;
 /// may depend on.
 const MAY_KNOW: [(&str, &[&str], &[&str]); 6] = [
     ("farside", &[], &["kameo", "tokio"]),
-    ("farside-worlds", &["farside"], &["nalgebra"]),
+    ("farside-worlds", &["farside"], &[]),
     ("farside-logs", &["farside"], &["mcap"]),
     ("farside-actors", &["farside", "farside-worlds"], &[]),
     (
@@ -20,7 +20,7 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 6] = [
             "farside-logs",
             "farside-actors",
         ],
-        &["clap", "indicatif"],
+        &[],
     ),
     (
         "farside-tests",
@@ -239,7 +239,9 @@ fn every_file_names_only_what_its_crate_may_know() {
 #[test]
 fn a_dependency_upwards_is_found() {
     let check = |member: &str, dependency: &str, expected: &[&str]| {
-        let mut graph = workspace();
+        let members = MAY_KNOW.iter().map(|(name, ..)| (*name).to_owned());
+        let mut graph: BTreeMap<_, BTreeSet<_>> =
+            members.map(|name| (name, BTreeSet::new())).collect();
         let dependencies = graph.entry(member.to_owned()).or_default();
         dependencies.insert(dependency.to_owned());
         assert_eq!(misplaced_dependencies(&graph), expected);
