@@ -62,7 +62,9 @@ pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError
     let committer = Committer::new(plan.clone(), observers, interrupt)?;
     match executor {
         Executor::Inline => Ok(inline::run(plan, engines, schedule, committer)),
-        Executor::Kameo { threads } => kameo::run(plan, engines, schedule, committer, threads),
+        Executor::Kameo { threads } => {
+            self::kameo::run(plan, engines, schedule, committer, threads)
+        }
     }
 }
 

@@ -1,3 +1,6 @@
 //! The tests that cross crates, one module for each behaviour.
 
 mod determinism;
+mod golden;
+mod house;
+mod layering;

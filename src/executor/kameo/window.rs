@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use kameo::actor::{ActorRef, Spawn};
 
-use super::{Apply, CollectInFlight, Done, RunWindow, Worker, lost_worker};
-use crate::commit::{Batch, Committer};
+use super::seat::{Round, Seats};
+use super::{Helper, Share, lost_worker};
+use crate::commit::Committer;
 use crate::engine::{Action, Engine, InFlight, Outgoing};
 use crate::executor::Ending;
 use crate::fault::Fault;
@@ -15,29 +16,11 @@ use crate::report::{End, Report};
 use crate::schedule::{Due, Schedule};
 use crate::time::SimDuration;
 
-/// An engine as the coordinator sees it.
-struct Seat {
-    worker: ActorRef<Worker>,
-    next: Option<Bound>,
-    inbox: Vec<Outgoing>,
-    batch: Batch,
-}
-
-impl Seat {
-    /// Time and step of the first event it would handle.
-    fn peek(&self) -> Option<Bound> {
-        let arriving = self.inbox.iter().map(|event| Bound {
-            time: event.key.time,
-            step: event.key.step,
-        });
-        arriving.chain(self.next).min()
-    }
-}
-
 /// Leads the engines of one run from window to window.
 pub(super) struct Coordinator {
     plan: Arc<Plan>,
-    seats: Vec<Seat>,
+    seats: Seats,
+    helpers: Vec<ActorRef<Helper>>,
     /// The engine of shared links, which runs after the others in each window.
     shared: Option<usize>,
     schedule: Schedule,
@@ -53,20 +36,16 @@ impl Coordinator {
         engines: Vec<Engine>,
         schedule: Schedule,
         committer: Committer,
+        threads: usize,
     ) -> Self {
         let shared = plan.links.iter().find(|(_, link)| link.shared);
         let shared = shared.map(|(link, _)| plan.place(*link).engine as usize);
         let look_ahead = plan.info.look_ahead;
-        let seat = |mut engine: Engine| Seat {
-            next: engine.peek(),
-            worker: Worker::spawn(Worker { engine }),
-            inbox: Vec::new(),
-            batch: Batch::default(),
-        };
-        let seats = engines.into_iter().map(seat).collect();
+        let helpers = (0..threads).map(|_| Helper::spawn(Helper)).collect();
         Coordinator {
             plan,
-            seats,
+            seats: Seats::new(engines),
+            helpers,
             shared,
             schedule,
             committer,
@@ -83,16 +62,13 @@ impl Coordinator {
             }
         };
         let mut in_flight = undone;
-        for seat in &mut self.seats {
-            for Outgoing { key, pending, .. } in seat.inbox.drain(..) {
+        for at in 0..self.seats.len() {
+            let mut seat = self.seats.take(at);
+            for Outgoing { key, pending, .. } in std::mem::take(&mut seat.inbox) {
                 let found = pending.in_flight(&self.plan, key, ending.fault);
                 in_flight.extend(found);
             }
-            let collect = CollectInFlight {
-                until: ending.fault,
-            };
-            let found = seat.worker.ask(collect).await;
-            in_flight.extend(found.unwrap_or_else(|error| lost_worker(&error)));
+            in_flight.extend(seat.engine.parts.take_in_flight(ending.fault));
         }
         self.committer.finish(ending.end, ending.time, in_flight)
     }
@@ -102,7 +78,8 @@ impl Coordinator {
         if let Some(end) = self.committer.verdict() {
             return Some(Ending::early(end, self.committer.last().time));
         }
-        let earliest = self.seats.iter().filter_map(Seat::peek).min();
+        let seats = 0..self.seats.len();
+        let earliest = seats.filter_map(|at| self.seats.take(at).peek()).min();
         let limit = self.schedule.bound();
         match earliest {
             Some(earliest) if earliest < limit => {
@@ -127,9 +104,7 @@ impl Coordinator {
                     by,
                     reason,
                 )),
-                Some(Due::Control(key, entity, action)) => {
-                    self.apply(key, entity, action, undone).await
-                }
+                Some(Due::Control(key, entity, action)) => self.apply(key, entity, action, undone),
                 None => Some(Ending::early(End::Completed, self.committer.last().time)),
             },
         }
@@ -137,48 +112,43 @@ impl Coordinator {
 
     async fn run_window(&mut self, bound: Bound, undone: &mut Vec<InFlight>) -> Option<Ending> {
         let shared = self.shared;
-        let independent: Vec<usize> = (0..self.seats.len())
-            .filter(|at| Some(*at) != shared)
-            .collect();
-        let mut finished = self.run_engines(&independent, bound).await;
-        if let Some(shared) = shared {
-            finished.extend(self.run_engines(&[shared], bound).await);
-        }
-        self.settle(finished, undone)
+        let independent = (0..self.seats.len()).filter(|at| Some(*at) != shared);
+        let mut finished = self.run_engines(independent, bound).await;
+        finished.extend(self.run_engines(shared.into_iter(), bound).await);
+        self.settle(&finished, undone)
     }
 
     /// Runs those of the engines that have something to do before `bound`, side by side, and
     /// hands out what they sent to other engines.
-    async fn run_engines(&mut self, engines: &[usize], bound: Bound) -> Vec<(usize, Done)> {
-        let mut asked = Vec::new();
-        for &at in engines {
-            let seat = &mut self.seats[at];
-            if seat.peek().is_none_or(|next| next >= bound) {
-                continue;
+    async fn run_engines(
+        &mut self,
+        engines: impl Iterator<Item = usize>,
+        bound: Bound,
+    ) -> Vec<usize> {
+        let is_due = |at: &usize| self.seats.take(*at).peek().is_some_and(|next| next < bound);
+        let due: Vec<usize> = engines.filter(is_due).collect();
+        let round = Arc::new(Round::new(self.seats.clone(), due, bound));
+        if round.due.len() > 1 {
+            // The leader takes no share itself: tokio starts the last actor that it asks on its own
+            // thread, and only once it waits.
+            let mut asked = Vec::with_capacity(self.helpers.len());
+            for helper in self.helpers.iter().take(round.due.len()) {
+                let answer = helper.ask(Share(round.clone())).enqueue().await;
+                asked.push(answer.unwrap_or_else(|error| lost_worker(&error)));
             }
-            let window = RunWindow {
-                bound,
-                inbox: std::mem::take(&mut seat.inbox),
-                batch: std::mem::take(&mut seat.batch),
-            };
-            let pending = seat.worker.ask(window).enqueue().await;
-            asked.push((at, pending.unwrap_or_else(|error| lost_worker(&error))));
-        }
-        let mut finished = Vec::with_capacity(asked.len());
-        for (at, pending) in asked {
-            let done: Box<Done> = pending.await.unwrap_or_else(|error| lost_worker(&error));
-            finished.push((at, *done));
-        }
-        for (at, done) in &mut finished {
-            self.seats[*at].next = done.next;
-            for event in done.outgoing.drain(..) {
-                self.seats[event.engine as usize].inbox.push(event);
+            for answer in asked {
+                answer.await.unwrap_or_else(|error| lost_worker(&error));
             }
+        } else {
+            round.share();
         }
-        finished
+        for at in &round.due {
+            self.seats.hand_out(*at);
+        }
+        round.due.clone()
     }
 
-    async fn apply(
+    fn apply(
         &mut self,
         key: EventKey,
         entity: EntityId,
@@ -186,59 +156,42 @@ impl Coordinator {
         undone: &mut Vec<InFlight>,
     ) -> Option<Ending> {
         let at = self.plan.place(entity).engine as usize;
-        let batch = std::mem::take(&mut self.seats[at].batch);
-        let reply = self.seats[at]
-            .worker
-            .ask(Apply {
-                key,
-                entity,
-                action,
-                batch,
-            })
-            .await;
-        let mut done = *reply.unwrap_or_else(|error| lost_worker(&error));
-        self.seats[at].next = done.next;
-        for event in done.outgoing.drain(..) {
-            self.seats[event.engine as usize].inbox.push(event);
-        }
-        self.settle(vec![(at, done)], undone)
+        self.seats.take(at).control(key, entity, action);
+        self.seats.hand_out(at);
+        self.settle(&[at], undone)
     }
 
     /// Commits what the engines did, in key order, up to the first fault.
-    fn settle(
-        &mut self,
-        finished: Vec<(usize, Done)>,
-        undone: &mut Vec<InFlight>,
-    ) -> Option<Ending> {
-        let fault = finished.iter().filter_map(|(_, done)| done.fault.as_ref());
+    fn settle(&mut self, finished: &[usize], undone: &mut Vec<InFlight>) -> Option<Ending> {
+        let mut done: Vec<_> = finished.iter().map(|at| self.seats.take(*at)).collect();
+        let fault = done.iter().filter_map(|seat| seat.fault.as_ref());
         let fault: Option<Box<Fault>> = fault.min_by_key(|fault| fault.key).cloned();
         self.order.clear();
-        for (place, (_, done)) in finished.iter().enumerate() {
-            let keys = (0..).map_while(|at| done.batch.key(at).map(|key| (key, place, at)));
+        for (place, seat) in done.iter().enumerate() {
+            let keys = (0..).map_while(|at| seat.batch.key(at).map(|key| (key, place, at)));
             self.order.extend(keys);
         }
         self.order.sort_unstable();
-        let mut uncommitted: Vec<Option<usize>> = vec![None; finished.len()];
+        let mut uncommitted: Vec<Option<usize>> = vec![None; done.len()];
         for &(key, place, at) in &self.order {
             if fault.as_ref().is_some_and(|fault| key >= fault.key) {
                 uncommitted[place].get_or_insert(at);
             } else {
-                finished[place].1.batch.commit(at, &mut self.committer);
+                done[place].batch.commit(at, &mut self.committer);
             }
         }
         if let Some(fault) = fault {
-            for (place, at) in uncommitted.iter().enumerate() {
+            for (seat, at) in done.iter().zip(&uncommitted) {
                 if let Some(at) = at {
-                    undone.extend(finished[place].1.batch.undone(*at, fault.key, &self.plan));
+                    undone.extend(seat.batch.undone(*at, fault.key, &self.plan));
                 }
             }
             return Some(Ending::fault(fault));
         }
         let mut stops: Vec<_> = Vec::from_iter(self.committer.stop.take());
-        for (at, mut done) in finished {
-            stops.append(&mut done.stops);
-            done.batch.clear();
-            self.seats[at].batch = done.batch;
+        for seat in &mut done {
+            stops.append(&mut seat.stops);
+            seat.batch.clear();
         }
         // Whoever asked first in the order of the run is heard first.
         stops.sort_by_key(|(key, by, _)| (*key, *by == EntityId::CONTROL));

@@ -1,0 +1,120 @@
+//! Seats: the engines of a run, where whoever has time for one can take it.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::commit::Batch;
+use crate::engine::{Action, Engine, Outgoing};
+use crate::fault::Fault;
+use crate::key::{Bound, EntityId, EventKey};
+
+/// An engine, what other engines sent to it, and what it did in the window that just ended.
+pub(super) struct Seat {
+    pub(super) engine: Engine,
+    pub(super) inbox: Vec<Outgoing>,
+    pub(super) batch: Batch,
+    pub(super) fault: Option<Box<Fault>>,
+    pub(super) stops: Vec<(EventKey, EntityId, String)>,
+}
+
+impl Seat {
+    pub(super) fn new(engine: Engine) -> Self {
+        Seat {
+            engine,
+            inbox: Vec::new(),
+            batch: Batch::default(),
+            fault: None,
+            stops: Vec::new(),
+        }
+    }
+
+    /// Time and step of the first event it would handle.
+    pub(super) fn peek(&mut self) -> Option<Bound> {
+        let arriving = self.inbox.iter().map(|event| Bound {
+            time: event.key.time,
+            step: event.key.step,
+        });
+        arriving.chain(self.engine.peek()).min()
+    }
+
+    /// Goes on until `bound`.
+    fn run(&mut self, bound: Bound) {
+        for Outgoing { key, pending, .. } in self.inbox.drain(..) {
+            self.engine.parts.insert(key, pending);
+        }
+        let result = loop {
+            let result = self.engine.run(bound, &mut self.batch);
+            // A request to stop interrupts the engine, but takes effect in a later window.
+            match self.engine.parts.stop.take() {
+                Some(stop) if result.is_ok() => self.stops.push(stop),
+                _ => break result,
+            }
+        };
+        self.fault = result.err();
+    }
+
+    /// Applies a control event.
+    pub(super) fn control(&mut self, key: EventKey, entity: EntityId, action: Action) {
+        let result = self.engine.control(key, entity, action, &mut self.batch);
+        self.fault = result.err();
+        self.stops.extend(self.engine.parts.stop.take());
+    }
+}
+
+/// All seats of a run. Nobody waits for a lock: in a window each seat has one claimant, and the
+/// coordinator touches them only between windows.
+#[derive(Clone)]
+pub(super) struct Seats(Arc<[Mutex<Seat>]>);
+
+impl Seats {
+    pub(super) fn new(engines: Vec<Engine>) -> Self {
+        let seats = engines
+            .into_iter()
+            .map(|engine| Mutex::new(Seat::new(engine)));
+        Seats(seats.collect())
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(super) fn take(&self, at: usize) -> MutexGuard<'_, Seat> {
+        // Handlers' panics are caught in the engine and are values there.
+        self.0[at].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Hands what the engine at `at` sent to other engines over to them.
+    pub(super) fn hand_out(&self, at: usize) {
+        let mut outgoing = std::mem::take(&mut self.take(at).engine.parts.outgoing);
+        for event in outgoing.drain(..) {
+            self.take(event.engine as usize).inbox.push(event);
+        }
+        self.take(at).engine.parts.outgoing = outgoing;
+    }
+}
+
+/// The engines that have something to do in one window. Whoever has time claims the next one.
+pub(super) struct Round {
+    seats: Seats,
+    pub(super) due: Vec<usize>,
+    claimed: AtomicUsize,
+    bound: Bound,
+}
+
+impl Round {
+    pub(super) fn new(seats: Seats, due: Vec<usize>, bound: Bound) -> Self {
+        Round {
+            seats,
+            due,
+            claimed: AtomicUsize::new(0),
+            bound,
+        }
+    }
+
+    /// Claims engines and runs them until none is left.
+    pub(super) fn share(&self) {
+        while let Some(at) = self.due.get(self.claimed.fetch_add(1, Ordering::Relaxed)) {
+            self.seats.take(*at).run(self.bound);
+        }
+    }
+}
