@@ -181,8 +181,15 @@ impl Sink for Committer {
         }
     }
 
-    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32) {
-        self.count(class, head.copy, head.reason, sends);
+    fn count_event(
+        &mut self,
+        class: RecordClass,
+        key: EventKey,
+        head: &Head,
+        reason: &'static str,
+        sends: u32,
+    ) {
+        self.count(class, head.copy, reason, sends);
         self.last = key;
     }
 
@@ -254,9 +261,8 @@ impl Batch {
                     ordinal: record.ordinal,
                     copy: record.copy,
                     match_key: record.match_key,
-                    sent: record.sent,
                     cause: record.cause,
-                    ..Head::of_entity(record.sender, record.sent)
+                    ..Head::of_entity(record.sender)
                 };
                 found.push((record.key, head, self.bytes[kept.body.clone()].to_vec()));
             }
@@ -281,7 +287,14 @@ impl Sink for Batch {
         });
     }
 
-    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32) {
+    fn count_event(
+        &mut self,
+        class: RecordClass,
+        key: EventKey,
+        head: &Head,
+        reason: &'static str,
+        sends: u32,
+    ) {
         // A window's events are merged by key before they count, so they are kept all the same.
         let record = Record {
             class,
@@ -295,8 +308,8 @@ impl Sink for Batch {
             ordinal: head.ordinal,
             copy: head.copy,
             match_key: head.match_key,
-            sent: head.sent,
-            reason: head.reason,
+            sent: head.sent(key),
+            reason,
             body: &[],
             sends,
         };

@@ -4,6 +4,7 @@
 //! `outgoing` for the executor to carry over.
 
 mod parts;
+mod store;
 
 use std::any::Any;
 use std::num::NonZeroU64;
@@ -17,7 +18,7 @@ use crate::digest::record_hash;
 use crate::fault::{Fault, FaultCause, Outcome};
 use crate::key::{Bound, EntityId, EventKey};
 use crate::message::{MatchKey, Sealed};
-use crate::plan::{FixedMap, KindIndex, Plan};
+use crate::plan::{FixedMap, KindIndex, Plan, Reason};
 use crate::queue::Entry;
 use crate::random::Stream;
 use crate::record::{Record, RecordClass};
@@ -29,7 +30,14 @@ pub(crate) use parts::Parts;
 pub(crate) trait Sink {
     fn commit(&mut self, record: &Record<'_>, hash: u128);
     /// Commits an event of which nobody wants a record: it is only counted.
-    fn count_event(&mut self, class: RecordClass, key: EventKey, head: &Head, sends: u32);
+    fn count_event(
+        &mut self,
+        class: RecordClass,
+        key: EventKey,
+        head: &Head,
+        reason: &'static str,
+        sends: u32,
+    );
     /// True once the run must not go on without its driver having a look.
     fn paused(&self) -> bool;
 }
@@ -71,18 +79,17 @@ pub(crate) struct Head {
     pub(crate) repeat: u32,
     pub(crate) copy: u32,
     pub(crate) match_key: Option<MatchKey>,
-    pub(crate) sent: SimTime,
     /// The event in whose handler the message was sent.
     pub(crate) cause: Option<EventKey>,
     /// The count in the key of the hand-over to a shared link, once it has happened. The rest of
     /// that key follows from `cause`.
     pub(crate) handed_over: Option<NonZeroU64>,
     pub(crate) incarnation: u32,
-    pub(crate) reason: &'static str,
+    pub(crate) reason: Reason,
 }
 
 impl Head {
-    pub(crate) fn of_entity(entity: EntityId, now: SimTime) -> Self {
+    pub(crate) fn of_entity(entity: EntityId) -> Self {
         Head {
             sender: entity,
             receiver: entity,
@@ -92,12 +99,16 @@ impl Head {
             repeat: 0,
             copy: 0,
             match_key: None,
-            sent: now,
             cause: None,
             handed_over: None,
             incarnation: 0,
-            reason: "",
+            reason: Reason::default(),
         }
+    }
+
+    /// When the message was sent, or the timer set; `key` is that of its event.
+    pub(crate) fn sent(&self, key: EventKey) -> SimTime {
+        self.cause.map_or(key.time, |cause| cause.time)
     }
 
     /// The event that scheduled the next hop: the cause, or the hand-over to a shared link.
@@ -127,8 +138,8 @@ impl Head {
             ordinal: self.ordinal,
             copy: self.copy,
             match_key: self.match_key,
-            sent: self.sent,
-            reason: self.reason,
+            sent: self.sent(key),
+            reason: plan.reason(self.reason),
             body,
             sends: 0,
         }
@@ -151,12 +162,11 @@ pub(crate) struct Outgoing {
     pub(crate) pending: Pending,
 }
 
-/// The place of a message in its flow.
+/// What a sender keeps of a flow (receiver, kind) in which it gives messages match keys.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Flow {
-    pub(crate) next: u64,
-    pub(crate) last_key: Option<MatchKey>,
-    pub(crate) repeat: u32,
+pub(crate) struct KeyedFlow {
+    last_key: Option<MatchKey>,
+    repeat: u32,
 }
 
 /// What the kernel keeps for an actor, crashed or not.
@@ -167,8 +177,10 @@ pub(crate) struct CellState {
     pub(crate) count: u64,
     pub(crate) streams: Vec<(&'static str, Stream)>,
     pub(crate) durable: Vec<Box<dyn Any + Send>>,
-    /// By receiver and kind; a timer's receiver is `u32::MAX`.
-    pub(crate) flows: FixedMap<u64, Flow>,
+    /// The next ordinal by receiver and kind; a timer's receiver is `u32::MAX`. One word for each,
+    /// since a team in which everyone talks to everyone has very many.
+    ordinals: FixedMap<u64, u64>,
+    keyed_flows: FixedMap<u64, KeyedFlow>,
 }
 
 impl CellState {
@@ -179,8 +191,34 @@ impl CellState {
             count: 0,
             streams: Vec::new(),
             durable: Vec::new(),
-            flows: FixedMap::default(),
+            ordinals: FixedMap::default(),
+            keyed_flows: FixedMap::default(),
         }
+    }
+
+    /// The ordinal of the next message in a flow, and how many right before it had the same key.
+    #[inline]
+    pub(crate) fn next_in_flow(
+        &mut self,
+        receiver: u32,
+        kind: KindIndex,
+        match_key: Option<MatchKey>,
+    ) -> (u64, u32) {
+        let flow = u64::from(receiver) << 32 | u64::from(kind);
+        let next = self.ordinals.entry(flow).or_insert(0);
+        let ordinal = *next;
+        *next += 1;
+        if match_key.is_none() {
+            return (ordinal, 0);
+        }
+        let keyed = self.keyed_flows.entry(flow).or_default();
+        keyed.repeat = if keyed.last_key == match_key {
+            keyed.repeat + 1
+        } else {
+            0
+        };
+        keyed.last_key = match_key;
+        (ordinal, keyed.repeat)
     }
 }
 
@@ -229,15 +267,8 @@ impl Engine {
                 .plan
                 .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
             cell.state.count += 1;
-            let head = Head::of_entity(cell.entity, SimTime::ZERO);
-            engine.parts.insert(
-                key,
-                Pending {
-                    class: Class::Start,
-                    head,
-                    letter: None,
-                },
-            );
+            let head = Head::of_entity(cell.entity);
+            engine.parts.insert(key, Class::Start, head, None);
         }
         engine
     }
@@ -281,7 +312,7 @@ impl Engine {
             Class::Timer => self.run_handler(class, RecordClass::Timer, key, &head, letter, sink),
             Class::Message if self.is_crashed(head.receiver) => {
                 let head = Head {
-                    reason: "crashed",
+                    reason: self.parts.plan.intern("crashed"),
                     ..head
                 };
                 self.commit(RecordClass::Lost, key, &head, sink);
@@ -383,7 +414,7 @@ impl Engine {
         action: Action,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let mut head = Head::of_entity(entity, key.time);
+        let mut head = Head::of_entity(entity);
         head.sender = EntityId::CONTROL;
         let local = self.parts.plan.place(entity).local as usize;
         self.parts.begin(key, None, None)?;
@@ -431,7 +462,8 @@ impl Engine {
             record.sends = parts.sends;
             sink.commit(&record, hash_if_wanted(&parts.plan, &record));
         } else {
-            sink.count_event(class, key, head, parts.sends);
+            let reason = parts.plan.reason(head.reason);
+            sink.count_event(class, key, head, reason, parts.sends);
         }
         if !parts.effects.is_empty() {
             parts.commit_effects(sink);
@@ -455,7 +487,8 @@ impl Engine {
             if at.time == key.time && waiting.class != Class::Void && chain.len() < 8 {
                 chain.push(hop(&waiting.head));
             }
-            self.parts.insert(at, waiting);
+            self.parts
+                .insert(at, waiting.class, waiting.head, waiting.letter);
         }
         self.parts.note_unfinished(key, class, *head);
         let cause = FaultCause::StepLimit {

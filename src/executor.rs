@@ -101,7 +101,7 @@ impl Ending {
         by: EntityId,
         reason: String,
     ) -> Self {
-        let mut head = Head::of_entity(EntityId::CONTROL, key.time);
+        let mut head = Head::of_entity(EntityId::CONTROL);
         head.sender = by;
         let record = head.record(plan, RecordClass::Stop, key, reason.as_bytes());
         committer.commit(&record, hash_if_wanted(plan, &record));

@@ -103,6 +103,10 @@ impl RunInfo {
     }
 }
 
+/// The number of a loss reason in [`Plan::reason`]: messages in flight carry two bytes, not a text.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Reason(u16);
+
 /// Index of a host.
 pub(crate) type HostIndex = u32;
 /// Index of a kind in [`RunInfo::kinds`].
@@ -151,6 +155,8 @@ pub(crate) struct Plan {
     pub(crate) routes: Vec<Routes>,
     pub(crate) links: FixedMap<EntityId, LinkPlan>,
     pub(crate) kind_of_type: FixedMap<TypeId, KindIndex>,
+    /// Reasons met so far. Their numbers differ from run to run, and leave the kernel as texts.
+    pub(crate) reasons: Mutex<Vec<&'static str>>,
     pub(crate) sample_kinds: Mutex<Vec<(TypeId, Arc<Kind>)>>,
     pub(crate) step_limit: u32,
     pub(crate) digest: bool,
@@ -246,6 +252,29 @@ impl Plan {
             source,
             count,
         }
+    }
+
+    /// The number of a loss reason.
+    pub(crate) fn intern(&self, reason: &'static str) -> Reason {
+        let mut reasons = self.reasons.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = reasons
+            .iter()
+            .position(|known| *known == reason)
+            .unwrap_or_else(|| {
+                reasons.push(reason);
+                reasons.len() - 1
+            });
+        // Reasons are literals in the source of links: a few.
+        Reason(at as u16 + 1)
+    }
+
+    /// The text of a loss reason; empty for none.
+    #[inline]
+    pub(crate) fn reason(&self, reason: Reason) -> &'static str {
+        let Some(at) = reason.0.checked_sub(1) else {
+            return "";
+        };
+        self.reasons.lock().unwrap_or_else(PoisonError::into_inner)[at as usize]
     }
 
     /// The kind of a sample type, traced when it is first met.

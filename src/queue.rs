@@ -1,10 +1,10 @@
-//! The event queue: small keys in a binary heap, payloads elsewhere, and a sorted FIFO for the
-//! events of the present instant, which never touch the heap.
+//! The event queue: small keys here, payloads elsewhere. The earliest events stand sorted, the others
+//! in a quaternary heap; the events of the present instant pass through a FIFO and touch neither.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;
 
-use std::collections::BinaryHeap;
+use dary_heap::QuaternaryHeap;
 
 use crate::key::{Bound, EntityId, EventKey};
 use crate::time::SimTime;
@@ -96,13 +96,17 @@ impl PartialOrd for Entry {
     }
 }
 
+/// How many of the earliest events are kept sorted. A line of cache holds two; inserting among so
+/// few costs less than a way through a heap.
+const NEAR: usize = 48;
+
 /// Events yet to be handled, by key.
 #[derive(Default)]
 pub(crate) struct Queue {
-    heap: BinaryHeap<Entry>,
-    /// The heap's top was taken and is still in place. Most events cause another, which then
-    /// replaces it: one way down the heap instead of a way down and two ways up.
-    stale_top: bool,
+    /// The earliest of the events in time, latest first.
+    near: Vec<Entry>,
+    /// The others: none has a lesser key than any in `near`.
+    far: QuaternaryHeap<Entry>,
     /// The rest of the present step, in key order.
     present: VecDeque<Entry>,
     /// The next step of the present instant, in order of arrival.
@@ -112,68 +116,96 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
+    #[inline]
     pub(crate) fn push(&mut self, entry: Entry) {
-        let next_step = self.now.map(|now| Bound {
+        if self.belongs_to_next_step(&entry) {
+            self.next.push(entry);
+        } else {
+            self.push_timed(entry);
+        }
+    }
+
+    #[inline]
+    fn belongs_to_next_step(&self, entry: &Entry) -> bool {
+        let Some(now) = self.now else { return false };
+        let next_step = Bound {
             time: now.time,
             step: now.step + 1,
-        });
-        // Once the next step stands in `present`, sorted, late arrivals go through the heap.
-        let sorted = self.present.front().map(Entry::bound) == next_step;
-        if next_step == Some(entry.bound()) && !sorted {
-            self.next.push(entry);
-        } else if std::mem::take(&mut self.stale_top)
-            && let Some(mut top) = self.heap.peek_mut()
-        {
-            *top = entry;
-        } else {
-            self.heap.push(entry);
+        };
+        // Once the next step stands in `present`, sorted, late arrivals take the other way.
+        entry.bound() == next_step && self.present.front().map(Entry::bound) != Some(next_step)
+    }
+
+    #[inline]
+    fn push_timed(&mut self, entry: Entry) {
+        let is_far = match self.near.first() {
+            Some(latest) => {
+                latest.before(&entry) && (self.near.len() >= NEAR || !self.far.is_empty())
+            }
+            None => !self.far.is_empty(),
+        };
+        if is_far {
+            self.far.push(entry);
+            return;
         }
+        // Among so few, walking from the earliest is faster than halving.
+        let mut at = self.near.len();
+        while at > 0 && self.near[at - 1].before(&entry) {
+            at -= 1;
+        }
+        self.near.insert(at, entry);
+        if self.near.len() > NEAR {
+            self.far.push(self.near.remove(0));
+        }
+    }
+
+    /// The earliest event that is not of the present instant's later steps.
+    #[inline]
+    fn timed(&mut self) -> Option<&Entry> {
+        if self.near.is_empty() && !self.far.is_empty() {
+            // From the heap they come in order: the earliest first, which belongs at the end.
+            self.near
+                .extend((0..NEAR / 2).map_while(|_| self.far.pop()));
+            self.near.reverse();
+        }
+        self.near.last()
     }
 
     /// Time and step of the next event.
     pub(crate) fn peek(&mut self) -> Option<Bound> {
-        self.drop_stale_top();
         let near = self.present.front().or(self.next.first()).map(Entry::bound);
-        let far = self.heap.peek().map(Entry::bound);
-        match (near, far) {
-            (Some(near), Some(far)) => Some(near.min(far)),
-            (near, far) => near.or(far),
+        let timed = self.timed().map(Entry::bound);
+        match (near, timed) {
+            (Some(near), Some(timed)) => Some(near.min(timed)),
+            (near, timed) => near.or(timed),
         }
     }
 
     /// Takes the event with the least key, if it comes before `bound`.
+    #[inline]
     pub(crate) fn pop_before(&mut self, bound: Bound) -> Option<Entry> {
-        self.drop_stale_top();
         if self.present.is_empty() && !self.next.is_empty() {
             self.advance_step();
         }
-        let entry = match (self.present.front(), self.heap.peek()) {
-            // Reversed order: the greater entry has the lesser key.
-            (Some(near), far) if near.bound() < bound && far.is_none_or(|far| near > far) => {
+        let timed = self.timed().copied();
+        let entry = match (self.present.front(), timed) {
+            (Some(step), timed)
+                if step.bound() < bound && timed.is_none_or(|timed| step.before(&timed)) =>
+            {
                 self.present.pop_front()?
             }
-            (_, Some(far)) if far.bound() < bound => {
-                self.stale_top = true;
-                *far
-            }
+            (_, Some(timed)) if timed.bound() < bound => self.near.pop()?,
             _ => return None,
         };
         self.now = Some(entry.bound());
         Some(entry)
     }
 
-    #[inline]
-    fn drop_stale_top(&mut self) {
-        if std::mem::take(&mut self.stale_top) {
-            self.heap.pop();
-        }
-    }
-
-    /// Moves the next step of this instant to the front, unless the heap still has events of the
-    /// step before: those may send more of them.
+    /// Moves the next step of this instant to the front, unless events of the step before are still
+    /// to come: those may send more of them.
     fn advance_step(&mut self) {
         let step = self.next[0].bound();
-        if self.heap.peek().is_some_and(|top| top.bound() < step) {
+        if self.timed().is_some_and(|earliest| earliest.bound() < step) {
             return;
         }
         // Greatest entry first is least key first.
@@ -183,16 +215,16 @@ impl Queue {
 
     /// Keeps the entries that `keep` accepts; for shedding cancelled timers.
     pub(crate) fn retain(&mut self, mut keep: impl FnMut(&Entry) -> bool) {
-        self.drop_stale_top();
-        self.heap.retain(|entry| keep(entry));
+        self.near.retain(|entry| keep(entry));
+        self.far.retain(|entry| keep(entry));
         self.present.retain(|entry| keep(entry));
         self.next.retain(|entry| keep(entry));
     }
 
     /// Everything left, in key order.
     pub(crate) fn drain_sorted(&mut self) -> Vec<Entry> {
-        self.drop_stale_top();
-        let mut rest: Vec<Entry> = self.heap.drain().collect();
+        let mut rest: Vec<Entry> = self.far.drain().collect();
+        rest.append(&mut self.near);
         rest.extend(self.present.drain(..));
         rest.append(&mut self.next);
         rest.sort_unstable_by(|a, b| b.cmp(a));
@@ -222,8 +254,8 @@ mod tests {
         /// come out in key order and none is lost.
         #[test]
         fn pops_in_key_order(
-            start in prop::collection::vec((0u64..4, 0u32..5), 1..20),
-            pushes in prop::collection::vec((0u64..3, 0u32..5), 0..200),
+            start in prop::collection::vec((0u64..4, 0u32..5), 1..120),
+            pushes in prop::collection::vec((0u64..90, 0u32..5), 0..400),
             windows in any::<bool>(),
         ) {
             let mut queue = Queue::default();
@@ -246,6 +278,8 @@ mod tests {
                     last = Some(popped.key());
                     taken += 1;
                     if let Some((delay, source)) = pushes.next() {
+                        // One in three at once, the others near and far.
+                        let delay = delay.saturating_sub(30);
                         count += 1;
                         let step = if delay == 0 { popped.bound().step + 1 } else { 0 };
                         queue.push(entry(popped.bound().time.as_nanos() + delay, step, source, count));

@@ -5,6 +5,8 @@
 //! written here and pinned by golden vectors, because those of general crates change between
 //! versions and platforms. Transcendental functions go through `libm`.
 
+mod ziggurat;
+
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128};
@@ -126,10 +128,11 @@ impl Stream {
     /// When `n` is zero: there is nothing to draw from.
     pub fn below(&mut self, n: u64) -> u64 {
         assert!(n > 0, "a draw below zero has no values");
-        let threshold = n.wrapping_neg() % n;
         loop {
             let wide = u128::from(self.next_u64()) * u128::from(n);
-            if wide as u64 >= threshold {
+            let low = wide as u64;
+            // The division decides only draws in the last, incomplete stretch: hardly ever needed.
+            if low >= n || low >= n.wrapping_neg() % n {
                 return (wide >> 64) as u64;
             }
         }
@@ -140,10 +143,10 @@ impl Stream {
         self.uniform() < probability
     }
 
-    /// Exponential with the given mean.
+    /// Exponential with the given mean (the ziggurat of Marsaglia and Tsang, *The Ziggurat Method
+    /// for Generating Random Variables*, 2000: one draw and no logarithm in 98.9 % of the calls).
     pub fn exponential(&mut self, mean: f64) -> f64 {
-        // 1 - u lies in (0, 1], so the logarithm is finite.
-        -mean * libm::log(1.0 - self.uniform())
+        mean * ziggurat::exponential(self)
     }
 
     /// Normal with the given mean and standard deviation (Box-Muller, one of the pair, so that
@@ -193,7 +196,7 @@ mod tests {
         let mut s = stream();
         assert_eq!(s.below(1000), 553);
         assert_eq!(s.uniform(), 0.3172701062907177);
-        assert_eq!(s.exponential(2.0), 1.9072704509685605);
+        assert_eq!(s.exponential(2.0), 1.2071562843991024);
         assert_eq!(s.normal(1.0, 2.0), -0.8770102719010568);
         let mut order: Vec<u8> = (0..8).collect();
         s.shuffle(&mut order);

@@ -7,24 +7,19 @@ use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Arc;
 
-use slab::Slab;
-
+use super::store::Store;
 use super::{
-    CellState, Class, Flow, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink,
-    hash_if_wanted,
+    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink, hash_if_wanted,
 };
 use crate::carrier::{Parcel, SealedChange, Verdict, Verdicts};
 use crate::context::TimerId;
 use crate::fault::{Fault, FaultCause};
 use crate::key::{EntityId, EventKey};
 use crate::message::{Message, Sealed};
-use crate::plan::{Kind, KindIndex, Plan};
+use crate::plan::{Kind, KindIndex, Plan, Reason};
 use crate::queue::{Entry, Queue};
 use crate::record::RecordClass;
 use crate::time::SimDuration;
-
-/// Cancelled timers are shed from the queue once there are this many, and more than half of it.
-const VOIDS_TO_SHED: usize = 1024;
 
 /// What happened in the event in hand besides the event: committed right after it.
 pub(crate) enum Effect {
@@ -45,8 +40,7 @@ pub(crate) struct Parts {
     index: u32,
     links: Vec<LinkCell>,
     pub(crate) queue: Queue,
-    pending: Slab<Pending>,
-    voids: usize,
+    store: Store,
     pub(crate) outgoing: Vec<Outgoing>,
     /// The key of the event in hand.
     key: EventKey,
@@ -76,8 +70,7 @@ impl Parts {
             index,
             links,
             queue: Queue::default(),
-            pending: Slab::new(),
-            voids: 0,
+            store: Store::default(),
             outgoing: Vec::new(),
             body: Vec::new(),
             effects: Vec::new(),
@@ -92,21 +85,22 @@ impl Parts {
         }
     }
 
-    #[inline]
-    pub(crate) fn insert(&mut self, key: EventKey, pending: Pending) -> u32 {
-        let slot =
-            u32::try_from(self.pending.insert(pending)).expect("fewer than 2^32 events wait");
+    #[inline(always)]
+    pub(crate) fn insert(
+        &mut self,
+        key: EventKey,
+        class: Class,
+        head: Head,
+        letter: Option<Sealed>,
+    ) -> u32 {
+        let slot = self.store.insert(class, head, letter);
         self.queue.push(Entry::new(key, slot));
         slot
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn take(&mut self, slot: u32) -> Pending {
-        let pending = self.pending.remove(slot as usize);
-        if pending.class == Class::Void {
-            self.voids -= 1;
-        }
-        pending
+        self.store.take(slot)
     }
 
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
@@ -180,11 +174,7 @@ impl Parts {
             match_key,
             delay,
         } = outbound;
-        let flow = state
-            .flows
-            .entry(u64::from(receiver.0) << 32 | u64::from(kind))
-            .or_default();
-        let (ordinal, repeat) = flow.advance(match_key);
+        let (ordinal, repeat) = state.next_in_flow(receiver.0, kind, match_key);
         let head = Head {
             receiver,
             kind: Some(kind),
@@ -192,7 +182,7 @@ impl Parts {
             repeat,
             match_key,
             cause: Some(self.key),
-            ..Head::of_entity(me, self.key.time)
+            ..Head::of_entity(me)
         };
         self.sends += 1;
         let (from, to) = (self.plan.place(me), self.plan.place(receiver));
@@ -236,16 +226,16 @@ impl Parts {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn schedule(&mut self, engine: u32, key: EventKey, class: Class, head: Head, letter: Sealed) {
-        let pending = Pending {
-            class,
-            head,
-            letter: Some(letter),
-        };
         if engine == self.index {
-            self.insert(key, pending);
+            self.insert(key, class, head, Some(letter));
         } else {
+            let pending = Pending {
+                class,
+                head,
+                letter: Some(letter),
+            };
             self.outgoing.push(Outgoing {
                 engine,
                 key,
@@ -325,7 +315,10 @@ impl Parts {
                     self.schedule(engine, key, Class::Message, head, own);
                 }
                 Verdict::Lose { after, reason } => {
-                    let head = Head { reason, ..head };
+                    let head = Head {
+                        reason: self.plan.intern(reason),
+                        ..head
+                    };
                     if after.is_zero() {
                         self.lose(head, &own, kind);
                     } else {
@@ -432,7 +425,7 @@ impl Parts {
                 Effect::Sample { entity, kind, body } => {
                     let head = Head {
                         cause: Some(self.key),
-                        ..Head::of_entity(entity, self.key.time)
+                        ..Head::of_entity(entity)
                     };
                     let body = &self.effect_bytes[body];
                     let mut record = head.record(&self.plan, RecordClass::Sample, self.key, body);
@@ -452,27 +445,16 @@ impl Parts {
         letter: Sealed,
         delay: SimDuration,
     ) -> TimerId {
-        let flow = state
-            .flows
-            .entry(u64::from(u32::MAX) << 32 | u64::from(kind))
-            .or_default();
-        let (ordinal, _) = flow.advance(None);
+        let (ordinal, _) = state.next_in_flow(u32::MAX, kind, None);
         let head = Head {
             kind: Some(kind),
             ordinal,
             cause: Some(self.key),
             incarnation: state.incarnation,
-            ..Head::of_entity(me, self.key.time)
+            ..Head::of_entity(me)
         };
         let key = self.later_key(me, &mut state.count, delay);
-        let slot = self.insert(
-            key,
-            Pending {
-                class: Class::Timer,
-                head,
-                letter: Some(letter),
-            },
-        );
+        let slot = self.insert(key, Class::Timer, head, Some(letter));
         // The ordinal tells a reused slot from this timer's.
         TimerId {
             slot,
@@ -482,31 +464,24 @@ impl Parts {
     }
 
     pub(crate) fn cancel_timer(&mut self, me: EntityId, timer: TimerId) -> bool {
-        let Some(pending) = self.pending.get_mut(timer.slot as usize) else {
-            return false;
-        };
-        let head = &pending.head;
-        let same = pending.class == Class::Timer
-            && head.receiver == me
-            && head.kind == Some(timer.kind)
-            && head.ordinal == timer.ordinal;
-        if same {
-            pending.class = Class::Void;
-            pending.letter = None;
-            self.voids += 1;
-            if self.voids >= VOIDS_TO_SHED && self.voids * 2 > self.pending.len() {
-                self.shed_voids();
-            }
+        let cancelled = self.store.cancel(timer.slot, |head| {
+            head.receiver == me && head.kind == Some(timer.kind) && head.ordinal == timer.ordinal
+        });
+        if cancelled && self.store.is_mostly_void() {
+            self.shed_voids();
         }
-        same
+        cancelled
     }
 
     fn shed_voids(&mut self) {
-        let pending = &mut self.pending;
-        self.queue
-            .retain(|entry| pending[entry.slot as usize].class != Class::Void);
-        pending.retain(|_, pending| pending.class != Class::Void);
-        self.voids = 0;
+        let store = &mut self.store;
+        self.queue.retain(|entry| {
+            let void = store.is_void(entry.slot);
+            if void {
+                store.take(entry.slot);
+            }
+            !void
+        });
     }
 
     pub(crate) fn apply_change(
@@ -574,25 +549,10 @@ impl Pending {
         Some((
             key,
             Head {
-                reason: "",
+                reason: Reason::default(),
                 ..self.head
             },
             body,
         ))
-    }
-}
-
-impl Flow {
-    /// The next ordinal, and how many messages before this one had the same match key.
-    fn advance(&mut self, match_key: Option<crate::message::MatchKey>) -> (u64, u32) {
-        let ordinal = self.next;
-        self.next += 1;
-        self.repeat = if match_key.is_some() && match_key == self.last_key {
-            self.repeat + 1
-        } else {
-            0
-        };
-        self.last_key = match_key;
-        (ordinal, self.repeat)
     }
 }

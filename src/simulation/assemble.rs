@@ -79,6 +79,7 @@ impl Simulation {
             routes: self.routes(&ranked)?,
             links,
             kind_of_type: kinds.of_type,
+            reasons: Mutex::default(),
             sample_kinds: Mutex::default(),
             step_limit: self.step_limit,
             digest: self.digest,

@@ -129,7 +129,7 @@ impl RockAbundance {
         }
         let mut rocks = Vec::new();
         // As many as exponential gaps of mean 1/expected fit into 1: a Poisson count.
-        let mut filled = stream.exponential(1.0);
+        let mut filled = gap(stream);
         while filled < expected {
             let x_m = stream.uniform_in(low_m.x, high_m.x);
             let y_m = stream.uniform_in(low_m.y, high_m.y);
@@ -138,10 +138,15 @@ impl RockAbundance {
                 position_m: Point2::new(x_m, y_m),
                 diameter_m,
             });
-            filled += stream.exponential(1.0);
+            filled += gap(stream);
         }
         Ok(rocks)
     }
+}
+
+/// An exponential gap of mean 1, by inversion: how it is drawn is part of what the built-in maps are.
+fn gap(stream: &mut Stream) -> f64 {
+    -libm::log(1.0 - stream.uniform())
 }
 
 #[cfg(test)]
