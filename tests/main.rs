@@ -1,3 +1,5 @@
 //! The tests that cross crates, one module for each behaviour.
 
 mod determinism;
+mod network_safety;
+mod network_team;

@@ -144,7 +144,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         tracing::info!("logging to {}", path.display());
         assembled.sim.observe(LogWriter::create(path, options)?);
     }
-    progress::show(&mut assembled.sim, scenario.shared().until);
+    let until = scenario.shared().until;
+    progress::show(&mut assembled.sim, assembled.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;

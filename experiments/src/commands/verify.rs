@@ -65,7 +65,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let verifier = Verifier::open(path)?;
     let handle = verifier.handle();
     assembled.sim.observe(verifier);
-    progress::show(&mut assembled.sim, scenario.shared().until);
+    let until = scenario.shared().until;
+    progress::show(&mut assembled.sim, assembled.goal, until);
     let interrupt = assembled.sim.interrupt();
     interrupt::raise_on_interrupt(interrupt);
     let executor = args.executor.executor(args.threads);
