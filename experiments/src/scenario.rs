@@ -424,7 +424,7 @@ fn part<'i>(
                 place: source.place(key.span().start),
                 found: name.to_owned(),
                 nearest: nearest(name, known()),
-                expected: known().collect::<Vec<_>>().join(", "),
+                expected: format!("one of {}", known().collect::<Vec<_>>().join(", ")),
                 within: String::new(),
             });
         }

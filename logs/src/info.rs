@@ -218,9 +218,9 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 info.metadata.insert(name, entries);
             }
             Item::Damage { offset, what, .. } => {
-                if info.missing.len() < MISSING_LIMIT {
-                    info.missing
-                        .push(format!("damaged at byte {offset}: {what}"));
+                let damage = format!("damaged at byte {offset}: {what}");
+                if info.missing.len() < MISSING_LIMIT && !info.missing.contains(&damage) {
+                    info.missing.push(damage);
                 }
             }
             Item::Cut { offset, what } => {

@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// The log
     #[arg(value_name = "RUN.mcap")]
     log: PathBuf,
-    /// How to execute: the result is the same
+    /// Execute on one thread (inline) or on many (kameo): the result is the same
     #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
     executor: ExecutorName,
     /// Threads for kameo; as many as there are cores unless given

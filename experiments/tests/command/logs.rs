@@ -69,6 +69,19 @@ fn two_runs_are_compared_and_a_cut_log_is_saved() {
     ] {
         assert!(!different["first"][key].is_null(), "{key}");
     }
+    let told = farside(folder.path(), &["diff", "a.mcap", "c.mcap"]);
+    let told = text(&told.stdout);
+    for part in [
+        "scenario: links.default.loss: 0.02 | 0.2",
+        "< only in a.mcap   > only in c.mcap",
+        "/node_*/assignments  (",
+        "--topics lists",
+    ] {
+        assert!(told.contains(part), "{part} is not in\n{told}");
+    }
+    assert!(told.lines().count() < 40, "{told}");
+    let all = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--topics"]);
+    assert!(text(&all.stdout).contains("/assignments\n") && !text(&all.stdout).contains("/node_*"));
     let trouble = farside(folder.path(), &["diff", "a.mcap", "missing.mcap"]);
     assert_eq!(trouble.status.code(), Some(2));
 
@@ -93,4 +106,18 @@ fn two_runs_are_compared_and_a_cut_log_is_saved() {
         );
         assert!(text(&verified.stdout).contains("as far as it goes"));
     }
+}
+
+#[test]
+fn what_is_in_a_log_fits_a_screen_unless_all_of_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    farside(folder.path(), &small(&[]));
+    let short = farside(folder.path(), &["info", "run.mcap"]);
+    let short = text(&short.stdout);
+    assert!(short.contains("/node_*/locations  ("), "{short}");
+    assert!(short.lines().count() < 50, "{short}");
+    let all = farside(folder.path(), &["info", "run.mcap", "--topics"]);
+    assert!(text(&all.stdout).contains("/node_02/locations"));
+    let everything = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
+    assert!(everything["topics"].as_array().unwrap().len() > 50);
 }

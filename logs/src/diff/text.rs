@@ -162,9 +162,14 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
             ordinal,
             fate,
         } = cause;
+        let who = if sender == receiver {
+            sender.clone()
+        } else {
+            format!("{sender} to {receiver}")
+        };
         writeln!(
             f,
-            "  because {time_s:.9} s {fate} {topic} ({sender} to {receiver}, {ordinal})"
+            "  because {time_s:.9} s {fate} {topic} ({who}, message {ordinal})"
         )?;
     }
     Ok(())
