@@ -165,9 +165,6 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("path ratio", format!("{:.2}", metrics.path_ratio));
         line("stops per rover", format!("{:.1}", metrics.mean_stops));
     }
-    if let Some(standstill) = &metrics.standstill {
-        line("standstill", standstill.clone());
-    }
     if metrics.collisions > 0 {
         let count = metrics.collisions;
         results.violations.push(format!("{count} collisions"));

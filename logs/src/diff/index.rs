@@ -111,10 +111,9 @@ impl Index {
                         return Err(LogError::damaged(path, frame, what));
                     }
                 }
-                Item::Metadata(name, entries) if mode == Mode::Farside => match name.as_str() {
-                    "farside.end" => end = Some(entries),
-                    _ => {}
-                },
+                Item::Metadata(name, entries) if mode == Mode::Farside && name == "farside.end" => {
+                    end = Some(entries);
+                }
                 Item::Damage { offset, what, .. } => {
                     return Err(LogError::damaged(path, offset, what));
                 }

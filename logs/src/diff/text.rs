@@ -169,7 +169,7 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
         };
         writeln!(
             f,
-            "  because {time_s:.9} s {fate} {topic} ({who}, message {ordinal})"
+            "  because {time_s:.9} s {fate} {topic} ({who}, number {ordinal})"
         )?;
     }
     Ok(())
