@@ -4,3 +4,5 @@ mod determinism;
 mod golden;
 mod house;
 mod layering;
+mod network_safety;
+mod network_team;

@@ -26,7 +26,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside_actors::units;
 use farside_experiments::cli;
 use farside_experiments::system::{
-    Conclude, Registry, Results, Settings, Setup, SetupError, System,
+    Conclude, Goal, Registry, Results, Settings, Setup, SetupError, System,
 };
 use serde::{Deserialize, Serialize};
 
@@ -175,6 +175,13 @@ impl Settings for PingScenario {
         setup.links.connect(sim, (rover, "rover"), (base, "base"));
         let pongs = Arc::new(AtomicU32::new(0));
         sim.observe(Pongs(pongs.clone()));
+        // What fills the progress bar; without it, the virtual time does.
+        let watched = pongs.clone();
+        setup.goal = Some(Goal {
+            what: "pings answered",
+            of: u64::from(count),
+            done: Box::new(move || u64::from(watched.load(Ordering::Relaxed))),
+        });
         Ok(Box::new(move |_report| {
             let answered = pongs.load(Ordering::Relaxed);
             let mut results = Results::default();

@@ -32,7 +32,7 @@ Examples:
 #[command(name = "farside", version, after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 struct Cli {
     /// Say more on stderr about what is done; twice for more (or set FARSIDE_LOG)
-    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    #[arg(short, long, action = clap::ArgAction::Count, global = true, display_order = 100)]
     verbose: u8,
     #[command(subcommand)]
     command: Command,

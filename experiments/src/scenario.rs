@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::system::{Conclude, Files, Registry, Settings, Setup, SetupError};
+use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
 pub use error::ScenarioError;
 pub use source::Place;
@@ -112,6 +112,8 @@ pub struct Assembled {
     pub sim: Simulation,
     /// Says what came of the run.
     pub conclude: Conclude,
+    /// What the run is to achieve, if the system says.
+    pub goal: Option<Goal>,
     /// The files that were read, for the log.
     pub files: Files,
 }
@@ -247,12 +249,15 @@ impl Scenario {
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
         let mut files = self.files.clone();
-        let conclude = self.settings.assemble(&mut Setup {
+        let mut setup = Setup {
             seed: self.shared.seed,
             sim: &mut sim,
             links: &mut links,
             files: &mut files,
-        });
+            goal: None,
+        };
+        let conclude = self.settings.assemble(&mut setup);
+        let goal = setup.goal;
         let conclude = conclude.map_err(wrong)?;
         links.finish().map_err(|error| wrong(error.into()))?;
         for (index, crash) in self.shared.crash.iter().enumerate() {
@@ -264,6 +269,7 @@ impl Scenario {
         Ok(Assembled {
             sim,
             conclude,
+            goal,
             files,
         })
     }
@@ -418,7 +424,7 @@ fn part<'i>(
                 place: source.place(key.span().start),
                 found: name.to_owned(),
                 nearest: nearest(name, known()),
-                expected: known().collect::<Vec<_>>().join(", "),
+                expected: format!("one of {}", known().collect::<Vec<_>>().join(", ")),
                 within: String::new(),
             });
         }

@@ -62,6 +62,18 @@ pub struct Setup<'a> {
     pub links: &'a mut LinkBuilder,
     /// Reads the files that the scenario names.
     pub files: &'a mut Files,
+    /// What the run is to achieve, for a progress bar; a system that knows sets it.
+    pub goal: Option<Goal>,
+}
+
+/// What a run is to achieve, in units that can be counted while it lasts.
+pub struct Goal {
+    /// What is counted: `rovers arrived`.
+    pub what: &'static str,
+    /// How many there are.
+    pub of: u64,
+    /// How many are done. Asked many times a second.
+    pub done: Box<dyn Fn() -> u64 + Send>,
 }
 
 /// Tells what came of a run.

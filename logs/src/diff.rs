@@ -3,15 +3,17 @@
 mod detail;
 mod index;
 mod matching;
+mod scenario;
+mod text;
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::LogError;
 use crate::fields::FieldDiff;
+use crate::log::Log;
 use crate::topics::Topics;
 use index::{Entry, Index, Mode, Names};
 
@@ -101,6 +103,10 @@ pub struct TopicDiff {
 /// How two logs differ.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DiffReport {
+    /// The first log's file.
+    pub file_a: String,
+    /// The second log's file.
+    pub file_b: String,
     /// True if nothing that was compared differs.
     pub identical: bool,
     /// The first difference.
@@ -151,7 +157,8 @@ pub fn diff(
     let (a, b) = (a.as_ref(), b.as_ref());
     // A glob that makes no sense is told before anything is read.
     Topics::new(&options.ignore)?;
-    let heads = [index::head(a)?, index::head(b)?];
+    let starts = [index::start(a)?, index::start(b)?];
+    let heads = starts.each_ref().map(|log| log.as_ref().map(Log::head));
     let mode = match heads.iter().flatten().count() {
         2 => Mode::Farside,
         _ => Mode::Any,
@@ -167,12 +174,20 @@ pub fn diff(
         b: Index::build(b, mode, &ignore, &mut names)?,
         mode,
         tolerance: options.tolerance,
-        report: DiffReport::default(),
+        report: DiffReport {
+            file_a: a.display().to_string(),
+            file_b: b.display().to_string(),
+            ..DiffReport::default()
+        },
         topics: BTreeMap::new(),
         earliest: None,
         names,
     };
-    comparison.note(strangers);
+    comparison.note_files(&text::short(a, b), strangers);
+    if let [Some(a), Some(b)] = &starts {
+        let notes = &mut comparison.report.notes;
+        scenario::note(notes, a, b);
+    }
     comparison.compare()?;
     comparison.finish()
 }
@@ -202,12 +217,12 @@ struct Comparison {
 type Order<'a> = (u64, u32, bool, &'a str, u64, bool, u32);
 
 impl Comparison {
-    fn note(&mut self, strangers: usize) {
+    fn note_files(&mut self, names: &(String, String), strangers: usize) {
         let notes = &mut self.report.notes;
         if strangers == 1 {
             notes.push("only one of the two is a Farside log: compared by topic".to_owned());
         }
-        for (name, index) in [("a", &self.a), ("b", &self.b)] {
+        for (name, index) in [(&names.0, &self.a), (&names.1, &self.b)] {
             match (&index.cut, &index.end) {
                 (Some((offset, what)), _) => {
                     notes.push(format!("{name} is cut at byte {offset}: {what}"));
@@ -219,29 +234,6 @@ impl Comparison {
                 }
                 _ => {}
             }
-        }
-        if let (Some(a), Some(b)) = (&self.a.head, &self.b.head) {
-            let pairs = [
-                ("seeds", a.seed.to_string(), b.seed.to_string()),
-                ("scenarios", a.scenario.clone(), b.scenario.clone()),
-                (
-                    "resolved scenarios",
-                    a.scenario_hash.clone(),
-                    b.scenario_hash.clone(),
-                ),
-                (
-                    "code versions",
-                    a.code_version.clone(),
-                    b.code_version.clone(),
-                ),
-                (
-                    "filtered topics",
-                    a.exclude.join(", "),
-                    b.exclude.join(", "),
-                ),
-            ];
-            let differing = pairs.into_iter().filter(|(_, a, b)| a != b);
-            notes.extend(differing.map(|(what, a, b)| format!("{what} differ: {a:?} and {b:?}")));
         }
     }
 
@@ -421,93 +413,4 @@ impl TopicDiff {
     fn differences(&self) -> u64 {
         self.changed + self.only_in_a + self.only_in_b + self.reordered
     }
-}
-
-impl fmt::Display for DiffReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for note in &self.notes {
-            writeln!(f, "note: {note}")?;
-        }
-        let Some(first) = &self.first else {
-            return writeln!(f, "identical: {} records compared", self.records_a);
-        };
-        write!(
-            f,
-            "first difference at {:.9} s on {}",
-            first.time_s, first.topic
-        )?;
-        if !first.sender.is_empty() {
-            write!(
-                f,
-                ": {} to {}, message {}",
-                first.sender, first.receiver, first.ordinal
-            )?;
-        }
-        if let Some(key) = &first.match_key {
-            write!(f, ", key {key}")?;
-        }
-        writeln!(f, "\n  {}: {} | {}", first.field, first.a, first.b)?;
-        if !first.link.is_empty() {
-            writeln!(f, "  on link {}", first.link)?;
-        }
-        if !first.reason.is_empty() {
-            writeln!(f, "  lost for {}", first.reason)?;
-        }
-        write_causes(f, first)?;
-        writeln!(
-            f,
-            "{} changed, {} only in a, {} only in b, {} reordered; of {} and {} records",
-            self.changed,
-            self.only_in_a,
-            self.only_in_b,
-            self.reordered,
-            self.records_a,
-            self.records_b
-        )?;
-        for topic in &self.topics {
-            let TopicDiff {
-                topic,
-                changed,
-                only_in_a,
-                only_in_b,
-                reordered,
-                ..
-            } = topic;
-            writeln!(
-                f,
-                "  {changed:>8} ~ {only_in_a:>8} < {only_in_b:>8} > {reordered:>8} ^  {topic}"
-            )?;
-        }
-        Ok(())
-    }
-}
-
-/// Causes that people are shown.
-const CAUSES_SHOWN: usize = 12;
-
-fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {
-    let count = first.causes.len();
-    for (at, cause) in first.causes.iter().enumerate() {
-        let last = at + 1 == count;
-        if at >= CAUSES_SHOWN && !last {
-            continue;
-        }
-        if last && count > CAUSES_SHOWN {
-            let omitted = first.causes_omitted + (count - 1 - CAUSES_SHOWN) as u64;
-            writeln!(f, "  ... {omitted} more ...")?;
-        }
-        let Cause {
-            time_s,
-            topic,
-            sender,
-            receiver,
-            ordinal,
-            fate,
-        } = cause;
-        writeln!(
-            f,
-            "  because {time_s:.9} s {fate} {topic} ({sender} to {receiver}, {ordinal})"
-        )?;
-    }
-    Ok(())
 }

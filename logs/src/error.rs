@@ -24,13 +24,13 @@ pub enum LogError {
         source: io::Error,
     },
     /// The file does not start like an MCAP file.
-    #[error("{path}: not an MCAP file: it starts with {actual}, not with {expected}")]
+    #[error("{path}: not an MCAP file: it {actual}; expected {expected} at its start")]
     NotMcap {
         /// The file.
         path: PathBuf,
         /// The magic bytes, in hexadecimal.
         expected: String,
-        /// What is there instead.
+        /// What is there instead, in words.
         actual: String,
     },
     /// A part of the file is damaged.

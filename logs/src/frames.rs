@@ -66,10 +66,10 @@ impl Frames {
             return Err(LogError::NotMcap {
                 path: path.to_owned(),
                 expected: hex(&MAGIC),
-                actual: if magic.is_empty() {
-                    "nothing".to_owned()
-                } else {
-                    hex(&magic)
+                actual: match magic.len() {
+                    0 => "is empty".to_owned(),
+                    length if length < MAGIC.len() => format!("has only {length} bytes"),
+                    _ => format!("starts with {}", hex(&magic)),
                 },
             });
         }

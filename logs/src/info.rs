@@ -8,6 +8,7 @@ use farside::Counts;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::group;
 use crate::log::Head;
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
 
@@ -217,9 +218,9 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 info.metadata.insert(name, entries);
             }
             Item::Damage { offset, what, .. } => {
-                if info.missing.len() < MISSING_LIMIT {
-                    info.missing
-                        .push(format!("damaged at byte {offset}: {what}"));
+                let damage = format!("damaged at byte {offset}: {what}");
+                if info.missing.len() < MISSING_LIMIT && !info.missing.contains(&damage) {
+                    info.missing.push(damage);
                 }
             }
             Item::Cut { offset, what } => {
@@ -260,6 +261,7 @@ fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelI
     topics.len() - 1
 }
 
+/// The alternate form, `{:#}`, lists every topic; else topics of numbered actors share a row.
 impl fmt::Display for LogInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{:<12} {} ({} bytes)", "file", self.path, self.bytes)?;
@@ -290,16 +292,7 @@ impl fmt::Display for LogInfo {
             self.messages,
             self.topics.len()
         )?;
-        for topic in &self.topics {
-            let TopicInfo {
-                topic,
-                messages,
-                bytes,
-                schema,
-                ..
-            } = topic;
-            writeln!(f, "  {messages:>9}  {bytes:>12} B  {topic}  {schema}")?;
-        }
+        self.write_topics(f)?;
         for attachment in &self.attachments {
             let AttachmentInfo {
                 name,
@@ -313,6 +306,42 @@ impl fmt::Display for LogInfo {
             )?;
         }
         Ok(())
+    }
+}
+
+impl LogInfo {
+    fn write_topics(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let alone = f.alternate() || self.topics.len() <= group::UNGROUPED;
+        let groups = group::groups(&self.topics, alone, |topic| &topic.topic);
+        let sum = |topics: &[&TopicInfo], of: fn(&TopicInfo) -> u64| -> u64 {
+            topics.iter().map(|topic| of(topic)).sum()
+        };
+        let mut rows: Vec<_> = groups
+            .iter()
+            .map(|(name, topics)| {
+                let bytes = sum(topics, |topic| topic.bytes);
+                (bytes, sum(topics, |topic| topic.messages), topics, name)
+            })
+            .collect();
+        if !alone {
+            // The largest first; groups come in name order, and a stable sort keeps it.
+            rows.sort_by_key(|row| std::cmp::Reverse(row.0));
+        }
+        writeln!(f, "{:>11}  {:>12}    topic", "messages", "bytes")?;
+        let shown = if alone { rows.len() } else { group::UNGROUPED };
+        for (bytes, messages, topics, name) in rows.iter().take(shown) {
+            write!(f, "{messages:>11}  {bytes:>12}    {name}")?;
+            match topics.as_slice() {
+                [topic] if topic.schema.is_empty() => writeln!(f)?,
+                [topic] => writeln!(f, "  {}", topic.schema)?,
+                topics => writeln!(f, "  ({} topics)", topics.len())?,
+            }
+        }
+        match rows.len().saturating_sub(shown) {
+            _ if alone => Ok(()),
+            0 => writeln!(f, "{:29}(--topics lists every topic)", ""),
+            more => writeln!(f, "{:29}and {more} more (--topics lists all)", ""),
+        }
     }
 }
 

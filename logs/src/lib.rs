@@ -47,6 +47,7 @@ mod envelope;
 mod error;
 mod fields;
 mod frames;
+mod group;
 mod info;
 mod log;
 mod parse;

@@ -38,7 +38,7 @@ impl RecoverReport {
     fn lose(&mut self, bytes: u64, what: String) {
         self.bytes_lost += bytes;
         self.losses += 1;
-        if self.lost.len() < DESCRIBED {
+        if self.lost.len() < DESCRIBED && self.lost.last() != Some(&what) {
             self.lost.push(what);
         }
     }

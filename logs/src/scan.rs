@@ -113,6 +113,9 @@ pub(crate) enum Item<'a> {
 enum Found {
     Message(MessageHead, Position),
     Other,
+    /// A message of so many bytes on a channel that is not declared, as behind damage: what
+    /// follows it can be read.
+    Stray(u64, String),
 }
 
 /// Reads a file from its start to its end.
@@ -174,6 +177,14 @@ impl Scanner {
                         self.last = Some((head, position, Within::Chunk));
                         return Ok(self.current().map(Item::Message));
                     }
+                    Ok(Found::Stray(bytes, what)) => {
+                        let offset = self.chunk_frame;
+                        return Ok(Some(Item::Damage {
+                            offset,
+                            bytes,
+                            what,
+                        }));
+                    }
                     Err(what) => {
                         let bytes = (self.chunk.len() - self.next_inner) as u64;
                         self.next_inner = self.chunk.len();
@@ -205,7 +216,7 @@ impl Scanner {
                     ..
                 } => self.data_ended = true,
                 Frame::Record { opcode, offset } => match self.top(opcode, offset) {
-                    Ok(Some(Found::Other)) | Err(None) => {}
+                    Ok(Some(Found::Other | Found::Stray(..))) | Err(None) => {}
                     Ok(Some(Found::Message(head, position))) => {
                         self.last = Some((head, position, Within::Frame));
                         return Ok(self.current().map(Item::Message));
@@ -390,7 +401,9 @@ impl Scanner {
         match opcode {
             op::MESSAGE => {
                 let head = MessageHead::parse(content).ok_or_else(malformed)?;
-                self.check_channel(head.channel)?;
+                if let Err(what) = self.check_channel(head.channel) {
+                    return Ok(Found::Stray(content.len() as u64, what));
+                }
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
                 let position = Position {
                     frame: self.chunk_frame,

@@ -429,14 +429,18 @@ impl LinkBuilder {
     fn nearest(&self, pattern: &Pattern) -> Option<String> {
         let mut candidates: BTreeSet<String> = self.names.iter().map(|name| shape(name)).collect();
         candidates.extend(self.names.iter().cloned());
-        if pattern.key[0] == "links" {
+        let distance = |name: &str| strsim::damerau_levenshtein(name, &pattern.text);
+        // Link names are long and `default` is short, so that anything short is nearer to it: only
+        // a slip of the keys counts.
+        if pattern.key[0] == "links" && distance("default") <= SLIP {
             candidates.insert("default".to_owned());
         }
-        candidates
-            .into_iter()
-            .min_by_key(|name| strsim::damerau_levenshtein(name, &pattern.text))
+        candidates.into_iter().min_by_key(|name| distance(name))
     }
 }
+
+/// How many letters a mistyped word may be off.
+const SLIP: usize = 3;
 
 /// The name with `*` for each run of digits.
 fn shape(name: &str) -> String {

@@ -241,6 +241,12 @@ impl Network {
         score.metrics(&self.site)
     }
 
+    /// How many rovers have arrived so far.
+    pub fn arrived(&self) -> u32 {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.arrived()
+    }
+
     /// The nodes' names, in order; hosts are called the same.
     pub fn node_names(&self) -> &[String] {
         &self.site.node_names

@@ -227,6 +227,11 @@ impl Score {
         }
     }
 
+    pub(crate) fn arrived(&self) -> u32 {
+        let arrived = self.tracks.iter().filter(|track| track.arrived.is_some());
+        arrived.count() as u32
+    }
+
     pub(crate) fn metrics(&self, site: &Site) -> NetworkMetrics {
         let mut metrics = NetworkMetrics {
             rovers: self.tracks.len() as u32,

@@ -15,7 +15,10 @@ pub(crate) struct Args {
     /// The other
     #[arg(value_name = "B.mcap")]
     b: PathBuf,
-    /// Print JSON
+    /// List every topic, not one row for `/node_01/grant`, `/node_02/grant`, ...
+    #[arg(long)]
+    topics: bool,
+    /// Print JSON, with every topic
     #[arg(long)]
     json: bool,
     /// Take numbers as equal that differ by at most this, absolutely or as a share
@@ -41,6 +44,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
     let report = farside_logs::diff(&args.a, &args.b, &options)?;
     if args.json {
         print_json(&report)?;
+    } else if args.topics {
+        print(format!("{report:#}"))?;
     } else {
         print(&report)?;
     }

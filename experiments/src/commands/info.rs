@@ -10,7 +10,10 @@ pub(crate) struct Args {
     /// The log; any MCAP file will do
     #[arg(value_name = "RUN.mcap")]
     log: PathBuf,
-    /// Print JSON
+    /// List every topic, not one row for `/node_01/grant`, `/node_02/grant`, ...
+    #[arg(long)]
+    topics: bool,
+    /// Print JSON, with every topic
     #[arg(long)]
     json: bool,
 }
@@ -19,6 +22,8 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
     let info = farside_logs::info(&args.log)?;
     if args.json {
         print_json(&info)?;
+    } else if args.topics {
+        print(format!("{info:#}"))?;
     } else {
         print(&info)?;
     }

@@ -41,7 +41,7 @@ pub(crate) struct Args {
     /// Stop at this virtual time, as in 90s
     #[arg(long, value_name = "DURATION", value_parser = duration, allow_hyphen_values = true)]
     until: Option<SimDuration>,
-    /// How to execute: the result is the same
+    /// Execute on one thread (inline) or on many (kameo): the result is the same
     #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
     executor: ExecutorName,
     /// Threads for kameo; as many as there are cores unless given
@@ -57,9 +57,7 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum ExecutorName {
-    /// On one thread
     Inline,
-    /// On many
     Kameo,
 }
 
@@ -144,7 +142,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         tracing::info!("logging to {}", path.display());
         assembled.sim.observe(LogWriter::create(path, options)?);
     }
-    progress::show(&mut assembled.sim, scenario.shared().until);
+    let until = scenario.shared().until;
+    progress::show(&mut assembled.sim, assembled.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;

@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// The log
     #[arg(value_name = "RUN.mcap")]
     log: PathBuf,
-    /// How to execute: the result is the same
+    /// Execute on one thread (inline) or on many (kameo): the result is the same
     #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
     executor: ExecutorName,
     /// Threads for kameo; as many as there are cores unless given
@@ -65,7 +65,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let verifier = Verifier::open(path)?;
     let handle = verifier.handle();
     assembled.sim.observe(verifier);
-    progress::show(&mut assembled.sim, scenario.shared().until);
+    let until = scenario.shared().until;
+    progress::show(&mut assembled.sim, assembled.goal, until);
     let interrupt = assembled.sim.interrupt();
     interrupt::raise_on_interrupt(interrupt);
     let executor = args.executor.executor(args.threads);

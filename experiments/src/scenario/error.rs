@@ -65,7 +65,7 @@ pub enum ScenarioError {
     },
     /// A key that does not exist.
     #[error(
-        "{place}: unknown key {found:?}{within}{}\n  expected one of {expected}{}",
+        "{place}: unknown key {found:?}{within}{}\n  expected {expected}{}",
         did_you_mean(.nearest), quoted(.place)
     )]
     UnknownKey {
@@ -158,7 +158,10 @@ impl ScenarioError {
             };
         };
         let nearest = nearest(found, expected.iter().copied());
-        let expected = expected.join(", ");
+        let expected = match expected {
+            [only] => (*only).to_owned(),
+            names => format!("one of {}", names.join(", ")),
+        };
         let found = (*found).to_owned();
         if unknown == 1 {
             return ScenarioError::UnknownValue {
@@ -166,7 +169,7 @@ impl ScenarioError {
                 key,
                 found,
                 nearest,
-                expected: format!("one of {expected}"),
+                expected,
             };
         }
         let table = key.rsplit_once('.').map(|(table, _)| table);

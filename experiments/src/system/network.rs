@@ -7,7 +7,7 @@ use farside_worlds::{Roadmap, SensorError, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{Conclude, Files, Results, Settings, Setup, SetupError, System};
+use super::{Conclude, Files, Goal, Results, Settings, Setup, SetupError, System};
 
 /// The most bytes of a roadmap file that are read; the reader itself takes no more than 1 MiB.
 const MAX_ROADMAP_BYTES: u64 = 2 << 20;
@@ -79,6 +79,13 @@ impl Settings for NetworkScenario {
             },
         );
         let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
+        let system = Arc::new(system);
+        let watched = system.clone();
+        setup.goal = Some(Goal {
+            what: "rovers arrived",
+            of: u64::from(self.team.rovers),
+            done: Box::new(move || u64::from(watched.arrived())),
+        });
         Ok(Box::new(move |_report| results(&system.metrics())))
     }
 }
@@ -157,9 +164,6 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("time ratio", format!("{:.2}", metrics.time_ratio));
         line("path ratio", format!("{:.2}", metrics.path_ratio));
         line("stops per rover", format!("{:.1}", metrics.mean_stops));
-    }
-    if let Some(standstill) = &metrics.standstill {
-        line("standstill", standstill.clone());
     }
     if metrics.collisions > 0 {
         let count = metrics.collisions;

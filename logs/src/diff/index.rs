@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::LogError;
 use crate::envelope::{KeyRef, RecordRef};
-use crate::log::Head;
+use crate::log::Log;
 use crate::scan::{Item, Position, ScannedMessage, Scanner};
 use crate::topics::Topics;
 
@@ -61,7 +61,6 @@ pub(super) struct Entry {
 pub(super) struct Index {
     pub(super) scanner: Scanner,
     pub(super) entries: Vec<Entry>,
-    pub(super) head: Option<Head>,
     pub(super) end: Option<BTreeMap<String, String>>,
     pub(super) cut: Option<(u64, String)>,
 }
@@ -76,9 +75,9 @@ pub(super) enum Mode {
 }
 
 /// What a Farside log says at its start; none for any other file.
-pub(super) fn head(path: &Path) -> Result<Option<Head>, LogError> {
-    match crate::log::Log::open(path) {
-        Ok(log) => Ok(Some(log.head().clone())),
+pub(super) fn start(path: &Path) -> Result<Option<Log>, LogError> {
+    match Log::open(path) {
+        Ok(log) => Ok(Some(log)),
         Err(LogError::NotFarside { .. } | LogError::Damaged { .. }) => Ok(None),
         Err(error) => Err(error),
     }
@@ -101,7 +100,7 @@ impl Index {
             entries: Vec::new(),
         };
         let mut scanner = Scanner::open(path)?;
-        let (mut head, mut end, mut cut) = (None, None, None);
+        let (mut end, mut cut) = (None, None);
         while let Some(item) = scanner.next()? {
             match item {
                 Item::Message(message) => {
@@ -112,11 +111,9 @@ impl Index {
                         return Err(LogError::damaged(path, frame, what));
                     }
                 }
-                Item::Metadata(name, entries) if mode == Mode::Farside => match name.as_str() {
-                    "farside" => head = Some(Head::read(path, &entries)?),
-                    "farside.end" => end = Some(entries),
-                    _ => {}
-                },
+                Item::Metadata(name, entries) if mode == Mode::Farside && name == "farside.end" => {
+                    end = Some(entries);
+                }
                 Item::Damage { offset, what, .. } => {
                     return Err(LogError::damaged(path, offset, what));
                 }
@@ -128,7 +125,6 @@ impl Index {
         Ok(Index {
             scanner,
             entries,
-            head,
             end,
             cut,
         })

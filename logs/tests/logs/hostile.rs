@@ -153,3 +153,38 @@ fn sizes_that_lie_cost_no_memory() {
         read_all(&file);
     }
 }
+
+#[test]
+fn a_message_on_an_unknown_channel_costs_only_itself() {
+    let mut channel = 1u16.to_le_bytes().to_vec();
+    channel.extend([0; 2]);
+    for text in ["/known", "json"] {
+        channel.extend((text.len() as u32).to_le_bytes());
+        channel.extend(text.as_bytes());
+    }
+    channel.extend([0; 4]);
+    let message = |channel: u16| [&channel.to_le_bytes()[..], &[0; 20], b"{}"].concat();
+    let records = [
+        (4u8, channel),
+        (5, message(1)),
+        (5, message(2)),
+        (5, message(2)),
+        (5, message(1)),
+    ];
+    let mut inner = Vec::new();
+    for (opcode, content) in records {
+        inner.push(opcode);
+        inner.extend((content.len() as u64).to_le_bytes());
+        inner.extend(content);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a");
+    std::fs::write(&path, unchecked(&inner)).unwrap();
+    let info = info(&path).unwrap();
+    assert_eq!(info.messages, 2);
+    let strays = info
+        .missing
+        .iter()
+        .filter(|what| what.contains("channel 2"));
+    assert_eq!(strays.count(), 1, "{:?}", info.missing);
+}

@@ -1,0 +1,123 @@
+//! Logs on the command line: verify, diff, recover.
+
+use crate::common::{farside, json, small, text};
+
+#[test]
+fn a_log_is_verified_by_running_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [
+        "--set",
+        "links.default.duplicate=0.1",
+        "--tie-seed",
+        "3",
+        "--seed",
+        "5",
+    ];
+    let run = json(&farside(
+        folder.path(),
+        &small(&[&["--json"], &sets[..]].concat()),
+    ));
+    let verified = farside(folder.path(), &["verify", "run.mcap", "--json"]);
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        text(&verified.stderr)
+    );
+    let verified = json(&verified);
+    assert_eq!(verified["result"], "same");
+    assert_eq!(verified["digest"], run["digest"]);
+    let said = farside(
+        folder.path(),
+        &["verify", "run.mcap", "--executor", "inline"],
+    );
+    assert!(text(&said.stdout).starts_with("run.mcap: the same: "));
+    let info = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
+    assert_eq!(info["run"]["seed"], 5);
+    assert_eq!(info["run"]["digest"], run["digest"]);
+}
+
+#[test]
+fn what_is_no_log_of_ours_is_trouble() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("x.mcap"), "not an MCAP file").unwrap();
+    std::fs::write(folder.path().join("empty.mcap"), "").unwrap();
+    for command in ["verify", "info"] {
+        for log in ["x.mcap", "empty.mcap", "missing.mcap", "."] {
+            let output = farside(folder.path(), &[command, log]);
+            assert_eq!(output.status.code(), Some(2), "{command} {log}");
+            assert!(text(&output.stderr).starts_with("error: "));
+        }
+    }
+}
+
+#[test]
+fn two_runs_are_compared_and_a_cut_log_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    farside(folder.path(), &small(&["--out", "a.mcap"]));
+    farside(folder.path(), &small(&["--out", "b.mcap"]));
+    let worse = ["--out", "c.mcap", "--set", "links.default.loss=0.2"];
+    farside(folder.path(), &small(&worse));
+    let same = farside(folder.path(), &["diff", "a.mcap", "b.mcap", "--json"]);
+    assert_eq!(same.status.code(), Some(0), "{}", text(&same.stdout));
+    assert_eq!(json(&same)["identical"], true);
+    let different = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--json"]);
+    assert_eq!(different.status.code(), Some(1));
+    let different = json(&different);
+    for key in [
+        "time_s", "topic", "sender", "receiver", "ordinal", "field", "a", "b", "causes",
+    ] {
+        assert!(!different["first"][key].is_null(), "{key}");
+    }
+    let told = farside(folder.path(), &["diff", "a.mcap", "c.mcap"]);
+    let told = text(&told.stdout);
+    for part in [
+        "scenario: links.default.loss: 0.02 | 0.2",
+        "< only in a.mcap   > only in c.mcap",
+        "/node_*/assignments  (",
+        "--topics lists",
+    ] {
+        assert!(told.contains(part), "{part} is not in\n{told}");
+    }
+    assert!(told.lines().count() < 40, "{told}");
+    let all = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--topics"]);
+    assert!(text(&all.stdout).contains("/assignments\n") && !text(&all.stdout).contains("/node_*"));
+    let trouble = farside(folder.path(), &["diff", "a.mcap", "missing.mcap"]);
+    assert_eq!(trouble.status.code(), Some(2));
+
+    let whole = std::fs::read(folder.path().join("a.mcap")).unwrap();
+    std::fs::write(
+        folder.path().join("cut.mcap"),
+        &whole[..whole.len() * 3 / 4],
+    )
+    .unwrap();
+    let saved = farside(
+        folder.path(),
+        &["recover", "cut.mcap", "--out", "saved.mcap"],
+    );
+    assert_eq!(saved.status.code(), Some(0), "{}", text(&saved.stderr));
+    for log in ["cut.mcap", "saved.mcap"] {
+        let verified = farside(folder.path(), &["verify", log]);
+        assert_eq!(
+            verified.status.code(),
+            Some(0),
+            "{}",
+            text(&verified.stderr)
+        );
+        assert!(text(&verified.stdout).contains("as far as it goes"));
+    }
+}
+
+#[test]
+fn what_is_in_a_log_fits_a_screen_unless_all_of_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    farside(folder.path(), &small(&[]));
+    let short = farside(folder.path(), &["info", "run.mcap"]);
+    let short = text(&short.stdout);
+    assert!(short.contains("/node_*/locations  ("), "{short}");
+    assert!(short.lines().count() < 50, "{short}");
+    let all = farside(folder.path(), &["info", "run.mcap", "--topics"]);
+    assert!(text(&all.stdout).contains("/node_02/locations"));
+    let everything = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
+    assert!(everything["topics"].as_array().unwrap().len() > 50);
+}

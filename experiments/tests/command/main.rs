@@ -1,0 +1,6 @@
+//! The `farside` command as a user meets it: what it prints where, and how it exits.
+
+mod common;
+mod logs;
+mod running;
+mod scenarios;

@@ -1,0 +1,176 @@
+//! A comparison as people read it: the first difference and its causes, then how far it spread.
+
+use std::fmt;
+use std::path::Path;
+
+use super::{Cause, DiffReport, FirstDifference, TopicDiff};
+use crate::group;
+
+/// Rows of the table that people are shown, unless they ask for all.
+const ROWS_SHOWN: usize = 15;
+
+/// Causes that people are shown.
+const CAUSES_SHOWN: usize = 12;
+
+/// The alternate form, `{:#}`, lists every topic; else topics of numbered actors share a row.
+impl fmt::Display for DiffReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
+        }
+        let Some(first) = &self.first else {
+            return writeln!(f, "identical: {} records compared", self.records_a);
+        };
+        write_first(f, first)?;
+        write_causes(f, first)?;
+        self.write_table(f)
+    }
+}
+
+/// The name of each file; their whole paths where the names are the same.
+pub(super) fn short<'a>(a: &'a Path, b: &'a Path) -> (String, String) {
+    let name = |path: &'a Path| path.file_name().map(Path::new).unwrap_or(path);
+    let (one, other) = match (name(a), name(b)) {
+        (one, other) if one == other => (a, b),
+        names => names,
+    };
+    (one.display().to_string(), other.display().to_string())
+}
+
+impl DiffReport {
+    fn write_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (a, b) = short(Path::new(&self.file_a), Path::new(&self.file_b));
+        writeln!(
+            f,
+            "\n{} records in {a}, {} in {b}; of these are",
+            self.records_a, self.records_b
+        )?;
+        writeln!(
+            f,
+            "  ~ changed   < only in {a}   > only in {b}   ^ reordered\n"
+        )?;
+        writeln!(f, "{:>8} {:>8} {:>8} {:>8}", "~", "<", ">", "^")?;
+        let all = f.alternate();
+        let groups = group::groups(&self.topics, all, |topic| &topic.topic);
+        let mut rows: Vec<(TopicDiff, usize)> = groups
+            .into_iter()
+            .map(|(name, topics)| (TopicDiff::sum(name, &topics), topics.len()))
+            .collect();
+        rows.sort_by_key(|(row, _)| std::cmp::Reverse(row.differences()));
+        let shown = if all { rows.len() } else { ROWS_SHOWN };
+        let grouped = rows.iter().any(|(_, topics)| *topics > 1);
+        for (row, topics) in rows.iter().take(shown) {
+            write_row(f, row, *topics)?;
+        }
+        let total = TopicDiff {
+            topic: "in all".to_owned(),
+            changed: self.changed,
+            only_in_a: self.only_in_a,
+            only_in_b: self.only_in_b,
+            reordered: self.reordered,
+            ..TopicDiff::default()
+        };
+        match (rows.len().saturating_sub(shown), grouped) {
+            (0, false) => {}
+            (0, true) => writeln!(f, "{:37}(--topics lists every topic)", "")?,
+            (more, _) => writeln!(f, "{:37}and {more} more (--topics lists all)", "")?,
+        }
+        write_row(f, &total, 1)
+    }
+}
+
+fn write_row(f: &mut fmt::Formatter<'_>, row: &TopicDiff, topics: usize) -> fmt::Result {
+    let count = |n: u64| match n {
+        0 => "-".to_owned(),
+        n => n.to_string(),
+    };
+    write!(
+        f,
+        "{:>8} {:>8} {:>8} {:>8}  {}",
+        count(row.changed),
+        count(row.only_in_a),
+        count(row.only_in_b),
+        count(row.reordered),
+        row.topic
+    )?;
+    if topics > 1 {
+        write!(f, "  ({topics} topics)")?;
+    }
+    writeln!(f)
+}
+
+impl TopicDiff {
+    fn sum(name: String, topics: &[&TopicDiff]) -> TopicDiff {
+        let mut sum = TopicDiff {
+            topic: name,
+            ..TopicDiff::default()
+        };
+        for topic in topics {
+            sum.a += topic.a;
+            sum.b += topic.b;
+            sum.changed += topic.changed;
+            sum.only_in_a += topic.only_in_a;
+            sum.only_in_b += topic.only_in_b;
+            sum.reordered += topic.reordered;
+        }
+        sum
+    }
+}
+
+fn write_first(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {
+    write!(
+        f,
+        "first difference at {:.9} s on {}",
+        first.time_s, first.topic
+    )?;
+    if !first.sender.is_empty() {
+        write!(
+            f,
+            ": {} to {}, message {}",
+            first.sender, first.receiver, first.ordinal
+        )?;
+    }
+    if let Some(key) = &first.match_key {
+        write!(f, ", key {key}")?;
+    }
+    writeln!(f, "\n  {}: {} | {}", first.field, first.a, first.b)?;
+    if !first.link.is_empty() {
+        writeln!(f, "  on link {}", first.link)?;
+    }
+    if !first.reason.is_empty() {
+        writeln!(f, "  lost for {}", first.reason)?;
+    }
+    Ok(())
+}
+
+fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {
+    let count = first.causes.len();
+    for (at, cause) in first.causes.iter().enumerate() {
+        let last = at + 1 == count;
+        if at >= CAUSES_SHOWN && !last {
+            continue;
+        }
+        if last && count > CAUSES_SHOWN {
+            let omitted = first.causes_omitted + (count - 1 - CAUSES_SHOWN) as u64;
+            writeln!(f, "  ... {omitted} more ...")?;
+        }
+        let Cause {
+            time_s,
+            topic,
+            sender,
+            receiver,
+            ordinal,
+            fate,
+        } = cause;
+        let who = if sender == receiver {
+            sender.clone()
+        } else {
+            format!("{sender} to {receiver}")
+        };
+        writeln!(
+            f,
+            "  because {time_s:.9} s {fate} {topic} ({who}, number {ordinal})"
+        )?;
+    }
+    Ok(())
+}
