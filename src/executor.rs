@@ -1,6 +1,6 @@
 //! Executors: how the events of a run meet processors. The result is the same.
 //!
-//! *Inline* runs everything on the calling thread. *Kameo* runs engines as kameo actors on tokio's
+//! *Inline* runs everything on the calling thread. *Kameo* runs engines in kameo actors on tokio's
 //! threads; light hosts share one engine, a host declared heavy has its own.
 
 mod inline;
