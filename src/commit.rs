@@ -107,6 +107,7 @@ impl Committer {
         report
     }
 
+    #[inline]
     fn count(&mut self, class: RecordClass, copy: u32, reason: &'static str, sends: u32) {
         let counts = &mut self.counts;
         counts.sent += u64::from(sends);

@@ -306,27 +306,23 @@ impl Engine {
         if key.step > self.parts.plan.step_limit {
             return Err(self.step_limit_fault(key, class, &head));
         }
-        match class {
-            Class::Void => Ok(()),
-            Class::Start => self.run_handler(class, RecordClass::Start, key, &head, None, sink),
-            Class::Timer => self.run_handler(class, RecordClass::Timer, key, &head, letter, sink),
+        let record = match class {
+            Class::Void => return Ok(()),
+            Class::Start => RecordClass::Start,
+            Class::Timer => RecordClass::Timer,
             Class::Message if self.is_crashed(head.receiver) => {
-                let head = Head {
-                    reason: self.parts.plan.intern("crashed"),
-                    ..head
-                };
-                self.commit(RecordClass::Lost, key, &head, sink);
-                Ok(())
+                let reason = self.parts.plan.intern("crashed");
+                self.commit(RecordClass::Lost, key, &Head { reason, ..head }, sink);
+                return Ok(());
             }
-            Class::Message => {
-                self.run_handler(class, RecordClass::Delivered, key, &head, letter, sink)
-            }
-            Class::HandOver => self.hand_over(key, head, letter, sink),
+            Class::Message => RecordClass::Delivered,
+            Class::HandOver => return self.hand_over(key, head, letter, sink),
             Class::LateLoss => {
                 self.commit(RecordClass::Lost, key, &head, sink);
-                Ok(())
+                return Ok(());
             }
-        }
+        };
+        self.run_handler(class, record, key, &head, letter, sink)
     }
 
     fn cell(&self, actor: EntityId) -> &ActorCell {
@@ -347,6 +343,7 @@ impl Engine {
     }
 
     /// Runs one handler, and commits the event if it did not fail.
+    #[inline(always)]
     fn run_handler(
         &mut self,
         class: Class,
@@ -455,6 +452,7 @@ impl Engine {
     }
 
     /// Commits the event just handled, then what happened in it.
+    #[inline]
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
         if parts.plan.recording() {
@@ -507,6 +505,7 @@ pub(crate) fn hash_if_wanted(plan: &Plan, record: &Record<'_>) -> u128 {
     }
 }
 
+#[inline(always)]
 fn invoke(
     cell: &mut ActorCell,
     parts: &mut Parts,

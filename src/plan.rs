@@ -232,6 +232,7 @@ impl Plan {
     }
 
     /// Completes a key with the tie hash that this run's tie seed gives it.
+    #[inline]
     pub(crate) fn key(&self, time: SimTime, step: u32, source: EntityId, count: u64) -> EventKey {
         let tie = match self.info.tie_seed {
             // `@control` comes first whatever the tie seed.

@@ -12,8 +12,9 @@ use crate::time::SimTime;
 /// An event's key and the slot of its payload: half a cache line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry {
-    /// Time, step and tie in one number: what nearly always decides, in one comparison.
-    head: u128,
+    time: SimTime,
+    /// Step and tie in one number.
+    rest: u64,
     count: u64,
     source: EntityId,
     pub(crate) slot: u32,
@@ -21,11 +22,10 @@ pub(crate) struct Entry {
 
 impl Entry {
     pub(crate) fn new(key: EventKey, slot: u32) -> Self {
-        let head = u128::from(key.time.as_nanos()) << 64
-            | u128::from(key.step) << 32
-            | u128::from(key.tie);
+        let rest = u64::from(key.step) << 32 | u64::from(key.tie);
         Entry {
-            head,
+            time: key.time,
+            rest,
             count: key.count,
             source: key.source,
             slot,
@@ -37,7 +37,7 @@ impl Entry {
         EventKey {
             time,
             step,
-            tie: self.head as u32,
+            tie: self.rest as u32,
             source: self.source,
             count: self.count,
         }
@@ -45,27 +45,31 @@ impl Entry {
 
     #[inline]
     fn bound(&self) -> Bound {
-        let time = SimTime::from_nanos((self.head >> 64) as u64);
         Bound {
-            time,
-            step: (self.head >> 32) as u32,
+            time: self.time,
+            step: (self.rest >> 32) as u32,
         }
     }
 
-    /// True if this entry's key comes first.
+    /// True if this entry's key comes first. The time nearly always decides.
     #[inline]
     fn before(&self, other: &Self) -> bool {
-        if self.head != other.head {
-            return self.head < other.head;
+        if self.time != other.time {
+            return self.time < other.time;
         }
-        (self.source, self.count) < (other.source, other.count)
+        (self.rest, self.source, self.count) < (other.rest, other.source, other.count)
     }
 }
 
 impl Ord for Entry {
     /// Reversed key order: the heap keeps its greatest entry on top, and we want the least key.
     fn cmp(&self, other: &Self) -> Ordering {
-        (other.head, other.source, other.count).cmp(&(self.head, self.source, self.count))
+        (other.time, other.rest, other.source, other.count).cmp(&(
+            self.time,
+            self.rest,
+            self.source,
+            self.count,
+        ))
     }
 }
 
@@ -116,7 +120,7 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn push(&mut self, entry: Entry) {
         if self.belongs_to_next_step(&entry) {
             self.next.push(entry);
@@ -182,7 +186,7 @@ impl Queue {
     }
 
     /// Takes the event with the least key, if it comes before `bound`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn pop_before(&mut self, bound: Bound) -> Option<Entry> {
         if self.present.is_empty() && !self.next.is_empty() {
             self.advance_step();

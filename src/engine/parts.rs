@@ -104,7 +104,7 @@ impl Parts {
     }
 
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn begin(
         &mut self,
         key: EventKey,
@@ -126,6 +126,7 @@ impl Parts {
         Ok(())
     }
 
+    #[inline]
     pub(crate) fn kind_of(&mut self, type_id: TypeId) -> Option<KindIndex> {
         match self.last_kind {
             Some((last, kind)) if last == type_id => Some(kind),
@@ -215,7 +216,7 @@ impl Parts {
     }
 
     /// The key that `source` gives an event `delay` from now.
-    #[inline]
+    #[inline(always)]
     fn later_key(&self, source: EntityId, count: &mut u64, delay: SimDuration) -> EventKey {
         let own = *count;
         *count += 1;
