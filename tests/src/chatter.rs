@@ -17,9 +17,9 @@ pub struct Chatter {
     pub tie_seed: Option<u64>,
     /// How many actors live on each host; a host is heavy if its number is odd.
     pub hosts: Vec<u8>,
-    /// Least delay of every link [ns]; 0 means no look-ahead at all.
+    /// Least delay of every link (ns); 0 means no look-ahead at all.
     pub min_delay_ns: u64,
-    /// Jitter on top, uniform [ns].
+    /// Jitter on top, uniform (ns).
     pub jitter_ns: u64,
     /// Loss and duplication probability of the links, in 1/16.
     pub loss_16: u8,
@@ -27,13 +27,13 @@ pub struct Chatter {
     pub copies_16: u8,
     /// Even hosts send through one shared link.
     pub shared: bool,
-    /// Crash and restart events: actor, time [ns], and whether it is a restart.
+    /// Crash and restart events: actor, time (ns), and whether it is a restart.
     pub controls: Vec<(u8, u64, bool)>,
     /// After how many messages handled by one actor it asks to stop; 0 for never.
     pub stop_after: u32,
     /// After how many messages handled by one actor it fails, by error or, if odd, by panic.
     pub fail_after: u32,
-    /// End of the run [ns].
+    /// End of the run (ns).
     pub until_ns: u64,
 }
 
