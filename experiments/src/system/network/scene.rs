@@ -249,3 +249,116 @@ fn text(level: Level, name: &str, message: &str) -> Drawing {
         message: message.to_owned(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use farside::prelude::*;
+    use farside::record::{Flow, Observer, ObserverError};
+    use farside_actors::network::{NetworkConfig, Sabotage, TeamConfig, WorldConfig, assemble};
+
+    use super::*;
+
+    /// Shows the scene what a log writer would.
+    struct Show(NetworkScene, Option<Arc<RunInfo>>, Arc<Mutex<Vec<Drawing>>>);
+
+    impl Observer for Show {
+        fn wants(&self) -> farside::record::Wants {
+            farside::record::Wants {
+                bodies: true,
+                samples: true,
+                checkpoints: false,
+            }
+        }
+
+        fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+            self.0.begin(run, &mut self.2.lock().unwrap());
+            self.1 = Some(run.clone());
+            Ok(())
+        }
+
+        fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+            let run = self.1.as_ref().unwrap();
+            self.0.record(record, run, &mut self.2.lock().unwrap());
+            Ok(Flow::Continue)
+        }
+    }
+
+    /// What is drawn of a small team, and how many collisions there were.
+    fn drawn(rovers: u32, sabotage: Sabotage) -> (Vec<Drawing>, u32) {
+        let world = WorldConfig::default();
+        let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+        let sensors = Arc::new(world.place(&roadmap, 1).unwrap());
+        let network = NetworkConfig {
+            sabotage,
+            ..NetworkConfig::default()
+        };
+        let mut sim = Simulation::new(1);
+        let wire = FixedDelay::new(SimDuration::from_millis(5));
+        let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), to: (HostId, &str)| {
+            sim.link(a, to.0, &format!("{from}-{}", to.1), wire.clone());
+        };
+        let (map, posts, team) = (roadmap.clone(), sensors.clone(), TeamConfig { rovers });
+        let system = assemble(
+            &mut sim,
+            &world,
+            map,
+            posts,
+            &team,
+            &network,
+            1,
+            &mut connect,
+        );
+        let system = Arc::new(system.unwrap());
+        let drawings = Arc::new(Mutex::new(Vec::new()));
+        let scene = NetworkScene::new(roadmap, sensors, system.clone());
+        sim.observe(Show(scene, None, drawings.clone()));
+        sim.stop_at(SimTime::ZERO + SimDuration::from_secs(120), "enough");
+        sim.run(Executor::Inline).unwrap();
+        let drawings = drawings.lock().unwrap().clone();
+        (drawings, system.collisions())
+    }
+
+    fn count(drawings: &[Drawing], counted: impl Fn(&Drawing) -> bool) -> usize {
+        drawings.iter().filter(|drawing| counted(drawing)).count()
+    }
+
+    #[test]
+    fn each_rover_is_drawn_once_and_removed_once() {
+        let (drawings, _) = drawn(3, Sabotage::None);
+        let rover = |id: &str| id.starts_with("rover_");
+        let come = count(
+            &drawings,
+            |d| matches!(d, Drawing::Entity { id, .. } if rover(id)),
+        );
+        let gone = count(
+            &drawings,
+            |d| matches!(d, Drawing::Remove { id } if rover(id)),
+        );
+        assert_eq!((come, gone), (3, 3));
+        assert!(matches!(&drawings[0], Drawing::Entity { id, .. } if id == "roadmap"));
+        let moves = count(&drawings, |d| matches!(d, Drawing::Transform { .. }));
+        assert!(moves > 6, "{moves}");
+    }
+
+    #[test]
+    fn collisions_are_told() {
+        let told = |d: &Drawing| {
+            matches!(
+                d,
+                Drawing::Text {
+                    level: Level::Error,
+                    ..
+                }
+            )
+        };
+        assert_eq!(count(&drawn(3, Sabotage::None).0, told), 0);
+        let (drawings, collisions) = drawn(30, Sabotage::MoveUnbidden(0.5));
+        let texts = count(&drawings, told);
+        assert!(
+            collisions > 0 && texts > 0 && texts <= collisions as usize,
+            "{texts} texts of {collisions} collisions"
+        );
+    }
+}
