@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use farside::{SimDuration, SimTime, Simulation};
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::units;
+use farside_logs::Scene;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -90,11 +91,22 @@ pub struct Crash {
 }
 
 /// The `[log]` table.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogSettings {
     /// Topics that are not written, as globs; `*` does not match `/`, `**` does.
     pub exclude: Vec<String>,
+    /// Whether the log holds what viewers draw: `/tf`, `/scene`, `/poses/...`, `/log`.
+    pub viewer: bool,
+}
+
+impl Default for LogSettings {
+    fn default() -> Self {
+        LogSettings {
+            exclude: Vec::new(),
+            viewer: true,
+        }
+    }
 }
 
 /// A scenario, read and resolved.
@@ -114,6 +126,8 @@ pub struct Assembled {
     pub conclude: Conclude,
     /// What the run is to achieve, if the system says.
     pub goal: Option<Goal>,
+    /// Draws the run for viewers, if the system can.
+    pub scene: Option<Box<dyn Scene>>,
     /// The files that were read, for the log.
     pub files: Files,
 }
@@ -255,9 +269,10 @@ impl Scenario {
             links: &mut links,
             files: &mut files,
             goal: None,
+            scene: None,
         };
         let conclude = self.settings.assemble(&mut setup);
-        let goal = setup.goal;
+        let (goal, scene) = (setup.goal, setup.scene);
         let conclude = conclude.map_err(wrong)?;
         links.finish().map_err(|error| wrong(error.into()))?;
         for (index, crash) in self.shared.crash.iter().enumerate() {
@@ -270,6 +285,7 @@ impl Scenario {
             sim,
             conclude,
             goal,
+            scene,
             files,
         })
     }

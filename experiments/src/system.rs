@@ -15,6 +15,7 @@ mod files;
 
 use farside::{Report, Simulation};
 use farside_actors::link::{LinkBuilder, LinkConfigError};
+use farside_logs::Scene;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
@@ -64,6 +65,8 @@ pub struct Setup<'a> {
     pub files: &'a mut Files,
     /// What the run is to achieve, for a progress bar; a system that knows sets it.
     pub goal: Option<Goal>,
+    /// Draws the run for viewers; a system that can sets it.
+    pub scene: Option<Box<dyn Scene>>,
 }
 
 /// What a run is to achieve, in units that can be counted while it lasts.

@@ -68,6 +68,11 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
+    /// True for topics that are not written.
+    pub(crate) fn excludes(&self, topic: &str) -> bool {
+        self.exclude.matches(topic)
+    }
+
     pub(crate) fn new(run: Arc<RunInfo>, exclude: Topics) -> Self {
         Encoder {
             run,

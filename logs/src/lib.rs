@@ -25,6 +25,10 @@
 //! | `/event/change/{link}` | a link was changed | when | when |
 //! | `/event/stop` | the run was stopped | when | when |
 //! | `/state/{actor}/{kind}` | a state sample; never compared | when | when |
+//! | `/tf` | drawn: frames, `foxglove.FrameTransforms` | when | when |
+//! | `/scene` | drawn: shapes, and deletions, `foxglove.SceneUpdate` | when | when |
+//! | `/poses/...` | drawn: where something is, `foxglove.PosesInFrame` | when | when |
+//! | `/log` | drawn: text, `foxglove.Log` | when | when |
 //! | `farside/checkpoint` | digest, and a 32-bit hash of each record since the last one | when | when |
 //!
 //! `kind` is the serde name of the message's type in `snake_case`. Each message is an envelope, the
@@ -33,8 +37,9 @@
 //! `cause`, `match_key` and `body`. What has no body is a `farside.log.Event`. State samples are
 //! their own type, without an envelope.
 //!
-//! `role` in a channel's metadata is `message`, `event`, `state` or `checkpoint`; readers skip the
-//! roles that they do not know. Metadata: `farside` (format, code version, seed, scenario),
+//! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
+//! skip the roles that they do not know. What is drawn ([`Scene`]) is derived from the records, in
+//! Foxglove's published schemas, and never compared. Metadata: `farside` (format, code version, seed, scenario),
 //! `farside.run`, `farside.host` (what may differ between machines), and at the end `farside.end`
 //! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
 //! scenario as `scenario.toml`, and the files that it read.
@@ -53,6 +58,7 @@ mod log;
 mod parse;
 mod recover;
 mod scan;
+mod scene;
 mod topics;
 mod verify;
 mod wire;
@@ -65,5 +71,6 @@ pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
+pub use scene::{Drawing, Form, Level, Pose, Scene, Shape};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

@@ -5,6 +5,7 @@
 //! only; when the disk cannot keep up, a bounded queue makes the run wait, and nothing else.
 
 mod thread;
+mod viewer;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,10 +19,12 @@ use xxhash_rust::xxh3::xxh3_128;
 use crate::LogError;
 use crate::descriptors::{self, SchemaOf};
 use crate::envelope::{Encoder, put_key};
+use crate::scene::Scene;
 use crate::topics::{self, CHECKPOINT, Topics};
 use crate::wire::{put_bytes, put_number, put_text};
 pub(crate) use thread::options as mcap_options;
 use thread::{Batch, Declaration, File, Header, Worker};
+use viewer::Stage;
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
 pub(crate) const FORMAT_MAJOR: u32 = 1;
@@ -80,7 +83,7 @@ pub enum Compression {
 /// };
 /// assert_eq!(options.epoch_ns, 0);
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct LogOptions {
     /// The scenario's name.
     pub scenario: String,
@@ -96,7 +99,10 @@ pub struct LogOptions {
     pub attachments: Vec<Attachment>,
     /// Topics that are not written, as globs; `*` does not match `/`, `**` does.
     pub exclude: Vec<String>,
-    /// Added to every time that MCAP itself stores, in nanoseconds since 1970.
+    /// Draws the run for viewers.
+    pub scene: Option<Box<dyn Scene>>,
+    /// Added to every time that MCAP itself stores, and that viewers are told, in nanoseconds since
+    /// 1970.
     pub epoch_ns: u64,
     /// How chunks are compressed.
     pub compression: Compression,
@@ -150,6 +156,8 @@ struct Live {
     /// From the first message in flight on: their `log_time` is the end, which is not known yet.
     at_end: Batch,
     checkpoint_channel: u16,
+    /// None if nothing is drawn.
+    stage: Option<Stage>,
     epoch_ns: u64,
     last_ns: u64,
     written: u64,
@@ -244,18 +252,22 @@ impl LogWriter {
             "",
             descriptors::checkpoint,
         )?;
-        Ok(Live {
+        let scene = self.options.scene.take();
+        let mut live = Live {
             encoder: Encoder::new(run.clone(), exclude),
             channels,
             worker,
             batch,
             at_end: Batch::default(),
             checkpoint_channel,
+            stage: scene.map(|scene| Stage::new(scene, run.clone())),
             epoch_ns: self.options.epoch_ns,
             last_ns: 0,
             written: 0,
             checkpoints: 0,
-        })
+        };
+        live.draw_begin()?;
+        Ok(live)
     }
 }
 
@@ -321,7 +333,7 @@ impl Live {
         let flow = &mut self.encoder.flows[index];
         if flow.excluded {
             self.last_ns = self.last_ns.max(self.log_time(record.class, &record.key));
-            return Ok(());
+            return self.draw(record);
         }
         let channel = match flow.channel {
             Some(channel) => channel,
@@ -359,6 +371,7 @@ impl Live {
             batch.message(header, |out| encoder.encode(index, record, out));
         }
         self.written += 1;
+        self.draw(record)?;
         self.hand_over_if_full()
     }
 

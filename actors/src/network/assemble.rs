@@ -247,6 +247,12 @@ impl Network {
         score.arrived()
     }
 
+    /// How many collisions there were so far.
+    pub fn collisions(&self) -> u32 {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.collisions()
+    }
+
     /// The nodes' names, in order; hosts are called the same.
     pub fn node_names(&self) -> &[String] {
         &self.site.node_names

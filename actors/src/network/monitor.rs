@@ -227,6 +227,10 @@ impl Score {
         }
     }
 
+    pub(crate) fn collisions(&self) -> u32 {
+        self.collisions
+    }
+
     pub(crate) fn arrived(&self) -> u32 {
         let arrived = self.tracks.iter().filter(|track| track.arrived.is_some());
         arrived.count() as u32

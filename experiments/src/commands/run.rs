@@ -138,7 +138,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     assembled.sim.tie_seed(args.tie_seed);
     let log = (!args.no_log).then_some(&args.out);
     if let Some(path) = log {
-        let options = log_options(&scenario, &assembled, executor)?;
+        let mut options = log_options(&scenario, &assembled, executor)?;
+        let draws = scenario.shared().log.viewer;
+        options.scene = assembled.scene.take().filter(|_| draws);
         tracing::info!("logging to {}", path.display());
         assembled.sim.observe(LogWriter::create(path, options)?);
     }

@@ -1,11 +1,15 @@
 //! The network-guided system, as scenarios see it: `[world]`, `[team]`, `[network]`.
 
+mod scene;
+
 use std::sync::Arc;
 
 use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
 use farside_worlds::{Roadmap, SensorError, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+use scene::NetworkScene;
 
 use super::{Conclude, Files, Goal, Results, Settings, Setup, SetupError, System};
 
@@ -65,12 +69,13 @@ impl Settings for NetworkScenario {
             SetupError::value(key, error)
         })?;
         let (world, team, settings) = (&self.world, &self.team, &self.network);
+        let (map, posts) = (roadmap.clone(), Arc::new(sensors));
         let links = &mut *setup.links;
         let system = network::assemble(
             setup.sim,
             world,
             roadmap,
-            Arc::new(sensors),
+            posts.clone(),
             team,
             settings,
             setup.seed,
@@ -80,6 +85,7 @@ impl Settings for NetworkScenario {
         );
         let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
         let system = Arc::new(system);
+        setup.scene = Some(Box::new(NetworkScene::new(map, posts, system.clone())));
         let watched = system.clone();
         setup.goal = Some(Goal {
             what: "rovers arrived",

@@ -180,7 +180,7 @@ impl Builder<'_> {
         let topic = &message.channel.topic;
         let compared = match self.mode {
             Mode::Farside => matches!(message.channel.role(), "message" | "event"),
-            Mode::Any => !matches!(message.channel.role(), "state" | "checkpoint" | "view"),
+            Mode::Any => !matches!(message.channel.role(), "state" | "checkpoint" | "viewer"),
         };
         let entry = ChannelEntry {
             topic: self.names.number(topic),

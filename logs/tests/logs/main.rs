@@ -7,4 +7,5 @@ mod python;
 mod reading;
 mod recovering;
 mod verifying;
+mod viewing;
 mod writing;

@@ -1,0 +1,364 @@
+//! The network-guided system as viewers draw it: the roadmap, the nodes, and rovers that drive.
+//!
+//! All of it is told by committed samples: a rover's frame is placed when it sets out and when it
+//! arrives, and viewers move it in between.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::sync::Arc;
+
+use farside::RunInfo;
+use farside::record::{Record, RecordClass};
+use farside_actors::network::Network;
+use farside_actors::network::messages::RoverState;
+use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
+use farside_worlds::{Roadmap, SensorNetwork, VertexId};
+
+/// The frame that everything is placed in.
+const MAP: &str = "map";
+
+const ROADS: [f64; 4] = [0.55, 0.5, 0.45, 1.0];
+const NODES: [f64; 4] = [0.25, 0.6, 0.95, 0.9];
+const ROVERS: [f64; 4] = [0.95, 0.55, 0.1, 1.0];
+const NAMES: [f64; 4] = [1.0, 1.0, 1.0, 1.0];
+
+pub(super) struct NetworkScene {
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    system: Arc<Network>,
+    /// The shortest edge \[m\]: what is drawn is as large as fits.
+    scale_m: f64,
+    /// By the number of the actor in the run; none for those that are no rovers.
+    rovers: Vec<Option<Seen>>,
+    collisions: u32,
+}
+
+/// A rover as it was last drawn.
+#[derive(Clone, Copy)]
+struct Seen {
+    on_the_map: bool,
+    heading: [f64; 2],
+}
+
+impl fmt::Debug for NetworkScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "NetworkScene({})", self.roadmap.name())
+    }
+}
+
+impl NetworkScene {
+    pub(super) fn new(
+        roadmap: Arc<Roadmap>,
+        sensors: Arc<SensorNetwork>,
+        system: Arc<Network>,
+    ) -> Self {
+        let length = |&(u, v): &(VertexId, VertexId)| {
+            let step = roadmap.position_m(v) - roadmap.position_m(u);
+            (step.x * step.x + step.y * step.y).sqrt()
+        };
+        let shortest = roadmap.edges().iter().map(length).reduce(f64::min);
+        NetworkScene {
+            scale_m: shortest.unwrap_or(1.0),
+            roadmap,
+            sensors,
+            system,
+            rovers: Vec::new(),
+            collisions: 0,
+        }
+    }
+
+    fn place(&self, vertex: VertexId) -> [f64; 3] {
+        let position = self.roadmap.position_m(vertex);
+        [position.x, position.y, self.roadmap.height_m(vertex)]
+    }
+
+    fn roads(&self) -> Drawing {
+        let ends = |&(u, v): &(VertexId, VertexId)| [self.place(u), self.place(v)];
+        let points_m = self.roadmap.edges().iter().flat_map(ends).collect();
+        let lines = Form::Lines {
+            points_m,
+            thickness_m: 0.06 * self.scale_m,
+        };
+        Drawing::Entity {
+            id: "roadmap".to_owned(),
+            frame: MAP.to_owned(),
+            shapes: vec![shape(lines, [0.0; 3], ROADS)],
+        }
+    }
+
+    /// The nodes' places: as high as the nearest vertex, because heights are known at vertices.
+    fn posts(&self) -> Vec<[f64; 3]> {
+        let post = |node| {
+            let at = self.sensors.position_m(node);
+            let distance = |v: &VertexId| (self.roadmap.position_m(*v) - at).norm_squared();
+            let near = |a: &VertexId, b: &VertexId| distance(a).total_cmp(&distance(b));
+            let nearest = self.roadmap.vertices().min_by(near);
+            let height_m = nearest.map_or(0.0, |v| self.roadmap.height_m(v));
+            [at.x, at.y, height_m]
+        };
+        self.sensors.nodes().map(post).collect()
+    }
+
+    fn node(&self, name: &str, [x, y, z]: [f64; 3]) -> Drawing {
+        let diameter_m = 0.4 * self.scale_m;
+        let ball = shape(Form::Sphere { diameter_m }, [x, y, z], NODES);
+        Drawing::Entity {
+            id: name.to_owned(),
+            frame: MAP.to_owned(),
+            shapes: vec![ball, self.label(name, [x, y, z + diameter_m])],
+        }
+    }
+
+    fn label(&self, name: &str, position_m: [f64; 3]) -> Shape {
+        let label = Form::Label {
+            text: name.to_owned(),
+            height_m: 0.25 * self.scale_m,
+        };
+        shape(label, position_m, NAMES)
+    }
+
+    /// A rover, in its own frame: it is drawn once, and its frame moves.
+    fn rover(&self, name: &str) -> Drawing {
+        let size_m = [0.5, 0.35, 0.25].map(|part| part * self.scale_m);
+        let above = |height: f64| [0.0, 0.0, height * self.scale_m];
+        Drawing::Entity {
+            id: name.to_owned(),
+            frame: base_link(name),
+            shapes: vec![
+                shape(Form::Cube { size_m }, above(0.125), ROVERS),
+                self.label(name, above(0.4)),
+            ],
+        }
+    }
+
+    /// A rover's sample: where it is now, and which way it faces.
+    fn follow(&self, name: &str, seen: &mut Seen, state: &RoverState, out: &mut Vec<Drawing>) {
+        let whereabouts = &state.whereabouts;
+        let Some(vertex) = whereabouts.vertex else {
+            if seen.on_the_map {
+                seen.on_the_map = false;
+                out.push(Drawing::Remove {
+                    id: name.to_owned(),
+                });
+                out.push(poses(name, Vec::new()));
+                out.push(text(Level::Info, name, "arrived and left"));
+            }
+            return;
+        };
+        let position_m = self.place(vertex);
+        if let Some(to) = whereabouts.moving_to {
+            let [x, y, _] = self.place(to);
+            seen.heading = [x - position_m[0], y - position_m[1]];
+        }
+        let pose = Pose {
+            position_m,
+            heading: seen.heading,
+        };
+        out.push(Drawing::Transform {
+            parent: MAP.to_owned(),
+            child: base_link(name),
+            pose,
+        });
+        if !seen.on_the_map {
+            seen.on_the_map = true;
+            out.push(self.rover(name));
+        }
+        out.push(poses(name, vec![pose]));
+    }
+
+    /// The monitor sees each sample before it is logged, and counts.
+    fn tell_collisions(&mut self, name: &str, out: &mut Vec<Drawing>) {
+        let collisions = self.system.collisions();
+        if collisions > self.collisions {
+            let message = "collision: it is where another rover is, or is bound to be";
+            out.push(text(Level::Error, name, message));
+        }
+        self.collisions = collisions;
+    }
+}
+
+impl Scene for NetworkScene {
+    fn begin(&mut self, run: &RunInfo, out: &mut Vec<Drawing>) {
+        let names: BTreeSet<&String> = self.system.rover_names().iter().collect();
+        let seen = |entity: &farside::Entity| {
+            names.contains(&entity.name).then_some(Seen {
+                on_the_map: false,
+                heading: [1.0, 0.0],
+            })
+        };
+        self.rovers = run.entities.iter().map(seen).collect();
+        out.push(self.roads());
+        let posts = self.posts();
+        let nodes = self.system.node_names().iter().zip(&posts);
+        out.extend(nodes.map(|(name, post)| self.node(name, *post)));
+        out.push(poses("nodes", posts.into_iter().map(Pose::at).collect()));
+    }
+
+    fn record(&mut self, record: &Record<'_>, run: &RunInfo, out: &mut Vec<Drawing>) {
+        let name = run.name(record.receiver);
+        match record.class {
+            RecordClass::Crash => out.push(text(Level::Warning, name, "crashed")),
+            RecordClass::Restart => out.push(text(Level::Info, name, "restarted")),
+            // Deadlocks are told here: the monitor stops the run for them, and says so.
+            RecordClass::Stop => {
+                let reason = String::from_utf8_lossy(record.body);
+                out.push(text(Level::Info, name, &format!("stopped: {reason}")));
+            }
+            RecordClass::Sample => {
+                let at = record.sender.index();
+                let name = run.name(record.sender);
+                let seen = self.rovers.get(at).copied().flatten();
+                if let Some(mut seen) = seen
+                    && let Some(kind) = record.kind
+                    && let Ok(state) = kind.schema().decode(record.body)
+                {
+                    self.follow(name, &mut seen, &state, out);
+                    self.rovers[at] = Some(seen);
+                    self.tell_collisions(name, out);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn base_link(name: &str) -> String {
+    format!("{name}/base_link")
+}
+
+fn shape(form: Form, position_m: [f64; 3], colour: [f64; 4]) -> Shape {
+    Shape {
+        form,
+        position_m,
+        colour,
+    }
+}
+
+fn poses(name: &str, poses: Vec<Pose>) -> Drawing {
+    Drawing::Poses {
+        topic: format!("/poses/{name}"),
+        frame: MAP.to_owned(),
+        poses,
+    }
+}
+
+fn text(level: Level, name: &str, message: &str) -> Drawing {
+    Drawing::Text {
+        level,
+        name: name.to_owned(),
+        message: message.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use farside::prelude::*;
+    use farside::record::{Flow, Observer, ObserverError};
+    use farside_actors::network::{NetworkConfig, Sabotage, TeamConfig, WorldConfig, assemble};
+
+    use super::*;
+
+    /// Shows the scene what a log writer would.
+    struct Show(NetworkScene, Option<Arc<RunInfo>>, Arc<Mutex<Vec<Drawing>>>);
+
+    impl Observer for Show {
+        fn wants(&self) -> farside::record::Wants {
+            farside::record::Wants {
+                bodies: true,
+                samples: true,
+                checkpoints: false,
+            }
+        }
+
+        fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+            self.0.begin(run, &mut self.2.lock().unwrap());
+            self.1 = Some(run.clone());
+            Ok(())
+        }
+
+        fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+            let run = self.1.as_ref().unwrap();
+            self.0.record(record, run, &mut self.2.lock().unwrap());
+            Ok(Flow::Continue)
+        }
+    }
+
+    /// What is drawn of a small team, and how many collisions there were.
+    fn drawn(rovers: u32, sabotage: Sabotage) -> (Vec<Drawing>, u32) {
+        let world = WorldConfig::default();
+        let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+        let sensors = Arc::new(world.place(&roadmap, 1).unwrap());
+        let network = NetworkConfig {
+            sabotage,
+            ..NetworkConfig::default()
+        };
+        let mut sim = Simulation::new(1);
+        let wire = FixedDelay::new(SimDuration::from_millis(5));
+        let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), to: (HostId, &str)| {
+            sim.link(a, to.0, &format!("{from}-{}", to.1), wire.clone());
+        };
+        let (map, posts, team) = (roadmap.clone(), sensors.clone(), TeamConfig { rovers });
+        let system = assemble(
+            &mut sim,
+            &world,
+            map,
+            posts,
+            &team,
+            &network,
+            1,
+            &mut connect,
+        );
+        let system = Arc::new(system.unwrap());
+        let drawings = Arc::new(Mutex::new(Vec::new()));
+        let scene = NetworkScene::new(roadmap, sensors, system.clone());
+        sim.observe(Show(scene, None, drawings.clone()));
+        sim.stop_at(SimTime::ZERO + SimDuration::from_secs(120), "enough");
+        sim.run(Executor::Inline).unwrap();
+        let drawings = drawings.lock().unwrap().clone();
+        (drawings, system.collisions())
+    }
+
+    fn count(drawings: &[Drawing], counted: impl Fn(&Drawing) -> bool) -> usize {
+        drawings.iter().filter(|drawing| counted(drawing)).count()
+    }
+
+    #[test]
+    fn each_rover_is_drawn_once_and_removed_once() {
+        let (drawings, _) = drawn(3, Sabotage::None);
+        let rover = |id: &str| id.starts_with("rover_");
+        let come = count(
+            &drawings,
+            |d| matches!(d, Drawing::Entity { id, .. } if rover(id)),
+        );
+        let gone = count(
+            &drawings,
+            |d| matches!(d, Drawing::Remove { id } if rover(id)),
+        );
+        assert_eq!((come, gone), (3, 3));
+        assert!(matches!(&drawings[0], Drawing::Entity { id, .. } if id == "roadmap"));
+        let moves = count(&drawings, |d| matches!(d, Drawing::Transform { .. }));
+        assert!(moves > 6, "{moves}");
+    }
+
+    #[test]
+    fn collisions_are_told() {
+        let told = |d: &Drawing| {
+            matches!(
+                d,
+                Drawing::Text {
+                    level: Level::Error,
+                    ..
+                }
+            )
+        };
+        assert_eq!(count(&drawn(3, Sabotage::None).0, told), 0);
+        let (drawings, collisions) = drawn(30, Sabotage::MoveUnbidden(0.5));
+        let texts = count(&drawings, told);
+        assert!(
+            collisions > 0 && texts > 0 && texts <= collisions as usize,
+            "{texts} texts of {collisions} collisions"
+        );
+    }
+}
