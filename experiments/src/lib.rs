@@ -20,4 +20,5 @@
 pub mod cli;
 mod commands;
 pub mod scenario;
+pub mod study;
 pub mod system;

@@ -29,6 +29,13 @@ pub struct NetworkMetrics {
     pub rovers: u32,
     /// Rovers that reached their goals.
     pub arrived: u32,
+    /// Every rover reached its goal.
+    pub completed: bool,
+    /// The team came to a standstill, see `deadlock`.
+    pub deadlocked: bool,
+    /// When each rover reached its goal, in seconds of virtual time, rover by rover; none for those
+    /// that had not when the run ended.
+    pub arrival_s: Vec<Option<f64>>,
     /// Times a rover claimed a vertex that another one had, or took an edge against another.
     pub collisions: u32,
     /// How the team came to a standstill, if it did.

@@ -8,8 +8,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use farside::RunInfo;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::{RunInfo, SimTime};
 use farside_worlds::VertexId;
 
 use super::assemble::Site;
@@ -24,6 +24,7 @@ struct Track {
     previous: Option<VertexId>,
     entered: Option<u32>,
     arrived: Option<u32>,
+    arrived_at: Option<SimTime>,
     /// Moves begun.
     moves: u32,
     backtracks: u32,
@@ -115,7 +116,7 @@ impl Observer for Monitor {
             let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
             if let Some(rover) = self.rovers[record.sender.index()] {
                 let state: RoverState = kind.schema().decode(record.body).map_err(failed)?;
-                return Ok(score.follow(&self.site, rover, &state));
+                return Ok(score.follow(&self.site, rover, &state, record.time()));
             } else if kind.name() == "NodeState" {
                 score.count(&kind.schema().decode(record.body).map_err(failed)?);
             }
@@ -138,7 +139,7 @@ impl Score {
     }
 
     /// A rover's change.
-    fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState) -> Flow {
+    fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
         let (vertex, moving_to) = (state.whereabouts.vertex, state.whereabouts.moving_to);
         let old = self.tracks[at].clone();
@@ -159,6 +160,7 @@ impl Score {
         }
         if vertex == Some(state.goal) && track.arrived.is_none() {
             track.arrived = Some(cycle);
+            track.arrived_at = Some(now);
         }
         if let Some(claim) = track.claim() {
             track.remaining = site.roadmap.distance(claim, state.goal);
@@ -246,6 +248,10 @@ impl Score {
             standstill: self.standstill.clone(),
             ..NetworkMetrics::default()
         };
+        let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
+        metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
+        metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
+        metrics.deadlocked = self.deadlock != Deadlock::None;
         metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
         metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {

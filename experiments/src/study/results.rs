@@ -1,0 +1,174 @@
+//! What a study leaves behind: a manifest, which holds all that it takes to run any part of the
+//! study again, and one record for each run.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// The version of the results format. A folder of another version is refused.
+pub const FORMAT: u32 = 1;
+
+/// Everything it takes to run any (cell, seed) of a study again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// The version of the code that ran it.
+    pub code_version: String,
+    /// The study's name: a built-in name, or the file's name without its ending.
+    pub study: String,
+    /// What the study asks, in a sentence.
+    pub question: String,
+    /// The scenario's name.
+    pub scenario: String,
+    /// The scenario with all defaults filled in and what the study sets laid over it, as TOML. A
+    /// cell's run is this with [`Cell::sets`] laid over it.
+    pub scenario_text: String,
+    /// The files that the scenario reads, by name.
+    pub files: BTreeMap<String, Vec<u8>>,
+    /// What is varied.
+    pub factors: Vec<Factor>,
+    /// What is measured, in the order of tables.
+    pub metrics: Vec<Metric>,
+    /// The cell that others are compared with.
+    pub baseline: Option<usize>,
+    /// The cells; records name them by their place here.
+    pub cells: Vec<Cell>,
+    /// The seeds, the same for each cell; with a stopping rule, the most there may be.
+    pub seeds: Vec<u64>,
+}
+
+/// What is varied.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Factor {
+    /// A short name: the column in tables (`loss`).
+    pub name: String,
+    /// What plots write on the axis (`message loss`).
+    pub label: String,
+    /// The unit of numeric values, empty for none (`s`, `messages`).
+    pub unit: String,
+    /// How plots space the values.
+    pub scale: Scale,
+}
+
+/// How a plot spaces the values of a factor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scale {
+    /// Evenly.
+    #[default]
+    Linear,
+    /// By ratio; values must be positive.
+    Log,
+}
+
+/// One combination of factor values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// The value of each factor, in base units if it is a quantity (a latency of `"600ms"` is 0.6),
+    /// as text if it is none.
+    pub values: Vec<Value>,
+    /// The same as people write it, in the same order (`"600ms"`).
+    pub texts: Vec<String>,
+    /// The `--set` arguments that make the cell of the scenario.
+    pub sets: Vec<String>,
+}
+
+/// What is measured. What a run reports under the metric's name decides how it is summed up:
+/// a number by its mean, true or false as a rate, a list of numbers as a distribution (`null`: it
+/// had not happened when the run ended).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Metric {
+    /// The name in a run's metrics; `messages.lost` and the like for what the kernel counts.
+    pub name: String,
+    /// What plots and tables write.
+    pub label: String,
+    /// The unit, empty for none.
+    pub unit: String,
+}
+
+/// What came of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunRecord {
+    /// Which cell.
+    pub cell: usize,
+    /// Which seed.
+    pub seed: u64,
+    /// What came of it.
+    pub outcome: RunOutcome,
+}
+
+/// What came of one run: figures, or why there are none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "status", deny_unknown_fields)]
+pub enum RunOutcome {
+    /// It came to its end.
+    Done {
+        /// How it ended: `completed`, `stopped`.
+        end: String,
+        /// Who stopped it and why.
+        end_detail: String,
+        /// The run's digest.
+        digest: String,
+        /// When it ended, in virtual time.
+        sim_time_s: f64,
+        /// It ended because its time was over: what had not happened might still have, so it is
+        /// censored. In a run that ended otherwise it would never have happened.
+        timed_out: bool,
+        /// Events handled.
+        events: u64,
+        /// What became of its messages.
+        messages: MessageCounts,
+        /// What the system reports, arrays and all; only what the study measures.
+        metrics: Map<String, Value>,
+        /// What must never happen and did.
+        violations: Vec<String>,
+    },
+    /// It failed: a panic, a fault, a scenario that cannot be.
+    Failed {
+        /// Why.
+        error: String,
+    },
+}
+
+/// What became of a run's messages.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MessageCounts {
+    /// Sent by actors.
+    pub sent: u64,
+    /// Copies delivered.
+    pub delivered: u64,
+    /// Copies lost.
+    pub lost: u64,
+    /// Copies beyond the first of a message.
+    pub duplicated: u64,
+    /// Copies on their way when the run ended.
+    pub in_flight: u64,
+    /// Lost copies by reason.
+    pub lost_by_reason: BTreeMap<String, u64>,
+}
+
+/// A study's results: what a results folder holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Results {
+    /// What was run.
+    pub manifest: Manifest,
+    /// One record for each run so far, in order of (cell, seed).
+    pub runs: Vec<RunRecord>,
+}
+
+impl Results {
+    /// The runs of one cell, in seed order.
+    pub fn of_cell(&self, cell: usize) -> &[RunRecord] {
+        let start = self.runs.partition_point(|run| run.cell < cell);
+        let end = self.runs.partition_point(|run| run.cell <= cell);
+        &self.runs[start..end]
+    }
+}
