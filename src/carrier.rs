@@ -25,7 +25,8 @@ pub trait Carrier: Send + 'static {
     /// may run ahead of each other; delivering sooner is a fault. Read once, before the start.
     fn min_delay(&self) -> SimDuration;
 
-    /// Decides the fate of `parcel`: at least one verdict, one for each copy.
+    /// Decides the fate of `parcel`: at least one verdict, one for each copy. A copy that was held
+    /// ([`Verdicts::hold`]) is shown again, with its token, and gets one verdict more.
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
 
     /// Takes a change from a control event.
@@ -37,12 +38,15 @@ pub trait Carrier: Send + 'static {
 pub struct Parcel<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) now: SimTime,
+    pub(crate) sent: SimTime,
     pub(crate) link: EntityId,
     pub(crate) sender: EntityId,
     pub(crate) receiver: EntityId,
     pub(crate) kind: &'a Kind,
     pub(crate) ordinal: u64,
     pub(crate) repeat: u32,
+    pub(crate) copy: u32,
+    pub(crate) token: Option<u64>,
     pub(crate) match_key: Option<MatchKey>,
     pub(crate) letter: &'a Sealed,
     pub(crate) size: Cell<Option<u64>>,
@@ -82,6 +86,21 @@ impl Parcel<'_> {
     /// How many messages of this kind this sender sent this receiver before.
     pub fn ordinal(&self) -> u64 {
         self.ordinal
+    }
+
+    /// When the message was sent; before [`Parcel::now`] only if it was held.
+    pub fn sent(&self) -> SimTime {
+        self.sent
+    }
+
+    /// What [`Verdicts::hold`] was given, if the link held this copy and now sees it again.
+    pub fn token(&self) -> Option<u64> {
+        self.token
+    }
+
+    /// Which copy this is: 0 unless the link made several and held this one.
+    pub fn copy(&self) -> u32 {
+        self.copy
     }
 
     /// The protocol's own identity for the message, if it gave one.
@@ -126,27 +145,115 @@ impl Parcel<'_> {
     }
 }
 
+/// How a link carried one copy of a message: the parts of its delay, and what it cost. Logs show
+/// it beside the fate.
+///
+/// ```
+/// use farside::carrier::Carriage;
+/// use farside::SimDuration;
+/// let carriage = Carriage {
+///     serialization: SimDuration::from_millis(2),
+///     propagation: SimDuration::from_millis(10),
+///     jitter_ns: -1_500_000,
+///     ..Carriage::default()
+/// };
+/// assert_eq!(carriage.total(), SimDuration::from_micros(10_500));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Carriage {
+    /// Waiting for the transmitter, for a contact, or for the channel to be free.
+    pub queue: SimDuration,
+    /// Putting the bits of the transmission that got through on the air.
+    pub serialization: SimDuration,
+    /// On the way.
+    pub propagation: SimDuration,
+    /// What chance added to the propagation, or took from it, in nanoseconds.
+    pub jitter_ns: i64,
+    /// From the first transmission to the one that got through: failed ones, and the waits for
+    /// answers that never came.
+    pub retries: SimDuration,
+    /// How often it was transmitted; 0 if it never left.
+    pub attempts: u32,
+    /// What the transmissions took from the sender, in joules.
+    pub energy_j: f64,
+}
+
+impl Carriage {
+    /// The whole delay, from the send to the fate. What jitter takes away is no more than the rest.
+    pub fn total(&self) -> SimDuration {
+        let rest = self.queue + self.serialization + self.propagation + self.retries;
+        let jitter = SimDuration::from_nanos(self.jitter_ns.unsigned_abs());
+        if self.jitter_ns < 0 {
+            rest - jitter
+        } else {
+            rest + jitter
+        }
+    }
+}
+
 /// The fates that a link gives to the copies of one message, in copy order.
 #[derive(Debug, Default)]
 pub struct Verdicts {
     pub(crate) list: Vec<Verdict>,
+    pub(crate) charge_j: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verdict {
     Deliver {
         after: SimDuration,
+        carriage: Option<Carriage>,
     },
     Lose {
         after: SimDuration,
         reason: &'static str,
+        carriage: Option<Carriage>,
+    },
+    Hold {
+        after: SimDuration,
+        token: u64,
     },
 }
 
 impl Verdicts {
     /// One copy arrives after `delay`.
     pub fn deliver(&mut self, delay: SimDuration) {
-        self.list.push(Verdict::Deliver { after: delay });
+        self.list.push(Verdict::Deliver {
+            after: delay,
+            carriage: None,
+        });
+    }
+
+    /// One copy arrives `delay` from now, carried so. Unless the copy was held, `delay` is
+    /// [`Carriage::total`].
+    pub fn deliver_as(&mut self, delay: SimDuration, carriage: Carriage) {
+        self.list.push(Verdict::Deliver {
+            after: delay,
+            carriage: Some(carriage),
+        });
+    }
+
+    /// One copy is lost `delay` from now, after it was carried so.
+    pub fn lose_as(&mut self, delay: SimDuration, reason: &'static str, carriage: Carriage) {
+        self.list.push(Verdict::Lose {
+            after: delay,
+            reason,
+            carriage: Some(carriage),
+        });
+    }
+
+    /// One copy waits at the link: `delay` from now the link is shown it again, with `token`.
+    pub fn hold(&mut self, delay: SimDuration, token: u64) {
+        self.list.push(Verdict::Hold {
+            after: delay,
+            token,
+        });
+    }
+
+    /// Charges the sending actor for the transmission, in joules. A shared link's charges reach it
+    /// one [`Carrier::min_delay`] later. See [`crate::Context::transmit_energy_j`].
+    pub fn charge(&mut self, energy_j: f64) {
+        self.charge_j += energy_j;
     }
 
     /// One copy is lost, now, for `reason` (`snake_case`: `loss`, `queue_full`, `outage`, ...).
@@ -159,6 +266,7 @@ impl Verdicts {
         self.list.push(Verdict::Lose {
             after: delay,
             reason,
+            carriage: None,
         });
     }
 }

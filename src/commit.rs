@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::carrier::Carriage;
 use crate::digest::Digest;
 use crate::engine::{Head, InFlight, Sink, hash_if_wanted};
 use crate::key::{EntityId, EventKey};
@@ -81,7 +82,7 @@ impl Committer {
         in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
         let plan = self.plan.clone();
         for (key, head, body) in in_flight {
-            let record = head.record(&plan, RecordClass::InFlight, key, &body);
+            let record = head.record(&plan, RecordClass::InFlight, key, &body, None);
             self.commit(&record, hash_if_wanted(&plan, &record));
         }
         self.checkpoint();
@@ -203,6 +204,7 @@ impl Sink for Committer {
 struct Kept {
     record: Record<'static>,
     kind: Option<Arc<Kind>>,
+    carriage: Option<Carriage>,
     body: Range<usize>,
     hash: u128,
 }
@@ -225,6 +227,7 @@ impl Batch {
         let kept = &self.kept[at];
         let record = Record {
             kind: kept.kind.as_ref(),
+            carriage: kept.carriage.as_ref(),
             body: &self.bytes[kept.body.clone()],
             ..kept.record
         };
@@ -280,8 +283,10 @@ impl Sink for Batch {
             record: Record {
                 kind: None,
                 body: &[],
+                carriage: None,
                 ..*record
             },
+            carriage: record.carriage.copied(),
             kind: record.kind.cloned(),
             body: start..self.bytes.len(),
             hash,
@@ -313,6 +318,7 @@ impl Sink for Batch {
             reason,
             body: &[],
             sends,
+            carriage: None,
         };
         self.commit(&record, 0);
     }

@@ -8,9 +8,10 @@ use crate::actor::{Actor, Handler};
 use crate::engine::{CellState, Outbound, Parts};
 use crate::fault::{FaultCause, LookupError};
 use crate::key::{EntityId, EventKey};
-use crate::message::{Address, MatchKey, Message, Target};
+use crate::message::{Address, MatchKey, Message, Target, seal_change};
 use crate::plan::KindIndex;
 use crate::random::{RandomKey, Stream};
+use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
 
 /// What a handler works with, whatever its actor's type.
@@ -124,6 +125,20 @@ impl<'a, A: Actor> Context<'a, A> {
     /// Cancels a timer. False if it has fired or was cancelled before.
     pub fn cancel(&mut self, timer: TimerId) -> bool {
         self.parts.cancel_timer(self.me, timer)
+    }
+
+    /// Tells a link something: new parameters, or where this host is. The link must be one of this
+    /// host's own, or a shared one; it hears of it in the next step of this instant.
+    pub fn tell_link<C: Message>(&mut self, link: LinkId<C>, change: C) {
+        let link = self.parts.plan.declared_links[link.declared as usize];
+        let letter = seal_change(change);
+        self.parts.ask_change(self.state, self.me, link, letter);
+    }
+
+    /// What links have charged this actor so far for transmitting what it sent, in joules. It
+    /// outlives a crash, as spent energy does.
+    pub fn transmit_energy_j(&self) -> f64 {
+        self.state.charged_j
     }
 
     /// This actor's random stream for `purpose`, derived from (run seed, actor, purpose,

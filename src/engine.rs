@@ -12,7 +12,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use crate::actor::{AnyActor, Factory};
-use crate::carrier::{AnyCarrier, SealedChange};
+use crate::carrier::{AnyCarrier, Carriage, SealedChange};
 use crate::context::Core;
 use crate::digest::record_hash;
 use crate::fault::{Fault, FaultCause, Outcome};
@@ -50,8 +50,14 @@ pub(crate) enum Class {
     Timer,
     /// A message reaches a shared link.
     HandOver,
+    /// A message comes back to the link that holds it.
+    Held,
     /// A message is lost on its way.
     LateLoss,
+    /// An actor changes a link.
+    Tell,
+    /// A shared link charges an actor for what it transmitted.
+    Charge,
     /// A cancelled timer.
     Void,
 }
@@ -61,6 +67,17 @@ pub(crate) struct Pending {
     pub(crate) class: Class,
     pub(crate) head: Head,
     pub(crate) letter: Option<Sealed>,
+    pub(crate) side: Option<Side>,
+}
+
+/// What only some events have: kept apart, so that the others need not carry it about.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Side {
+    pub(crate) carriage: Option<Carriage>,
+    /// The event that put this one on its way, where neither the cause nor a hand-over did.
+    pub(crate) scheduled_by: Option<EventKey>,
+    /// What a link that holds the message knows it by.
+    pub(crate) token: u64,
 }
 
 /// A message still on its way: the key its next event would have had, what is known of it, and its
@@ -86,6 +103,7 @@ pub(crate) struct Head {
     pub(crate) handed_over: Option<NonZeroU64>,
     pub(crate) incarnation: u32,
     pub(crate) reason: Reason,
+    pub(crate) has_side: bool,
 }
 
 impl Head {
@@ -103,6 +121,7 @@ impl Head {
             handed_over: None,
             incarnation: 0,
             reason: Reason::default(),
+            has_side: false,
         }
     }
 
@@ -111,8 +130,12 @@ impl Head {
         self.cause.map_or(key.time, |cause| cause.time)
     }
 
-    /// The event that scheduled the next hop: the cause, or the hand-over to a shared link.
-    pub(crate) fn scheduled_by(&self, plan: &Plan) -> Option<EventKey> {
+    /// The event that scheduled the next hop: the cause, the hand-over to a shared link, or the
+    /// link's last look at a message that it held.
+    pub(crate) fn scheduled_by(&self, plan: &Plan, side: Option<&Side>) -> Option<EventKey> {
+        if let Some(held) = side.and_then(|side| side.scheduled_by) {
+            return Some(held);
+        }
         let (cause, Some(count)) = (self.cause?, self.handed_over) else {
             return self.cause;
         };
@@ -125,12 +148,13 @@ impl Head {
         class: RecordClass,
         key: EventKey,
         body: &'a [u8],
+        side: Option<&'a Side>,
     ) -> Record<'a> {
         Record {
             class,
             key,
             cause: self.cause,
-            scheduled_by: self.scheduled_by(plan),
+            scheduled_by: self.scheduled_by(plan, side),
             sender: self.sender,
             receiver: self.receiver,
             link: self.link,
@@ -142,6 +166,7 @@ impl Head {
             reason: plan.reason(self.reason),
             body,
             sends: 0,
+            carriage: side.and_then(|side| side.carriage.as_ref()),
         }
     }
 }
@@ -177,6 +202,8 @@ pub(crate) struct CellState {
     pub(crate) count: u64,
     pub(crate) streams: Vec<(&'static str, Stream)>,
     pub(crate) durable: Vec<Box<dyn Any + Send>>,
+    /// What links have charged this actor. Spent energy outlives a crash.
+    pub(crate) charged_j: f64,
     /// The next ordinal by receiver and kind; a timer's receiver is `u32::MAX`. One word for each,
     /// since a team in which everyone talks to everyone has very many.
     ordinals: FixedMap<u64, u64>,
@@ -191,6 +218,7 @@ impl CellState {
             count: 0,
             streams: Vec::new(),
             durable: Vec::new(),
+            charged_j: 0.0,
             ordinals: FixedMap::default(),
             keyed_flows: FixedMap::default(),
         }
@@ -294,8 +322,10 @@ impl Engine {
             class,
             head,
             letter,
+            side,
         } = self.parts.take(entry.slot);
         let key = entry.key();
+        self.parts.side = side;
         if class == Class::Void || self.died_with_its_incarnation(class, &head) {
             return Ok(());
         }
@@ -316,7 +346,16 @@ impl Engine {
                 return Ok(());
             }
             Class::Message => RecordClass::Delivered,
-            Class::HandOver => return self.hand_over(key, head, letter, sink),
+            Class::HandOver | Class::Held => {
+                return self.hand_over(class, key, head, letter, sink);
+            }
+            Class::Tell => return self.tell(key, &head, letter, sink),
+            Class::Charge => {
+                let charge = side.and_then(|side| side.carriage);
+                let local = self.parts.plan.place(head.receiver).local as usize;
+                self.actors[local].state.charged_j += charge.map_or(0.0, |charge| charge.energy_j);
+                return Ok(());
+            }
             Class::LateLoss => {
                 self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
@@ -383,6 +422,7 @@ impl Engine {
 
     fn hand_over(
         &mut self,
+        class: Class,
         key: EventKey,
         head: Head,
         letter: Option<Sealed>,
@@ -391,15 +431,41 @@ impl Engine {
         let (Some(link), Some(letter)) = (head.link, letter) else {
             unreachable!("a message is handed over with its letter, to a link");
         };
+        let held = self.parts.side.filter(|_| class == Class::Held);
         let parts = &mut self.parts;
-        let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter)));
+        let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter, held)));
         let result = carried.map_err(|payload| Box::new(FaultCause::Panic(panic_text(&*payload))));
-        if let Err(cause) = result.and(self.parts.fault.take().map_or(Ok(()), Err)) {
-            self.parts.note_unfinished(key, Class::HandOver, head);
+        let result = result.and_then(|charge_j| match self.parts.fault.take() {
+            Some(cause) => Err(cause),
+            None => Ok(charge_j),
+        });
+        if let Err(cause) = result {
+            self.parts.note_unfinished(key, class, head);
             let message = format!("a message from {}", self.parts.plan.name(head.sender));
             return Err(self.parts.fault_at(key, link, Some(message), *cause));
         }
         self.commit(RecordClass::HandOver, key, &head, sink);
+        Ok(())
+    }
+
+    /// Gives a link the change that an actor asked for.
+    fn tell(
+        &mut self,
+        key: EventKey,
+        head: &Head,
+        letter: Option<Sealed>,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let change = letter.and_then(|mut letter| letter.0.take_change());
+        let (link, parts) = (head.receiver, &mut self.parts);
+        if let Some(change) = change {
+            let told = catch_unwind(AssertUnwindSafe(|| parts.tell(link, change, key.time)));
+            if let Err(payload) = told {
+                let cause = FaultCause::Panic(panic_text(&*payload));
+                return Err(self.parts.fault_at(key, link, None, cause));
+            }
+        }
+        self.commit(RecordClass::Change, key, head, sink);
         Ok(())
     }
 
@@ -456,7 +522,8 @@ impl Engine {
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
         if parts.plan.recording() {
-            let mut record = head.record(&parts.plan, class, key, &parts.body);
+            let side = parts.side.as_ref().filter(|_| head.has_side);
+            let mut record = head.record(&parts.plan, class, key, &parts.body, side);
             record.sends = parts.sends;
             sink.commit(&record, hash_if_wanted(&parts.plan, &record));
         } else {
@@ -485,8 +552,7 @@ impl Engine {
             if at.time == key.time && waiting.class != Class::Void && chain.len() < 8 {
                 chain.push(hop(&waiting.head));
             }
-            self.parts
-                .insert(at, waiting.class, waiting.head, waiting.letter);
+            self.parts.insert_pending(at, waiting);
         }
         self.parts.note_unfinished(key, class, *head);
         let cause = FaultCause::StepLimit {

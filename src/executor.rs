@@ -103,7 +103,7 @@ impl Ending {
     ) -> Self {
         let mut head = Head::of_entity(EntityId::CONTROL);
         head.sender = by;
-        let record = head.record(plan, RecordClass::Stop, key, reason.as_bytes());
+        let record = head.record(plan, RecordClass::Stop, key, reason.as_bytes(), None);
         committer.commit(&record, hash_if_wanted(plan, &record));
         let by = plan.name(by).to_owned();
         Ending {

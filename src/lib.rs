@@ -129,7 +129,7 @@ mod simulation;
 pub mod time;
 
 pub use actor::{Accepts, Actor, Handler};
-pub use carrier::{Carrier, FixedDelay, Parcel, Verdicts};
+pub use carrier::{Carriage, Carrier, FixedDelay, Parcel, Verdicts};
 pub use context::{Context, TimerId};
 pub use digest::Digest;
 pub use executor::Executor;

@@ -178,6 +178,40 @@ pub(crate) trait Letter: Send {
     /// Another letter with the message that `bytes` encode, for a link's further copies: messages
     /// need not be `Clone`.
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError>;
+    /// The change of a link that this letter holds, if it is one.
+    fn take_change(&mut self) -> Option<Box<dyn Any + Send>> {
+        None
+    }
+}
+
+/// A change of a link, on its way from an actor.
+struct Change<M>(Option<M>);
+
+/// Seals what an actor tells a link.
+pub(crate) fn seal_change<M: Message>(change: M) -> Sealed {
+    Sealed(smallbox::smallbox!(Change(Some(change))))
+}
+
+impl<M: Message> Letter for Change<M> {
+    fn deliver(&mut self, _actor: &mut dyn Any, _core: &mut Core<'_>) -> Outcome {
+        unreachable!("changes go to links");
+    }
+
+    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError> {
+        match &self.0 {
+            Some(change) => schema.encode(change, out),
+            None => Ok(()),
+        }
+    }
+
+    fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
+        Ok(seal_change::<M>(schema.decode(bytes)?))
+    }
+
+    fn take_change(&mut self) -> Option<Box<dyn Any + Send>> {
+        let change = self.0.take()?;
+        Some(Box::new(change))
+    }
 }
 
 struct Addressed<A, M> {

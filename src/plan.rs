@@ -146,6 +146,8 @@ pub(crate) struct Plan {
     pub(crate) name_hashes: Vec<u64>,
     /// From the number in an address to the entity.
     pub(crate) declared: Vec<EntityId>,
+    /// From the number in a link's id to the entity.
+    pub(crate) declared_links: Vec<EntityId>,
     /// From the entity to the number in its address, if it is an actor.
     pub(crate) address_numbers: Vec<Option<u32>>,
     /// From the number in an address to the Rust type of the actor.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
+use crate::carrier::Carriage;
 use crate::digest::Digest;
 use crate::key::{EntityId, EventKey};
 use crate::message::MatchKey;
@@ -28,13 +29,14 @@ pub enum RecordClass {
     InFlight = 3,
     /// A timer fired.
     Timer = 4,
-    /// A message reached a shared link, which then decided its fate.
+    /// A message reached a shared link, or came back to a link that had held it; the link then
+    /// decided its fate, or holds it.
     HandOver = 5,
     /// A control event crashed an actor.
     Crash = 6,
     /// A control event restarted an actor.
     Restart = 7,
-    /// A control event changed a link.
+    /// A control event or an actor changed a link.
     Change = 8,
     /// The run was stopped.
     Stop = 9,
@@ -103,6 +105,9 @@ pub struct Record<'a> {
     pub body: &'a [u8],
     /// How many messages the actor sent while it handled this event.
     pub sends: u32,
+    /// How the link carried the message, where the link says. Explains the fate, as samples explain
+    /// a state; no part of the digest, which has the delay itself.
+    pub carriage: Option<&'a Carriage>,
 }
 
 impl Record<'_> {

@@ -21,7 +21,7 @@ pub struct HostId(u32);
 
 /// A link of a simulation that takes changes of type `C`.
 pub struct LinkId<C> {
-    declared: u32,
+    pub(crate) declared: u32,
     change: std::marker::PhantomData<fn(C)>,
 }
 

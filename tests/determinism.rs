@@ -13,6 +13,7 @@ prop_compose! {
         jitter_ns in 0u64..6,
         loss_16 in 0u8..17,
         copies_16 in 0u8..9,
+        holds_16 in 0u8..9,
         shared in any::<bool>(),
         controls in prop::collection::vec((any::<u8>(), 0u64..40, any::<bool>()), 0..6),
         stop_after in prop_oneof![Just(0u32), 1u32..40],
@@ -20,8 +21,8 @@ prop_compose! {
         until_ns in 1u64..50,
     ) -> Chatter {
         Chatter {
-            seed, tie_seed, hosts, min_delay_ns, jitter_ns, loss_16, copies_16, shared, controls,
-            stop_after, fail_after, until_ns,
+            seed, tie_seed, hosts, min_delay_ns, jitter_ns, loss_16, copies_16, holds_16, shared,
+            controls, stop_after, fail_after, until_ns,
         }
     }
 }
@@ -101,6 +102,7 @@ fn without_the_min_delay_check_executors_disagree() {
         jitter_ns: 3,
         loss_16: 0,
         copies_16: 0,
+        holds_16: 0,
         shared: false,
         controls: Vec::new(),
         stop_after: 0,

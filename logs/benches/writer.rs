@@ -104,6 +104,7 @@ impl Observer for Keeper {
             record: Record {
                 kind: None,
                 body: &[],
+                carriage: None,
                 ..*record
             },
         };

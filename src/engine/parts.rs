@@ -1,7 +1,7 @@
 //! What a handler changes while its actor is borrowed: the queue, the payloads, the links, and
 //! what the event in hand has done so far.
 
-use std::any::TypeId;
+use std::any::{Any, TypeId};
 use std::cell::Cell;
 use std::num::NonZeroU64;
 use std::ops::Range;
@@ -9,9 +9,10 @@ use std::sync::Arc;
 
 use super::store::Store;
 use super::{
-    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sink, hash_if_wanted,
+    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Side, Sink,
+    hash_if_wanted,
 };
-use crate::carrier::{Parcel, SealedChange, Verdict, Verdicts};
+use crate::carrier::{Carriage, Parcel, SealedChange, Verdict, Verdicts};
 use crate::context::TimerId;
 use crate::fault::{Fault, FaultCause};
 use crate::key::{EntityId, EventKey};
@@ -19,13 +20,14 @@ use crate::message::{Message, Sealed};
 use crate::plan::{Kind, KindIndex, Plan, Reason};
 use crate::queue::{Entry, Queue};
 use crate::record::RecordClass;
-use crate::time::SimDuration;
+use crate::time::{SimDuration, SimTime};
 
 /// What happened in the event in hand besides the event: committed right after it.
 pub(crate) enum Effect {
     Lost {
         head: Head,
         body: Range<usize>,
+        side: Option<Box<Side>>,
     },
     Sample {
         entity: EntityId,
@@ -46,6 +48,8 @@ pub(crate) struct Parts {
     key: EventKey,
     /// The encoded message in hand.
     pub(crate) body: Vec<u8>,
+    /// What the event in hand has besides, if its head says that it has anything.
+    pub(crate) side: Option<Side>,
     pub(crate) effects: Vec<Effect>,
     effect_bytes: Vec<u8>,
     verdicts: Verdicts,
@@ -65,7 +69,7 @@ pub(crate) struct Parts {
 impl Parts {
     pub(crate) fn new(plan: Arc<Plan>, index: u32, links: Vec<LinkCell>) -> Self {
         Parts {
-            key: plan.key(crate::time::SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            key: plan.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
             plan,
             index,
             links,
@@ -73,6 +77,7 @@ impl Parts {
             store: Store::default(),
             outgoing: Vec::new(),
             body: Vec::new(),
+            side: None,
             effects: Vec::new(),
             effect_bytes: Vec::new(),
             verdicts: Verdicts::default(),
@@ -96,6 +101,13 @@ impl Parts {
         let slot = self.store.insert(class, head, letter);
         self.queue.push(Entry::new(key, slot));
         slot
+    }
+
+    pub(crate) fn insert_pending(&mut self, key: EventKey, pending: Pending) {
+        let slot = self.insert(key, pending.class, pending.head, pending.letter);
+        if let Some(side) = pending.side {
+            self.store.set_side(slot, side);
+        }
     }
 
     #[inline(always)]
@@ -189,7 +201,7 @@ impl Parts {
         let (from, to) = (self.plan.place(me), self.plan.place(receiver));
         if from.host == to.host {
             let key = self.later_key(me, &mut state.count, delay);
-            self.schedule(to.engine, key, Class::Message, head, letter);
+            self.schedule(to.engine, key, Class::Message, head, Some(letter));
         } else if !delay.is_zero() {
             let receiver = self.plan.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
@@ -201,9 +213,9 @@ impl Parts {
             if self.plan.links.get(&link).is_some_and(|link| link.shared) {
                 let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
                 let engine = self.plan.place(link).engine;
-                self.schedule(engine, key, Class::HandOver, head, letter);
+                self.schedule(engine, key, Class::HandOver, head, Some(letter));
             } else {
-                self.carry(link, head, letter);
+                state.charged_j += self.carry(link, head, letter, None);
             }
         } else {
             self.raise(FaultCause::NoRoute {
@@ -228,15 +240,37 @@ impl Parts {
     }
 
     #[inline(always)]
-    fn schedule(&mut self, engine: u32, key: EventKey, class: Class, head: Head, letter: Sealed) {
+    fn schedule(
+        &mut self,
+        engine: u32,
+        key: EventKey,
+        class: Class,
+        head: Head,
+        letter: Option<Sealed>,
+    ) {
         if engine == self.index {
-            self.insert(key, class, head, Some(letter));
+            self.insert(key, class, head, letter);
         } else {
-            let pending = Pending {
-                class,
-                head,
-                letter: Some(letter),
-            };
+            self.outgoing.push(Outgoing {
+                engine,
+                key,
+                pending: Pending {
+                    class,
+                    head,
+                    letter,
+                    side: None,
+                },
+            });
+        }
+    }
+
+    /// Schedules an event that has a side, if it has.
+    #[inline(always)]
+    fn schedule_with(&mut self, engine: u32, key: EventKey, mut pending: Pending) {
+        pending.head.has_side = pending.side.is_some();
+        if engine == self.index {
+            self.insert_pending(key, pending);
+        } else {
             self.outgoing.push(Outgoing {
                 engine,
                 key,
@@ -245,22 +279,32 @@ impl Parts {
         }
     }
 
-    /// Lets `link` decide the fate of a message, now.
-    pub(crate) fn carry(&mut self, link: EntityId, head: Head, letter: Sealed) {
+    /// Lets `link` decide the fate of a message, now; `held` if it held it before. Returns what the
+    /// sender is charged at once, in joules: what an own link asks for.
+    pub(crate) fn carry(
+        &mut self,
+        link: EntityId,
+        head: Head,
+        letter: Sealed,
+        held: Option<Side>,
+    ) -> f64 {
         self.carrying = Some(link);
         let plan = self.plan.clone();
         let Some(kind) = head.kind.map(|kind| plan.kind(kind)) else {
-            return;
+            return 0.0;
         };
         let parcel = Parcel {
             plan: &plan,
             now: self.key.time,
+            sent: head.sent(self.key),
             link,
             sender: head.sender,
             receiver: head.receiver,
             kind,
             ordinal: head.ordinal,
             repeat: head.repeat,
+            copy: head.copy,
+            token: held.map(|held| held.token),
             match_key: head.match_key,
             letter: &letter,
             size: Cell::new(None),
@@ -271,11 +315,85 @@ impl Parts {
         let mut count = cell.count;
         self.execute(link, &mut count, head, letter, kind, &verdicts);
         self.links[plan.place(link).local as usize].count = count;
+        let charge_j = std::mem::take(&mut verdicts.charge_j);
         verdicts.list.clear();
         self.verdicts = verdicts;
         if self.fault.is_none() {
             self.carrying = None;
         }
+        // Only while its sender is at hand can a message's cost be charged at once, and whether it
+        // is must not hang on how hosts are dealt to engines.
+        if charge_j == 0.0 || held.is_none() && !self.is_shared(link) {
+            return charge_j;
+        }
+        self.charge_later(link, head.sender, charge_j);
+        0.0
+    }
+
+    fn is_shared(&self, link: EntityId) -> bool {
+        self.plan.links.get(&link).is_some_and(|link| link.shared)
+    }
+
+    fn charge_later(&mut self, link: EntityId, sender: EntityId, energy_j: f64) {
+        let plan = self.plan.clone();
+        let min_delay = plan.links.get(&link).map(|link| link.min_delay);
+        let cell = &mut self.links[plan.place(link).local as usize];
+        let mut count = cell.count;
+        let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
+        self.links[plan.place(link).local as usize].count = count;
+        let carriage = Carriage {
+            energy_j,
+            ..Carriage::default()
+        };
+        let pending = Pending {
+            class: Class::Charge,
+            head: Head::of_entity(sender),
+            letter: None,
+            side: Some(Side {
+                carriage: Some(carriage),
+                ..Side::default()
+            }),
+        };
+        self.schedule_with(plan.place(sender).engine, key, pending);
+    }
+
+    /// Asks for a change of a link on behalf of an actor.
+    pub(crate) fn ask_change(
+        &mut self,
+        state: &mut CellState,
+        me: EntityId,
+        link: EntityId,
+        letter: Sealed,
+    ) {
+        let (mine, its) = (self.plan.place(me), self.plan.place(link));
+        if self.fault.is_some() {
+            return;
+        }
+        if mine.host != its.host && !self.is_shared(link) {
+            return self.raise(FaultCause::NoRoute {
+                from: self.plan.host_name(me).to_owned(),
+                to: self.plan.host_name(link).to_owned(),
+                receiver: self.plan.name(link).to_owned(),
+                kind: "a change".to_owned(),
+            });
+        }
+        let kind = self.plan.links.get(&link).map(|link| link.change_kind);
+        let flow = state.next_in_flow(link.0, kind.unwrap_or(KindIndex::MAX), None);
+        let head = Head {
+            receiver: link,
+            kind,
+            ordinal: flow.0,
+            cause: Some(self.key),
+            ..Head::of_entity(me)
+        };
+        let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
+        self.schedule(its.engine, key, Class::Tell, head, Some(letter));
+    }
+
+    /// Gives a link a change.
+    pub(crate) fn tell(&mut self, link: EntityId, change: Box<dyn Any + Send>, now: SimTime) {
+        let local = self.plan.place(link).local as usize;
+        self.links[local].carrier.change(change, now);
     }
 
     /// Turns a link's verdicts into deliveries and losses, the last copy with the letter itself.
@@ -288,13 +406,23 @@ impl Parts {
         kind: &Kind,
         verdicts: &Verdicts,
     ) {
+        // Of the messages that a link decides about, only those that it held have a side.
+        let held = head.has_side;
         let mut letter = Some(letter);
-        // Only a hand-over is an event of its own between the cause and this.
-        let handed_over = head.cause.filter(|cause| *cause != self.key);
+        // Only a hand-over is an event of its own between the cause and this, unless it was held.
+        let handed_over = head.cause.filter(|cause| *cause != self.key && !held);
         let handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
+        let scheduled_by = held.then_some(self.key);
+        let side = |carriage: Option<Carriage>, token: u64, needed: bool| {
+            (needed || carriage.is_some() || held).then_some(Side {
+                carriage,
+                scheduled_by,
+                token,
+            })
+        };
         for (copy, verdict) in verdicts.list.iter().enumerate() {
             let head = Head {
-                copy: copy as u32,
+                copy: head.copy + copy as u32,
                 handed_over,
                 ..head
             };
@@ -307,24 +435,51 @@ impl Parts {
                 return;
             };
             match *verdict {
-                Verdict::Deliver { after } => {
+                Verdict::Deliver { after, carriage } => {
                     if let Err(cause) = self.check_delay(link, after) {
                         return self.raise(cause);
                     }
                     let key = self.later_key(link, count, after);
                     let engine = self.plan.place(head.receiver).engine;
-                    self.schedule(engine, key, Class::Message, head, own);
+                    let pending = Pending {
+                        class: Class::Message,
+                        head,
+                        letter: Some(own),
+                        side: side(carriage, 0, false),
+                    };
+                    self.schedule_with(engine, key, pending);
                 }
-                Verdict::Lose { after, reason } => {
+                Verdict::Hold { after, token } => {
+                    let key = self.later_key(link, count, after);
+                    let pending = Pending {
+                        class: Class::Held,
+                        head,
+                        letter: Some(own),
+                        side: side(None, token, true),
+                    };
+                    self.schedule_with(self.index, key, pending);
+                }
+                Verdict::Lose {
+                    after,
+                    reason,
+                    carriage,
+                } => {
                     let head = Head {
                         reason: self.plan.intern(reason),
                         ..head
                     };
+                    let side = side(carriage, 0, false);
                     if after.is_zero() {
-                        self.lose(head, &own, kind);
+                        self.lose(head, &own, kind, side);
                     } else {
                         let key = self.later_key(link, count, after);
-                        self.schedule(self.index, key, Class::LateLoss, head, own);
+                        let pending = Pending {
+                            class: Class::LateLoss,
+                            head,
+                            letter: Some(own),
+                            side,
+                        };
+                        self.schedule_with(self.index, key, pending);
                     }
                 }
             }
@@ -381,7 +536,7 @@ impl Parts {
         })
     }
 
-    fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind) {
+    fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind, side: Option<Side>) {
         let start = self.effect_bytes.len();
         if self.plan.recording()
             && let Err(error) = letter.0.encode(kind.schema(), &mut self.effect_bytes)
@@ -392,6 +547,7 @@ impl Parts {
         self.effects.push(Effect::Lost {
             head,
             body: start..self.effect_bytes.len(),
+            side: side.map(Box::new),
         });
     }
 
@@ -418,9 +574,10 @@ impl Parts {
     pub(crate) fn commit_effects(&mut self, sink: &mut impl Sink) {
         for effect in self.effects.drain(..) {
             match effect {
-                Effect::Lost { head, body } => {
+                Effect::Lost { head, body, side } => {
                     let body = &self.effect_bytes[body];
-                    let record = head.record(&self.plan, RecordClass::Lost, self.key, body);
+                    let side = side.as_deref();
+                    let record = head.record(&self.plan, RecordClass::Lost, self.key, body, side);
                     sink.commit(&record, hash_if_wanted(&self.plan, &record));
                 }
                 Effect::Sample { entity, kind, body } => {
@@ -429,7 +586,8 @@ impl Parts {
                         ..Head::of_entity(entity)
                     };
                     let body = &self.effect_bytes[body];
-                    let mut record = head.record(&self.plan, RecordClass::Sample, self.key, body);
+                    let class = RecordClass::Sample;
+                    let mut record = head.record(&self.plan, class, self.key, body, None);
                     record.kind = Some(&kind);
                     sink.commit(&record, 0);
                 }
@@ -507,7 +665,7 @@ impl Parts {
     pub(crate) fn take_in_flight(&mut self, until: Option<EventKey>) -> Vec<InFlight> {
         let mut found = Vec::new();
         if let Some((key, class, head)) = self.unfinished.take()
-            && head.in_flight(&self.plan, class, until)
+            && head.in_flight(&self.plan, class, self.side.as_ref(), until)
         {
             found.push((key, head, std::mem::take(&mut self.body)));
         }
@@ -524,10 +682,21 @@ impl Parts {
 
 impl Head {
     /// True for a message that was sent before `until`, which a fault left of the run.
-    fn in_flight(&self, plan: &Plan, class: Class, until: Option<EventKey>) -> bool {
-        let undone =
-            until.is_some_and(|until| self.scheduled_by(plan).is_none_or(|by| by >= until));
-        matches!(class, Class::Message | Class::HandOver | Class::LateLoss) && !undone
+    fn in_flight(
+        &self,
+        plan: &Plan,
+        class: Class,
+        side: Option<&Side>,
+        until: Option<EventKey>,
+    ) -> bool {
+        let side = side.filter(|_| self.has_side);
+        let by = || self.scheduled_by(plan, side);
+        let undone = until.is_some_and(|until| by().is_none_or(|by| by >= until));
+        let message = matches!(
+            class,
+            Class::Message | Class::HandOver | Class::Held | Class::LateLoss
+        );
+        message && !undone
     }
 }
 
@@ -539,7 +708,10 @@ impl Pending {
         key: EventKey,
         until: Option<EventKey>,
     ) -> Option<InFlight> {
-        if !self.head.in_flight(plan, self.class, until) {
+        if !self
+            .head
+            .in_flight(plan, self.class, self.side.as_ref(), until)
+        {
             return None;
         }
         let mut body = Vec::new();
@@ -551,6 +723,7 @@ impl Pending {
             key,
             Head {
                 reason: Reason::default(),
+                has_side: false,
                 ..self.head
             },
             body,

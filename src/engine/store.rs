@@ -1,7 +1,7 @@
 //! Where events wait: what is known of a message in one table, the message itself in another, both
 //! by slot. Slots are reused, last freed first, while they are still in the cache.
 
-use super::{Class, Head, Pending};
+use super::{Class, Head, Pending, Side};
 use crate::message::Sealed;
 
 /// The events that wait, by slot.
@@ -9,6 +9,8 @@ use crate::message::Sealed;
 pub(crate) struct Store {
     heads: Vec<(Class, Head)>,
     letters: Vec<Option<Sealed>>,
+    /// What few events have besides, by slot; shorter than the others if no late slot has any.
+    sides: Vec<Side>,
     free: Vec<u32>,
     /// How many of the events that wait are cancelled timers.
     voids: usize,
@@ -29,6 +31,14 @@ impl Store {
         slot
     }
 
+    /// Adds to an event just inserted, whose head says that it has a side.
+    pub(crate) fn set_side(&mut self, slot: u32, side: Side) {
+        if self.sides.len() <= slot as usize {
+            self.sides.resize(slot as usize + 1, Side::default());
+        }
+        self.sides[slot as usize] = side;
+    }
+
     /// Takes the event out of its slot, which must hold one.
     #[inline(always)]
     pub(crate) fn take(&mut self, slot: u32) -> Pending {
@@ -41,6 +51,7 @@ impl Store {
             class,
             head,
             letter: self.letters[slot as usize].take(),
+            side: head.has_side.then(|| self.sides[slot as usize]),
         }
     }
 

@@ -68,6 +68,7 @@ impl Simulation {
                 .map(|entity| name_hash(&entity.name))
                 .collect(),
             declared: ranked.actors.clone(),
+            declared_links: ranked.links.clone(),
             address_numbers,
             actor_types: self
                 .actors

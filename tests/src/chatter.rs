@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside::{Carrier, Parcel, Verdicts};
+use farside::{Carriage, Carrier, LinkId, Parcel, Verdicts};
 use serde::{Deserialize, Serialize};
 
 /// What a run of the model looks like. Small numbers, so that a failing case can be read.
@@ -25,6 +25,8 @@ pub struct Chatter {
     pub loss_16: u8,
     /// Further copies, in 1/16.
     pub copies_16: u8,
+    /// How often links hold a copy, in 1/16; what they hold they may hold again.
+    pub holds_16: u8,
     /// Even hosts send through one shared link.
     pub shared: bool,
     /// Crash and restart events: actor, time (ns), and whether it is a restart.
@@ -65,6 +67,7 @@ pub struct NewLoss {
 struct Talker {
     names: Arc<Vec<(String, usize)>>,
     host: usize,
+    link: Option<LinkId<NewLoss>>,
     handled: u32,
     stop_after: u32,
     fail_after: u32,
@@ -95,7 +98,10 @@ impl Talker {
             let to = ctx.lookup::<Talker>(name)?;
             let chat = Chat {
                 hops: hops - 1,
-                note: hops.is_multiple_of(2).then(|| name.clone()),
+                // What links charge is part of what happens.
+                note: hops
+                    .is_multiple_of(2)
+                    .then(|| format!("{name} {}", ctx.transmit_energy_j())),
             };
             match ctx.random("how").below(3) {
                 0 => ctx.send_keyed(to, MatchKey::new(hops, self.handled), chat),
@@ -138,6 +144,10 @@ impl Handler<Tick> for Talker {
         self.count(ctx)?;
         let wait = SimDuration::from_nanos(1 + ctx.random("wait").below(9));
         let number = ctx.durable::<Memory>().0;
+        if let Some(link) = self.link.filter(|_| number.is_multiple_of(4)) {
+            let loss_16 = ctx.random("loss").below(17) as u8;
+            ctx.tell_link(link, NewLoss { loss_16 });
+        }
         let timer = ctx.timer(wait, Tick { number });
         let spare = ctx.timer(wait, Tick { number: number + 1 });
         ctx.cancel(spare);
@@ -156,6 +166,7 @@ struct Noisy {
     jitter_ns: u64,
     loss_16: u8,
     copies_16: u8,
+    holds_16: u8,
     undercut: bool,
 }
 
@@ -168,16 +179,35 @@ impl Carrier for Noisy {
 
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
         let one_in_16 = |p: u8| f64::from(p) / 16.0;
-        let copies = 1 + u32::from(parcel.random(1, 0, 0).uniform() < one_in_16(self.copies_16));
-        for copy in 0..copies {
-            let mut draws = parcel.random(2, 0, copy).stream();
+        let held = parcel.token();
+        let copies = match held {
+            Some(_) => 1,
+            None => 1 + u32::from(parcel.random(1, 0, 0).uniform() < one_in_16(self.copies_16)),
+        };
+        let round = held.map_or(0, |token| token as u32 + 1);
+        for copy in parcel.copy()..parcel.copy() + copies {
+            let mut draws = parcel.random(2, round, copy).stream();
+            if round < 3 && draws.chance(one_in_16(self.holds_16)) {
+                let wait = SimDuration::from_nanos(draws.below(6));
+                verdicts.hold(wait, u64::from(round));
+                continue;
+            }
+            verdicts.charge(0.25);
             let mut delay =
                 self.min_delay + SimDuration::from_nanos(draws.below(self.jitter_ns + 1));
             if self.undercut && draws.chance(0.3) {
                 delay = SimDuration::from_nanos(1);
             }
+            let carriage = Carriage {
+                queue: parcel.now().since(parcel.sent()),
+                propagation: delay,
+                attempts: round + 1,
+                ..Carriage::default()
+            };
             if draws.uniform() >= one_in_16(self.loss_16) {
-                verdicts.deliver(delay);
+                verdicts.deliver_as(delay, carriage);
+            } else if draws.chance(0.5) {
+                verdicts.lose_as(delay, "late", carriage);
             } else if parcel.size_bytes().is_multiple_of(2) {
                 verdicts.lose("loss");
             } else {
@@ -213,13 +243,15 @@ impl Chatter {
         let hosts: Vec<HostId> = (0..self.hosts.len())
             .map(|host| sim.host(&format!("h{host}")))
             .collect();
+        let links = self.join(&mut sim, &hosts, undercut);
         let mut addresses = Vec::new();
         for (name, host) in names.iter() {
-            let (names, host) = (names.clone(), *host);
+            let (names, host, link) = (names.clone(), *host, links[*host]);
             let (stop_after, fail_after) = (self.stop_after, self.fail_after);
             addresses.push(sim.actor(hosts[host], name, move |_| Talker {
                 names: names.clone(),
                 host,
+                link,
                 handled: 0,
                 stop_after,
                 fail_after,
@@ -229,7 +261,6 @@ impl Chatter {
                 sim.heavy(hosts[host]);
             }
         }
-        self.join(&mut sim, &hosts, undercut);
         for (actor, time_ns, restart) in &self.controls {
             let address = addresses[*actor as usize % addresses.len()];
             let time = SimTime::from_nanos(*time_ns);
@@ -243,12 +274,20 @@ impl Chatter {
         sim
     }
 
-    fn join(&self, sim: &mut Simulation, hosts: &[HostId], undercut: bool) {
+    /// Declares the links; returns for each host one that it may tell something.
+    fn join(
+        &self,
+        sim: &mut Simulation,
+        hosts: &[HostId],
+        undercut: bool,
+    ) -> Vec<Option<LinkId<NewLoss>>> {
+        let mut told = vec![None; hosts.len()];
         let noisy = || Noisy {
             min_delay: SimDuration::from_nanos(self.min_delay_ns),
             jitter_ns: self.jitter_ns,
             loss_16: self.loss_16,
             copies_16: self.copies_16,
+            holds_16: self.holds_16,
             undercut,
         };
         let medium = self.shared.then(|| sim.shared_link("medium", noisy()));
@@ -256,17 +295,22 @@ impl Chatter {
             for (b, to) in hosts.iter().enumerate() {
                 match medium {
                     _ if a == b => {}
-                    Some(medium) if a % 2 == 0 => sim.route(*from, *to, medium),
+                    Some(medium) if a % 2 == 0 => {
+                        sim.route(*from, *to, medium);
+                        told[a] = Some(medium);
+                    }
                     _ => {
                         let link = sim.link(*from, *to, &format!("h{a}-h{b}"), noisy());
                         let change = NewLoss {
                             loss_16: self.loss_16.saturating_sub(1),
                         };
                         sim.change_at(SimTime::from_nanos(self.until_ns / 2), link, change);
+                        told[a] = Some(link);
                     }
                 }
             }
         }
+        told
     }
 }
 

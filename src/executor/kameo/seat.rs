@@ -40,9 +40,7 @@ impl Seat {
     /// Goes on until `bound`.
     fn run(&mut self, bound: Bound) {
         for Outgoing { key, pending, .. } in self.inbox.drain(..) {
-            self.engine
-                .parts
-                .insert(key, pending.class, pending.head, pending.letter);
+            self.engine.parts.insert_pending(key, pending);
         }
         let result = loop {
             let result = self.engine.run(bound, &mut self.batch);
