@@ -3,6 +3,7 @@
 
 use std::any::Any;
 use std::cell::Cell;
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -188,6 +189,32 @@ impl Carriage {
         } else {
             rest + jitter
         }
+    }
+}
+
+impl fmt::Display for Carriage {
+    /// The parts that are not zero, as in `queue 2ms, propagation 10ms, 1 attempt`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parts = [
+            ("queue", self.queue),
+            ("serialization", self.serialization),
+            ("propagation", self.propagation),
+            ("retries", self.retries),
+        ];
+        for (name, part) in parts.iter().filter(|(_, part)| !part.is_zero()) {
+            write!(f, "{name} {part}, ")?;
+        }
+        if self.jitter_ns != 0 {
+            let sign = if self.jitter_ns < 0 { "-" } else { "" };
+            let size = SimDuration::from_nanos(self.jitter_ns.unsigned_abs());
+            write!(f, "jitter {sign}{size}, ")?;
+        }
+        let plural = if self.attempts == 1 { "" } else { "s" };
+        write!(f, "{} attempt{plural}", self.attempts)?;
+        if self.energy_j != 0.0 {
+            write!(f, ", {} J", self.energy_j)?;
+        }
+        Ok(())
     }
 }
 

@@ -95,13 +95,30 @@ fn shared_file() -> FileDescriptorProto {
     FileDescriptorProto {
         name: Some(SHARED_FILE.to_owned()),
         package: Some("farside.log".to_owned()),
-        message_type: vec![key, checkpoint, envelope("Event", None)],
+        message_type: vec![key, carriage(), checkpoint, envelope("Event", None)],
         syntax: Some("proto3".to_owned()),
         ..Default::default()
     }
 }
 
 const KEY: &str = ".farside.log.EventKey";
+const CARRIAGE: &str = ".farside.log.Carriage";
+
+fn carriage() -> DescriptorProto {
+    DescriptorProto {
+        name: Some("Carriage".to_owned()),
+        field: vec![
+            field("queue_ns", 1, Type::Uint64),
+            field("serialization_ns", 2, Type::Uint64),
+            field("propagation_ns", 3, Type::Uint64),
+            field("jitter_ns", 4, Type::Sint64),
+            field("retries_ns", 5, Type::Uint64),
+            field("attempts", 6, Type::Uint32),
+            field("energy_j", 7, Type::Double),
+        ],
+        ..Default::default()
+    }
+}
 
 fn envelope(name: &str, body: Option<String>) -> DescriptorProto {
     let mut match_key = field("match_key", number::MATCH_KEY, Type::Uint64);
@@ -124,6 +141,7 @@ fn envelope(name: &str, body: Option<String>) -> DescriptorProto {
         message_field("cause", number::CAUSE, KEY),
         match_key,
         field("tie", number::TIE, Type::Uint32),
+        message_field("carriage", number::CARRIAGE, CARRIAGE),
     ];
     fields.push(match body {
         Some(body) => message_field("body", number::BODY, &body),

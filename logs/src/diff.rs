@@ -75,6 +75,9 @@ pub struct FirstDifference {
     pub link: String,
     /// Why it was lost in one of them; empty if it was not.
     pub reason: String,
+    /// How the link carried it in the first log that has it: the parts of its delay, the attempts;
+    /// empty if the link does not say.
+    pub carriage: String,
     /// What caused it, nearest first, back to a start.
     pub causes: Vec<Cause>,
     /// How many causes are left out between the last but one and the last.

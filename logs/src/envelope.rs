@@ -6,13 +6,16 @@
 
 use std::sync::Arc;
 
+use farside::carrier::Carriage;
 use farside::key::EventKey;
 use farside::record::{Record, RecordClass};
-use farside::{Kind, RunInfo};
+use farside::{Kind, RunInfo, SimDuration};
 use rustc_hash::FxBuildHasher;
 
 use crate::topics::{Topics, topic_of};
-use crate::wire::{Fields, put_bytes, put_number, put_text, put_varint, varint_len};
+use crate::wire::{
+    Fields, put_bytes, put_double, put_number, put_signed, put_text, put_varint, signed, varint_len,
+};
 
 /// Field numbers of `farside.record.<Kind>` and `farside.log.Event`.
 pub(crate) mod field {
@@ -34,6 +37,7 @@ pub(crate) mod field {
     pub(crate) const MATCH_KEY: u32 = 16;
     pub(crate) const TIE: u32 = 17;
     pub(crate) const NOTE: u32 = 18;
+    pub(crate) const CARRIAGE: u32 = 19;
 }
 
 /// What is the same for all records of one class, sender, receiver, link and kind.
@@ -145,6 +149,9 @@ impl Encoder {
             put_varint(out, key.bits());
         }
         put_number(out, field::TIE, u64::from(record.key.tie));
+        if let Some(carriage) = record.carriage {
+            put_carriage(out, carriage);
+        }
         if record.kind.is_some() {
             put_bytes(out, field::BODY, record.body);
         } else if !record.body.is_empty() {
@@ -176,6 +183,44 @@ pub(crate) fn put_key(out: &mut Vec<u8>, number: u32, key: &EventKey, source: &s
     for (field, value) in numbers {
         put_number(out, field, value);
     }
+}
+
+/// Appends how a link carried a message, as a message field.
+fn put_carriage(out: &mut Vec<u8>, carriage: &Carriage) {
+    // Seven fields of at most eleven bytes: the length always fits one byte.
+    let at = out.len();
+    put_varint(out, u64::from(field::CARRIAGE) << 3 | 2);
+    let length_at = out.len();
+    out.push(0);
+    put_number(out, 1, carriage.queue.as_nanos());
+    put_number(out, 2, carriage.serialization.as_nanos());
+    put_number(out, 3, carriage.propagation.as_nanos());
+    put_signed(out, 4, carriage.jitter_ns);
+    put_number(out, 5, carriage.retries.as_nanos());
+    put_number(out, 6, u64::from(carriage.attempts));
+    put_double(out, 7, carriage.energy_j);
+    let length = out.len() - length_at - 1;
+    debug_assert!(length < 0x80 && at < length_at);
+    out[length_at] = length as u8;
+}
+
+fn read_carriage(message: &[u8]) -> Option<Carriage> {
+    let mut carriage = Carriage::default();
+    for read in Fields::new(message) {
+        let (number, value) = read.ok()?;
+        let nanos = || value.number().map(SimDuration::from_nanos);
+        match number {
+            1 => carriage.queue = nanos()?,
+            2 => carriage.serialization = nanos()?,
+            3 => carriage.propagation = nanos()?,
+            4 => carriage.jitter_ns = signed(value.number()?),
+            5 => carriage.retries = nanos()?,
+            6 => carriage.attempts = u32::try_from(value.number()?).ok()?,
+            7 => carriage.energy_j = value.double()?,
+            _ => {}
+        }
+    }
+    Some(carriage)
 }
 
 /// An event's key as a log holds it: its source by name.
@@ -261,6 +306,8 @@ pub struct RecordRef<'a> {
     pub body: &'a [u8],
     /// What there is to say about an event without a body: why the run was stopped.
     pub note: &'a str,
+    /// How the link carried it, where the link says.
+    pub carriage: Option<Carriage>,
 }
 
 pub(crate) const CLASSES: [RecordClass; 11] = [
@@ -295,6 +342,7 @@ impl<'a> RecordRef<'a> {
             reason: "",
             body: &[],
             note: "",
+            carriage: None,
         };
         let mut fate = "";
         for read in Fields::new(envelope) {
@@ -318,6 +366,7 @@ impl<'a> RecordRef<'a> {
                 field::MATCH_KEY => record.match_key = Some(value.number()?),
                 field::TIE => record.key.tie = u32::try_from(value.number()?).ok()?,
                 field::NOTE => record.note = value.text()?,
+                field::CARRIAGE => record.carriage = Some(read_carriage(value.bytes()?)?),
                 // A later minor version may have more fields.
                 _ => {}
             }

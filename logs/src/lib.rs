@@ -10,7 +10,7 @@
 //! - [`diff`] says which messages of two logs differ, which one first, and what caused it.
 //! - [`recover`] makes a whole file of a broken one.
 //!
-//! # The format, version 1.0
+//! # The format, version 1.1
 //!
 //! One MCAP message for each record of a run, in the order in which they were committed.
 //!
@@ -34,7 +34,9 @@
 //! `kind` is the serde name of the message's type in `snake_case`. Each message is an envelope, the
 //! protobuf message `farside.record.{Kind}`: `sender`, `receiver`, `link`, `kind`, `fate`, `reason`,
 //! `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`), `sent_ns`,
-//! `cause`, `match_key` and `body`. What has no body is a `farside.log.Event`. State samples are
+//! `cause`, `match_key`, `body`, and `carriage`: how the link carried the message, its delay in parts
+//! (`queue_ns`, `serialization_ns`, `propagation_ns`, `jitter_ns`, `retries_ns`), the `attempts` it
+//! took and the `energy_j` they cost; that explains a fate and is never compared. What has no body is a `farside.log.Event`. State samples are
 //! their own type, without an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers

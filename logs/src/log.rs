@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use farside::MatchKey;
 use farside::record::RecordClass;
+use farside::{Carriage, MatchKey};
 
 use crate::LogError;
 use crate::envelope::{CheckpointRef, KeyRef, RecordRef};
@@ -325,6 +325,7 @@ impl Records {
             reason: "",
             body: message.data,
             note: "",
+            carriage: None,
         };
         Ok((record, message.channel))
     }
@@ -405,6 +406,8 @@ pub struct LoggedRecord {
     pub body: Vec<u8>,
     /// What there is to say about an event without a body.
     pub note: String,
+    /// How the link carried it, where the link says.
+    pub carriage: Option<Carriage>,
 }
 
 impl LoggedRecord {
@@ -427,6 +430,7 @@ impl LoggedRecord {
             reason: record.reason.to_owned(),
             body: record.body.to_owned(),
             note: record.note.to_owned(),
+            carriage: record.carriage,
         }
     }
 }

@@ -17,6 +17,13 @@ impl<'a> Value<'a> {
         }
     }
 
+    pub(crate) fn double(self) -> Option<f64> {
+        match self {
+            Value::Fixed64(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
     pub(crate) fn bytes(self) -> Option<&'a [u8]> {
         match self {
             Value::Bytes(bytes) => Some(bytes),
@@ -52,6 +59,24 @@ pub(crate) fn put_number(out: &mut Vec<u8>, field: u32, value: u64) {
     if value != 0 {
         put_varint(out, u64::from(field) << 3);
         put_varint(out, value);
+    }
+}
+
+/// A signed number field, zigzag; zero is left out.
+pub(crate) fn put_signed(out: &mut Vec<u8>, field: u32, value: i64) {
+    put_number(out, field, (value << 1 ^ value >> 63) as u64);
+}
+
+/// The signed number that [`put_signed`] wrote as this one.
+pub(crate) fn signed(value: u64) -> i64 {
+    (value >> 1) as i64 ^ -((value & 1) as i64)
+}
+
+/// A double field; zero is left out.
+pub(crate) fn put_double(out: &mut Vec<u8>, field: u32, value: f64) {
+    if value != 0.0 {
+        put_varint(out, u64::from(field) << 3 | 1);
+        out.extend_from_slice(&value.to_le_bytes());
     }
 }
 
@@ -149,6 +174,17 @@ mod tests {
         assert_eq!(read.len(), 6);
         assert_eq!(read[4], (3, Value::Varint(u64::MAX)));
         assert_eq!(read[5].1.text(), Some("rover_1"));
+    }
+
+    #[test]
+    fn signs_survive() {
+        for value in [0, 1, -1, 63, -64, i64::MAX, i64::MIN] {
+            let mut out = Vec::new();
+            put_signed(&mut out, 1, value);
+            let read = Fields::new(&out).next().map(Result::unwrap);
+            let number = read.map_or(0, |(_, number)| number.number().unwrap());
+            assert_eq!(signed(number), value);
+        }
     }
 
     #[test]

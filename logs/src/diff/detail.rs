@@ -126,6 +126,8 @@ pub(super) fn describe(
         .map(|bits| MatchKey::from_bits(bits).to_string());
     first.link = record.link.to_owned();
     first.reason = record.reason.to_owned();
+    let carriage = record.carriage.map(|carriage| carriage.to_string());
+    first.carriage = carriage.unwrap_or_default();
     let cause = record.cause.map(|key| owned(&key));
     trace(index, names, cause, &mut first)?;
     Ok(first)

@@ -137,6 +137,9 @@ fn write_first(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Resu
     if !first.link.is_empty() {
         writeln!(f, "  on link {}", first.link)?;
     }
+    if !first.carriage.is_empty() {
+        writeln!(f, "  carried with {}", first.carriage)?;
+    }
     if !first.reason.is_empty() {
         writeln!(f, "  lost for {}", first.reason)?;
     }

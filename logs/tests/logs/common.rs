@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use farside::carrier::{Carrier, Parcel, Verdicts};
+use farside::carrier::{Carriage, Carrier, Parcel, Verdicts};
 use farside::prelude::*;
 use farside::record::Observer;
 use farside_logs::{Attachment, LogOptions, LogWriter};
@@ -145,6 +145,19 @@ pub(crate) struct Lossy {
     delay: SimDuration,
 }
 
+impl Lossy {
+    /// As if jitter had halved a longer way.
+    pub(crate) fn carriage(&self) -> Carriage {
+        Carriage {
+            propagation: self.delay * 2,
+            jitter_ns: -(self.delay.as_nanos() as i64),
+            attempts: 1,
+            energy_j: 0.125,
+            ..Carriage::default()
+        }
+    }
+}
+
 #[derive(Serialize, Deserialize)]
 pub(crate) struct NewLoss {
     pub(crate) loss: f64,
@@ -162,7 +175,7 @@ impl Carrier for Lossy {
         if draw < self.loss {
             verdicts.lose("loss");
         } else {
-            verdicts.deliver(self.delay);
+            verdicts.deliver_as(self.delay, self.carriage());
             if draw > 0.95 {
                 verdicts.deliver(self.delay * 2);
             }

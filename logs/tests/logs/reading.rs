@@ -48,6 +48,60 @@ fn every_record_is_read_back() {
 }
 
 #[test]
+fn how_a_message_was_carried_is_read_back() {
+    let (_folder, path, _) = logged(&Plan::default());
+    let mut records = Log::open(&path).unwrap().records().unwrap();
+    let mut seen = 0;
+    while let Some((record, _)) = records.next_ref().unwrap() {
+        if let Some(carriage) = record.carriage {
+            let delay_ns = record.key.time_ns - record.sent_ns;
+            assert_eq!(carriage.total().as_nanos(), delay_ns);
+            assert_eq!((carriage.attempts, carriage.energy_j), (1, 0.125));
+            seen += 1;
+        }
+    }
+    assert!(seen > 0);
+}
+
+#[test]
+fn other_programs_read_how_a_message_was_carried() {
+    let (_folder, path, _) = logged(&Plan::default());
+    let bytes = std::fs::read(&path).unwrap();
+    let mut seen = 0;
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let schema = message.channel.schema.as_ref().unwrap();
+        if schema.name != "farside.record.Odometry" {
+            continue;
+        }
+        let pool = prost_reflect::DescriptorPool::decode(&schema.data[..]).unwrap();
+        let descriptor = pool.get_message_by_name(&schema.name).unwrap();
+        let envelope = DynamicMessage::decode(descriptor, &message.data[..]).unwrap();
+        let parts = envelope.get_field_by_name("carriage").unwrap();
+        let field = |name| {
+            parts
+                .as_message()?
+                .get_field_by_name(name)
+                .map(|v| v.into_owned())
+        };
+        if field("attempts").and_then(|v| v.as_u32()) == Some(1) {
+            let delay_ns = message.log_time - message.publish_time;
+            assert_eq!(
+                field("jitter_ns").unwrap().as_i64(),
+                Some(-(delay_ns as i64))
+            );
+            assert_eq!(
+                field("propagation_ns").unwrap().as_u64(),
+                Some(2 * delay_ns)
+            );
+            assert_eq!(field("energy_j").unwrap().as_f64(), Some(0.125));
+            seen += 1;
+        }
+    }
+    assert!(seen > 0);
+}
+
+#[test]
 fn bodies_decode_field_by_field_and_back_to_their_types() {
     let (_folder, path, _) = logged(&Plan::default());
     let schema = farside::encoding::Schema::of::<Odometry>().unwrap();
