@@ -12,6 +12,7 @@ use crate::key::EntityId;
 use crate::message::{MatchKey, Message, Sealed};
 use crate::plan::{Kind, Plan};
 use crate::random::RandomKey;
+use crate::simulation::HostId;
 use crate::time::{SimDuration, SimTime};
 
 /// A link: decides when each message arrives, how often, or why it does not.
@@ -79,6 +80,12 @@ impl Parcel<'_> {
         self.plan.host_name(self.receiver)
     }
 
+    /// The sender's host and the receiver's.
+    pub fn hosts(&self) -> (HostId, HostId) {
+        let host = |entity| HostId::from_index(self.plan.place(entity).host);
+        (host(self.sender), host(self.receiver))
+    }
+
     /// The message's kind: its serde name.
     pub fn kind(&self) -> &str {
         self.kind.name()
@@ -121,6 +128,15 @@ impl Parcel<'_> {
         let size = scratch.len() as u64;
         self.size.set(Some(size));
         size
+    }
+
+    /// The address of this link's draws that belong to no message: (run seed, link, purpose,
+    /// number). A channel's fading in the n-th second is one.
+    pub fn random_at(&self, purpose: u64, number: u64) -> RandomKey {
+        RandomKey::new(self.plan.seed)
+            .number(self.plan.name_hash(self.link))
+            .number(purpose)
+            .number(number)
     }
 
     /// The address of this link's draws for this message: (run seed, link, purpose, message

@@ -127,6 +127,14 @@ impl<'a, A: Actor> Context<'a, A> {
         self.parts.cancel_timer(self.me, timer)
     }
 
+    /// The link called `name`, which takes changes of type `C`.
+    ///
+    /// # Errors
+    /// When no link has that name, or it takes other changes.
+    pub fn lookup_link<C: Message>(&self, name: &str) -> Result<LinkId<C>, LookupError> {
+        self.parts.plan.lookup_link::<C>(name)
+    }
+
     /// Tells a link something: new parameters, or where this host is. The link must be one of this
     /// host's own, or a shared one; it hears of it in the next step of this instant.
     pub fn tell_link<C: Message>(&mut self, link: LinkId<C>, change: C) {

@@ -10,8 +10,9 @@ use crate::actor::Actor;
 use crate::encoding::Schema;
 use crate::fault::LookupError;
 use crate::key::{EntityId, EventKey};
-use crate::message::Address;
+use crate::message::{Address, Message};
 use crate::random::name_hash;
+use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
 
 /// A hash map that is only ever asked for a key, with a hasher that is the same on every machine.
@@ -226,6 +227,29 @@ impl Plan {
             });
         }
         Ok(Address::new(declared))
+    }
+
+    /// The link called `name`.
+    pub(crate) fn lookup_link<C: Message>(&self, name: &str) -> Result<LinkId<C>, LookupError> {
+        let unknown = || LookupError::Unknown {
+            name: name.to_owned(),
+        };
+        let entity = self.info.entity(name).ok_or_else(unknown)?;
+        let link = self.links.get(&entity).ok_or_else(unknown)?;
+        let wanted = self.kind_of_type.get(&TypeId::of::<C>()).copied();
+        if wanted != Some(link.change_kind) {
+            return Err(LookupError::WrongType {
+                name: name.to_owned(),
+                expected: std::any::type_name::<C>(),
+                actual: "a link that takes other changes",
+            });
+        }
+        let declared = self
+            .declared_links
+            .iter()
+            .position(|known| *known == entity);
+        let declared = declared.ok_or_else(unknown)?;
+        Ok(LinkId::new(declared as u32))
     }
 
     /// True if records, and so encoded bodies, are needed at all.

@@ -19,10 +19,30 @@ use crate::time::{SimDuration, SimTime};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct HostId(u32);
 
+impl HostId {
+    pub(crate) fn from_index(index: u32) -> Self {
+        HostId(index)
+    }
+
+    /// The host's number in order of declaration, from 0.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// A link of a simulation that takes changes of type `C`.
 pub struct LinkId<C> {
     pub(crate) declared: u32,
     change: std::marker::PhantomData<fn(C)>,
+}
+
+impl<C> LinkId<C> {
+    pub(crate) fn new(declared: u32) -> Self {
+        LinkId {
+            declared,
+            change: std::marker::PhantomData,
+        }
+    }
 }
 
 impl<C> Clone for LinkId<C> {
@@ -216,10 +236,7 @@ impl Simulation {
             change: KindEntry::of::<C::Change>(),
             carrier: Box::new(carrier),
         });
-        LinkId {
-            declared: self.links.len() as u32 - 1,
-            change: std::marker::PhantomData,
-        }
+        LinkId::new(self.links.len() as u32 - 1)
     }
 
     /// Crashes an actor at `time`: its state is gone, its timers are void, and what reaches it is

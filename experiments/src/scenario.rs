@@ -5,6 +5,7 @@
 //! with its place, what was found, what was expected and the nearest valid name.
 
 mod builtin;
+mod crash;
 mod error;
 mod source;
 
@@ -20,6 +21,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
+pub use crash::Crash;
 pub use error::ScenarioError;
 pub use source::Place;
 use source::Source;
@@ -70,24 +72,6 @@ pub struct Shared {
     /// What the log holds.
     #[serde(default)]
     pub log: LogSettings,
-}
-
-/// A `[[crash]]` entry.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Crash {
-    /// The actor's name.
-    pub actor: String,
-    /// When it crashes, from the start of the run.
-    #[serde(with = "units::duration")]
-    pub at: SimDuration,
-    /// When it is started again; without, it stays down.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub restart: Option<SimDuration>,
 }
 
 /// The `[log]` table.
@@ -276,7 +260,8 @@ impl Scenario {
         let conclude = conclude.map_err(wrong)?;
         links.finish().map_err(|error| wrong(error.into()))?;
         for (index, crash) in self.shared.crash.iter().enumerate() {
-            self.plan_crash(&mut sim, index, crash)?;
+            let planned = crash.plan(&mut sim, self.shared.seed, index, self.shared.until);
+            planned.map_err(|mistake| self.crash_error(index, mistake))?;
         }
         if let Some(until) = self.shared.until {
             sim.stop_at(SimTime::ZERO + until, &format!("until {until}"));
@@ -290,42 +275,22 @@ impl Scenario {
         })
     }
 
-    fn plan_crash(
-        &self,
-        sim: &mut Simulation,
-        index: usize,
-        crash: &Crash,
-    ) -> Result<(), ScenarioError> {
-        let key = ["crash".to_owned(), index.to_string(), "actor".to_owned()];
-        let planned = sim.crash_named_at(SimTime::ZERO + crash.at, &crash.actor);
-        let planned = planned.and_then(|()| match crash.restart {
-            Some(restart) => sim.restart_named_at(SimTime::ZERO + restart, &crash.actor),
-            None => Ok(()),
-        });
-        planned.map_err(|_unknown| {
-            let names: Vec<&str> = sim.actor_names().collect();
-            ScenarioError::UnknownValue {
-                place: self.source.place_of_key(&key),
-                key: key.join("."),
-                found: crash.actor.clone(),
-                nearest: nearest(&crash.actor, names.iter().copied()),
-                expected: format!("the name of one of {} actors", names.len()),
-            }
-        })
-    }
-
     fn check_crashes(&self) -> Result<(), ScenarioError> {
         for (index, crash) in self.shared.crash.iter().enumerate() {
-            if let Some(restart) = crash.restart.filter(|restart| *restart <= crash.at) {
-                let key = ["crash".to_owned(), index.to_string(), "restart".to_owned()];
-                return Err(ScenarioError::Invalid {
-                    place: self.source.place_of_key(&key),
-                    key: key.join("."),
-                    message: format!("{restart}: expected a time after the crash at {}", crash.at),
-                });
-            }
+            let checked = crash.check(self.shared.until);
+            checked.map_err(|mistake| self.crash_error(index, mistake))?;
         }
         Ok(())
+    }
+
+    fn crash_error(&self, index: usize, mistake: crash::Mistake) -> ScenarioError {
+        let mut key = vec!["crash".to_owned(), index.to_string()];
+        key.push(mistake.key.to_owned());
+        ScenarioError::Invalid {
+            place: self.source.place_of_key(&key),
+            key: key.join("."),
+            message: mistake.message,
+        }
     }
 }
 

@@ -1,0 +1,200 @@
+//! What lies between two antennas: distance, terrain, and how much of the signal is left.
+//!
+//! | quantity | formula | source |
+//! |---|---|---|
+//! | received power | `P_tx - (L0 + 10 n log10(d / 1 m)) - S - O` in dBm | log-distance model, Rappaport, *Wireless Communications*, 2nd ed., section 4.9; defaults of Gazebo's RF model |
+//! | shadowing `S` | normal, mean 0, one draw for each pair of stations and stretch of time | same, section 4.9.2 |
+//! | bit error rate | `erfc(sqrt(snr)) / 2`, QPSK with the noise in the bit's bandwidth | Proakis, *Digital Communications*, 4th ed., section 5.2.7 |
+//! | message error rate | `1 - (1 - BER)^bits` | independent bit errors |
+
+use std::sync::Arc;
+
+use farside::carrier::Parcel;
+use farside::{SimDuration, SimTime};
+use farside_worlds::HeightField;
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+use crate::units;
+
+/// The speed of light in vacuum, in metres a second.
+pub const LIGHT_M_PER_S: f64 = 299_792_458.0;
+
+/// Why a message is lost whose signal is too weak where it arrives.
+pub const RANGE: &str = "range";
+/// Why a message is lost when the ground is between the antennas.
+pub const OCCLUDED: &str = "occluded";
+
+/// How the signal fades with distance: the log-distance model. See the module's table.
+///
+/// ```
+/// use farside_actors::radio::PathLoss;
+/// let loss = PathLoss { shadowing_db: 0.0, ..PathLoss::default() };
+/// // 27 dBm less 40 dB at a metre and 25 dB for each factor of ten.
+/// assert_eq!(loss.received_dbm(100.0, 0.0), 27.0 - 40.0 - 50.0);
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PathLoss {
+    /// The transmitter's power with its antenna's gain, in dBm; 27 unless given.
+    pub tx_power_dbm: f64,
+    /// The loss at one metre, in dB; 40 unless given, which is 2.4 GHz in free space.
+    pub reference_db: f64,
+    /// The exponent n; 2 in free space, 2.5 unless given.
+    pub exponent: f64,
+    /// The standard deviation of shadowing, in dB; 10 unless given, 0 for none.
+    pub shadowing_db: f64,
+    /// For how long a pair of stations keeps one draw of shadowing; 1 s unless given.
+    #[serde(with = "units::duration")]
+    pub shadowing_every: SimDuration,
+    /// The noise at the receiver, in dBm; -90 unless given.
+    pub noise_dbm: f64,
+}
+
+impl Default for PathLoss {
+    /// Those of Gazebo's RF communications model.
+    fn default() -> Self {
+        PathLoss {
+            tx_power_dbm: 27.0,
+            reference_db: 40.0,
+            exponent: 2.5,
+            shadowing_db: 10.0,
+            shadowing_every: SimDuration::from_secs(1),
+            noise_dbm: -90.0,
+        }
+    }
+}
+
+impl PathLoss {
+    /// The power that arrives over `distance_m`, in dBm; `shadowing_db` is what shadows take.
+    /// Nearer than a metre is taken as a metre.
+    pub fn received_dbm(&self, distance_m: f64, shadowing_db: f64) -> f64 {
+        let decades = libm::log10(distance_m.max(1.0));
+        self.tx_power_dbm - self.reference_db - 10.0 * self.exponent * decades - shadowing_db
+    }
+
+    /// The probability that a message of `bits` arrives damaged beyond use.
+    pub fn error_rate(&self, received_dbm: f64, bits: u64) -> f64 {
+        let snr = libm::pow(10.0, (received_dbm - self.noise_dbm) / 10.0);
+        let bit_error_rate = 0.5 * libm::erfc(libm::sqrt(snr));
+        // 1 - (1 - p)^n without losing small p.
+        -libm::expm1(bits as f64 * libm::log1p(-bit_error_rate))
+    }
+
+    /// What shadows take from a pair of stations at `now`, in dB, the same both ways.
+    fn shadowing_db(&self, parcel: &Parcel<'_>, purpose: u64, now: SimTime) -> f64 {
+        if self.shadowing_db == 0.0 {
+            return 0.0;
+        }
+        let stretch = now.as_nanos() / self.shadowing_every.as_nanos().max(1);
+        let (a, b) = (parcel.sender_host(), parcel.receiver_host());
+        let key = parcel.random_at(purpose, stretch);
+        let mut draws = key.text(a.min(b)).text(a.max(b)).stream();
+        draws.normal(0.0, self.shadowing_db)
+    }
+}
+
+/// What a radio system lets through, and how late.
+///
+/// ```
+/// use farside_actors::radio::Propagation;
+/// let table = "light_time = true\nrange = '120m'\n[path_loss]\nexponent = 3.0";
+/// let propagation: Propagation = toml::from_str(table)?;
+/// assert_eq!(propagation.path_loss.unwrap().noise_dbm, -90.0);
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Propagation {
+    /// Adds distance over the speed of light to each delay.
+    pub light_time: bool,
+    /// Nothing arrives from farther away (`range`); without, there is no such limit.
+    #[serde(
+        with = "units::length_m::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub range: Option<f64>,
+    /// Asks whether the ground is between the antennas.
+    pub line_of_sight: bool,
+    /// What ground between the antennas takes from the signal, in dB; without, it takes all
+    /// (`occluded`). Needs `path_loss`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub occlusion_db: Option<f64>,
+    /// How the signal fades with distance; without, it does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path_loss: Option<PathLoss>,
+}
+
+/// One way from antenna to antenna, at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Way {
+    /// What distance adds to the delay.
+    pub light_time: SimDuration,
+    /// The power that arrives, in dBm, if there is a model of it.
+    pub received_dbm: Option<f64>,
+    /// Why nothing arrives, if nothing does.
+    pub blocked: Option<&'static str>,
+}
+
+impl Propagation {
+    /// What the way from `from_m` to `to_m` does at `now` to the message in hand. `purpose` tells
+    /// the draws of shadowing from others of the link.
+    pub fn way(
+        &self,
+        parcel: &Parcel<'_>,
+        purpose: u64,
+        now: SimTime,
+        (from_m, to_m): (Point3<f64>, Point3<f64>),
+        terrain: Option<&Arc<HeightField>>,
+    ) -> Way {
+        let distance_m = nalgebra::distance(&from_m, &to_m);
+        let mut way = Way::default();
+        if self.light_time {
+            way.light_time = SimDuration::from_secs_f64(distance_m / LIGHT_M_PER_S);
+        }
+        if self.range.is_some_and(|range_m| distance_m > range_m) {
+            way.blocked = Some(RANGE);
+        }
+        let hidden = self.line_of_sight
+            && terrain.is_some_and(|terrain| !terrain.line_of_sight(from_m, to_m));
+        if hidden && (self.occlusion_db.is_none() || self.path_loss.is_none()) {
+            way.blocked = way.blocked.or(Some(OCCLUDED));
+        }
+        if let Some(loss) = &self.path_loss {
+            let shadow_db = loss.shadowing_db(parcel, purpose, now);
+            let behind_db = self.occlusion_db.filter(|_| hidden).unwrap_or(0.0);
+            way.received_dbm = Some(loss.received_dbm(distance_m, shadow_db + behind_db));
+        }
+        way
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_rates_match_their_closed_form() {
+        let loss = PathLoss::default();
+        // At 0 dB of signal over noise, QPSK errs in erfc(1) / 2 = 7.865 % of its bits.
+        let one_bit = loss.error_rate(-90.0, 1);
+        assert!((one_bit - 0.078_649_603_525_143).abs() < 1e-12);
+        let hundred = loss.error_rate(-90.0, 100);
+        assert!((hundred - (1.0 - (1.0 - one_bit).powi(100))).abs() < 1e-12);
+        // A strong signal: rates too small for 1 - (1 - p)^n.
+        let strong = loss.error_rate(-78.0, 8);
+        assert!(strong > 0.0 && strong < 1e-6, "{strong}");
+        assert_eq!(loss.error_rate(-200.0, 800), 1.0);
+    }
+
+    #[test]
+    fn power_falls_by_the_exponent_for_each_decade() {
+        let loss = PathLoss {
+            exponent: 3.5,
+            ..PathLoss::default()
+        };
+        let fall = loss.received_dbm(10.0, 0.0) - loss.received_dbm(1000.0, 0.0);
+        assert!((fall - 70.0).abs() < 1e-12);
+        assert_eq!(loss.received_dbm(0.0, 0.0), loss.received_dbm(1.0, 0.0));
+    }
+}

@@ -1,0 +1,341 @@
+//! The `[[crash]]` entries of a scenario: who crashes, when, and when it is back. By schedule, or
+//! by chance: a fraction of a group, or each with a mean time between failures.
+
+use farside::random::RandomKey;
+use farside::{SimDuration, SimTime, Simulation};
+use farside_actors::units;
+use globset::Glob;
+use serde::{Deserialize, Serialize};
+
+use super::nearest;
+
+/// The most crashes and restarts that one entry may plan.
+const MAX_EVENTS: usize = 100_000;
+
+/// A `[[crash]]` entry.
+///
+/// | key | meaning | default |
+/// |---|---|---|
+/// | `actor` | a name, or a pattern over names (`node_*`) | needed |
+/// | `fraction` | the share of the actors that match, rounded to whole ones | all |
+/// | `at` | when it crashes, or from when on | 0 s |
+/// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
+/// | `restart` | when it is started again | never |
+/// | `restart_after` | how long after the crash it is started again | never |
+/// | `mtbf` | it crashes again and again, each time after an exponential time of this mean | |
+/// | `mttr` | and is down for an exponential time of this mean | it stays down |
+///
+/// Who is among the fraction and when it crashes are drawn by (run seed, entry, actor): a larger
+/// fraction crashes the same actors at the same times, and more.
+///
+/// ```
+/// use farside_experiments::scenario::Crash;
+/// let crash: Crash = toml::from_str("actor = 'node_*'\nfraction = '10%'\nat = '60s'")?;
+/// assert_eq!(crash.fraction, 0.1);
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crash {
+    /// The actor's name, or a pattern over actors' names.
+    pub actor: String,
+    /// The share of the actors that match.
+    #[serde(default = "all", with = "units::fraction")]
+    pub fraction: f64,
+    /// When it crashes, from the start of the run.
+    #[serde(default, with = "units::duration")]
+    pub at: SimDuration,
+    /// How much later than `at` it may be.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub within: Option<SimDuration>,
+    /// When it is started again, from the start of the run; without, it stays down.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub restart: Option<SimDuration>,
+    /// How long after the crash it is started again.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub restart_after: Option<SimDuration>,
+    /// The mean time between failures.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub mtbf: Option<SimDuration>,
+    /// The mean time to repair.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub mttr: Option<SimDuration>,
+}
+
+fn all() -> f64 {
+    1.0
+}
+
+/// What is wrong with an entry: the key to blame, what was found and what was expected.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Mistake {
+    pub(super) key: &'static str,
+    pub(super) message: String,
+}
+
+fn mistake(key: &'static str, message: impl ToString) -> Mistake {
+    Mistake {
+        key,
+        message: message.to_string(),
+    }
+}
+
+impl Crash {
+    /// Finds what can be found without knowing the actors.
+    pub(super) fn check(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
+        if let Some(restart) = self.restart {
+            let last = self.at + self.within.unwrap_or(SimDuration::ZERO);
+            if restart <= last {
+                let message = format!("{restart}: expected a time after the crash at {last}");
+                return Err(mistake("restart", message));
+            }
+            if self.restart_after.is_some() {
+                let message = "expected `restart` or `restart_after`, not both";
+                return Err(mistake("restart_after", message));
+            }
+        }
+        if self.restart_after.is_some_and(SimDuration::is_zero) {
+            return Err(mistake("restart_after", "0s: expected a time over zero"));
+        }
+        let Some(mtbf) = self.mtbf else {
+            return match self.mttr {
+                Some(_) => Err(mistake("mttr", "expected `mtbf` beside it")),
+                None => Ok(()),
+            };
+        };
+        let one_off = self
+            .within
+            .or(self.restart)
+            .or(self.restart_after)
+            .is_some();
+        if one_off {
+            let message = "expected no `within`, `restart` or `restart_after` beside it: \
+                           it says when each crash and restart is";
+            return Err(mistake("mtbf", message));
+        }
+        let Some(until) = until else {
+            let message = "expected the scenario to have an `until`: crashes go on until then";
+            return Err(mistake("mtbf", message));
+        };
+        let (mean, mttr) = (mtbf.as_secs_f64(), self.mttr.map(SimDuration::as_secs_f64));
+        let often = until.as_secs_f64() / (mean + mttr.unwrap_or(0.0)).max(1e-9);
+        if mtbf.is_zero() || mttr.is_some() && often > MAX_EVENTS as f64 / 4.0 {
+            let limit = MAX_EVENTS / 4;
+            let message = format!("{mtbf}: expected at most {limit} crashes until {until}");
+            return Err(mistake("mtbf", message));
+        }
+        Ok(())
+    }
+
+    /// Plans this entry's crashes and restarts; `index` is its place among the entries.
+    pub(super) fn plan(
+        &self,
+        sim: &mut Simulation,
+        seed: u64,
+        index: usize,
+        until: Option<SimDuration>,
+    ) -> Result<(), Mistake> {
+        let draws = |name: &str| {
+            let key = RandomKey::new(seed).text("crash").number(index as u64);
+            key.text(name)
+        };
+        let mut planned = 0;
+        for name in self.chosen(sim, &draws)? {
+            for (down, up) in self.times(&draws(&name), until) {
+                planned += 2;
+                if planned > MAX_EVENTS {
+                    let message = format!("more than {MAX_EVENTS} crashes and restarts");
+                    return Err(mistake("mtbf", message));
+                }
+                let known =
+                    sim.crash_named_at(SimTime::ZERO + down, &name)
+                        .and_then(|()| match up {
+                            Some(up) => sim.restart_named_at(SimTime::ZERO + up, &name),
+                            None => Ok(()),
+                        });
+                debug_assert!(known.is_ok(), "chosen among the actors there are");
+            }
+        }
+        Ok(())
+    }
+
+    /// Who crashes: of those that match, the fraction with the least draws.
+    fn chosen(
+        &self,
+        sim: &Simulation,
+        draws: &dyn Fn(&str) -> RandomKey,
+    ) -> Result<Vec<String>, Mistake> {
+        let glob = Glob::new(&self.actor).map_err(|error| {
+            let (found, why) = (&self.actor, error.kind());
+            mistake(
+                "actor",
+                format!("{found:?} is no pattern over names: {why}"),
+            )
+        })?;
+        let glob = glob.compile_matcher();
+        let names = sim.actor_names().filter(|name| glob.is_match(name));
+        let mut names: Vec<String> = names.map(str::to_owned).collect();
+        if names.is_empty() {
+            let known: Vec<&str> = sim.actor_names().collect();
+            let hint = nearest(&self.actor, known.iter().copied());
+            let hint = hint.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
+            let (found, count) = (&self.actor, known.len());
+            let message = format!(
+                "{found:?}: expected the name of one of {count} actors, or a pattern{hint}"
+            );
+            return Err(mistake("actor", message));
+        }
+        names.sort_by(|a, b| {
+            let draw = |name: &str| draws(name).text("chosen").uniform();
+            draw(a).total_cmp(&draw(b)).then_with(|| a.cmp(b))
+        });
+        let count = libm::round(self.fraction * names.len() as f64);
+        names.truncate(count as usize);
+        Ok(names)
+    }
+
+    /// When one actor crashes and is back, crash by crash.
+    fn times(
+        &self,
+        draws: &RandomKey,
+        until: Option<SimDuration>,
+    ) -> Vec<(SimDuration, Option<SimDuration>)> {
+        let mut stream = draws.text("times").stream();
+        let Some(mtbf) = self.mtbf else {
+            let later = self.within.map_or(0.0, SimDuration::as_secs_f64) * stream.uniform();
+            let down = self.at + SimDuration::from_secs_f64(later);
+            let up = self.restart.or(self.restart_after.map(|wait| down + wait));
+            return vec![(down, up)];
+        };
+        let mut times = Vec::new();
+        let until = until.unwrap_or(SimDuration::ZERO);
+        let mut now = self.at;
+        while times.len() < MAX_EVENTS {
+            let down = now + SimDuration::from_secs_f64(stream.exponential(mtbf.as_secs_f64()));
+            if down >= until {
+                break;
+            }
+            let repair = self.mttr.map(|mean| stream.exponential(mean.as_secs_f64()));
+            let up = repair.map(|wait| {
+                down + SimDuration::from_secs_f64(wait).max(SimDuration::from_nanos(1))
+            });
+            times.push((down, up));
+            match up {
+                Some(up) => now = up,
+                None => break,
+            }
+        }
+        times
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crash(text: &str) -> Crash {
+        toml::from_str(text).unwrap()
+    }
+
+    fn team() -> Simulation {
+        struct Idle;
+        impl farside::Actor for Idle {
+            type Accepts = ();
+        }
+        let mut sim = Simulation::new(1);
+        for name in (1..=20).map(|i| format!("node_{i:02}")) {
+            let host = sim.host(&name);
+            sim.actor(host, &name, |_| Idle);
+        }
+        sim
+    }
+
+    fn key(name: &str) -> RandomKey {
+        RandomKey::new(9).text(name)
+    }
+
+    #[test]
+    fn a_larger_fraction_crashes_the_same_actors_and_more() {
+        let chosen = |fraction: f64| {
+            let entry = crash(&format!("actor = 'node_*'\nfraction = {fraction}"));
+            entry.chosen(&team(), &|name| key(name)).unwrap()
+        };
+        let (few, many) = (chosen(0.1), chosen(0.3));
+        assert_eq!((few.len(), many.len(), chosen(0.0).len()), (2, 6, 0));
+        assert!(few.iter().all(|name| many.contains(name)));
+    }
+
+    #[test]
+    fn failures_and_repairs_have_their_means() {
+        let entry = crash("actor = 'x'\nmtbf = '100s'\nmttr = '20s'");
+        let until = SimDuration::from_secs(1_000_000);
+        let times = entry.times(&key("x"), Some(until));
+        let count = times.len() as f64;
+        // A failure for each 120 s on average, with a standard error of about 1 %.
+        assert!((count - 8333.0).abs() < 300.0, "{count}");
+        let down = times.iter().map(|(down, up)| {
+            let up = up.unwrap();
+            assert!(up > *down);
+            (up - *down).as_secs_f64()
+        });
+        let mean_down = down.sum::<f64>() / count;
+        assert!((mean_down - 20.0).abs() < 1.0, "{mean_down}");
+        assert!(times.windows(2).all(|pair| pair[0].1.unwrap() < pair[1].0));
+    }
+
+    #[test]
+    fn one_crash_lies_within_its_window() {
+        let entry = crash("actor = 'x'\nat = '10s'\nwithin = '5s'\nrestart_after = '2s'");
+        for i in 0..100 {
+            let times = entry.times(&key("x").number(i), None);
+            let [(down, Some(up))] = times[..] else {
+                panic!("one crash, one restart: {times:?}");
+            };
+            let window = SimDuration::from_secs(10)..=SimDuration::from_secs(15);
+            assert!(window.contains(&down));
+            assert_eq!(up, down + SimDuration::from_secs(2));
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let until = Some(SimDuration::from_secs(100));
+        let wrong = |text: &str| crash(&format!("actor = 'x'\n{text}")).check(until);
+        let key = |text: &str| wrong(text).unwrap_err().key;
+        assert_eq!(key("at = '5s'\nrestart = '5s'"), "restart");
+        assert_eq!(key("at = '5s'\nwithin = '5s'\nrestart = '9s'"), "restart");
+        assert_eq!(key("mttr = '5s'"), "mttr");
+        assert_eq!(key("mtbf = '5s'\nwithin = '1s'"), "mtbf");
+        assert_eq!(key("mtbf = '0s'"), "mtbf");
+        assert_eq!(key("mtbf = '1ns'\nmttr = '1ns'"), "mtbf");
+        assert_eq!(key("restart_after = '0s'"), "restart_after");
+        assert_eq!(
+            crash("actor = 'x'\nmtbf = '5s'")
+                .check(None)
+                .unwrap_err()
+                .key,
+            "mtbf"
+        );
+        assert_eq!(wrong("mtbf = '5s'\nmttr = '1s'"), Ok(()));
+    }
+}
