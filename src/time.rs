@@ -44,6 +44,11 @@ impl SimTime {
         SimTime(nanos)
     }
 
+    /// The instant `secs` seconds after the start.
+    pub const fn from_secs(secs: u64) -> Self {
+        SimTime(secs * 1_000_000_000)
+    }
+
     /// Nanoseconds since the start.
     pub const fn as_nanos(self) -> u64 {
         self.0

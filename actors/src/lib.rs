@@ -2,4 +2,5 @@
 
 pub mod link;
 pub mod network;
+pub mod radio;
 pub mod units;
