@@ -379,11 +379,8 @@ fn ground_between_antennas_blocks_or_weakens() {
     let ridge = HeightField::new(Point2::new(0.0, -50.0), 50.0, 3, heights_m).unwrap();
     let ridge = Arc::new(ridge);
     let lost = |radio: &str, x_m: f64| {
-        let stations = vec![
-            (Point3::new(5.0, 0.0, 0.5), 1),
-            (Point3::new(x_m, 0.0, 0.5), 0),
-        ];
-        let mut team = Team::new(radio, stations);
+        let ground = |x_m| ridge.antenna_m(x_m, 0.0, 0.0);
+        let mut team = Team::new(radio, vec![(ground(5.0), 1), (ground(x_m), 0)]);
         team.terrain = Some(ridge.clone());
         team.until_s = 300;
         let (_, fates, _) = team.run(Executor::Inline);
