@@ -127,12 +127,11 @@ impl<'a, A: Actor> Context<'a, A> {
         self.parts.cancel_timer(self.me, timer)
     }
 
-    /// The link called `name`, which takes changes of type `C`.
-    ///
-    /// # Errors
-    /// When no link has that name, or it takes other changes.
-    pub fn lookup_link<C: Message>(&self, name: &str) -> Result<LinkId<C>, LookupError> {
-        self.parts.plan.lookup_link::<C>(name)
+    /// The links that carry what this host sends and take changes of type `C`, in name order: those
+    /// that [`Context::tell_link`] may be called with.
+    pub fn links<C: Message>(&self) -> Vec<LinkId<C>> {
+        let host = self.parts.plan.place(self.me).host;
+        self.parts.plan.links_from(host)
     }
 
     /// Tells a link something: new parameters, or where this host is. The link must be one of this

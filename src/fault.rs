@@ -193,8 +193,8 @@ pub enum BuildError {
 /// An address was asked for under a name or type that the run does not have.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
-    /// No actor, or no link, has the name.
-    #[error("no actor or link is called {name:?}")]
+    /// No actor has the name.
+    #[error("no actor is called {name:?}")]
     Unknown {
         /// The name.
         name: String,

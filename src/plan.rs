@@ -229,27 +229,22 @@ impl Plan {
         Ok(Address::new(declared))
     }
 
-    /// The link called `name`.
-    pub(crate) fn lookup_link<C: Message>(&self, name: &str) -> Result<LinkId<C>, LookupError> {
-        let unknown = || LookupError::Unknown {
-            name: name.to_owned(),
+    /// The links that carry what `host` sends and take changes of type `C`, in name order.
+    pub(crate) fn links_from<C: Message>(&self, host: HostIndex) -> Vec<LinkId<C>> {
+        let Some(kind) = self.kind_of_type.get(&TypeId::of::<C>()) else {
+            return Vec::new();
         };
-        let entity = self.info.entity(name).ok_or_else(unknown)?;
-        let link = self.links.get(&entity).ok_or_else(unknown)?;
-        let wanted = self.kind_of_type.get(&TypeId::of::<C>()).copied();
-        if wanted != Some(link.change_kind) {
-            return Err(LookupError::WrongType {
-                name: name.to_owned(),
-                expected: std::any::type_name::<C>(),
-                actual: "a link that takes other changes",
-            });
-        }
-        let declared = self
-            .declared_links
-            .iter()
-            .position(|known| *known == entity);
-        let declared = declared.ok_or_else(unknown)?;
-        Ok(LinkId::new(declared as u32))
+        let routes = &self.routes[host as usize];
+        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
+        links.extend(routes.uplink);
+        links.retain(|link| self.links[link].change_kind == *kind);
+        links.sort_unstable();
+        links.dedup();
+        let id = |link: EntityId| {
+            let declared = self.declared_links.iter().position(|known| *known == link);
+            declared.map(|declared| LinkId::new(declared as u32))
+        };
+        links.into_iter().filter_map(id).collect()
     }
 
     /// True if records, and so encoded bodies, are needed at all.

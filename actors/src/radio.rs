@@ -158,7 +158,8 @@ pub struct Radio<H> {
 }
 
 impl<H: Hop> Radio<H> {
-    /// A radio without stations or links. `terrain` is what `line_of_sight` asks.
+    /// A radio without stations or links. With a `terrain` stations stand on it, whatever height
+    /// they are said to have, and `line_of_sight` asks it.
     pub fn new(config: RadioConfig, terrain: Option<Arc<HeightField>>) -> Self {
         Radio {
             config,
@@ -230,8 +231,11 @@ impl<H: Hop> Radio<H> {
 
     /// Where a station's antenna is.
     fn antenna(&self, station: Station, now: SimTime) -> Point3<f64> {
-        let ground = self.places[station as usize].track.at(now);
-        Point3::new(ground.x, ground.y, ground.z + self.config.antenna_m)
+        let place = self.places[station as usize].track.at(now);
+        match &self.terrain {
+            Some(terrain) => terrain.antenna_m(place.x, place.y, self.config.antenna_m),
+            None => Point3::new(place.x, place.y, place.z + self.config.antenna_m),
+        }
     }
 
     fn way(&self, parcel: &Parcel<'_>, directed: u32, now: SimTime) -> Way {

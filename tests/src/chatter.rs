@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside::{Carriage, Carrier, LinkId, Parcel, Verdicts};
+use farside::{Carriage, Carrier, Parcel, Verdicts};
 use serde::{Deserialize, Serialize};
 
 /// What a run of the model looks like. Small numbers, so that a failing case can be read.
@@ -67,7 +67,6 @@ pub struct NewLoss {
 struct Talker {
     names: Arc<Vec<(String, usize)>>,
     host: usize,
-    link: Option<LinkId<NewLoss>>,
     handled: u32,
     stop_after: u32,
     fail_after: u32,
@@ -144,9 +143,10 @@ impl Handler<Tick> for Talker {
         self.count(ctx)?;
         let wait = SimDuration::from_nanos(1 + ctx.random("wait").below(9));
         let number = ctx.durable::<Memory>().0;
-        if let Some(link) = self.link.filter(|_| number.is_multiple_of(4)) {
+        let link = ctx.links().first().copied();
+        if let Some(link) = link.filter(|_| number.is_multiple_of(4)) {
             let loss_16 = ctx.random("loss").below(17) as u8;
-            ctx.tell_link(link, NewLoss { loss_16 });
+            ctx.tell_link::<NewLoss>(link, NewLoss { loss_16 });
         }
         let timer = ctx.timer(wait, Tick { number });
         let spare = ctx.timer(wait, Tick { number: number + 1 });
@@ -243,15 +243,14 @@ impl Chatter {
         let hosts: Vec<HostId> = (0..self.hosts.len())
             .map(|host| sim.host(&format!("h{host}")))
             .collect();
-        let links = self.join(&mut sim, &hosts, undercut);
+        self.join(&mut sim, &hosts, undercut);
         let mut addresses = Vec::new();
         for (name, host) in names.iter() {
-            let (names, host, link) = (names.clone(), *host, links[*host]);
+            let (names, host) = (names.clone(), *host);
             let (stop_after, fail_after) = (self.stop_after, self.fail_after);
             addresses.push(sim.actor(hosts[host], name, move |_| Talker {
                 names: names.clone(),
                 host,
-                link,
                 handled: 0,
                 stop_after,
                 fail_after,
@@ -274,14 +273,7 @@ impl Chatter {
         sim
     }
 
-    /// Declares the links; returns for each host one that it may tell something.
-    fn join(
-        &self,
-        sim: &mut Simulation,
-        hosts: &[HostId],
-        undercut: bool,
-    ) -> Vec<Option<LinkId<NewLoss>>> {
-        let mut told = vec![None; hosts.len()];
+    fn join(&self, sim: &mut Simulation, hosts: &[HostId], undercut: bool) {
         let noisy = || Noisy {
             min_delay: SimDuration::from_nanos(self.min_delay_ns),
             jitter_ns: self.jitter_ns,
@@ -295,22 +287,17 @@ impl Chatter {
             for (b, to) in hosts.iter().enumerate() {
                 match medium {
                     _ if a == b => {}
-                    Some(medium) if a % 2 == 0 => {
-                        sim.route(*from, *to, medium);
-                        told[a] = Some(medium);
-                    }
+                    Some(medium) if a % 2 == 0 => sim.route(*from, *to, medium),
                     _ => {
                         let link = sim.link(*from, *to, &format!("h{a}-h{b}"), noisy());
                         let change = NewLoss {
                             loss_16: self.loss_16.saturating_sub(1),
                         };
                         sim.change_at(SimTime::from_nanos(self.until_ns / 2), link, change);
-                        told[a] = Some(link);
                     }
                 }
             }
         }
-        told
     }
 }
 

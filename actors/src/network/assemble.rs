@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use farside::prelude::*;
 use farside::random::RandomKey;
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+use nalgebra::Point3;
 
 use super::config::{ConfigError, NetworkConfig, TeamConfig, WorldConfig};
 use super::lng::LocalGraph;
@@ -67,6 +68,12 @@ impl Site {
     /// The planning cycle at `now`, from 0. Nodes' clocks are synchronous.
     pub(crate) fn cycle_at(&self, now: SimTime) -> u32 {
         u32::try_from(now.as_nanos() / self.config.cycle.as_nanos()).unwrap_or(u32::MAX)
+    }
+
+    /// Where a vertex is, on the ground, in the world's frame [m].
+    pub(crate) fn place_m(&self, vertex: VertexId) -> Point3<f64> {
+        let at = self.roadmap.position_m(vertex);
+        Point3::new(at.x, at.y, self.roadmap.height_m(vertex))
     }
 
     /// From `now` to the start of the next cycle; never zero.
@@ -261,6 +268,23 @@ impl Network {
     /// The rovers' names, in order; hosts are called the same.
     pub fn rover_names(&self) -> &[String] {
         &self.site.rover_names
+    }
+
+    /// Where each host stands at first, in the world's frame, in metres: nodes at their places, as
+    /// high as a vertex of theirs; rovers at their entries.
+    pub fn places_m(&self) -> Vec<(&str, Point3<f64>)> {
+        let (site, sensors) = (&self.site, &self.site.sensors);
+        let nodes = sensors.nodes().zip(&site.node_names).map(|(id, name)| {
+            let at = sensors.position_m(id);
+            let height_m = sensors.owned(id).first().map(|v| site.roadmap.height_m(*v));
+            (
+                name.as_str(),
+                Point3::new(at.x, at.y, height_m.unwrap_or(0.0)),
+            )
+        });
+        let rovers = site.missions.iter().zip(&site.rover_names);
+        let rovers = rovers.map(|((entry, _), name)| (name.as_str(), site.place_m(*entry)));
+        nodes.chain(rovers).collect()
     }
 
     /// Each rover's entry and goal, in the order of the names.

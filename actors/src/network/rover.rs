@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use farside::LinkId;
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,7 @@ use super::config::Sabotage;
 use super::messages::{Beacon, Grant, RoverId, RoverState};
 use super::node::Node;
 use super::safety::{Answer, RoverMemory};
+use crate::radio::RadioChange;
 
 /// A rover of the network-guided system.
 ///
@@ -23,6 +25,8 @@ pub struct Rover {
     entry: VertexId,
     goal: VertexId,
     nodes: Vec<Address<Node>>,
+    /// What must know where it is.
+    radios: Vec<LinkId<RadioChange>>,
 }
 
 /// Timer: a planning cycle begins.
@@ -44,6 +48,7 @@ impl Rover {
             entry,
             goal,
             nodes: Vec::new(),
+            radios: Vec::new(),
         }
     }
 
@@ -54,6 +59,25 @@ impl Rover {
             entry: self.entry,
             goal: self.goal,
         });
+    }
+
+    /// Begins to drive along the edge from `here`.
+    fn drive(&self, ctx: &mut Context<'_, Self>) {
+        ctx.timer(self.site.config.traverse, EdgeEnds);
+        let memory = ctx.durable::<RoverMemory>();
+        let (Some(here), Some(next)) = (memory.vertex, memory.moving_to) else {
+            return;
+        };
+        let end = ctx.now() + self.site.config.traverse;
+        for radio in &self.radios {
+            let moves = RadioChange::Moves {
+                host: self.site.rover_names[self.id.0 as usize].clone(),
+                from_m: self.site.place_m(here).into(),
+                to_m: self.site.place_m(next).into(),
+                end_ns: end.as_nanos(),
+            };
+            ctx.tell_link(*radio, moves);
+        }
     }
 
     fn beacon(&self, ctx: &mut Context<'_, Self>, to: NodeId) {
@@ -81,7 +105,7 @@ impl Rover {
             return;
         };
         memory.moving_to = self.site.roadmap.neighbors(here).first().copied();
-        ctx.timer(self.site.config.traverse, EdgeEnds);
+        self.drive(ctx);
         self.record(ctx);
         self.beacon_here(ctx);
     }
@@ -94,9 +118,10 @@ impl Actor for Rover {
         for name in &self.site.node_names {
             self.nodes.push(ctx.lookup::<Node>(name)?);
         }
+        self.radios = ctx.links();
         // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
         if ctx.durable::<RoverMemory>().moving_to.is_some() {
-            ctx.timer(self.site.config.traverse, EdgeEnds);
+            self.drive(ctx);
         }
         self.record(ctx);
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
@@ -129,7 +154,7 @@ impl Handler<Grant> for Rover {
             Answer::Hold => return Ok(()),
             Answer::Report => {}
             Answer::SetOut => {
-                ctx.timer(self.site.config.traverse, EdgeEnds);
+                self.drive(ctx);
                 self.record(ctx);
                 // LEAVING goes to the owner of the vertex left, which is not the one that granted
                 // the next one.
