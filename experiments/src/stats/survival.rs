@@ -182,20 +182,33 @@ impl Survival {
         })
     }
 
+    /// When it has happened to a share `q`; infinite if that is never seen, not a number if nothing
+    /// was watched.
+    pub fn quantile(&self, q: f64) -> f64 {
+        self.first(|share| share.value, 1.0 - q)
+    }
+
     /// When it has happened to half; infinite if that is never seen. The interval reaches over the
     /// times at which the curve's interval holds one half (Brookmeyer and Crowley 1982).
     pub fn median(&self) -> Estimate {
-        let first = |half_or_less: &dyn Fn(&Estimate) -> bool| {
-            let step = self.steps.iter().find(|step| half_or_less(&step.remaining));
-            step.map_or(f64::INFINITY, |step| step.time)
-        };
         if self.watched == 0 {
             return Estimate::unknown(f64::NAN);
         }
         Estimate {
-            value: first(&|share| share.value <= 0.5),
-            low: first(&|share| share.low <= 0.5),
-            high: first(&|share| share.high <= 0.5),
+            value: self.quantile(0.5),
+            low: self.first(|share| share.low, 0.5),
+            high: self.first(|share| share.high, 0.5),
         }
+    }
+
+    /// The first time at which what remains, or an end of its interval, is down to a share.
+    fn first(&self, remaining: impl Fn(&Estimate) -> f64, share: f64) -> f64 {
+        if self.watched == 0 {
+            return f64::NAN;
+        }
+        // The curve is a product: a half may come out as a rounding more.
+        let down = |step: &&Step| remaining(&step.remaining) <= share + 1e-12;
+        let step = self.steps.iter().find(down);
+        step.map_or(f64::INFINITY, |step| step.time)
     }
 }

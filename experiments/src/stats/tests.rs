@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::Estimate;
 use super::bootstrap::{mean, mean_and_interquartile_mean, paired_difference, stratified};
 use super::distribution::{Ecdf, quantile};
-use super::rates::{mcnemar, wilson};
+use super::rates::{mcnemar, paired_rate_difference, wilson};
 use super::survival::{Observation, Survival, kaplan_meier};
 
 /// Skewed, as times on bad links are.
@@ -112,6 +112,30 @@ fn mcnemar_agrees_with_statsmodels() {
         assert_eq!((test.only_first, test.only_second), (first, second));
         assert!((test.p - p).abs() < 1e-10, "{test:?}, not {p}");
     }
+}
+
+/// Pairs that go together, as runs of one seed do: the first holds with 0.8, the second with 0.6, and
+/// never the second alone.
+#[test]
+fn paired_rates_hold_the_truth_about_as_often_as_they_say() {
+    let trials = 2000;
+    let held = (0..trials).filter(|trial| {
+        let mut stream = RandomKey::new(11).number(*trial).stream();
+        let pairs: Vec<(bool, bool)> = (0..30)
+            .map(|_| {
+                let draw = stream.uniform();
+                (draw < 0.8, draw < 0.6)
+            })
+            .collect();
+        let test = mcnemar(&pairs);
+        let there = paired_rate_difference(&test);
+        let swapped: Vec<(bool, bool)> = pairs.iter().map(|(a, b)| (*b, *a)).collect();
+        let back = paired_rate_difference(&mcnemar(&swapped));
+        close(there, -back.value, -back.high, -back.low, 1e-12);
+        there.low <= 0.2 && 0.2 <= there.high
+    });
+    let share = held.count() as f64 / trials as f64;
+    assert!((0.92..=0.98).contains(&share), "{share}");
 }
 
 fn singles(times: &[f64], happened: &[u8]) -> Vec<Observation> {
