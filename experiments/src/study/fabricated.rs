@@ -125,6 +125,7 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
             baseline: Some(0),
             cells: cells.collect(),
             seeds: (1..=seeds).collect(),
+            stop: None,
             factors,
         },
         runs,
