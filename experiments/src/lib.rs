@@ -20,5 +20,6 @@
 pub mod cli;
 mod commands;
 pub mod scenario;
+pub mod stats;
 pub mod study;
 pub mod system;

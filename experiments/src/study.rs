@@ -4,3 +4,7 @@
 //! values is a cell, and each cell runs with the same seeds. What comes of it is [`results`].
 
 pub mod results;
+pub mod summary;
+
+#[cfg(test)]
+pub(crate) mod fabricated;

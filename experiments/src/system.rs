@@ -38,8 +38,8 @@ pub trait System: Send + Sync {
     -> Result<Box<dyn Settings>, toml::de::Error>;
 }
 
-/// The settings of one scenario for one system.
-pub trait Settings {
+/// The settings of one scenario for one system. Several threads may build from them at once.
+pub trait Settings: Send + Sync {
     /// The same keys again, defaults filled in.
     ///
     /// # Errors

@@ -30,15 +30,15 @@ pub enum ScenarioError {
         source: std::io::Error,
     },
     /// The file is no text.
-    #[error("{}: not a scenario: byte {at_byte} is not UTF-8; expected TOML text", .path.display())]
+    #[error("{}: byte {at_byte} is not UTF-8; expected TOML text", .path.display())]
     NotUtf8 {
         /// The file.
         path: PathBuf,
         /// The first byte that is no text.
         at_byte: usize,
     },
-    /// The file is larger than any scenario that is read.
-    #[error("{}: {actual_bytes} bytes; a scenario has at most {limit_bytes}", .path.display())]
+    /// The file is larger than any that is read.
+    #[error("{}: {actual_bytes} bytes; at most {limit_bytes} are read", .path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -115,7 +115,7 @@ pub enum ScenarioError {
     },
 }
 
-fn did_you_mean(nearest: &Option<String>) -> String {
+pub(crate) fn did_you_mean(nearest: &Option<String>) -> String {
     match nearest {
         Some(name) => format!("; did you mean {name:?}?"),
         None => String::new(),
@@ -123,7 +123,7 @@ fn did_you_mean(nearest: &Option<String>) -> String {
 }
 
 /// The line itself, with a mark below the column.
-fn quoted(place: &Place) -> String {
+pub(crate) fn quoted(place: &Place) -> String {
     match place {
         Place::File {
             line, column, text, ..
@@ -140,8 +140,19 @@ fn quoted(place: &Place) -> String {
 }
 
 impl ScenarioError {
+    /// Where in the text or among the `--set` arguments it is, if it is there.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            ScenarioError::Syntax { place, .. }
+            | ScenarioError::UnknownKey { place, .. }
+            | ScenarioError::UnknownValue { place, .. }
+            | ScenarioError::Invalid { place, .. } => Some(place),
+            _ => None,
+        }
+    }
+
     /// An error of the TOML reader, with its place and the nearest valid name.
-    pub(super) fn from_toml(source: &Source, error: &toml::de::Error) -> Self {
+    pub(crate) fn from_toml(source: &Source, error: &toml::de::Error) -> Self {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.start);
         let key = source.key_at(&span);

@@ -27,6 +27,7 @@ pub struct Manifest {
     /// cell's run is this with [`Cell::sets`] laid over it.
     pub scenario_text: String,
     /// The files that the scenario reads, by name.
+    #[serde(with = "file_texts")]
     pub files: BTreeMap<String, Vec<u8>>,
     /// What is varied.
     pub factors: Vec<Factor>,
@@ -38,6 +39,62 @@ pub struct Manifest {
     pub cells: Vec<Cell>,
     /// The seeds, the same for each cell; with a stopping rule, the most there may be.
     pub seeds: Vec<u64>,
+    /// When a cell has seeds enough; without, each cell runs with all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<Stop>,
+}
+
+/// When a cell has seeds enough.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// The metric whose interval decides.
+    pub metric: String,
+    /// The widest that its 95 % interval may be, in the metric's unit.
+    pub width: f64,
+    /// How many seeds each cell runs with before it is looked at.
+    pub min_seeds: usize,
+}
+
+/// Files in a manifest: as text where they are text, for people to read, else as bytes.
+mod file_texts {
+    use std::collections::BTreeMap;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Content {
+        Text(String),
+        Bytes(Vec<u8>),
+    }
+
+    pub(super) fn serialize<S: Serializer>(
+        files: &BTreeMap<String, Vec<u8>>,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        to.collect_map(files.iter().map(|(name, bytes)| {
+            let content = match std::str::from_utf8(bytes) {
+                Ok(text) => Content::Text(text.to_owned()),
+                Err(_) => Content::Bytes(bytes.clone()),
+            };
+            (name, content)
+        }))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<BTreeMap<String, Vec<u8>>, D::Error> {
+        let files = BTreeMap::<String, Content>::deserialize(from)?;
+        let bytes = |content| match content {
+            Content::Text(text) => text.into_bytes(),
+            Content::Bytes(bytes) => bytes,
+        };
+        Ok(files
+            .into_iter()
+            .map(|(name, content)| (name, bytes(content)))
+            .collect())
+    }
 }
 
 /// What is varied.
