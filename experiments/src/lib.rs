@@ -22,3 +22,4 @@ mod commands;
 pub mod scenario;
 pub mod study;
 pub mod system;
+mod wall;
