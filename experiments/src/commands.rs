@@ -6,8 +6,11 @@ pub(crate) mod info;
 mod interrupt;
 mod progress;
 pub(crate) mod recover;
+pub(crate) mod reproduce;
 pub(crate) mod run;
 pub(crate) mod scenarios;
+pub(crate) mod studies;
+pub(crate) mod study;
 mod table;
 pub(crate) mod verify;
 
@@ -21,6 +24,7 @@ use thiserror::Error;
 
 use crate::cli::Exit;
 use crate::scenario::ScenarioError;
+use crate::study::{StoreError, StudyError};
 
 /// The version that logs are stamped with.
 pub(crate) const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -31,6 +35,12 @@ pub(crate) enum CommandError {
     /// The scenario.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// A study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A results folder.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A log that is read.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -52,7 +62,12 @@ impl CommandError {
     /// The exit code it deserves.
     pub(crate) fn exit(&self) -> Exit {
         match self {
-            CommandError::Scenario(_)
+            CommandError::Study(StudyError::CellFails { .. } | StudyError::Workers(_))
+            | CommandError::Study(StudyError::Store(StoreError::Io { .. }))
+            | CommandError::Store(StoreError::Io { .. }) => Exit::Failed,
+            CommandError::Study(_)
+            | CommandError::Store(_)
+            | CommandError::Scenario(_)
             | CommandError::Log(_)
             | CommandError::NotRepeatable { .. } => Exit::Wrong,
             CommandError::Build(_) | CommandError::Output(_) | CommandError::Json(_) => {

@@ -23,3 +23,4 @@ pub mod scenario;
 pub mod stats;
 pub mod study;
 pub mod system;
+mod wall;
