@@ -162,6 +162,18 @@ impl Parcel<'_> {
     }
 }
 
+impl Parcel<'_> {
+    /// The address of a draw of the link itself, whatever message asks: (run seed, link, purpose,
+    /// number), where the number may be that of a slot of time. All messages that meet this slot
+    /// then meet the same channel.
+    pub fn random_at(&self, purpose: u64, number: u64) -> RandomKey {
+        RandomKey::new(self.plan.seed)
+            .number(self.plan.name_hash(self.link))
+            .number(purpose)
+            .number(number)
+    }
+}
+
 /// How a link carried one copy of a message: the parts of its delay, and what it cost. Logs show
 /// it beside the fate.
 ///

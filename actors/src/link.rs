@@ -1,12 +1,65 @@
 //! Links: when a message arrives, how often, or why it does not.
 //!
-//! A [`Link`] joins two hosts, one way. It is a chain of stages, each a few lines in [`stage`]:
-//! is the link out, how many copies are there, is this copy lost, how long does it take. Which
-//! link has which parameters is the affair of [`LinksConfig`], and when they change, of
-//! [`Degrade`]; both are what scenario files hold, and [`LinkBuilder`] turns them into links.
+//! A [`Link`] joins two hosts, one way. What it does with a message is decided by a [`Transmitter`]
+//! from a [`Timeline`] of [`LinkParams`]; which link has which is the affair of [`LinksConfig`], and
+//! when they change, of [`Degrade`]; both are what scenario files hold, and [`LinkBuilder`] turns
+//! them into links.
+//!
+//! # What happens to a message
+//!
+//! 1. It arrives at the link. By `duplicate` it is one copy or two, each on its own from here.
+//! 2. It waits until those before it are done with, and, with `store_and_forward`, until the link
+//!    can transmit it as a whole. If more than `queue` would wait, it is lost: `queue_full`.
+//! 3. It is transmitted: `8 (L + overhead) / rate`, or at a `trace`'s opportunities. In an `outage`
+//!    or without a contact it is lost before or cut short (`outage`, `no_contact`).
+//! 4. It may be lost when its last bit has left, by `loss` or by a `burst`.
+//! 5. It is on its way for the latency and the jitter, or held back by `reorder`. It may arrive
+//!    `corrupt`.
+//! 6. With `retries`, a sender that has no answer after `timeout` goes back to 3, with new luck;
+//!    those behind it wait. An answer takes the latency and is never lost.
+//!
+//! All this is decided when the message is sent, by what holds at the instant of each step: a message
+//! that is sent now and transmitted in six minutes meets the outage that begins in five.
+//!
+//! # The keys of `[links.default]`, `[links.PATTERN]` and `[[degrade]]`
+//!
+//! Everything is off by default. What is on is turned off with `"off"`, 0 or false.
+//!
+//! | key | alias | unit | default | what it is |
+//! |---|---|---|---|---|
+//! | `preset` | | name | none | all parameters, from [`Preset`]; other keys override it |
+//! | `latency` | `delay` | duration | 5 ms | one way |
+//! | `jitter` | | duration | 0 | scale of `jitter_shape` |
+//! | `jitter_shape` | `distribution` | [`JitterShape`] | `"uniform"` | `"normal"`, `"pareto"`, `{ table = [...] }` |
+//! | `jitter_correlation` | | fraction | 0 | AR(1), mapped to the shape; netem's own recipe shrinks the variance |
+//! | `min_delay` | | duration | where the jitter ends | floor under latency and jitter |
+//! | `fifo` | | bool | false | later messages never arrive before earlier ones |
+//! | `loss` | | fraction | 0 | each message by itself; reason `loss` |
+//! | `burst` | `gemodel`, `loss_gemodel`, `loss_state` | [`Burst`] | off | Gilbert-Elliott or four states, in time; reason `burst` |
+//! | `duplicate` | | fraction | 0 | messages that set out twice |
+//! | `reorder` | | fraction | 0 | messages that are held back by `reorder_by` |
+//! | `reorder_by` | | duration | the latency | netem sends those at once and delays the others: the same gap, but no least delay |
+//! | `corrupt` | | fraction | 0 | messages that arrive corrupt; reason `corrupt` |
+//! | `ber` | | fraction | 0 | bit error rate: `1 - (1 - ber)^(8 (L + overhead))` |
+//! | `rate` | | data rate | unlimited | bits on the air |
+//! | `overhead` | | data size | 0 | bytes beside the message |
+//! | `queue` | `limit` | messages or data size | unlimited | drop-tail, behind the one being sent; netem counts that one too |
+//! | `trace` | | milliseconds | off | mahimahi's delivery opportunities, in place of `rate` |
+//! | `contacts` | | [`Contacts`] | always | windows with rate and light time; reason `no_contact` |
+//! | `store_and_forward` | | bool | false | wait for the end of an outage, for a contact |
+//! | `retries` | | number | 0 | stop-and-wait repetitions |
+//! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
+//! | `tx_power` | | power | 0 | `tx_power 8 (L + overhead) / rate` of the sender's energy each attempt |
+//! | `outage` | | bool | false | the link is out; reason `outage` |
+//!
+//! Sources: tc-netem(8) for names and for what users expect of them; the pages of each type for the
+//! rest. Rates that change during a transmission do not change it; outages and contacts cut it.
+//!
+//! # Randomness
 //!
 //! Every draw is addressed by the message's identity, so what happens to one message leaves the
-//! next alone, and raising a loss rate loses the same messages and more.
+//! next alone, and raising a loss rate loses the same messages and more. A burst's are addressed by
+//! the slot of time. Of attempts each has its own.
 //!
 //! ```
 //! use farside_actors::link::{Link, LinkParams};
@@ -21,22 +74,68 @@
 //! assert_eq!(Link::new(params).min_delay(), SimDuration::from_millis(1280));
 //! ```
 
+mod build;
+mod burst;
+mod change;
 mod config;
+mod contacts;
+mod form;
+mod jitter;
 mod params;
-pub mod stage;
+mod preset;
+mod queue;
+mod stage;
+mod timeline;
+mod transmit;
+
+use std::sync::Arc;
 
 use farside::carrier::{Carrier, Parcel, Verdicts};
 use farside::{SimDuration, SimTime};
 
-pub use config::{Degrade, LinkBuilder, LinkConfigError, LinksConfig};
-pub use params::{JitterShape, LinkChange, LinkOverrides, LinkParams};
+use stage::{Draws, Purpose};
+
+pub use build::LinkBuilder;
+pub use burst::Burst;
+pub use change::LinkChange;
+pub use config::{Degrade, LinkConfigError, LinksConfig};
+pub use contacts::{Contact, Contacts, Trace, Window};
+pub use jitter::JitterShape;
+pub use params::{LinkOverrides, LinkParams};
+pub use preset::Preset;
+pub use queue::QueueLimit;
+pub use stage::packet_error_rate;
+pub use timeline::Timeline;
+pub use transmit::{Attempt, Path, Sent, Transmitter};
 
 /// Why a link loses a message by chance.
 pub const LOSS: &str = "loss";
+/// Why a link loses a message while its channel is bad.
+pub const BURST: &str = "burst";
 /// Why a link that is out loses every message.
 pub const OUTAGE: &str = "outage";
+/// Why a link loses a message outside its contacts.
+pub const NO_CONTACT: &str = "no_contact";
+/// Why a link loses a message when too many wait.
+pub const QUEUE_FULL: &str = "queue_full";
+/// Why a message is dropped where it arrives.
+pub const CORRUPT: &str = "corrupt";
 
-/// A link with latency, jitter, random loss, duplication and outages. See the module's front page.
+/// How long so many bytes are on the air: `8 bytes / rate`, rounded up to whole nanoseconds, so
+/// that no link is faster than its rate.
+///
+/// ```
+/// use farside_actors::link::transmission_time;
+/// assert_eq!(transmission_time(1500, 12_000_000).as_nanos(), 1_000_000);
+/// assert_eq!(transmission_time(1, 3).as_nanos(), 2_666_666_667);
+/// ```
+pub fn transmission_time(bytes: u64, rate_bit_per_s: u64) -> SimDuration {
+    let bit_ns = u128::from(bytes) * 8 * 1_000_000_000;
+    let nanos = bit_ns.div_ceil(u128::from(rate_bit_per_s.max(1)));
+    SimDuration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+}
+
+/// A link of one host to another, one way, for nobody else. See the module's front page.
 ///
 /// ```
 /// use farside::prelude::*;
@@ -78,30 +177,57 @@ pub const OUTAGE: &str = "outage";
 /// ```
 #[derive(Clone, Debug)]
 pub struct Link {
-    params: LinkParams,
-    /// The least delay of all parameters this link will ever have.
-    min_delay: SimDuration,
+    transmitter: Transmitter,
+    /// Which parameters held when last asked, and until when.
+    index: usize,
+    until: SimTime,
 }
 
 impl Link {
-    /// A link whose parameters stay as they are.
-    pub fn new(params: LinkParams) -> Self {
+    /// A link with these parameters, or with a [`Timeline`] of them.
+    pub fn new(timeline: impl Into<Arc<Timeline>>) -> Self {
+        let transmitter = Transmitter::new(timeline);
         Link {
-            min_delay: params.min_delay(),
-            params,
+            until: transmitter.timeline().end_of(0).unwrap_or(SimTime::MAX),
+            index: 0,
+            transmitter,
         }
     }
 
     /// Declares that the link may be given these parameters during the run: [`Carrier::min_delay`]
     /// allows for them. A change that was not declared is held to the delays that were.
+    #[must_use]
     pub fn may_become(mut self, params: &LinkParams) -> Self {
-        self.min_delay = self.min_delay.min(params.min_delay());
+        self.transmitter.allow_delay(params.min_delay());
         self
     }
 
-    /// The present parameters.
-    pub fn params(&self) -> &LinkParams {
-        &self.params
+    /// The parameters at `at`.
+    pub fn params(&self, at: SimTime) -> &LinkParams {
+        self.transmitter.timeline().at(at)
+    }
+
+    /// Finds the parameters that hold now.
+    fn turn_to(&mut self, now: SimTime) {
+        let timeline = self.transmitter.timeline();
+        self.index = timeline.index(now);
+        self.until = timeline.end_of(self.index).unwrap_or(SimTime::MAX);
+    }
+
+    /// What most links are, decided without more than it takes: no size, no parts, no allocation.
+    fn carry_plainly(&self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        let span = &self.transmitter.timeline().spans[self.index];
+        let params = &span.params;
+        for copy in 0..stage::copies(params, parcel) {
+            let draws = Draws::first(copy);
+            if draws.happens(parcel, Purpose::Loss, params.loss) {
+                verdicts.lose(LOSS);
+            } else {
+                let way = stage::way(params, params.latency, span.floor, parcel, draws);
+                // Only a change that nobody declared can be faster than what the run counts on.
+                verdicts.deliver(way.max(self.transmitter.min_delay()));
+            }
+        }
     }
 }
 
@@ -109,27 +235,36 @@ impl Carrier for Link {
     type Change = LinkChange;
 
     fn min_delay(&self) -> SimDuration {
-        self.min_delay
+        self.transmitter.min_delay()
     }
 
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        if self.params.outage {
-            verdicts.lose(OUTAGE);
-            return;
+        let now = parcel.now();
+        if now >= self.until {
+            self.turn_to(now);
         }
-        for copy in 0..stage::copies(&self.params, parcel) {
-            if stage::is_lost(&self.params, parcel, copy) {
-                verdicts.lose(LOSS);
-            } else {
-                let delay = stage::delay(&self.params, parcel, copy);
-                // Only a change that nobody declared can be faster than what the run counts on.
-                verdicts.deliver(delay.max(self.min_delay));
+        let span = &self.transmitter.timeline().spans[self.index];
+        if span.plain && self.transmitter.free_at() <= now {
+            if span.params.outage {
+                return verdicts.lose(OUTAGE);
             }
+            return self.carry_plainly(parcel, verdicts);
+        }
+        for copy in 0..self.transmitter.copies(parcel) {
+            let sent = self.transmitter.send(parcel, copy, now, &Path::default());
+            sent.tell(now, verdicts);
         }
     }
 
-    fn change(&mut self, change: LinkChange, _now: SimTime) {
-        self.params = change.into();
+    fn change(&mut self, change: LinkChange, now: SimTime) {
+        if change.is_planned() {
+            return;
+        }
+        // Only who writes changes by hand can write one that is none.
+        if let Ok(over) = change.overrides() {
+            self.transmitter.replace_from(now, &over);
+            self.turn_to(now);
+        }
     }
 }
 

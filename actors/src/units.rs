@@ -29,7 +29,7 @@ mod with;
 use farside::SimDuration;
 use thiserror::Error;
 
-pub use with::{data_rate_bit_per_s, data_size_bytes, duration, fraction, length_m};
+pub use with::{data_rate_bit_per_s, data_size_bytes, duration, fraction, length_m, power_w};
 
 /// A text is not the quantity that was expected.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -147,6 +147,16 @@ const DATA_SIZE: Quantity = Quantity {
         unit("KiB", 1 << 10, 0),
         unit("MiB", 1 << 20, 0),
         unit("GiB", 1 << 30, 0),
+    ],
+};
+
+const POWER: Quantity = Quantity {
+    expected: "a power such as \"100mW\" or \"12W\"",
+    units: &[
+        unit("uW", 1, -6),
+        unit("mW", 1, -3),
+        unit("W", 1, 0),
+        unit("kW", 1, 3),
     ],
 };
 
@@ -352,6 +362,27 @@ pub fn print_data_size(bytes: u64) -> String {
     print_whole(bytes, &["B", "kB", "MB", "GB"])
 }
 
+/// Reads a power in watts: `"12W"`, `"100mW"`.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_power_w("100mW"), Ok(0.1));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_power_w(text: &str) -> Result<f64, UnitError> {
+    POWER.nearest(text)
+}
+
+/// Writes a power in watts so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_power_w(0.1), "0.1W");
+/// ```
+pub fn print_power_w(power_w: f64) -> String {
+    format!("{power_w}W")
+}
+
 /// The number in the largest of these units, each 1000 of the one before, that leaves it whole.
 fn print_whole(mut value: u64, symbols: &[&str]) -> String {
     let mut symbol = 0;
@@ -415,6 +446,7 @@ mod tests {
             prop_assert_eq!(parse_data_rate(&print_data_rate(rate)), Ok(rate));
             prop_assert_eq!(parse_data_size(&print_data_size(rate)), Ok(rate));
             prop_assert_eq!(parse_length_m(&print_length_m(length_m)), Ok(length_m));
+            prop_assert_eq!(parse_power_w(&print_power_w(length_m)), Ok(length_m));
         }
 
         #[test]
@@ -422,6 +454,7 @@ mod tests {
             for text in [text, format!("{number}{unit}")] {
                 let _ = parse_duration(&text);
                 let _ = parse_length_m(&text);
+                let _ = parse_power_w(&text);
                 let _ = parse_fraction(&text);
                 let _ = parse_data_rate(&text);
                 let _ = parse_data_size(&text);

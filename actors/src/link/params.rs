@@ -1,215 +1,359 @@
-//! The parameters of a link: all of them, some of them, and as a change that logs can hold.
+//! The parameters of a link: one list, from which come all of them, some of them, the reading of
+//! `[links]` and `[[degrade]]`, and what a change writes to the log.
+
+use std::fmt;
 
 use farside::SimDuration;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::units;
+use super::form::{
+    DataRate, DataSize, Duration, Form, Fraction, OrOff, Plain, Power, Retries, Span,
+};
+use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace};
 
-/// How delays scatter round the latency.
-///
-/// ```
-/// use farside_actors::link::JitterShape;
-/// assert_eq!(JitterShape::default(), JitterShape::Uniform);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum JitterShape {
-    /// Evenly, by at most the jitter to either side.
-    #[default]
-    Uniform,
-    /// Normally, with the jitter as standard deviation, cut at three of them to either side.
-    Normal,
+/// Whether a parameter of `LinkParams` is written when it is off, as a resolved scenario is.
+enum Shown {
+    Always,
+    IfOn,
 }
 
-impl JitterShape {
-    /// Where the normal shape is cut, in standard deviations.
-    pub const NORMAL_SPREAD: u32 = 3;
-}
-
-/// All parameters of a link.
-///
-/// ```
-/// use farside_actors::link::LinkParams;
-/// let params: LinkParams = toml::from_str("latency = '5ms'\njitter = '1ms'\nloss = '2%'")?;
-/// assert_eq!(params.loss, 0.02);
-/// assert_eq!(params.min_delay().to_string(), "4ms");
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LinkParams {
-    /// The one-way delay, 5 ms unless given.
-    #[serde(with = "units::duration")]
-    pub latency: SimDuration,
-    /// How far delays scatter round the latency.
-    #[serde(with = "units::duration")]
-    pub jitter: SimDuration,
-    /// How they scatter.
-    pub jitter_shape: JitterShape,
-    /// No delay is below this, whatever the jitter. Unless given, it is where the jitter ends.
-    #[serde(
-        rename = "min_delay",
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub least_delay: Option<SimDuration>,
-    /// The fraction of messages that are lost, each by itself.
-    #[serde(with = "units::fraction")]
-    pub loss: f64,
-    /// The fraction of messages that set out twice.
-    #[serde(with = "units::fraction")]
-    pub duplicate: f64,
-    /// The link is out: everything is lost.
-    pub outage: bool,
-}
-
-impl Default for LinkParams {
-    fn default() -> Self {
-        LinkParams {
-            latency: SimDuration::from_millis(5),
-            jitter: SimDuration::ZERO,
-            jitter_shape: JitterShape::Uniform,
-            least_delay: None,
-            loss: 0.0,
-            duplicate: 0.0,
-            outage: false,
+macro_rules! parameters {
+    ($(
+        $(#[$doc:meta])*
+        $field:ident: $type:ty = $default:expr,
+            key $key:literal $(or $alias:literal)*, as $form:ty, $shown:ident;
+    )*) => {
+        /// All parameters of a link. The table of keys is on the module's front page.
+        ///
+        /// ```
+        /// use farside_actors::link::LinkParams;
+        /// let params: LinkParams = toml::from_str("latency = '5ms'\njitter = '1ms'\nloss = '2%'")?;
+        /// assert_eq!(params.loss, 0.02);
+        /// assert_eq!(params.min_delay().to_string(), "4ms");
+        /// # Ok::<(), toml::de::Error>(())
+        /// ```
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct LinkParams {
+            $($(#[$doc])* pub $field: $type,)*
         }
-    }
+
+        /// Some parameters of a link; what is absent stays as it is.
+        ///
+        /// ```
+        /// use farside_actors::link::LinkOverrides;
+        /// let over: LinkOverrides = toml::from_str("loss = 0.3")?;
+        /// assert_eq!((over.loss, over.latency), (Some(0.3), None));
+        /// # Ok::<(), toml::de::Error>(())
+        /// ```
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct LinkOverrides {
+            /// What all parameters are replaced by, before the others here.
+            pub preset: Option<Preset>,
+            $($(#[$doc])* pub $field: Option<$type>,)*
+        }
+
+        impl Default for LinkParams {
+            fn default() -> Self {
+                LinkParams { $($field: $default,)* }
+            }
+        }
+
+        impl LinkParams {
+            /// These parameters with some replaced.
+            ///
+            /// ```
+            /// use farside_actors::link::{LinkOverrides, LinkParams};
+            /// let out = LinkOverrides { outage: Some(true), ..LinkOverrides::default() };
+            /// assert!(LinkParams::default().with(&out).outage);
+            /// ```
+            #[must_use]
+            pub fn with(&self, over: &LinkOverrides) -> LinkParams {
+                let mut params = match over.preset {
+                    Some(preset) => preset.params(),
+                    None => self.clone(),
+                };
+                $(if let Some(value) = &over.$field {
+                    params.$field = value.clone();
+                })*
+                params
+            }
+
+            /// What has to be replaced here to get `other`.
+            ///
+            /// ```
+            /// use farside_actors::link::LinkParams;
+            /// let bad = LinkParams { loss: 0.3, ..LinkParams::default() };
+            /// let over = LinkParams::default().changes_to(&bad);
+            /// assert_eq!((over.loss, over.latency), (Some(0.3), None));
+            /// ```
+            pub fn changes_to(&self, other: &LinkParams) -> LinkOverrides {
+                LinkOverrides {
+                    preset: None,
+                    $($field: (self.$field != other.$field).then(|| other.$field.clone()),)*
+                }
+            }
+        }
+
+        impl From<LinkParams> for LinkOverrides {
+            fn from(params: LinkParams) -> Self {
+                LinkOverrides { preset: None, $($field: Some(params.$field),)* }
+            }
+        }
+
+        /// The keys of a link's parameters.
+        pub(super) const KEYS: &[&str] = &["preset", $($key,)*];
+
+        /// The keys of a `[[degrade]]` entry.
+        pub(super) const DEGRADE_KEYS: &[&str] = &["at", "until", "links", "preset", $($key,)*];
+
+        /// The key that an alias stands for, or the key itself.
+        pub(super) fn key_of(name: &str) -> Option<&'static str> {
+            match name {
+                "preset" => Some("preset"),
+                $($key $(| $alias)* => Some($key),)*
+                _ => None,
+            }
+        }
+
+        impl LinkOverrides {
+            /// Reads the value of one of [`KEYS`].
+            pub(super) fn read<'de, A: MapAccess<'de>>(
+                &mut self,
+                key: &str,
+                map: &mut A,
+            ) -> Result<(), A::Error> {
+                match key {
+                    "preset" => self.preset = Some(map.next_value()?),
+                    $($key => {
+                        struct Seed;
+                        impl<'de> DeserializeSeed<'de> for Seed {
+                            type Value = $type;
+                            fn deserialize<D: Deserializer<'de>>(
+                                self,
+                                from: D,
+                            ) -> Result<$type, D::Error> {
+                                <$form as Form>::read(from)
+                            }
+                        }
+                        self.$field = Some(map.next_value_seed(Seed)?);
+                    })*
+                    _ => {
+                        map.next_value::<IgnoredAny>()?;
+                    }
+                }
+                Ok(())
+            }
+
+            /// Writes what is there.
+            pub(super) fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+                if let Some(preset) = &self.preset {
+                    map.serialize_entry("preset", preset)?;
+                }
+                $(if let Some(value) = &self.$field {
+                    struct Value<'a>(&'a $type);
+                    impl Serialize for Value<'_> {
+                        fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                            <$form as Form>::write(self.0, to)
+                        }
+                    }
+                    map.serialize_entry($key, &Value(value))?;
+                })*
+                Ok(())
+            }
+        }
+
+        impl Serialize for LinkParams {
+            fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                let off = LinkParams::default();
+                let shown = LinkOverrides {
+                    preset: None,
+                    $($field: (matches!(Shown::$shown, Shown::Always) || self.$field != off.$field)
+                        .then(|| self.$field.clone()),)*
+                };
+                shown.serialize(to)
+            }
+        }
+    };
+}
+
+parameters! {
+    /// The one-way delay, 5 ms unless given.
+    latency: SimDuration = SimDuration::from_millis(5),
+        key "latency" or "delay", as Duration, Always;
+    /// How far delays scatter round the latency.
+    jitter: SimDuration = SimDuration::ZERO, key "jitter", as Duration, Always;
+    /// How they scatter.
+    jitter_shape: JitterShape = JitterShape::Uniform,
+        key "jitter_shape" or "distribution", as Plain<JitterShape>, Always;
+    /// How much the jitter of a message is like that of the one before it: the lag-one correlation
+    /// of a Gaussian AR(1) process `z' = rho z + sqrt(1 - rho^2) e`, mapped to the shape, which
+    /// keeps it.
+    jitter_correlation: f64 = 0.0, key "jitter_correlation", as Fraction, IfOn;
+    /// No delay is below this, whatever the jitter. Unless given, it is where the jitter ends.
+    least_delay: Option<SimDuration> = None, key "min_delay", as OrOff<Duration>, IfOn;
+    /// Later messages never arrive before earlier ones. It wins over `reorder`.
+    fifo: bool = false, key "fifo", as Plain<bool>, IfOn;
+    /// The fraction of messages that are lost, each by itself.
+    loss: f64 = 0.0, key "loss", as Fraction, Always;
+    /// Loss in bursts, beside that.
+    burst: Option<Burst> = None,
+        key "burst" or "gemodel" or "loss_gemodel" or "loss_state", as OrOff<Plain<Burst>>, IfOn;
+    /// The fraction of messages that set out twice, each a transmission of its own.
+    duplicate: f64 = 0.0, key "duplicate", as Fraction, Always;
+    /// The fraction of messages that are held back on their way by `reorder_by`, so that those sent
+    /// up to that much later overtake them.
+    reorder: f64 = 0.0, key "reorder", as Fraction, IfOn;
+    /// How long those are held back; the latency unless given.
+    reorder_by: Option<SimDuration> = None, key "reorder_by", as OrOff<Duration>, IfOn;
+    /// The fraction of messages that arrive corrupt, and are dropped there.
+    corrupt: f64 = 0.0, key "corrupt", as Fraction, IfOn;
+    /// The bit error rate: a message of L bytes is corrupt with `1 - (1 - ber)^(8 (L + overhead))`.
+    ber: f64 = 0.0, key "ber", as Fraction, IfOn;
+    /// The bit rate: a message of L bytes takes `8 (L + overhead) / rate`, rounded up to whole
+    /// nanoseconds, and the next one waits.
+    rate: Option<u64> = None, key "rate", as OrOff<DataRate>, IfOn;
+    /// The bytes that each transmission has beside the message: headers, checksums, preambles.
+    overhead: u64 = 0, key "overhead", as DataSize, IfOn;
+    /// The most messages, or bytes with overhead, that wait behind the one being sent. Who comes
+    /// then is lost.
+    queue: Option<QueueLimit> = None,
+        key "queue" or "limit", as OrOff<Plain<QueueLimit>>, IfOn;
+    /// Delivery opportunities in place of a rate.
+    trace: Option<Trace> = None, key "trace", as OrOff<Plain<Trace>>, IfOn;
+    /// When the link can transmit at all, with rates and light times.
+    contacts: Option<Contacts> = None,
+        key "contacts", as OrOff<Plain<Contacts>>, IfOn;
+    /// Messages wait for the end of an outage, and for the next contact in which their whole
+    /// transmission fits.
+    store_and_forward: bool = false, key "store_and_forward", as Plain<bool>, IfOn;
+    /// How often a lost message is sent again: stop and wait, so that those behind it wait.
+    retries: u32 = 0, key "retries", as Retries, IfOn;
+    /// How long after a transmission began it is given up. Never below what an answer takes:
+    /// the transmission and twice the latency.
+    timeout: Option<SimDuration> = None, key "timeout", as OrOff<Span>, IfOn;
+    /// The power while transmitting, in watts: an attempt takes `tx_power 8 (L + overhead) / rate`
+    /// from the sender.
+    tx_power_w: f64 = 0.0, key "tx_power", as Power, IfOn;
+    /// The link is out: everything is lost.
+    outage: bool = false, key "outage", as Plain<bool>, Always;
 }
 
 impl LinkParams {
     /// The least delay that a link with these parameters gives.
-    pub fn min_delay(&self) -> SimDuration {
-        let spread = match self.jitter_shape {
-            JitterShape::Uniform => self.jitter,
-            JitterShape::Normal => self.jitter * u64::from(JitterShape::NORMAL_SPREAD),
-        };
-        let end_of_jitter = self.latency - spread;
-        self.least_delay.unwrap_or(end_of_jitter)
-    }
-
-    /// These parameters with some replaced.
     ///
-    /// ```
-    /// use farside_actors::link::{LinkOverrides, LinkParams};
-    /// let out = LinkOverrides { outage: Some(true), ..LinkOverrides::default() };
-    /// assert!(LinkParams::default().with(&out).outage);
-    /// ```
-    #[must_use]
-    pub fn with(&self, over: &LinkOverrides) -> LinkParams {
-        LinkParams {
-            latency: over.latency.unwrap_or(self.latency),
-            jitter: over.jitter.unwrap_or(self.jitter),
-            jitter_shape: over.jitter_shape.unwrap_or(self.jitter_shape),
-            least_delay: over.least_delay.or(self.least_delay),
-            loss: over.loss.unwrap_or(self.loss),
-            duplicate: over.duplicate.unwrap_or(self.duplicate),
-            outage: over.outage.unwrap_or(self.outage),
-        }
+    /// It is the least latency, of contacts too, less what the jitter can take, plus the time to
+    /// send an empty message. A given `min_delay` stands in for the first two.
+    pub fn min_delay(&self) -> SimDuration {
+        let light = |owlt: Option<SimDuration>| owlt.unwrap_or(self.latency);
+        let windows = self.contacts.iter().flat_map(Contacts::windows);
+        let latency = windows.clone().map(|window| light(window.owlt)).min();
+        let fastest = windows
+            .map(|window| window.rate.or(self.rate))
+            .reduce(|a, b| {
+                // No rate is the fastest of all.
+                Some(a?.max(b?))
+            });
+        let rate = fastest.unwrap_or(self.rate);
+        let sending = match (rate, &self.trace) {
+            (Some(rate), None) => super::transmission_time(self.overhead, rate),
+            _ => SimDuration::ZERO,
+        };
+        self.least_way(latency.unwrap_or(self.latency)) + sending
+    }
+
+    /// The least time on the way, with this latency.
+    pub(super) fn least_way(&self, latency: SimDuration) -> SimDuration {
+        let end_of_jitter = || {
+            let least = self.jitter_shape.least() * self.jitter.as_nanos() as f64;
+            let size = SimDuration::from_nanos(libm::ceil(least.abs()) as u64);
+            match least < 0.0 {
+                true => latency - size,
+                // Rounded down, for delays are.
+                false => latency + SimDuration::from_nanos(least as u64),
+            }
+        };
+        self.least_delay.unwrap_or_else(end_of_jitter)
     }
 }
 
-/// Some parameters of a link; what is absent stays as it is.
-///
-/// ```
-/// use farside_actors::link::LinkOverrides;
-/// let over: LinkOverrides = toml::from_str("loss = 0.3")?;
-/// assert_eq!((over.loss, over.latency), (Some(0.3), None));
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LinkOverrides {
-    /// See [`LinkParams::latency`], and so on.
-    #[serde(
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub latency: Option<SimDuration>,
-    /// The jitter.
-    #[serde(
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub jitter: Option<SimDuration>,
-    /// The jitter's shape.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub jitter_shape: Option<JitterShape>,
-    /// The least delay.
-    #[serde(
-        rename = "min_delay",
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub least_delay: Option<SimDuration>,
-    /// The loss.
-    #[serde(
-        with = "units::fraction::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub loss: Option<f64>,
-    /// The duplication.
-    #[serde(
-        with = "units::fraction::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub duplicate: Option<f64>,
-    /// The outage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub outage: Option<bool>,
+/// Reads a key: one of `keys`, or an alias of one, not seen before.
+pub(super) struct Key<'a> {
+    pub(super) keys: &'static [&'static str],
+    pub(super) seen: &'a mut Vec<&'static str>,
 }
 
-/// What a control event tells a link, and what the log shows of it: all parameters, from now on.
-///
-/// ```
-/// use farside_actors::link::{LinkChange, LinkParams};
-/// let change = LinkChange::from(LinkParams::default());
-/// assert_eq!(change.latency_ns, 5_000_000);
-/// assert_eq!(LinkParams::from(change), LinkParams::default());
-/// ```
-// Apart from `LinkParams`, because messages are plain numbers where scenarios have units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LinkChange {
-    /// The one-way delay in nanoseconds.
-    pub latency_ns: u64,
-    /// The jitter in nanoseconds.
-    pub jitter_ns: u64,
-    /// The jitter's shape.
-    pub jitter_shape: JitterShape,
-    /// The least delay in nanoseconds, if one is set.
-    pub min_delay_ns: Option<u64>,
-    /// The fraction of messages that are lost.
-    pub loss: f64,
-    /// The fraction of messages that set out twice.
-    pub duplicate: f64,
-    /// The link is out.
-    pub outage: bool,
-}
+impl<'de> DeserializeSeed<'de> for Key<'_> {
+    type Value = &'static str;
 
-impl From<LinkParams> for LinkChange {
-    fn from(params: LinkParams) -> Self {
-        LinkChange {
-            latency_ns: params.latency.as_nanos(),
-            jitter_ns: params.jitter.as_nanos(),
-            jitter_shape: params.jitter_shape,
-            min_delay_ns: params.least_delay.map(SimDuration::as_nanos),
-            loss: params.loss,
-            duplicate: params.duplicate,
-            outage: params.outage,
-        }
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<&'static str, D::Error> {
+        from.deserialize_identifier(self)
     }
 }
 
-impl From<LinkChange> for LinkParams {
-    fn from(change: LinkChange) -> Self {
-        LinkParams {
-            latency: SimDuration::from_nanos(change.latency_ns),
-            jitter: SimDuration::from_nanos(change.jitter_ns),
-            jitter_shape: change.jitter_shape,
-            least_delay: change.min_delay_ns.map(SimDuration::from_nanos),
-            loss: change.loss,
-            duplicate: change.duplicate,
-            outage: change.outage,
+impl Visitor<'_> for Key<'_> {
+    type Value = &'static str;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a parameter of links")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<&'static str, E> {
+        let own = self.keys.iter().copied().find(|key| *key == name);
+        let Some(key) = own.or_else(|| key_of(name)) else {
+            return Err(E::unknown_field(name, self.keys));
+        };
+        if self.seen.contains(&key) {
+            return Err(E::duplicate_field(key));
         }
+        self.seen.push(key);
+        Ok(key)
+    }
+}
+
+impl Serialize for LinkOverrides {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let mut map = to.serialize_map(None)?;
+        self.write(&mut map)?;
+        map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for LinkOverrides {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Table;
+
+        impl<'de> Visitor<'de> for Table {
+            type Value = LinkOverrides;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table of a link's parameters")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<LinkOverrides, A::Error> {
+                let mut over = LinkOverrides::default();
+                let mut seen = Vec::new();
+                loop {
+                    let seed = Key {
+                        keys: KEYS,
+                        seen: &mut seen,
+                    };
+                    let Some(key) = map.next_key_seed(seed)? else {
+                        return Ok(over);
+                    };
+                    over.read(key, &mut map)?;
+                }
+            }
+        }
+
+        from.deserialize_map(Table)
+    }
+}
+
+impl<'de> Deserialize<'de> for LinkParams {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let over = LinkOverrides::deserialize(from)?;
+        Ok(LinkParams::default().with(&over))
     }
 }

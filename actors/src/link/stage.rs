@@ -1,57 +1,79 @@
-//! The stages of a link: each asks one question about one message, and draws under a purpose of
-//! its own, so that a stage added or switched off leaves the draws of the others where they were.
+//! The draws of a link: each asks one question about one copy of a message, under a purpose of its
+//! own, so that a parameter added or switched off leaves the draws of the others where they were.
 
 use farside::SimDuration;
 use farside::carrier::Parcel;
 use farside::random::RandomKey;
 
-use super::{JitterShape, LinkParams};
+use super::{LinkParams, jitter};
 
 /// What a draw is for. The numbers are part of every run's identity: add, never renumber.
 #[derive(Clone, Copy)]
-enum Purpose {
+pub(super) enum Purpose {
     Loss = 1,
     Jitter = 2,
     Duplicate = 3,
+    Burst = 4,
+    /// By slot, not by message.
+    BurstSlot = 5,
+    Corrupt = 6,
+    BitErrors = 7,
+    Reorder = 8,
+    Path = 9,
 }
 
-fn draw(parcel: &Parcel<'_>, purpose: Purpose, copy: u32) -> RandomKey {
-    parcel.random(purpose as u64, 0, copy)
+/// One transmission of one copy of a message.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Draws {
+    pub(super) attempt: u32,
+    pub(super) copy: u32,
+}
+
+impl Draws {
+    /// The first transmission of this copy.
+    pub(super) fn first(copy: u32) -> Self {
+        Draws { attempt: 0, copy }
+    }
+
+    pub(super) fn key(self, parcel: &Parcel<'_>, purpose: Purpose) -> RandomKey {
+        parcel.random(purpose as u64, self.attempt, self.copy)
+    }
+
+    /// Whether something of this probability happens. Below one draw lie all smaller
+    /// probabilities: who is lost at 10 % is lost at 20 % too.
+    pub(super) fn happens(self, parcel: &Parcel<'_>, purpose: Purpose, probability: f64) -> bool {
+        probability > 0.0 && self.key(parcel, purpose).uniform() < probability
+    }
 }
 
 /// How many copies of the message set out: one, or two.
-pub fn copies(params: &LinkParams, parcel: &Parcel<'_>) -> u32 {
-    let twice =
-        params.duplicate > 0.0 && draw(parcel, Purpose::Duplicate, 0).uniform() < params.duplicate;
+pub(super) fn copies(params: &LinkParams, parcel: &Parcel<'_>) -> u32 {
+    let twice = Draws::first(0).happens(parcel, Purpose::Duplicate, params.duplicate);
     1 + u32::from(twice)
 }
 
-/// Whether this copy is lost. Below one draw lie all smaller loss rates: whoever is lost at 10 %
-/// is lost at 20 % too.
-pub fn is_lost(params: &LinkParams, parcel: &Parcel<'_>, copy: u32) -> bool {
-    params.loss > 0.0 && draw(parcel, Purpose::Loss, copy).uniform() < params.loss
+/// How long this copy is on its way, with jitter drawn for itself alone.
+pub(super) fn way(
+    params: &LinkParams,
+    latency: SimDuration,
+    floor: SimDuration,
+    parcel: &Parcel<'_>,
+    draws: Draws,
+) -> SimDuration {
+    if params.jitter.is_zero() {
+        return latency.max(floor);
+    }
+    let deviation = params.jitter_shape.draw(draws.key(parcel, Purpose::Jitter));
+    jitter::shifted(latency, params.jitter, deviation).max(floor)
 }
 
-/// How long this copy takes.
-pub fn delay(params: &LinkParams, parcel: &Parcel<'_>, copy: u32) -> SimDuration {
-    if params.jitter.is_zero() {
-        return params.latency.max(params.min_delay());
-    }
-    let key = draw(parcel, Purpose::Jitter, copy);
-    // In units of `jitter`, within the spread that bounds the shape.
-    let deviation = match params.jitter_shape {
-        JitterShape::Uniform => 2.0 * key.uniform() - 1.0,
-        JitterShape::Normal => {
-            let spread = f64::from(JitterShape::NORMAL_SPREAD);
-            key.stream().normal(0.0, 1.0).clamp(-spread, spread)
-        }
-    };
-    let offset = deviation * params.jitter.as_nanos() as f64;
-    let size = SimDuration::from_nanos(offset.abs() as u64);
-    let delay = if offset < 0.0 {
-        params.latency - size
-    } else {
-        params.latency + size
-    };
-    delay.max(params.min_delay())
+/// The probability that a packet of so many bytes has a wrong bit: `1 - (1 - ber)^(8 bytes)`.
+///
+/// ```
+/// use farside_actors::link::packet_error_rate;
+/// assert!((packet_error_rate(1e-6, 125) - 0.000_999_5).abs() < 1e-9);
+/// assert_eq!(packet_error_rate(1.0, 1), 1.0);
+/// ```
+pub fn packet_error_rate(ber: f64, bytes: u64) -> f64 {
+    -libm::expm1(8.0 * bytes as f64 * libm::log1p(-ber))
 }

@@ -8,9 +8,9 @@ use serde::de::{Error, Visitor};
 use serde::{Deserializer, Serializer};
 
 use super::{
-    DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, UnitError, check_fraction, parse_data_rate,
-    parse_data_size, parse_duration, parse_fraction, parse_length_m, print_data_rate,
-    print_data_size, print_length_m,
+    DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, POWER, UnitError, check_fraction,
+    parse_data_rate, parse_data_size, parse_duration, parse_fraction, parse_length_m,
+    parse_power_w, print_data_rate, print_data_size, print_length_m, print_power_w,
 };
 
 /// How one quantity is read, from a text or from a bare number.
@@ -166,6 +166,15 @@ quantity! {
     text parse_fraction,
     number check_fraction,
     write |value, to| to.serialize_f64(*value)
+}
+
+quantity! {
+    /// Powers: `"12W"` and watts. Bare numbers are refused.
+    power_w: f64, PowerW,
+    expected POWER.expected,
+    text parse_power_w,
+    number |number: f64| Err(POWER.no_unit(number)),
+    write |value, to| to.collect_str(&print_power_w(*value))
 }
 
 quantity! {

@@ -1,0 +1,247 @@
+//! Links from a scenario, by name.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use farside::{HostId, LinkId, SimDuration, SimTime, Simulation};
+use globset::{Glob, GlobMatcher};
+
+use super::{
+    Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig, Timeline,
+};
+
+/// A pattern, and whether any link has matched it.
+struct Pattern {
+    key: Vec<String>,
+    text: String,
+    glob: GlobMatcher,
+    used: bool,
+}
+
+impl Pattern {
+    fn new(key: Vec<String>, text: &str) -> Result<Self, LinkConfigError> {
+        match Glob::new(text) {
+            Ok(glob) => Ok(Pattern {
+                key,
+                text: text.to_owned(),
+                glob: glob.compile_matcher(),
+                used: false,
+            }),
+            Err(error) => Err(LinkConfigError::BadPattern {
+                key,
+                pattern: text.to_owned(),
+                error: error.kind().to_string(),
+            }),
+        }
+    }
+
+    fn matches(&mut self, name: &str) -> bool {
+        let yes = self.glob.is_match(name);
+        self.used |= yes;
+        yes
+    }
+}
+
+/// Builds links by name from [`LinksConfig`] and [`Degrade`]s, and checks that every pattern
+/// matches some link.
+///
+/// ```
+/// use farside::Simulation;
+/// use farside_actors::link::{LinkBuilder, LinksConfig};
+/// let links: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
+/// let mut sim = Simulation::new(1);
+/// let (base, rover) = (sim.host("base"), sim.host("rover_1"));
+/// let mut builder = LinkBuilder::new(&links, &[])?;
+/// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
+/// builder.finish()?;
+///
+/// let links: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
+/// let mut builder = LinkBuilder::new(&links, &[])?;
+/// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
+/// let error = builder.finish().unwrap_err();
+/// assert!(error.to_string().ends_with("matches no link; did you mean \"base-rover_*\"?"));
+/// # Ok::<(), farside_actors::link::LinkConfigError>(())
+/// ```
+pub struct LinkBuilder {
+    default: LinkParams,
+    overrides: Vec<(Pattern, LinkOverrides)>,
+    degrades: Vec<(Pattern, Degrade)>,
+    names: Vec<String>,
+    /// What links were given before: most of them share a base and the degradations they meet.
+    known: Vec<Known>,
+}
+
+/// The timeline of all links with one base and one set of degradations.
+struct Known {
+    base: LinkParams,
+    /// Indices into the degradations.
+    degrades: Vec<usize>,
+    timeline: Arc<Timeline>,
+}
+
+/// The most patterns, and the most degradations.
+const MAX_ENTRIES: usize = 1000;
+
+impl LinkBuilder {
+    /// A builder for links with these parameters and changes.
+    ///
+    /// # Errors
+    /// When a pattern cannot be read, or a degradation makes no sense by itself.
+    pub fn new(links: &LinksConfig, degrades: &[Degrade]) -> Result<Self, LinkConfigError> {
+        for (key, actual) in [("links", links.patterns.len()), ("degrade", degrades.len())] {
+            // Each is matched with each link's name.
+            if actual > MAX_ENTRIES {
+                return Err(LinkConfigError::TooMany {
+                    key: vec![key.to_owned()],
+                    actual,
+                    limit: MAX_ENTRIES,
+                });
+            }
+        }
+        let mut builder = LinkBuilder {
+            default: links.default.clone(),
+            overrides: Vec::new(),
+            degrades: Vec::new(),
+            names: Vec::new(),
+            known: Vec::new(),
+        };
+        for (text, over) in &links.patterns {
+            let key = vec!["links".to_owned(), text.clone()];
+            let pattern = Pattern::new(key, text)?;
+            builder.overrides.push((pattern, over.clone()));
+        }
+        for (index, degrade) in degrades.iter().enumerate() {
+            let key = |last: &str| vec!["degrade".to_owned(), index.to_string(), last.to_owned()];
+            if let Some(until) = degrade.until.filter(|until| *until <= degrade.at) {
+                return Err(LinkConfigError::EndsBeforeItBegins {
+                    key: key("until"),
+                    at: degrade.at.to_string(),
+                    until: until.to_string(),
+                });
+            }
+            if degrade.over == LinkOverrides::default() {
+                let key = vec!["degrade".to_owned(), index.to_string()];
+                return Err(LinkConfigError::ChangesNothing { key });
+            }
+            let pattern = Pattern::new(key("links"), &degrade.links)?;
+            builder.degrades.push((pattern, degrade.clone()));
+        }
+        Ok(builder)
+    }
+
+    /// Declares the link `{from}-{to}`, and its changes.
+    pub fn connect(
+        &mut self,
+        sim: &mut Simulation,
+        (from_host, from): (HostId, &str),
+        (to_host, to): (HostId, &str),
+    ) -> LinkId<LinkChange> {
+        let name = format!("{from}-{to}");
+        let timeline = self.resolve(&name);
+        let id = sim.link(from_host, to_host, &name, Link::new(timeline.clone()));
+        for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
+            sim.change_at(at, id, LinkChange::planned(before.1, params));
+        }
+        id
+    }
+
+    /// What the link of this name has, and when: for who builds a carrier of another kind around a
+    /// [`super::Transmitter`].
+    pub fn resolve(&mut self, name: &str) -> Arc<Timeline> {
+        let name = name.to_owned();
+        let mut base = self.default.clone();
+        for (pattern, over) in &mut self.overrides {
+            if pattern.matches(&name) {
+                base = base.with(over);
+            }
+        }
+        let mut degrades = Vec::new();
+        for (index, (pattern, _)) in self.degrades.iter_mut().enumerate() {
+            if pattern.matches(&name) {
+                degrades.push(index);
+            }
+        }
+        let timeline = self.timeline(base, degrades);
+        self.names.push(name);
+        timeline
+    }
+
+    /// What such a link has from each instant on at which a degradation begins or ends.
+    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> Arc<Timeline> {
+        let same = |known: &&Known| known.degrades == degrades && known.base == base;
+        if let Some(known) = self.known.iter().find(same) {
+            return known.timeline.clone();
+        }
+        let mine = degrades.iter().map(|&index| &self.degrades[index].1);
+        let mine: Vec<&Degrade> = mine.collect();
+        let instants: BTreeSet<SimDuration> = mine
+            .iter()
+            .flat_map(|degrade| [Some(degrade.at), degrade.until])
+            .flatten()
+            .collect();
+        let params_at = |at: SimDuration| {
+            let active = mine.iter().filter(|degrade| degrade.is_active(at));
+            active.fold(base.clone(), |params, degrade| params.with(&degrade.over))
+        };
+        let mut timeline = Timeline::new(base.clone());
+        for at in instants {
+            timeline = timeline.then(SimTime::ZERO + at, params_at(at));
+        }
+        let timeline = Arc::new(timeline);
+        self.known.push(Known {
+            base,
+            degrades,
+            timeline: timeline.clone(),
+        });
+        timeline
+    }
+
+    /// Checks that every pattern has matched some link.
+    ///
+    /// # Errors
+    /// When one has not; the error has the nearest name.
+    pub fn finish(self) -> Result<(), LinkConfigError> {
+        let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
+        let degrades = self.degrades.iter().map(|(pattern, _)| pattern);
+        match overrides.chain(degrades).find(|pattern| !pattern.used) {
+            None => Ok(()),
+            Some(unused) => Err(LinkConfigError::NoSuchLink {
+                key: unused.key.clone(),
+                pattern: unused.text.clone(),
+                nearest: self.nearest(unused),
+            }),
+        }
+    }
+}
+
+impl LinkBuilder {
+    /// The link name, or the pattern that names with other numbers share, closest to a pattern; in
+    /// `[links]` it may also have been meant for `default`.
+    fn nearest(&self, pattern: &Pattern) -> Option<String> {
+        let mut candidates: BTreeSet<String> = self.names.iter().map(|name| shape(name)).collect();
+        candidates.extend(self.names.iter().cloned());
+        let distance = |name: &str| strsim::damerau_levenshtein(name, &pattern.text);
+        // Link names are long and `default` is short, so that anything short is nearer to it: only
+        // a slip of the keys counts.
+        if pattern.key[0] == "links" && distance("default") <= SLIP {
+            candidates.insert("default".to_owned());
+        }
+        candidates.into_iter().min_by_key(|name| distance(name))
+    }
+}
+
+/// How many letters a mistyped word may be off.
+const SLIP: usize = 3;
+
+/// The name with `*` for each run of digits.
+fn shape(name: &str) -> String {
+    let mut shape = String::with_capacity(name.len());
+    for c in name.chars() {
+        if !c.is_ascii_digit() {
+            shape.push(c);
+        } else if !shape.ends_with('*') {
+            shape.push('*');
+        }
+    }
+    shape
+}

@@ -1,0 +1,129 @@
+//! Links of known places, by name.
+
+use std::sync::OnceLock;
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{LinkOverrides, LinkParams};
+
+/// A named set of parameters; `presets.toml` beside this file has the figures, each with its
+/// source or marked as an estimate.
+///
+/// ```
+/// use farside_actors::link::{LinkParams, Preset};
+/// assert!(Preset::names().any(|name| name == "mars-relay"));
+/// let relay: LinkParams = toml::from_str("preset = 'mars-relay'\nrate = '2048kbit/s'")?;
+/// assert_eq!(relay.rate, Some(2_048_000));
+/// assert!(relay.store_and_forward);
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Preset(usize);
+
+const TEXT: &str = include_str!("presets.toml");
+
+/// The names, in the file's order. The test holds them to the file.
+const NAMES: [&str; 7] = [
+    "perfect",
+    "lunar-surface-wifi",
+    "lunar-relay",
+    "earth-moon-teleop",
+    "mars-relay",
+    "mars-direct",
+    "subsurface-mesh",
+];
+
+/// The parameters of each preset, read once.
+fn all() -> &'static [LinkParams] {
+    static ALL: OnceLock<Vec<LinkParams>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let table = TEXT.parse::<toml::Table>().unwrap_or_default();
+        let read = |name: &&str| {
+            let over = table.get(*name).cloned();
+            let over = over.map(LinkOverrides::deserialize).and_then(Result::ok);
+            LinkParams::default().with(&over.unwrap_or_default())
+        };
+        NAMES.iter().map(read).collect()
+    })
+}
+
+impl Preset {
+    /// The preset of this name.
+    pub fn find(name: &str) -> Option<Preset> {
+        NAMES.iter().position(|known| *known == name).map(Preset)
+    }
+
+    /// All names.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        NAMES.into_iter()
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        NAMES[self.0]
+    }
+
+    /// Its parameters.
+    pub fn params(self) -> LinkParams {
+        all()[self.0].clone()
+    }
+}
+
+impl Serialize for Preset {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Preset {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Name;
+
+        impl serde::de::Visitor<'_> for Name {
+            type Value = Preset;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the name of a preset such as \"mars-relay\"")
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<Preset, E> {
+                Preset::find(name).ok_or_else(|| E::unknown_variant(name, &NAMES))
+            }
+        }
+
+        from.deserialize_str(Name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_of_the_file_can_be_named_and_read() {
+        let table: toml::Table = TEXT.parse().unwrap();
+        let mut names: Vec<&str> = table.keys().map(String::as_str).collect();
+        let mut known = NAMES.to_vec();
+        names.sort_unstable();
+        known.sort_unstable();
+        assert_eq!(names, known);
+        for preset in NAMES.iter().filter_map(|name| Preset::find(name)) {
+            let over = LinkOverrides::deserialize(table[preset.name()].clone()).unwrap();
+            assert_eq!(preset.params(), LinkParams::default().with(&over));
+            assert!(!preset.params().min_delay().is_zero(), "{}", preset.name());
+        }
+    }
+
+    #[test]
+    fn passes_carry_what_their_sources_say() {
+        // MER: 128 kbit/s for 8 minutes are 60 Mbit.
+        let relay = Preset::find("mars-relay").unwrap().params();
+        let pass = relay.contacts.unwrap().windows()[0];
+        let bits = relay.rate.unwrap() * (pass.end - pass.start).as_nanos() / 1_000_000_000;
+        assert!((60_000_000..62_000_000).contains(&bits));
+        // Two light times between Earth and Moon are 2.6 s.
+        let teleop = Preset::find("earth-moon-teleop").unwrap().params();
+        assert_eq!((teleop.latency * 2).to_string(), "2.6s");
+    }
+}

@@ -1,0 +1,486 @@
+//! The core of a link: one transmitter, one way, and what becomes of what it sends.
+//!
+//! A [`Transmitter`] knows a [`Timeline`] of parameters and what it was asked to send so far. Ask it
+//! for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something else
+//! decides when the channel is free, for one transmission at a time ([`Transmitter::attempt`]).
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use farside::carrier::{Carriage, Parcel, Verdicts};
+use farside::{SimDuration, SimTime};
+
+use super::burst::Known;
+use super::contacts::Opportunity;
+use super::stage::{self, Draws, Purpose};
+use super::timeline::Timeline;
+use super::{BURST, CORRUPT, LOSS, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
+
+/// What the world between two antennas adds to the parameters of a link. The default adds nothing.
+///
+/// ```
+/// use farside::SimDuration;
+/// use farside_actors::link::Path;
+/// // 300 km apart, and a tenth lost for want of signal.
+/// let path = Path { propagation: SimDuration::from_millis(1), loss: 0.1, ..Path::default() };
+/// assert_eq!(path.reason, "range");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Path {
+    /// The time on the way beside the latency: the distance over the speed of light.
+    pub propagation: SimDuration,
+    /// The probability that a transmission is lost on this path, beside all other losses.
+    pub loss: f64,
+    /// Why it is lost then.
+    pub reason: &'static str,
+}
+
+impl Default for Path {
+    fn default() -> Self {
+        Path {
+            propagation: SimDuration::ZERO,
+            loss: 0.0,
+            reason: "range",
+        }
+    }
+}
+
+/// One transmission, and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attempt {
+    /// When it begins.
+    pub start: SimTime,
+    /// When the channel is free again: its last bit has left, or it was cut.
+    pub end: SimTime,
+    /// When it arrives, or when its loss shows.
+    pub at: SimTime,
+    /// The time on the way without jitter; none if it did not get so far.
+    pub propagation: SimDuration,
+    /// Why it failed, if it did.
+    pub failed: Option<&'static str>,
+    /// Whether anything went on the air.
+    pub sent: bool,
+    /// What it took from the sender.
+    pub energy_j: f64,
+    /// The time that an answer takes to come back.
+    answer: SimDuration,
+}
+
+impl Attempt {
+    /// When the sender has an answer, if it waits for one: the answer takes the propagation back,
+    /// has no jitter, and is never lost.
+    pub fn answered(&self) -> SimTime {
+        self.end + self.answer + self.answer
+    }
+}
+
+/// What became of a message: when, why not, and how it was carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sent {
+    /// When it arrives, or when it is lost.
+    pub at: SimTime,
+    /// Why it is lost, if it is.
+    pub lost: Option<&'static str>,
+    /// The parts of its delay; their sum is `at` less the instant it was sent.
+    pub carriage: Carriage,
+}
+
+impl Sent {
+    /// Tells the kernel, at `now`, and charges the sender.
+    pub fn tell(&self, now: SimTime, verdicts: &mut Verdicts) {
+        let after = self.at.since(now);
+        match self.lost {
+            None => verdicts.deliver_as(after, self.carriage),
+            Some(reason) => verdicts.lose_as(after, reason, self.carriage),
+        }
+        verdicts.charge(self.carriage.energy_j);
+    }
+}
+
+/// The sending end of a link. See the module's page.
+#[derive(Clone, Debug)]
+pub struct Transmitter {
+    timeline: Arc<Timeline>,
+    /// The least delay that was declared.
+    floor: SimDuration,
+    /// When the last message it took is done with.
+    free: SimTime,
+    /// Of the messages that wait: when each begins to be transmitted, and its bytes.
+    waiting: VecDeque<(SimTime, u64)>,
+    /// The last state of the correlated jitter.
+    deviate: Option<f64>,
+    /// The latest arrival so far.
+    arrived: SimTime,
+    /// Where the walk through the burst chain may stop, and for which span that holds.
+    known: Option<(usize, Known)>,
+    /// What is left of the last opportunity of a trace, and in which span.
+    opportunity: Option<(usize, Opportunity)>,
+}
+
+impl Transmitter {
+    /// A transmitter that has sent nothing yet.
+    pub fn new(timeline: impl Into<Arc<Timeline>>) -> Self {
+        let timeline = timeline.into();
+        Transmitter {
+            floor: timeline.min_delay(),
+            timeline,
+            free: SimTime::ZERO,
+            waiting: VecDeque::new(),
+            deviate: None,
+            arrived: SimTime::ZERO,
+            known: None,
+            opportunity: None,
+        }
+    }
+
+    /// The parameters it has and will have.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// The least delay of anything it delivers.
+    pub fn min_delay(&self) -> SimDuration {
+        self.floor
+    }
+
+    /// Declares a smaller least delay: parameters may come that the timeline does not know.
+    pub fn allow_delay(&mut self, least: SimDuration) {
+        self.floor = self.floor.min(least);
+    }
+
+    /// Replaces some parameters from `from` on. The least delay stays as declared.
+    pub fn replace_from(&mut self, from: SimTime, over: &super::LinkOverrides) {
+        Arc::make_mut(&mut self.timeline).replace_from(from, over);
+        // Spans have other numbers now, and other chains.
+        self.known = None;
+        self.opportunity = None;
+    }
+
+    /// When it has sent all it was given.
+    pub fn free_at(&self) -> SimTime {
+        self.free
+    }
+
+    /// How many copies of the message set out, by the parameters of its arrival at the link: one
+    /// where it is lost at once.
+    pub fn copies(&self, parcel: &Parcel<'_>) -> u32 {
+        let params = self.timeline.at(parcel.now());
+        match params.outage && !params.store_and_forward {
+            true => 1,
+            false => stage::copies(params, parcel),
+        }
+    }
+
+    /// How long the message is on the air if it begins at `start`.
+    pub fn airtime(&self, parcel: &Parcel<'_>, start: SimTime) -> SimDuration {
+        self.air(parcel, start).0
+    }
+
+    fn air(&self, parcel: &Parcel<'_>, start: SimTime) -> (SimDuration, Option<Opportunity>) {
+        let index = self.timeline.index(start);
+        let params = &self.timeline.spans[index].params;
+        let own = self.timeline.window(start).and_then(|window| window.rate);
+        if let (None, Some(trace)) = (own, &params.trace) {
+            let used = self.opportunity.filter(|(span, _)| *span == index);
+            let bytes = bytes(params, parcel);
+            let (end, rest) = trace.delivered(start, bytes, used.map(|(_, used)| used));
+            return (end.since(start), Some(rest));
+        }
+        let airtime = match own.or(params.rate) {
+            Some(rate) => super::transmission_time(bytes(params, parcel), rate),
+            None => SimDuration::ZERO,
+        };
+        (airtime, None)
+    }
+
+    /// Sends one copy of a message, no sooner than `from`, behind those it sends already.
+    pub fn send(&mut self, parcel: &Parcel<'_>, copy: u32, from: SimTime, path: &Path) -> Sent {
+        let now = parcel.now();
+        let deviate = self.step_jitter(parcel, copy);
+        let ready = now.max(from).max(self.free);
+        let start = self.opening(parcel, ready);
+        let first = start.unwrap_or(ready);
+        if let Some(refused) = self.enqueue(parcel, first) {
+            return refused;
+        }
+        let carriage = Carriage {
+            queue: first.since(parcel.sent()),
+            ..Carriage::default()
+        };
+        match start {
+            Ok(_) => self.attempts(parcel, copy, first, path, deviate, carriage),
+            Err(reason) => {
+                self.free = first;
+                Sent {
+                    at: first,
+                    lost: Some(reason),
+                    carriage,
+                }
+            }
+        }
+    }
+
+    /// Transmits until it gets through or there are no retries left.
+    fn attempts(
+        &mut self,
+        parcel: &Parcel<'_>,
+        copy: u32,
+        first: SimTime,
+        path: &Path,
+        deviate: Option<f64>,
+        mut carriage: Carriage,
+    ) -> Sent {
+        let retries = self.timeline.at(first).retries;
+        let mut start = first;
+        let mut number = 0;
+        loop {
+            let draws = Draws {
+                attempt: number,
+                copy,
+            };
+            let mut attempt = self.transmit(parcel, draws, start, path, deviate);
+            carriage.attempts += u32::from(attempt.sent);
+            carriage.energy_j += attempt.energy_j;
+            let timeout = self.timeline.at(start).timeout.unwrap_or_default();
+            let gives_up = (start + timeout).max(attempt.answered());
+            if attempt.failed.is_some() && number < retries {
+                if let Ok(next) = self.opening(parcel, gives_up) {
+                    number += 1;
+                    start = next;
+                    continue;
+                }
+            }
+            self.free = match (retries, attempt.failed) {
+                (0, _) => attempt.end,
+                (_, None) => attempt.answered(),
+                (_, Some(_)) => gives_up,
+            };
+            if attempt.failed.is_none() {
+                attempt.at = self.in_order(parcel, attempt.at);
+            }
+            carriage.retries = start.since(first);
+            carriage.serialization = attempt.end.since(start);
+            carriage.propagation = attempt.propagation;
+            let way = attempt.at.since(attempt.end);
+            carriage.jitter_ns = difference(way, attempt.propagation);
+            return Sent {
+                at: attempt.at,
+                lost: attempt.failed,
+                carriage,
+            };
+        }
+    }
+
+    /// One transmission of one copy that begins at `start`, whatever else the transmitter does: for
+    /// a shared medium, which knows when the channel is free and who collides. Attempts have draws
+    /// of their own; an own queue, answers and retries are up to the caller, and so is
+    /// [`Transmitter::in_order`].
+    pub fn attempt(
+        &mut self,
+        parcel: &Parcel<'_>,
+        (attempt, copy): (u32, u32),
+        start: SimTime,
+        path: &Path,
+    ) -> Attempt {
+        let deviate = match attempt {
+            0 => self.step_jitter(parcel, copy),
+            _ => self.deviate,
+        };
+        self.transmit(parcel, Draws { attempt, copy }, start, path, deviate)
+    }
+
+    fn transmit(
+        &mut self,
+        parcel: &Parcel<'_>,
+        draws: Draws,
+        start: SimTime,
+        path: &Path,
+        deviate: Option<f64>,
+    ) -> Attempt {
+        let index = self.timeline.index(start);
+        let timeline = self.timeline.clone();
+        let span = &timeline.spans[index];
+        let params = &span.params;
+        let light = timeline.window(start).and_then(|window| window.owlt);
+        let latency = light.unwrap_or(params.latency);
+        let propagation = latency + path.propagation;
+        let mut attempt = Attempt {
+            start,
+            end: start,
+            at: start,
+            propagation: SimDuration::ZERO,
+            failed: None,
+            sent: false,
+            energy_j: 0.0,
+            answer: propagation,
+        };
+        if let Some(closed) = timeline.closed(start) {
+            attempt.failed = Some(closed.reason);
+            return attempt;
+        }
+        let (airtime, rest) = self.air(parcel, start);
+        self.opportunity = rest.map(|rest| (index, rest));
+        let cut = timeline.cut(start, start + airtime);
+        attempt.sent = true;
+        attempt.end = cut.map_or(start + airtime, |(at, _)| at);
+        attempt.at = attempt.end;
+        attempt.energy_j = params.tx_power_w * attempt.end.since(start).as_secs_f64();
+        attempt.failed = match cut {
+            Some((_, reason)) => Some(reason),
+            None => self.lost_on_air(parcel, draws, index, start, path),
+        };
+        if attempt.failed.is_some() {
+            return attempt;
+        }
+        let floor = match light {
+            Some(light) => params.least_way(light),
+            None => span.floor,
+        };
+        let way = match deviate {
+            Some(z) if params.jitter_correlation > 0.0 => {
+                let deviation = params.jitter_shape.of_normal(z);
+                jitter::shifted(latency, params.jitter, deviation).max(floor)
+            }
+            _ => stage::way(params, latency, floor, parcel, draws),
+        };
+        let mut way = way + path.propagation;
+        if draws.happens(parcel, Purpose::Reorder, params.reorder) {
+            way = way + params.reorder_by.unwrap_or(latency);
+        }
+        attempt.propagation = propagation;
+        // Only a change that nobody declared can be faster than what the run counts on.
+        attempt.at = (attempt.end + way).max(parcel.now() + self.floor);
+        let wrong = match params.ber {
+            0.0 => 0.0,
+            ber => packet_error_rate(ber, bytes(params, parcel)),
+        };
+        if draws.happens(parcel, Purpose::Corrupt, params.corrupt)
+            || draws.happens(parcel, Purpose::BitErrors, wrong)
+        {
+            attempt.failed = Some(CORRUPT);
+        }
+        attempt
+    }
+
+    /// Why a transmission that was on the air to its end does not get through.
+    fn lost_on_air(
+        &mut self,
+        parcel: &Parcel<'_>,
+        draws: Draws,
+        index: usize,
+        start: SimTime,
+        path: &Path,
+    ) -> Option<&'static str> {
+        let params = &self.timeline.spans[index].params;
+        if draws.happens(parcel, Purpose::Loss, params.loss) {
+            return Some(LOSS);
+        }
+        if let Some(burst) = &params.burst {
+            let known = self.known.filter(|(span, _)| *span == index);
+            let mut known = known.map(|(_, known)| known);
+            let slot = |slot| parcel.random_at(Purpose::BurstSlot as u64, slot).uniform();
+            let loss = burst.chain().loss_at(start, &mut known, slot);
+            self.known = known.map(|known| (index, known));
+            if draws.happens(parcel, Purpose::Burst, loss) {
+                return Some(BURST);
+            }
+        }
+        draws
+            .happens(parcel, Purpose::Path, path.loss)
+            .then_some(path.reason)
+    }
+
+    /// An arrival, not before those of earlier messages if the link keeps their order.
+    pub fn in_order(&mut self, parcel: &Parcel<'_>, at: SimTime) -> SimTime {
+        let at = match self.timeline.at(parcel.now()).fifo {
+            true => at.max(self.arrived),
+            false => at,
+        };
+        self.arrived = self.arrived.max(at);
+        at
+    }
+
+    /// The first instant from `ready` on at which the message can be transmitted as a whole; or at
+    /// once, if it does not wait for that.
+    pub fn opening(&self, parcel: &Parcel<'_>, ready: SimTime) -> Result<SimTime, &'static str> {
+        let timeline = &self.timeline;
+        let mut at = ready;
+        let mut tries = 0;
+        let mut looked = usize::MAX;
+        loop {
+            let index = timeline.index(at);
+            if !timeline.spans[index].params.store_and_forward {
+                return Ok(at);
+            }
+            tries = if index == looked { tries + 1 } else { 0 };
+            looked = index;
+            let (next, reason) = match timeline.closed(at) {
+                Some(closed) => (closed.until, closed.reason),
+                None => match timeline.cut(at, at + self.airtime(parcel, at)) {
+                    None => return Ok(at),
+                    Some((cut, reason)) => (Some(cut), reason),
+                },
+            };
+            let next = match tries > timeline.patience(index) {
+                true => timeline.end_of(index),
+                false => next,
+            };
+            // Nothing later than the last instant, and nothing earlier than this one.
+            at = next.filter(|next| *next > at).ok_or(reason)?;
+        }
+    }
+
+    /// Puts a message that begins at `start` into the queue, or refuses it.
+    fn enqueue(&mut self, parcel: &Parcel<'_>, start: SimTime) -> Option<Sent> {
+        let now = parcel.now();
+        let params = self.timeline.at(now);
+        while self.waiting.front().is_some_and(|(start, _)| *start <= now) {
+            self.waiting.pop_front();
+        }
+        if start <= now {
+            return None;
+        }
+        let own = bytes(params, parcel);
+        let messages = self.waiting.len() as u64 + 1;
+        let bytes = self.waiting.iter().map(|(_, bytes)| bytes).sum::<u64>() + own;
+        if params
+            .queue
+            .is_some_and(|limit| !limit.allows(messages, bytes))
+        {
+            let queue = now.since(parcel.sent());
+            return Some(Sent {
+                at: now,
+                lost: Some(QUEUE_FULL),
+                carriage: Carriage {
+                    queue,
+                    ..Carriage::default()
+                },
+            });
+        }
+        self.waiting.push_back((start, own));
+        None
+    }
+
+    /// The next state of the correlated jitter: one step for each copy, whatever becomes of it, so
+    /// that losses leave the jitter of other messages alone.
+    fn step_jitter(&mut self, parcel: &Parcel<'_>, copy: u32) -> Option<f64> {
+        let correlation = self.timeline.at(parcel.now()).jitter_correlation;
+        if correlation > 0.0 {
+            let key = Draws::first(copy).key(parcel, Purpose::Jitter);
+            let fresh = key.stream().normal(0.0, 1.0);
+            self.deviate = Some(jitter::next_normal(self.deviate, correlation, fresh));
+        }
+        self.deviate
+    }
+}
+
+/// The bytes on the air.
+fn bytes(params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
+    parcel.size_bytes().saturating_add(params.overhead)
+}
+
+/// `a - b` in nanoseconds.
+fn difference(a: SimDuration, b: SimDuration) -> i64 {
+    let (a, b) = (a.as_nanos() as i64, b.as_nanos() as i64);
+    a.wrapping_sub(b)
+}
