@@ -130,15 +130,6 @@ impl Parcel<'_> {
         size
     }
 
-    /// The address of this link's draws that belong to no message: (run seed, link, purpose,
-    /// number). A channel's fading in the n-th second is one.
-    pub fn random_at(&self, purpose: u64, number: u64) -> RandomKey {
-        RandomKey::new(self.plan.seed)
-            .number(self.plan.name_hash(self.link))
-            .number(purpose)
-            .number(number)
-    }
-
     /// The address of this link's draws for this message: (run seed, link, purpose, message
     /// identity, attempt, copy). The identity is the match key where the protocol gave one, so
     /// that matching messages of two runs meet the same luck.

@@ -50,6 +50,7 @@
 //! | `retries` | | number | 0 | stop-and-wait repetitions |
 //! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
 //! | `tx_power` | | power | 0 | `tx_power 8 (L + overhead) / rate` of the sender's energy each attempt |
+//! | `radio` | | name | none | what the link goes through, see [`crate::radio`] |
 //! | `outage` | | bool | false | the link is out; reason `outage` |
 //!
 //! Sources: tc-netem(8) for names and for what users expect of them; the pages of each type for the
@@ -90,7 +91,7 @@ mod transmit;
 
 use std::sync::Arc;
 
-use farside::carrier::{Carrier, Parcel, Verdicts};
+use farside::carrier::{Carriage, Carrier, Parcel, Verdicts};
 use farside::{SimDuration, SimTime};
 
 use stage::{Draws, Purpose};
@@ -106,6 +107,7 @@ pub use preset::Preset;
 pub use queue::QueueLimit;
 pub use stage::packet_error_rate;
 pub use timeline::Timeline;
+pub(crate) use transmit::difference;
 pub use transmit::{Attempt, Path, Sent, Transmitter};
 
 /// Why a link loses a message by chance.
@@ -214,7 +216,7 @@ impl Link {
         self.until = timeline.end_of(self.index).unwrap_or(SimTime::MAX);
     }
 
-    /// What most links are, decided without more than it takes: no size, no parts, no allocation.
+    /// What most links are, decided without more than it takes: no size, no allocation.
     fn carry_plainly(&self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
         let span = &self.transmitter.timeline().spans[self.index];
         let params = &span.params;
@@ -225,7 +227,14 @@ impl Link {
             } else {
                 let way = stage::way(params, params.latency, span.floor, parcel, draws);
                 // Only a change that nobody declared can be faster than what the run counts on.
-                verdicts.deliver(way.max(self.transmitter.min_delay()));
+                let way = way.max(self.transmitter.min_delay());
+                let carriage = Carriage {
+                    propagation: params.latency,
+                    jitter_ns: difference(way, params.latency),
+                    attempts: 1,
+                    ..Carriage::default()
+                };
+                verdicts.deliver_as(way, carriage);
             }
         }
     }
@@ -257,14 +266,8 @@ impl Carrier for Link {
     }
 
     fn change(&mut self, change: LinkChange, now: SimTime) {
-        if change.is_planned() {
-            return;
-        }
-        // Only who writes changes by hand can write one that is none.
-        if let Ok(over) = change.overrides() {
-            self.transmitter.replace_from(now, &over);
-            self.turn_to(now);
-        }
+        self.transmitter.change(&change, now);
+        self.turn_to(now);
     }
 }
 

@@ -3,14 +3,15 @@
 //!
 //! A link by itself ([`crate::link`]) knows neither where its ends are nor who else transmits. Links
 //! that name a radio are carried by a [`Radio`], a shared link and so a process of its own: it is
-//! told where stations are ([`RadioChange::Moves`]), keeps the channels, and asks each link for
-//! what is the link's own ([`Hop`]).
+//! told where stations are ([`RadioChange::Moves`]), keeps the channels, and asks each link's
+//! [`Transmitter`] for what is the link's own.
 //!
 //! On a channel, a message is a frame that waits in its station's line, contends, is on the air for
 //! as long as its link's rate says, and then arrives, or is spoiled and tried again. Each of these
 //! steps is an event in which the radio holds the message ([`farside::Verdicts::hold`]); what they
 //! cost in delay is in [`farside::Carriage`].
 
+mod build;
 mod channel;
 mod config;
 mod contend;
@@ -26,56 +27,19 @@ use farside_worlds::HeightField;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use crate::link::LinkChange;
+use crate::link::{Attempt, LinkChange, Path, Timeline, Transmitter};
+pub(crate) use build::RadioBuilder;
 use channel::{Channel, Station, Transmission};
 pub use config::{Access, RadioConfig, Sharing};
-pub use path::{LIGHT_M_PER_S, OCCLUDED, PathLoss, RANGE, Way};
+pub use path::{LIGHT_M_PER_S, OCCLUDED, PathLoss, RANGE};
 pub use track::Track;
 
 /// Why a message is lost whose transmissions all met others.
 pub const COLLISION: &str = "collision";
-/// Why a message is lost that finds its station's line full.
-pub const QUEUE_FULL: &str = "queue_full";
 
 /// What a draw of the radio is for; links number theirs from 1.
 const BACKOFF: u64 = 1001;
 const SHADOWING: u64 = 1002;
-const FADING: u64 = 1003;
-
-/// What a radio asks of the link that a message takes.
-pub trait Hop: Send + 'static {
-    /// The least delay this link adds after a transmission has ended.
-    fn min_delay(&self) -> SimDuration;
-
-    /// Decides the whole fate, where there is no channel to contend for.
-    fn carry(&mut self, parcel: &Parcel<'_>, way: &Way, verdicts: &mut Verdicts);
-
-    /// How long the message is on the air, if the transmission begins at `at`.
-    fn airtime(&mut self, parcel: &Parcel<'_>, at: SimTime) -> SimDuration;
-
-    /// What being on the air for `airtime` from `at` takes from the sender, in joules.
-    fn energy_j(&mut self, airtime: SimDuration, at: SimTime) -> f64;
-
-    /// How often a transmission that failed is repeated, and how long the sender waits for an
-    /// answer that does not come.
-    fn retries(&mut self, parcel: &Parcel<'_>, at: SimTime) -> (u32, SimDuration);
-
-    /// Whether the transmission from `start` to `end`, not spoiled by others, gets through: the
-    /// delay from its end (propagation and jitter in nanoseconds), or why it does not.
-    ///
-    /// # Errors
-    /// With the reason, when it does not.
-    fn attempt(
-        &mut self,
-        parcel: &Parcel<'_>,
-        attempt: u32,
-        span: (SimTime, SimTime),
-        way: &Way,
-    ) -> Result<(SimDuration, i64), &'static str>;
-
-    /// Takes a change of this link.
-    fn change(&mut self, change: LinkChange, now: SimTime);
-}
 
 /// What a radio may be told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,6 +80,7 @@ enum Phase {
 struct Frame {
     directed: u32,
     from: Station,
+    copy: u32,
     phase: Phase,
     /// Transmissions so far.
     attempts: u32,
@@ -125,15 +90,17 @@ struct Frame {
     next: SimTime,
     first_start: Option<SimTime>,
     start: SimTime,
+    /// The transmission that is on the air.
+    attempt: Option<Attempt>,
     energy_j: f64,
 }
 
-struct Directed<H> {
+struct Directed {
     name: String,
     from: Station,
     to: Station,
     channel: u32,
-    hop: H,
+    transmitter: Transmitter,
 }
 
 struct Place {
@@ -143,13 +110,13 @@ struct Place {
 }
 
 /// A radio system: a shared link. See the module's front page.
-pub struct Radio<H> {
+pub struct Radio {
     config: RadioConfig,
     terrain: Option<Arc<HeightField>>,
     places: Vec<Place>,
     /// From a host's number to its station, from 1; 0 for none.
     station_of_host: Vec<u32>,
-    directed: Vec<Directed<H>>,
+    directed: Vec<Directed>,
     /// From (station, station) to the link, from 1; 0 for none.
     by_pair: Vec<u32>,
     channels: Vec<Channel>,
@@ -157,7 +124,7 @@ pub struct Radio<H> {
     free: Vec<u32>,
 }
 
-impl<H: Hop> Radio<H> {
+impl Radio {
     /// A radio without stations or links. With a `terrain` stations stand on it, whatever height
     /// they are said to have, and `line_of_sight` asks it.
     pub fn new(config: RadioConfig, terrain: Option<Arc<HeightField>>) -> Self {
@@ -193,9 +160,13 @@ impl<H: Hop> Radio<H> {
     ///
     /// # Panics
     /// When one is not: a bug in the caller.
-    pub fn link(&mut self, name: &str, from: usize, to: usize, hop: H) {
+    pub fn link(&mut self, name: &str, from: usize, to: usize, timeline: impl Into<Arc<Timeline>>) {
         let count = self.places.len();
         self.by_pair.resize(count * count, 0);
+        let transmitter = match self.config.access {
+            Access::FullDuplex => Transmitter::new(timeline).in_lane(name),
+            _ => Transmitter::behind_shared(name, timeline),
+        };
         let (from, to) = (self.station_of_host[from] - 1, self.station_of_host[to] - 1);
         let channel = match self.config.channel {
             Sharing::All => 0,
@@ -216,7 +187,7 @@ impl<H: Hop> Radio<H> {
             from,
             to,
             channel,
-            hop,
+            transmitter,
         });
         self.by_pair[from as usize * count + to as usize] = self.directed.len() as u32;
     }
@@ -238,22 +209,12 @@ impl<H: Hop> Radio<H> {
         }
     }
 
-    fn way(&self, parcel: &Parcel<'_>, directed: u32, now: SimTime) -> Way {
+    /// What lies between the ends of a link at `now`.
+    fn path(&self, parcel: &Parcel<'_>, directed: u32, now: SimTime) -> Path {
         let link = &self.directed[directed as usize];
         let ends = (self.antenna(link.from, now), self.antenna(link.to, now));
         self.config
-            .way(parcel, SHADOWING, now, ends, self.terrain.as_ref())
-    }
-
-    /// Why a transmission is lost on its way, if it is, whatever else its link does to it.
-    fn fades(&self, parcel: &Parcel<'_>, attempt: u32, way: &Way) -> Option<&'static str> {
-        if way.blocked.is_some() {
-            return way.blocked;
-        }
-        let (loss, received_dbm) = (self.config.path_loss.as_ref()?, way.received_dbm?);
-        let error_rate = loss.error_rate(received_dbm, 8 * parcel.size_bytes());
-        let draw = parcel.random(FADING, attempt, parcel.copy()).uniform();
-        (draw < error_rate).then_some(RANGE)
+            .path(parcel, SHADOWING, now, ends, self.terrain.as_ref())
     }
 
     /// The signal that a station gets from another, in dBm and without shadowing; nothing from
@@ -299,11 +260,14 @@ impl<H: Hop> Radio<H> {
     }
 }
 
-impl<H: Hop> Carrier for Radio<H> {
+impl Carrier for Radio {
     type Change = RadioChange;
 
     fn min_delay(&self) -> SimDuration {
-        let delays = self.directed.iter().map(|link| link.hop.min_delay());
+        let delays = self
+            .directed
+            .iter()
+            .map(|link| link.transmitter.min_delay());
         delays.min().unwrap_or(SimDuration::ZERO)
     }
 
@@ -319,10 +283,13 @@ impl<H: Hop> Carrier for Radio<H> {
         if self.config.access != Access::FullDuplex {
             return self.accept(parcel, directed, verdicts);
         }
-        let mut way = self.way(parcel, directed, parcel.now());
-        way.blocked = self.fades(parcel, 0, &way);
-        let link = &mut self.directed[directed as usize];
-        link.hop.carry(parcel, &way, verdicts);
+        let now = parcel.now();
+        let path = self.path(parcel, directed, now);
+        let transmitter = &mut self.directed[directed as usize].transmitter;
+        for copy in 0..transmitter.copies(parcel) {
+            let sent = transmitter.send(parcel, copy, now, &path);
+            sent.tell(now, verdicts);
+        }
     }
 
     fn change(&mut self, change: RadioChange, now: SimTime) {
@@ -342,7 +309,7 @@ impl<H: Hop> Carrier for Radio<H> {
             RadioChange::Link { name, change } => {
                 let link = self.directed.iter_mut().find(|link| link.name == name);
                 if let Some(link) = link {
-                    link.hop.change(change, now);
+                    link.transmitter.change(&change, now);
                 }
             }
         }

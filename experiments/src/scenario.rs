@@ -284,7 +284,9 @@ impl Scenario {
         let conclude = self.settings.assemble(&mut setup);
         let (goal, scene) = (setup.goal, setup.scene);
         let conclude = conclude.map_err(wrong)?;
-        links.finish().map_err(|error| wrong(error.into()))?;
+        links
+            .finish(&mut sim)
+            .map_err(|error| wrong(error.into()))?;
         for (index, crash) in self.shared.crash.iter().enumerate() {
             let planned = crash.plan(&mut sim, self.shared.seed, index, self.shared.until);
             planned.map_err(|mistake| self.crash_error(index, mistake))?;

@@ -1,14 +1,17 @@
 //! Links from a scenario, by name.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use farside::{HostId, LinkId, SimDuration, SimTime, Simulation};
+use farside::{HostId, SimDuration, SimTime, Simulation};
+use farside_worlds::HeightField;
 use globset::{Glob, GlobMatcher};
+use nalgebra::Point3;
 
 use super::{
     Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig, Timeline,
 };
+use crate::radio::{RadioBuilder, RadioConfig};
 
 /// A pattern, and whether any link has matched it.
 struct Pattern {
@@ -53,12 +56,12 @@ impl Pattern {
 /// let (base, rover) = (sim.host("base"), sim.host("rover_1"));
 /// let mut builder = LinkBuilder::new(&links, &[])?;
 /// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
-/// builder.finish()?;
+/// builder.finish(&mut sim)?;
 ///
 /// let links: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
 /// let mut builder = LinkBuilder::new(&links, &[])?;
 /// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
-/// let error = builder.finish().unwrap_err();
+/// let error = builder.finish(&mut sim).unwrap_err();
 /// assert!(error.to_string().ends_with("matches no link; did you mean \"base-rover_*\"?"));
 /// # Ok::<(), farside_actors::link::LinkConfigError>(())
 /// ```
@@ -67,6 +70,17 @@ pub struct LinkBuilder {
     overrides: Vec<(Pattern, LinkOverrides)>,
     degrades: Vec<(Pattern, Degrade)>,
     names: Vec<String>,
+    /// The radios that links may go through.
+    radios: Vec<RadioBuilder>,
+    /// The hosts that links join.
+    hosts: BTreeMap<HostId, String>,
+    /// Where hosts stand at first.
+    places_m: BTreeMap<String, Point3<f64>>,
+    terrain: Option<Arc<HeightField>>,
+    /// How far ahead contacts that repeat are told to the log.
+    until: Option<SimDuration>,
+    /// The first mistake that a link met.
+    mistake: Option<LinkConfigError>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<Known>,
 }
@@ -103,6 +117,12 @@ impl LinkBuilder {
             overrides: Vec::new(),
             degrades: Vec::new(),
             names: Vec::new(),
+            radios: Vec::new(),
+            hosts: BTreeMap::new(),
+            places_m: BTreeMap::new(),
+            terrain: None,
+            until: None,
+            mistake: None,
             known: Vec::new(),
         };
         for (text, over) in &links.patterns {
@@ -119,6 +139,12 @@ impl LinkBuilder {
                     until: until.to_string(),
                 });
             }
+            if degrade.over.radio.is_some() {
+                return Err(LinkConfigError::Value {
+                    key: key("radio"),
+                    message: "a link cannot change its radio during a run".to_owned(),
+                });
+            }
             if degrade.over == LinkOverrides::default() {
                 let key = vec!["degrade".to_owned(), index.to_string()];
                 return Err(LinkConfigError::ChangesNothing { key });
@@ -129,20 +155,98 @@ impl LinkBuilder {
         Ok(builder)
     }
 
-    /// Declares the link `{from}-{to}`, and its changes.
+    /// The radios that links may go through, by name; with a `terrain` to stand on.
+    ///
+    /// # Errors
+    /// When a radio makes no sense.
+    pub fn radios(
+        &mut self,
+        radios: &BTreeMap<String, RadioConfig>,
+    ) -> Result<(), LinkConfigError> {
+        for (name, config) in radios {
+            config.check().map_err(|(key, message)| {
+                let keys = key.split('.').map(str::to_owned);
+                LinkConfigError::Value {
+                    key: ["radios".to_owned(), name.clone()]
+                        .into_iter()
+                        .chain(keys)
+                        .collect(),
+                    message,
+                }
+            })?;
+            self.radios.push(RadioBuilder::new(name, config.clone()));
+        }
+        Ok(())
+    }
+
+    /// The ground that radios look over.
+    pub fn terrain(&mut self, terrain: Arc<HeightField>) {
+        self.terrain = Some(terrain);
+    }
+
+    /// Where the host called `name` stands at first, in metres in the world's frame.
+    pub fn place(&mut self, name: &str, place_m: Point3<f64>) {
+        self.places_m.insert(name.to_owned(), place_m);
+    }
+
+    /// Whether any link can ask where hosts are.
+    pub fn has_radios(&self) -> bool {
+        !self.radios.is_empty()
+    }
+
+    /// When the run ends at the latest: contacts that repeat are told to the log until then.
+    pub fn until(&mut self, until: Option<SimDuration>) {
+        self.until = until;
+    }
+
+    /// Declares the link `{from}-{to}`, and its changes. A link through a radio is declared with it,
+    /// by [`LinkBuilder::finish`].
     pub fn connect(
         &mut self,
         sim: &mut Simulation,
         (from_host, from): (HostId, &str),
         (to_host, to): (HostId, &str),
-    ) -> LinkId<LinkChange> {
+    ) {
         let name = format!("{from}-{to}");
         let timeline = self.resolve(&name);
-        let id = sim.link(from_host, to_host, &name, Link::new(timeline.clone()));
+        let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
-            sim.change_at(at, id, LinkChange::planned(before.1, params));
+            changes.push((at, LinkChange::planned(before.1, params)));
         }
-        id
+        changes.extend(timeline.contact_changes(self.until));
+        self.hosts.insert(from_host, from.to_owned());
+        self.hosts.insert(to_host, to.to_owned());
+        let Some(wanted) = timeline.at(SimTime::ZERO).radio.clone() else {
+            let id = sim.link(from_host, to_host, &name, Link::new(timeline));
+            for (at, change) in changes {
+                sim.change_at(at, id, change);
+            }
+            return;
+        };
+        match self.radios.iter_mut().find(|radio| radio.name() == wanted) {
+            Some(radio) => radio.join(&name, (from_host, to_host), timeline, changes),
+            None => self.no_such_radio(&name, &wanted),
+        }
+    }
+
+    fn no_such_radio(&mut self, link: &str, wanted: &str) {
+        let names = || self.radios.iter().map(RadioBuilder::name);
+        let nearest = names().min_by_key(|name| strsim::damerau_levenshtein(name, wanted));
+        let hint = match nearest {
+            Some(nearest) => format!("; did you mean {nearest:?}?"),
+            None => format!("; there is no [radios.{wanted}]"),
+        };
+        let setter = self
+            .overrides
+            .iter()
+            .rev()
+            .find(|(pattern, over)| over.radio.is_some() && pattern.glob.is_match(link));
+        let place = setter.map_or("default", |(pattern, _)| pattern.text.as_str());
+        let key = ["links", place, "radio"].map(str::to_owned).to_vec();
+        self.mistake.get_or_insert(LinkConfigError::Value {
+            key,
+            message: format!("{wanted:?}: expected the name of one of [radios]{hint}"),
+        });
     }
 
     /// What the link of this name has, and when: for who builds a carrier of another kind around a
@@ -196,11 +300,28 @@ impl LinkBuilder {
         timeline
     }
 
-    /// Checks that every pattern has matched some link.
+    /// Declares the radios with the links through them, and checks that every pattern has matched
+    /// some link.
     ///
     /// # Errors
-    /// When one has not; the error has the nearest name.
-    pub fn finish(self) -> Result<(), LinkConfigError> {
+    /// When one has not (the error has the nearest name), a link names a radio that there is not, or
+    /// a radio must know where a host is that has no place.
+    pub fn finish(mut self, sim: &mut Simulation) -> Result<(), LinkConfigError> {
+        if let Some(mistake) = self.mistake.take() {
+            return Err(mistake);
+        }
+        for radio in std::mem::take(&mut self.radios) {
+            let key = vec!["radios".to_owned(), radio.name().to_owned()];
+            let terrain = self.terrain.clone();
+            let declared = radio.declare(sim, &self.hosts, &self.places_m, terrain);
+            declared.map_err(|host| LinkConfigError::Value {
+                key,
+                message: format!(
+                    "it asks where stations are, and {host:?} has no place: expected one in [places]"
+                ),
+            })?;
+        }
+
         let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
         let degrades = self.degrades.iter().map(|(pattern, _)| pattern);
         match overrides.chain(degrades).find(|pattern| !pattern.used) {

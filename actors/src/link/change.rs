@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{LinkOverrides, LinkParams};
+use super::{LinkOverrides, LinkParams, Window};
+use crate::units;
 
 /// What a link is told, and what the log shows of it: the parameters that are replaced, by key, as
 /// a scenario would write them (`{"loss": "0.3", "latency": "1.3s", "rate": "off"}`).
@@ -42,6 +43,25 @@ impl LinkChange {
         LinkChange {
             planned: true,
             ..LinkChange::from(&from.changes_to(to))
+        }
+    }
+
+    /// A contact opens, or closes: what the log is told of what the link has planned.
+    pub(super) fn contact(window: Option<&Window>) -> Self {
+        let state = if window.is_some() { "open" } else { "closed" };
+        let rate = window.and_then(|window| window.rate);
+        let owlt = window.and_then(|window| window.owlt);
+        let set = [
+            ("contact", Some(state.to_owned())),
+            ("rate", rate.map(units::print_data_rate)),
+            ("latency", owlt.map(units::print_duration)),
+        ];
+        let set = set.into_iter();
+        LinkChange {
+            set: set
+                .filter_map(|(key, text)| Some((key.to_owned(), text?)))
+                .collect(),
+            planned: true,
         }
     }
 

@@ -214,6 +214,14 @@ pub enum LinkConfigError {
         /// The most there may be.
         limit: usize,
     },
+    /// A value that cannot be.
+    #[error("{message}")]
+    Value {
+        /// Where in the scenario.
+        key: Vec<String>,
+        /// What was found and what was expected.
+        message: String,
+    },
     /// A degradation that leaves everything as it is.
     #[error("it changes nothing: expected a link's parameters, such as latency, loss or outage")]
     ChangesNothing {
@@ -234,6 +242,7 @@ impl LinkConfigError {
             | LinkConfigError::NoSuchLink { key, .. }
             | LinkConfigError::EndsBeforeItBegins { key, .. }
             | LinkConfigError::TooMany { key, .. }
+            | LinkConfigError::Value { key, .. }
             | LinkConfigError::ChangesNothing { key } => key,
         }
     }

@@ -223,6 +223,13 @@ impl Contacts {
         }
     }
 
+    /// The contact that `at` lies in, if it lies in one, and all that begin later.
+    pub fn from(&self, at: SimTime) -> impl Iterator<Item = Window> + '_ {
+        let next = |at| self.next_after(at).and_then(|start| self.at(start));
+        let first = self.at(at).or_else(|| next(at));
+        std::iter::successors(first, move |window| next(window.start))
+    }
+
     /// Where the period that `at` lies in begins, and how far into it `at` is.
     fn split(&self, at: SimTime) -> (SimTime, SimDuration) {
         let nanos = at.as_nanos();

@@ -233,6 +233,8 @@ parameters! {
     /// How long after a transmission began it is given up. Never below what an answer takes:
     /// the transmission and twice the latency.
     timeout: Option<SimDuration> = None, key "timeout", as OrOff<Span>, IfOn;
+    /// The name of the radio that the link goes through, one of the scenario's `[radios]`.
+    radio: Option<String> = None, key "radio", as OrOff<Plain<String>>, IfOn;
     /// The power while transmitting, in watts: an attempt takes `tx_power 8 (L + overhead) / rate`
     /// from the sender.
     tx_power_w: f64 = 0.0, key "tx_power", as Power, IfOn;
@@ -246,9 +248,7 @@ impl LinkParams {
     /// It is the least latency, of contacts too, less what the jitter can take, plus the time to
     /// send an empty message. A given `min_delay` stands in for the first two.
     pub fn min_delay(&self) -> SimDuration {
-        let light = |owlt: Option<SimDuration>| owlt.unwrap_or(self.latency);
         let windows = self.contacts.iter().flat_map(Contacts::windows);
-        let latency = windows.clone().map(|window| light(window.owlt)).min();
         let fastest = windows
             .map(|window| window.rate.or(self.rate))
             .reduce(|a, b| {
@@ -260,7 +260,14 @@ impl LinkParams {
             (Some(rate), None) => super::transmission_time(self.overhead, rate),
             _ => SimDuration::ZERO,
         };
-        self.least_way(latency.unwrap_or(self.latency)) + sending
+        self.least_way_of_all() + sending
+    }
+
+    /// The least time on the way, over all contacts.
+    pub(super) fn least_way_of_all(&self) -> SimDuration {
+        let windows = self.contacts.iter().flat_map(Contacts::windows);
+        let latencies = windows.map(|window| window.owlt.unwrap_or(self.latency));
+        self.least_way(latencies.min().unwrap_or(self.latency))
     }
 
     /// The least time on the way, with this latency.

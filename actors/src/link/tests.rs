@@ -93,7 +93,7 @@ fn fates(seed: u64, count: u32, links: &str, degrades: &str) -> Vec<Fate> {
     sim.actor(a, "source", move |_| Source { sink, left: count });
     let mut builder = LinkBuilder::new(&links, &degrades.degrade).unwrap();
     builder.connect(&mut sim, (a, "a"), (b, "b"));
-    builder.finish().unwrap();
+    builder.finish(&mut sim).unwrap();
     let seen = Arc::new(Mutex::new(Vec::new()));
     sim.observe(Fates(seen.clone()));
     let report = sim.run(Executor::Inline).unwrap();

@@ -6,7 +6,10 @@ use std::sync::Arc;
 use farside::{SimDuration, SimTime};
 
 use super::contacts::Window;
-use super::{LinkOverrides, LinkParams, NO_CONTACT, OUTAGE};
+use super::{LinkChange, LinkOverrides, LinkParams, NO_CONTACT, OUTAGE};
+
+/// The most contacts of one link that the log is told of: someone may repeat one each nanosecond.
+const MAX_TOLD: usize = 10_000;
 
 /// All parameters that a link will have, by the instant from which each set of them holds.
 ///
@@ -120,6 +123,34 @@ impl Timeline {
         self.spans.iter().map(|span| (span.from, &span.params))
     }
 
+    /// What the log is told of contacts: when each opens and closes, as a planned change of
+    /// `contact`. Contacts that repeat are told until `until`, and without it once.
+    pub(super) fn contact_changes(&self, until: Option<SimDuration>) -> Vec<(SimTime, LinkChange)> {
+        let horizon = until.map_or(SimTime::MAX, |until| SimTime::ZERO + until);
+        let mut changes = Vec::new();
+        for (index, span) in self.spans.iter().enumerate() {
+            let Some(contacts) = &span.params.contacts else {
+                continue;
+            };
+            let end = self.end_of(index).unwrap_or(SimTime::MAX).min(horizon);
+            let most = match until {
+                Some(_) => MAX_TOLD,
+                None => contacts.len(),
+            };
+            for window in contacts.from(span.from).take(most) {
+                if window.start >= end {
+                    break;
+                }
+                let open = window.start.max(span.from);
+                changes.push((open, LinkChange::contact(Some(&window))));
+                if window.end < end {
+                    changes.push((window.end, LinkChange::contact(None)));
+                }
+            }
+        }
+        changes
+    }
+
     /// The least delay over all parameters. Those of an outage count only if there are no others:
     /// nothing is delivered under them.
     pub fn min_delay(&self) -> SimDuration {
@@ -131,6 +162,12 @@ impl Timeline {
             spans.map(|span| span.params.min_delay()).min()
         };
         delays(false).or(delays(true)).unwrap_or_default()
+    }
+
+    /// The least time on the way over all parameters, without what a transmission takes.
+    pub(super) fn least_way(&self) -> SimDuration {
+        let spans = self.spans.iter().map(|span| span.params.least_way_of_all());
+        spans.min().unwrap_or_default()
     }
 
     pub(super) fn index(&self, at: SimTime) -> usize {

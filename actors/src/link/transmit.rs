@@ -8,13 +8,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use farside::carrier::{Carriage, Parcel, Verdicts};
+use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
 use super::burst::Known;
 use super::contacts::Opportunity;
 use super::stage::{self, Draws, Purpose};
 use super::timeline::Timeline;
-use super::{BURST, CORRUPT, LOSS, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
+use super::{BURST, CORRUPT, LOSS, LinkChange, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
 
 /// What the world between two antennas adds to the parameters of a link. The default adds nothing.
 ///
@@ -101,6 +102,8 @@ impl Sent {
 #[derive(Clone, Debug)]
 pub struct Transmitter {
     timeline: Arc<Timeline>,
+    /// Tells its slots' draws from those of others behind one shared link.
+    lane: Option<u64>,
     /// The least delay that was declared.
     floor: SimDuration,
     /// When the last message it took is done with.
@@ -122,6 +125,7 @@ impl Transmitter {
     pub fn new(timeline: impl Into<Arc<Timeline>>) -> Self {
         let timeline = timeline.into();
         Transmitter {
+            lane: None,
             floor: timeline.min_delay(),
             timeline,
             free: SimTime::ZERO,
@@ -131,6 +135,14 @@ impl Transmitter {
             known: None,
             opportunity: None,
         }
+    }
+
+    /// A transmitter of the link called `name`, one of several behind a shared link that contends
+    /// for the air before each transmission. It delivers no sooner than the way takes.
+    pub fn behind_shared(name: &str, timeline: impl Into<Arc<Timeline>>) -> Self {
+        let mut transmitter = Transmitter::new(timeline).in_lane(name);
+        transmitter.floor = transmitter.timeline.least_way();
+        transmitter
     }
 
     /// The parameters it has and will have.
@@ -146,6 +158,22 @@ impl Transmitter {
     /// Declares a smaller least delay: parameters may come that the timeline does not know.
     pub fn allow_delay(&mut self, least: SimDuration) {
         self.floor = self.floor.min(least);
+    }
+
+    /// The same for the link called `name`, one of several behind a shared link: what it draws by
+    /// time is its own.
+    #[must_use]
+    pub fn in_lane(mut self, name: &str) -> Self {
+        self.lane = Some(name_hash(name));
+        self
+    }
+
+    /// Takes a change, unless the timeline has it already.
+    pub fn change(&mut self, change: &LinkChange, now: SimTime) {
+        // Only who writes changes by hand can write one that is none.
+        if let (false, Ok(over)) = (change.is_planned(), change.overrides()) {
+            self.replace_from(now, &over);
+        }
     }
 
     /// Replaces some parameters from `from` on. The least delay stays as declared.
@@ -378,7 +406,11 @@ impl Transmitter {
         if let Some(burst) = &params.burst {
             let known = self.known.filter(|(span, _)| *span == index);
             let mut known = known.map(|(_, known)| known);
-            let slot = |slot| parcel.random_at(Purpose::BurstSlot as u64, slot).uniform();
+            let lane = self.lane;
+            let slot = |slot| {
+                let key = parcel.random_at(Purpose::BurstSlot as u64, slot);
+                lane.map_or(key, |lane| key.number(lane)).uniform()
+            };
             let loss = burst.chain().loss_at(start, &mut known, slot);
             self.known = known.map(|known| (index, known));
             if draws.happens(parcel, Purpose::Burst, loss) {
@@ -480,7 +512,7 @@ fn bytes(params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
 }
 
 /// `a - b` in nanoseconds.
-fn difference(a: SimDuration, b: SimDuration) -> i64 {
+pub(crate) fn difference(a: SimDuration, b: SimDuration) -> i64 {
     let (a, b) = (a.as_nanos() as i64, b.as_nanos() as i64);
     a.wrapping_sub(b)
 }

@@ -137,6 +137,11 @@ impl Default for RadioConfig {
 }
 
 impl RadioConfig {
+    /// Whether it matters where stations are.
+    pub fn needs_places(&self) -> bool {
+        self.light_time || self.line_of_sight || self.range_m.is_some() || self.path_loss.is_some()
+    }
+
     /// What makes no sense, if anything: the key, what was found and what was expected.
     ///
     /// # Errors

@@ -5,22 +5,33 @@ use farside::carrier::{Carriage, Parcel, Verdicts};
 use farside::{SimDuration, SimTime};
 
 use super::channel::Transmission;
-use super::{Access, BACKOFF, COLLISION, Frame, Hop, Phase, QUEUE_FULL, Radio};
+use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
+use crate::link::{Attempt, QUEUE_FULL, difference};
 
-impl<H: Hop> Radio<H> {
-    /// Takes a message into its station's line.
+impl Radio {
+    /// Takes the copies of a message into its station's line.
     pub(super) fn accept(&mut self, parcel: &Parcel<'_>, directed: u32, verdicts: &mut Verdicts) {
-        let from = self.directed[directed as usize].from;
-        let line = &self.places[from as usize].line;
-        if line.len() >= self.config.queue as usize {
-            return verdicts.lose(QUEUE_FULL);
+        let link = &self.directed[directed as usize];
+        let from = link.from;
+        for copy in 0..link.transmitter.copies(parcel) {
+            if self.places[from as usize].line.len() >= self.config.queue as usize {
+                verdicts.lose(QUEUE_FULL);
+                continue;
+            }
+            let at = self.frame(Frame {
+                directed,
+                from,
+                copy,
+                ..Frame::default()
+            });
+            self.places[from as usize].line.push_back(at);
+            self.resume(parcel, at, verdicts);
         }
-        let frame = Frame {
-            directed,
-            from,
-            ..Frame::default()
-        };
-        let at = match self.free.pop() {
+    }
+
+    /// Keeps a frame; returns where.
+    fn frame(&mut self, frame: Frame) -> u32 {
+        match self.free.pop() {
             Some(at) => {
                 self.frames[at as usize] = frame;
                 at
@@ -29,9 +40,7 @@ impl<H: Hop> Radio<H> {
                 self.frames.push(frame);
                 self.frames.len() as u32 - 1
             }
-        };
-        self.places[from as usize].line.push_back(at);
-        self.resume(parcel, at, verdicts);
+        }
     }
 
     /// Looks at a frame again.
@@ -60,10 +69,21 @@ impl<H: Hop> Radio<H> {
         verdicts.hold(next.since(now), u64::from(at));
     }
 
-    /// Transmits if the channel may be used, or waits for it.
+    /// Transmits if the link is open and the channel free, or waits for that.
     fn contend(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
         let now = parcel.now();
-        match self.wait_for(parcel, at, now) {
+        let directed = self.frames[at as usize].directed as usize;
+        let opening = self.directed[directed].transmitter.opening(parcel, now);
+        let next = match opening {
+            Err(reason) => {
+                let carriage = self.carriage(parcel, at, now);
+                verdicts.lose_as(SimDuration::ZERO, reason, carriage);
+                return self.done(at);
+            }
+            Ok(open) if open > now => Some(open),
+            Ok(_) => self.wait_for(parcel, at, now),
+        };
+        match next {
             Some(next) => self.hold_until(now, next, at, verdicts),
             None => self.transmit(parcel, at, verdicts),
         }
@@ -101,26 +121,27 @@ impl<H: Hop> Radio<H> {
         let frame = &mut self.frames[at as usize];
         let doubled = u64::from(self.config.window) << frame.attempts.min(32);
         let window = doubled.min(u64::from(self.config.window_max));
-        let draw = parcel.random(BACKOFF, frame.waits, parcel.copy());
+        let draw = parcel.random(BACKOFF, frame.waits, frame.copy);
         frame.waits += 1;
         self.config.slot * draw.stream().below(window)
     }
 
     fn transmit(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
         let now = parcel.now();
-        let directed = self.frames[at as usize].directed;
-        let link = &mut self.directed[directed as usize];
-        let airtime = link.hop.airtime(parcel, now);
-        let energy_j = link.hop.energy_j(airtime, now);
-        let (from, to, channel) = (link.from, link.to, link.channel as usize);
+        let frame = self.frames[at as usize];
+        let path = self.path(parcel, frame.directed, now);
+        let link = &mut self.directed[frame.directed as usize];
+        let number = (frame.attempts, frame.copy);
+        let attempt = link.transmitter.attempt(parcel, number, now, &path);
         let new = Transmission {
             frame: at,
-            from,
-            to,
+            from: link.from,
+            to: link.to,
             start: now,
-            end: now + airtime,
+            end: attempt.end,
             spoiled: false,
         };
+        let channel = link.channel as usize;
         // Taken out, so that the rest of the radio can be asked meanwhile.
         let mut air = std::mem::take(&mut self.channels[channel]);
         air.begin(new, |victim, other| self.spoils(victim, other, now));
@@ -130,59 +151,96 @@ impl<H: Hop> Radio<H> {
         frame.start = now;
         frame.first_start.get_or_insert(now);
         frame.attempts += 1;
-        frame.energy_j += energy_j;
-        verdicts.charge(energy_j);
-        self.hold_until(now, new.end, at, verdicts);
+        frame.energy_j += attempt.energy_j;
+        frame.attempt = Some(attempt);
+        verdicts.charge(attempt.energy_j);
+        self.hold_until(now, attempt.end, at, verdicts);
     }
 
     /// A transmission has ended: it got through, is tried again, or is lost.
     fn leave_air(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
         let now = parcel.now();
         let frame = self.frames[at as usize];
-        let channel = self.directed[frame.directed as usize].channel as usize;
-        let spoiled = self.channels[channel].end(at);
-        let attempt = frame.attempts - 1;
-        let mut way = self.way(parcel, frame.directed, now);
-        way.blocked = self.fades(parcel, attempt, &way);
-        let hop = &mut self.directed[frame.directed as usize].hop;
-        let through = match spoiled {
-            true => Err(COLLISION),
-            false => hop.attempt(parcel, attempt, (frame.start, now), &way),
+        let link = &mut self.directed[frame.directed as usize];
+        let spoiled = self.channels[link.channel as usize].end(at);
+        let Some(attempt) = frame.attempt else {
+            unreachable!("a frame on the air is an attempt");
         };
-        let mut carriage = Carriage {
-            queue: frame
-                .first_start
-                .map_or(SimDuration::ZERO, |start| start.since(parcel.sent())),
-            retries: frame
-                .first_start
-                .map_or(SimDuration::ZERO, |start| frame.start.since(start)),
-            serialization: now.since(frame.start),
-            attempts: frame.attempts,
-            energy_j: frame.energy_j,
-            ..Carriage::default()
+        let failed = if spoiled {
+            Some(COLLISION)
+        } else {
+            attempt.failed
         };
-        match through {
-            Ok((propagation, jitter_ns)) => {
-                carriage.propagation = propagation;
-                carriage.jitter_ns = jitter_ns;
-                let way = Carriage {
-                    propagation,
-                    jitter_ns,
-                    ..Carriage::default()
-                };
-                verdicts.deliver_as(way.total(), carriage);
-            }
-            Err(reason) => {
-                let (retries, timeout) = hop.retries(parcel, now);
-                if frame.attempts <= retries {
-                    self.frames[at as usize].phase = Phase::Contending;
-                    let next = now + timeout + self.retry_wait(parcel, at);
-                    return self.hold_until(now, next, at, verdicts);
-                }
-                verdicts.lose_as(SimDuration::ZERO, reason, carriage);
-            }
+        let Some(reason) = failed else {
+            let arrival = link.transmitter.in_order(parcel, attempt.at);
+            self.arrive(parcel, at, &attempt, arrival, verdicts);
+            return self.done(at);
+        };
+        let params = link.transmitter.timeline().at(frame.start);
+        if frame.attempts <= params.retries {
+            let timeout = frame.start + params.timeout.unwrap_or_default();
+            let given_up = timeout.max(attempt.answered());
+            self.frames[at as usize].phase = Phase::Contending;
+            let next = given_up + self.retry_wait(parcel, at);
+            return self.hold_until(now, next, at, verdicts);
         }
-        self.places[frame.from as usize].line.pop_front();
+        let carriage = self.carriage(parcel, at, now);
+        // What is corrupt is noticed where it arrives; a collision, where it happens.
+        let after = if spoiled {
+            SimDuration::ZERO
+        } else {
+            attempt.at.since(now)
+        };
+        verdicts.lose_as(after, reason, carriage);
+        self.done(at);
+    }
+
+    /// What the frame's delay is made of so far.
+    fn carriage(&self, parcel: &Parcel<'_>, at: u32, now: SimTime) -> Carriage {
+        let frame = &self.frames[at as usize];
+        let on_air = |since: SimTime| {
+            let end = frame.attempt.map_or(now, |attempt| attempt.end);
+            end.since(since)
+        };
+        match frame.first_start {
+            None => Carriage {
+                queue: now.since(parcel.sent()),
+                ..Carriage::default()
+            },
+            Some(first) => Carriage {
+                queue: first.since(parcel.sent()),
+                retries: frame.start.since(first),
+                serialization: on_air(frame.start),
+                attempts: frame.attempts,
+                energy_j: frame.energy_j,
+                ..Carriage::default()
+            },
+        }
+    }
+
+    fn arrive(
+        &self,
+        parcel: &Parcel<'_>,
+        at: u32,
+        attempt: &Attempt,
+        arrival: SimTime,
+        verdicts: &mut Verdicts,
+    ) {
+        let now = parcel.now();
+        let link = &self.directed[self.frames[at as usize].directed as usize];
+        // Only a change that nobody declared can be faster than what the run counts on.
+        let way = arrival.since(now).max(link.transmitter.min_delay());
+        let mut carriage = self.carriage(parcel, at, now);
+        carriage.propagation = attempt.propagation;
+        carriage.jitter_ns = difference(way, attempt.propagation);
+        verdicts.deliver_as(way, carriage);
+    }
+
+    /// Forgets a frame that came first in its line.
+    fn done(&mut self, at: u32) {
+        let line = &mut self.places[self.frames[at as usize].from as usize].line;
+        let first = line.pop_front();
+        debug_assert_eq!(first, Some(at), "only the first of a line is sent");
         self.free.push(at);
     }
 

@@ -16,6 +16,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::config::RadioConfig;
+use crate::link::Path;
 use crate::units;
 
 /// The speed of light in vacuum, in metres a second.
@@ -95,47 +96,43 @@ impl PathLoss {
     }
 }
 
-/// One way from antenna to antenna, at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Way {
-    /// What distance adds to the delay.
-    pub light_time: SimDuration,
-    /// The power that arrives, in dBm, if there is a model of it.
-    pub received_dbm: Option<f64>,
-    /// Why nothing arrives, if nothing does.
-    pub blocked: Option<&'static str>,
-}
-
 impl RadioConfig {
     /// What the way from `from_m` to `to_m` does at `now` to the message in hand. `purpose` tells
     /// the draws of shadowing from others of the link.
-    pub fn way(
+    pub fn path(
         &self,
         parcel: &Parcel<'_>,
         purpose: u64,
         now: SimTime,
         (from_m, to_m): (Point3<f64>, Point3<f64>),
         terrain: Option<&Arc<HeightField>>,
-    ) -> Way {
+    ) -> Path {
         let distance_m = nalgebra::distance(&from_m, &to_m);
-        let mut way = Way::default();
+        let mut path = Path::default();
         if self.light_time {
-            way.light_time = SimDuration::from_secs_f64(distance_m / LIGHT_M_PER_S);
+            path.propagation = SimDuration::from_secs_f64(distance_m / LIGHT_M_PER_S);
         }
+        let blocked = |path: Path, reason| Path {
+            loss: 1.0,
+            reason,
+            ..path
+        };
         if self.range_m.is_some_and(|range_m| distance_m > range_m) {
-            way.blocked = Some(RANGE);
+            return blocked(path, RANGE);
         }
         let hidden = self.line_of_sight
             && terrain.is_some_and(|terrain| !terrain.line_of_sight(from_m, to_m));
-        if hidden && (self.occlusion_db.is_none() || self.path_loss.is_none()) {
-            way.blocked = way.blocked.or(Some(OCCLUDED));
+        if hidden && self.occlusion_db.is_none() {
+            return blocked(path, OCCLUDED);
         }
         if let Some(loss) = &self.path_loss {
-            let shadow_db = loss.shadowing_db(parcel, purpose, now);
             let behind_db = self.occlusion_db.filter(|_| hidden).unwrap_or(0.0);
-            way.received_dbm = Some(loss.received_dbm(distance_m, shadow_db + behind_db));
+            let lost_db = loss.shadowing_db(parcel, purpose, now) + behind_db;
+            let received_dbm = loss.received_dbm(distance_m, lost_db);
+            path.loss = loss.error_rate(received_dbm, 8 * parcel.size_bytes());
+            path.reason = if hidden { OCCLUDED } else { RANGE };
         }
-        way
+        path
     }
 }
 
