@@ -314,12 +314,7 @@ impl LinkBuilder {
             let key = vec!["radios".to_owned(), radio.name().to_owned()];
             let terrain = self.terrain.clone();
             let declared = radio.declare(sim, &self.hosts, &self.places_m, terrain);
-            declared.map_err(|host| LinkConfigError::Value {
-                key,
-                message: format!(
-                    "it asks where stations are, and {host:?} has no place: expected one in [places]"
-                ),
-            })?;
+            declared.map_err(|message| LinkConfigError::Value { key, message })?;
         }
 
         let overrides = self.overrides.iter().map(|(pattern, _)| pattern);

@@ -58,7 +58,8 @@ impl RadioBuilder {
     /// Declares the radio and its routes. `hosts` has the names of hosts and where they stand.
     ///
     /// # Errors
-    /// With the name of a host that has no place, if the radio must know places.
+    /// With what is missing: the place of a host, if the radio must know places, or the ground, if
+    /// it must look over it.
     pub(crate) fn declare(
         self,
         sim: &mut Simulation,
@@ -70,6 +71,12 @@ impl RadioBuilder {
             return Ok(());
         }
         let needs_places = self.config.needs_places();
+        if self.config.line_of_sight && terrain.is_none() {
+            return Err(
+                "line_of_sight: expected a world with terrain, such as a built-in crater"
+                    .to_owned(),
+            );
+        }
         let mut radio = Radio::new(self.config, terrain);
         let mut stations: Vec<HostId> = self.links.iter().flat_map(|l| [l.from, l.to]).collect();
         stations.sort_unstable();
@@ -78,7 +85,12 @@ impl RadioBuilder {
             let name = hosts.get(&host).map_or("", String::as_str);
             let place_m = match places_m.get(name) {
                 Some(place_m) => *place_m,
-                None if needs_places => return Err(name.to_owned()),
+                None if needs_places => {
+                    return Err(format!(
+                        "it asks where stations are, and {name:?} has no place: expected one in \
+                         [places]"
+                    ));
+                }
                 None => Point3::origin(),
             };
             radio.station(host.index(), name, place_m);

@@ -5,7 +5,7 @@ mod scene;
 use std::sync::Arc;
 
 use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
-use farside_worlds::{Roadmap, SensorError, WorldError};
+use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -85,6 +85,17 @@ impl Settings for NetworkScenario {
         );
         let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
         let system = Arc::new(system);
+        if setup.links.has_radios() {
+            for (name, place_m) in system.places_m() {
+                setup.links.place(name, place_m);
+            }
+            // The built-in roadmaps lie in the default crater; of others the ground is not known.
+            if !self.world.roadmap.ends_with(".toml") {
+                let crater = Crater::generate(&CraterSettings::default())
+                    .map_err(|error| SetupError::value("world.roadmap", error))?;
+                setup.links.terrain(Arc::new(crater.terrain().clone()));
+            }
+        }
         setup.scene = Some(Box::new(NetworkScene::new(map, posts, system.clone())));
         let watched = system.clone();
         setup.goal = Some(Goal {
