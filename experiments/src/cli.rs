@@ -7,7 +7,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
-use crate::commands::{CommandError, check, diff, info, recover, run, scenarios, verify};
+use crate::commands::{CommandError, check, diff, info, recover, report, run, scenarios, verify};
 use crate::system::Registry;
 
 const EXIT_CODES: &str = "\
@@ -52,6 +52,8 @@ enum Command {
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
     Diff(diff::Args),
+    /// Write up a study: a page with plots, and tables for other programs
+    Report(report::Args),
     /// Save what can be saved of a cut or damaged log
     Recover(recover::Args),
     /// Print completions for a shell
@@ -109,6 +111,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
