@@ -2,7 +2,7 @@
 
 use super::layout::Layout;
 use super::numbers::{Style, plain};
-use crate::stats::Estimate;
+use crate::stats::{Estimate, rates};
 use crate::study::results::{Metric, Results};
 use crate::study::summary::values::{Kind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
@@ -51,6 +51,13 @@ impl<'a> Study<'a> {
             }
         };
         metrics.map(measure).collect()
+    }
+
+    /// The baseline, if there is anything to compare with it.
+    pub(super) fn baseline(&self) -> Option<usize> {
+        self.summary
+            .baseline
+            .filter(|_| self.summary.cells.len() > 1)
     }
 
     /// A cell's name for people: `latency 5ms, loss 30%`.
@@ -125,7 +132,7 @@ impl Measure<'_> {
     /// The label with the unit: `age of information (s)`.
     pub(super) fn label(&self) -> String {
         let unit = match (self.style, self.metric.unit.as_str()) {
-            (Style::Percent, _) => "of runs",
+            (Style::Percent, _) => "% of runs",
             (_, unit) => unit,
         };
         // `messages lost (messages)` says one thing twice.
@@ -163,10 +170,9 @@ impl Measure<'_> {
 
     /// That the metric is the same in all runs, in a sentence, if it is.
     pub(super) fn constant(&self, summary: &Summary) -> Option<String> {
-        let label = &self.metric.label;
         let runs: usize = summary.cells.iter().map(|cell| self.n(cell)).sum();
         if runs == 0 {
-            return Some(format!("No run reports {label}."));
+            return Some("No run reports it.".to_owned());
         }
         let mut ends: Option<(f64, f64)> = None;
         for cell in summary.cells.iter().filter(|cell| self.n(cell) > 0) {
@@ -183,21 +189,22 @@ impl Measure<'_> {
         if low != high {
             return None;
         }
-        // Never or always in all runs says something of the next one.
-        let bound = crate::stats::rates::wilson(0, runs).high;
-        let bound = Style::Percent.value(&Estimate {
-            value: bound,
-            low: 0.0,
-            high: bound,
-        });
-        let surely = format!("a rate of more than {bound} is unlikely (Wilson, 95 %)");
+        // Never in all runs says something of the next one.
+        let none = rates::wilson(0, runs);
+        let percent = |value: f64| Style::Percent.value(&Estimate { value, ..none });
+        let (most, least) = (percent(none.high), percent(1.0 - none.high));
         Some(match self.kind {
-            Kind::Rate if low == 0.0 => format!("{label}: none of {runs} runs; {surely}."),
-            Kind::Rate => format!("{label}: all {runs} runs; of the contrary, {surely}."),
-            _ if low == 0.0 => {
-                format!("{label}: 0 in all {runs} runs; of runs with any, {surely}.")
+            Kind::Rate if low == 0.0 => {
+                format!("In none of {runs} runs. A rate above {most} is unlikely (Wilson, 95 %).")
             }
-            _ => format!("{label}: {} in all {runs} runs.", plain(low)),
+            Kind::Rate => {
+                format!("In all {runs} runs. A rate below {least} is unlikely (Wilson, 95 %).")
+            }
+            _ if low == 0.0 => format!(
+                "0 in all {runs} runs. That more than {most} of all runs have any is unlikely \
+                 (Wilson, 95 %)."
+            ),
+            _ => format!("{} in all {runs} runs.", plain(low)),
         })
     }
 }

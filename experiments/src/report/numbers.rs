@@ -115,7 +115,7 @@ impl Style {
     fn unit(self, text: String) -> String {
         match self {
             Style::Plain => text,
-            Style::Percent => format!("{text} %"),
+            Style::Percent => format!("{text}\u{a0}%"),
         }
     }
 }
@@ -133,8 +133,8 @@ mod tests {
         let large = estimate(41234.4, 40100.0, 42800.0);
         assert_eq!(Style::Plain.value(&large), "41,234");
         let rate = estimate(0.9, 0.744, 0.965);
-        assert_eq!(Style::Percent.value(&rate), "90 %");
-        assert_eq!(Style::Percent.interval(&rate), "74 to 96 %");
+        assert_eq!(Style::Percent.value(&rate), "90\u{a0}%");
+        assert_eq!(Style::Percent.interval(&rate), "74 to 96\u{a0}%");
         let less = estimate(-0.51, -0.6, -0.4);
         assert_eq!((Style::Plain.signed(&less)).as_str(), "−0.51");
         assert_eq!(Style::Plain.signed(&wide), "+1.41");

@@ -11,7 +11,6 @@ use super::numbers::plain;
 use super::plots::{self, Plots};
 use super::svg::{Figure, slug};
 use crate::study::results::Metric;
-use crate::study::summary::values::Kind;
 
 /// The page, and the figures that are on it.
 pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
@@ -98,7 +97,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                     div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
                 }
                 @for note in &plots.notes { p class="note" { (note) } }
-                @if measure.kind == Kind::Text {
+                @if plots.figures.is_empty() {
                     (tables::of_metric(study, measure))
                 } @else {
                     details {

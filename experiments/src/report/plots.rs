@@ -5,6 +5,7 @@ mod heat;
 mod losses;
 mod steps;
 
+use self::curves::Shown;
 use super::layout::Shape;
 use super::measure::{Measure, Study};
 use super::svg::{Area, Figure};
@@ -40,7 +41,13 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
         Shape::Scattered => plots.figures.extend(curves::scattered(study, measure)),
         Shape::Grid | Shape::Row => {
             if let Some(curves) = study.layout.curves() {
-                plots.figures.extend(curves::all(study, measure, &curves));
+                let all = |shown| curves::all(study, measure, &curves, shown);
+                plots.figures.extend(all(Shown::Estimate));
+                // A heat map has the place of the differences; the table has both.
+                match heat::map(study, measure) {
+                    Some(map) => plots.figures.push(map),
+                    None => plots.figures.extend(all(Shown::Difference)),
+                }
                 if curves.more {
                     plots.notes.push(
                         "There are more curves than can be told apart; an even choice is shown, \
@@ -49,7 +56,6 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
                     );
                 }
             }
-            plots.figures.extend(heat::map(study, measure));
         }
     }
     if measure.kind == Kind::List {

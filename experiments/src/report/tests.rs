@@ -154,8 +154,8 @@ fn a_page_says_what_there_is_to_say() {
     let page = build(&latency_and_loss(), "runs/night").page;
     for said in [
         "every combination of one-way latency (5ms, 100ms, 250ms, 600ms, 1.3s)",
-        "collisions: 0 in all",
-        "a rate of more than",
+        "0 in all 749 runs",
+        "of all runs have any is unlikely",
         "farside reproduce runs/night --cell 24 --seed 30 --out cell24-seed30.mcap",
         "no &lt;path&gt; left &amp; none to give",
         "Kaplan",

@@ -45,7 +45,7 @@ pub(super) fn what_was_run(study: &Study<'_>) -> Markup {
                     }
                 }
             }
-            @if let Some(baseline) = summary.baseline.filter(|_| cells > 1) {
+            @if let Some(baseline) = study.baseline() {
                 "Cells are compared with cell " (baseline) ": " (study.cell_name(baseline)) "."
             }
         }

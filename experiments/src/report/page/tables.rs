@@ -21,7 +21,7 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
         p class="note" {
                     "Means (numbers), rates (true or false) and medians (lists), each with its 95 % \
                      interval"
-                    @if study.summary.baseline.is_some() {
+                    @if study.baseline().is_some() {
                         ", and the difference to the baseline over the same seeds. ▲ and ▼ mark \
                          differences whose interval leaves out 0: of twenty that are none, about \
                          one is marked."
@@ -85,8 +85,8 @@ fn marked(style: Style, difference: &Estimate) -> Markup {
     let sure = difference.low > 0.0 || difference.high < 0.0;
     let known = difference.is_known();
     let sign = match (sure && known, difference.value > 0.0) {
-        (true, true) => " ▲",
-        (true, false) => " ▼",
+        (true, true) => "\u{a0}▲",
+        (true, false) => "\u{a0}▼",
         _ => "",
     };
     html! {
@@ -95,7 +95,7 @@ fn marked(style: Style, difference: &Estimate) -> Markup {
 }
 
 fn is_baseline(study: &Study<'_>, cell: &CellSummary) -> Option<&'static str> {
-    (study.summary.baseline == Some(cell.cell)).then_some("baseline")
+    (study.baseline() == Some(cell.cell)).then_some("baseline")
 }
 
 fn cell_headers(study: &Study<'_>) -> Markup {

@@ -10,8 +10,6 @@ use crate::report::scale::text_width;
 use crate::report::svg::{Area, Figure, Px, TEXT, path, shortened, slug, widest};
 use crate::stats::Estimate;
 
-/// The least width of a field that its estimate fits into.
-const FIELD: f64 = 52.0;
 /// From this width on, the interval fits too.
 const WITH_INTERVAL: f64 = 74.0;
 
@@ -37,7 +35,18 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         .map(|level| shortened(&level.text, 14))
         .collect();
     let left = 18.0 + widest(names.iter().map(String::as_str));
-    let width = ((WIDTH - left - 12.0) / columns as f64).max(FIELD);
+    let estimates = study
+        .summary
+        .cells
+        .iter()
+        .filter_map(|cell| measure.estimate(cell));
+    let estimates: Vec<Estimate> = estimates.collect();
+    let texts: Vec<String> = estimates
+        .iter()
+        .map(|one| field_text(measure, one))
+        .collect();
+    let least = widest(texts.iter().map(String::as_str)) + 8.0;
+    let width = ((WIDTH - left - 12.0) / columns as f64).max(least);
     let height = if width >= WITH_INTERVAL { 44.0 } else { 30.0 };
     let area = Area {
         left,
@@ -45,12 +54,8 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         width: width * columns as f64,
         height: height * rows as f64,
     };
-    let estimates = study
-        .summary
-        .cells
-        .iter()
-        .filter_map(|cell| measure.estimate(cell));
     let values: Vec<f64> = estimates
+        .iter()
         .map(|estimate| estimate.value)
         .filter(|value| value.is_finite())
         .collect();
@@ -109,6 +114,11 @@ fn columns_named(area: &Area, x: &Axis, width: f64) -> Markup {
     }
 }
 
+/// What is written into a field: the estimate, whose unit is above the map.
+fn field_text(measure: &Measure<'_>, estimate: &Estimate) -> String {
+    measure.style.value(estimate).replace("\u{a0}%", "")
+}
+
 impl Map<'_> {
     fn share(&self, value: f64) -> f64 {
         let (least, most) = self.ends;
@@ -151,7 +161,7 @@ impl Map<'_> {
                 rect class="field" x=(Px(x)) y=(Px(y)) width=(Px(width)) height=(Px(height))
                     fill=(colour) { title { (says) } }
                 text x=(Px(middle)) y=(Px(centre + if interval.is_some() { -2.0 } else { 4.5 }))
-                    text-anchor="middle" { (self.measure.style.value(&estimate)) }
+                    text-anchor="middle" { (field_text(self.measure, &estimate)) }
                 @if let Some(interval) = interval {
                     text class="small" x=(Px(middle)) y=(Px(centre + 13.0)) text-anchor="middle" {
                         (interval)
@@ -171,7 +181,7 @@ impl Map<'_> {
             return None;
         }
         let text = self.measure.style.interval(estimate);
-        let text = text.replace(" to ", "–").replace(" %", "");
+        let text = text.replace(" to ", "–").replace("\u{a0}%", "");
         (text_width(&text, TEXT * 0.8) < width - 10.0).then_some(text)
     }
 
