@@ -3,7 +3,7 @@
 use crate::stats::Estimate;
 
 /// The most decimals that are ever written.
-const MOST_DECIMALS: usize = 6;
+const MOST_DECIMALS: usize = 12;
 
 /// A number with `decimals`, thousands apart from 10,000 on, and a real minus.
 pub(super) fn decimal(value: f64, decimals: usize) -> String {
@@ -13,6 +13,9 @@ pub(super) fn decimal(value: f64, decimals: usize) -> String {
         } else {
             "–".to_owned()
         };
+    }
+    if value.abs() >= 1e15 {
+        return format!("{value:.3e}").replace('-', "−");
     }
     let text = format!("{:.*}", decimals, value.abs());
     let (whole, rest) = text.split_at(text.find('.').unwrap_or(text.len()));
@@ -54,14 +57,24 @@ pub(super) enum Style {
     Plain,
     /// As percent: rates.
     Percent,
+    /// As percentage points: differences of rates.
+    Points,
 }
 
 impl Style {
+    /// How a difference of such figures is written.
+    pub(super) fn of_differences(self) -> Self {
+        match self {
+            Style::Plain => Style::Plain,
+            Style::Percent | Style::Points => Style::Points,
+        }
+    }
+
     /// The number that is written: 30 for a rate of 0.3.
     pub(super) fn scaled(self, value: f64) -> f64 {
         match self {
             Style::Plain => value,
-            Style::Percent => 100.0 * value,
+            Style::Percent | Style::Points => 100.0 * value,
         }
     }
 
@@ -116,6 +129,7 @@ impl Style {
         match self {
             Style::Plain => text,
             Style::Percent => format!("{text}\u{a0}%"),
+            Style::Points => format!("{text}\u{a0}pp"),
         }
     }
 }
@@ -142,8 +156,14 @@ mod tests {
         assert_eq!(Style::Plain.interval(&Estimate::unknown(2.0)), "unknown");
         assert_eq!(Style::Plain.value(&Estimate::unknown(f64::NAN)), "–");
         assert_eq!(
-            [plain(0.0), plain(12345.0), plain(0.01234)],
-            ["0", "12,345", "0.0123"]
+            [
+                plain(0.0),
+                plain(12345.0),
+                plain(0.01234),
+                plain(-2e300),
+                plain(3.1e-9)
+            ],
+            ["0", "12,345", "0.0123", "−2.000e300", "0.00000000310"]
         );
     }
 }

@@ -4,21 +4,24 @@ mod method;
 mod runs;
 mod tables;
 
+use std::collections::BTreeSet;
+
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::measure::{Measure, Study};
 use super::numbers::plain;
 use super::plots::{self, Plots};
-use super::svg::{Figure, slug};
-use crate::study::results::Metric;
+use super::svg::Figure;
 
 /// The page, and the figures that are on it.
 pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
     let measures = study.measures();
-    let plotted: Vec<Plots> = measures
+    let mut plotted: Vec<Plots> = measures
         .iter()
         .map(|measure| plots::of_metric(study, measure))
         .collect();
+    let figures = plotted.iter_mut().flat_map(|plots| &mut plots.figures);
+    make_unique(figures);
     let losses = plots::losses(study);
     let manifest = &study.results.manifest;
     let markup = html! {
@@ -63,9 +66,22 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
     (markup.into_string(), figures.collect())
 }
 
+/// Gives each figure a file of its own: names that differ may be alike in letters and digits.
+fn make_unique<'a>(figures: impl Iterator<Item = &'a mut Figure>) {
+    let mut taken = BTreeSet::new();
+    for figure in figures {
+        let stem = figure.file.trim_end_matches(".svg").to_owned();
+        let mut number = 1;
+        while !taken.insert(figure.file.clone()) {
+            number += 1;
+            figure.file = format!("{stem}-{number}.svg");
+        }
+    }
+}
+
 /// Where a metric's section is.
-fn anchor(metric: &Metric) -> String {
-    format!("metric-{}", slug(&metric.name))
+fn anchor(measure: &Measure<'_>) -> String {
+    format!("metric-{}", measure.index)
 }
 
 fn contents(measures: &[Measure<'_>], losses: bool) -> Markup {
@@ -74,7 +90,7 @@ fn contents(measures: &[Measure<'_>], losses: bool) -> Markup {
             ul {
                 li { a href="#cells" { "All cells" } }
                 @for measure in measures {
-                    li { a href={ "#" (anchor(measure.metric)) } { (measure.metric.label) } }
+                    li { a href={ "#" (anchor(measure)) } { (measure.metric.label) } }
                 }
                 @if losses { li { a href="#losses" { "Losses" } } }
                 li { a href="#again" { "Run again" } }
@@ -87,7 +103,7 @@ fn contents(measures: &[Measure<'_>], losses: bool) -> Markup {
 
 fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Markup {
     html! {
-        section id=(anchor(measure.metric)) {
+        section id=(anchor(measure)) {
             h2 { (capital(&measure.metric.label)) }
             @if let Some(sentence) = measure.constant(study.summary) {
                 p { (sentence) }

@@ -87,11 +87,11 @@ impl Scale {
     /// Round numbers along a linear axis, about `count` of them.
     pub(super) fn ticks(&self, count: f64) -> Vec<Tick> {
         let step = self.step(count);
-        let decimals = (0..7).find(|decimals| {
+        let decimals = (0..12).find(|decimals| {
             let scaled = step * libm::pow(10.0, f64::from(*decimals));
             (scaled - libm::round(scaled)).abs() < 1e-6
         });
-        let decimals = decimals.unwrap_or(6) as usize;
+        let decimals = decimals.unwrap_or(12) as usize;
         let first = libm::ceil(self.low / step - 1e-9);
         let last = libm::floor(self.high / step + 1e-9);
         // A step is a fifth to a tenth of the axis, so there are few.

@@ -53,10 +53,11 @@ impl Figure {
                 (self.body)
             }
         };
-        format!(
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n",
-            markup.into_string()
-        )
+        // XML has no place for control characters, escaped or not.
+        let allowed = |letter: char| !letter.is_control() || letter == '\n' || letter == '\t';
+        let text = markup.into_string();
+        let text: String = text.chars().filter(|letter| allowed(*letter)).collect();
+        format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{text}\n")
     }
 
     fn view_box(&self) -> String {

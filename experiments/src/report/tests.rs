@@ -35,6 +35,16 @@ fn hostile() -> Results {
     manifest.metrics[1].label = evil.to_owned();
     manifest.cells[0].texts[0] = evil.to_owned();
     manifest.cells[0].sets[0] = evil.to_owned();
+    results.manifest.factors[1].label = "bell \u{7}".to_owned();
+    // Alike in letters and digits.
+    results.manifest.metrics[7].name = "AGE-S".to_owned();
+    results.manifest.metrics[8].name = "age s".to_owned();
+    for run in &mut results.runs {
+        if let RunOutcome::Done { metrics, .. } = &mut run.outcome {
+            metrics.insert("AGE-S".to_owned(), json!(1e300 * run.seed as f64));
+            metrics.insert("age s".to_owned(), json!(1e-300 * run.cell as f64));
+        }
+    }
     results.runs[0].outcome = RunOutcome::Failed {
         error: evil.to_owned(),
     };

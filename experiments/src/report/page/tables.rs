@@ -24,7 +24,7 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                     @if study.baseline().is_some() {
                         ", and the difference to the baseline over the same seeds. ▲ and ▼ mark \
                          differences whose interval leaves out 0: of twenty that are none, about \
-                         one is marked."
+                         one is marked. Differences of rates are in percentage points (pp)."
                     } @else { "." }
                 }
         div class="scroll" tabindex="0" {
@@ -34,7 +34,7 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                         (cell_headers(study))
                         th class="narrow" { "runs" }
                         @for measure in &shown {
-                            th { a href={ "#" (anchor(measure.metric)) } { (measure.label()) } }
+                            th { a href={ "#" (anchor(measure)) } { (measure.label()) } }
                         }
                     }
                 }
@@ -74,7 +74,7 @@ fn overview_field(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
             @if estimate.width() != 0.0 { small { (measure.style.interval(&estimate)) } }
             // Nothing more is to be said of what never varies.
             @if let Some(difference) = measure.difference(cell).filter(|one| one.width() != 0.0) {
-                (marked(measure.style, &difference))
+                (marked(measure.style.of_differences(), &difference))
             }
         }
     }
@@ -248,8 +248,8 @@ fn estimate_fields(style: Style, estimate: Option<Estimate>) -> Markup {
 fn difference_fields(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
     html! {
         @if let Some(difference) = measure.difference(cell) {
-            td { (measure.style.signed(&difference)) }
-            td { (measure.style.interval(&difference)) }
+            td { (measure.style.of_differences().signed(&difference)) }
+            td { (measure.style.of_differences().interval(&difference)) }
         } @else {
             td { "–" }
             td { "–" }

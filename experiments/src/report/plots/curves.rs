@@ -114,10 +114,8 @@ impl<'a> Plot<'a> {
         let says = match self.shown {
             Shown::Estimate => self.measure.tooltip(self.study, summary, &estimate),
             Shown::Difference => {
-                let (value, interval) = (
-                    self.measure.style.signed(&estimate),
-                    self.measure.style.interval(&estimate),
-                );
+                let style = self.measure.style.of_differences();
+                let (value, interval) = (style.signed(&estimate), style.interval(&estimate));
                 format!("{}: {value} ({interval})", self.study.cell_name(cell))
             }
         };
@@ -130,7 +128,8 @@ impl<'a> Plot<'a> {
     }
 
     fn y_ticks(&self) -> Vec<Tick> {
-        measured_ticks(&self.y, self.measure.style == Style::Percent)
+        let percent = self.measure.style == Style::Percent && self.shown == Shown::Estimate;
+        measured_ticks(&self.y, percent)
     }
 
     fn left_room(&self) -> f64 {
@@ -247,6 +246,9 @@ impl<'a> Plot<'a> {
             x_ticks: x_ticks.collect(),
             y_label: match self.shown {
                 Shown::Estimate => self.measure.axis_label(),
+                Shown::Difference if self.measure.style == Style::Percent => {
+                    "difference to the baseline (percentage points)".to_owned()
+                }
                 Shown::Difference => "difference to the baseline, same seeds".to_owned(),
             },
             y_ticks: self.y_ticks(),

@@ -54,20 +54,13 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         width: width * columns as f64,
         height: height * rows as f64,
     };
-    let values: Vec<f64> = estimates
-        .iter()
-        .map(|estimate| estimate.value)
-        .filter(|value| value.is_finite())
-        .collect();
-    let least = values.iter().copied().fold(f64::NAN, f64::min);
-    let most = values.iter().copied().fold(f64::NAN, f64::max);
     let map = Map {
         study,
         measure,
         area,
         columns,
         rows,
-        ends: (least, most),
+        ends: ends(&estimates),
     };
     let body = html! {
         text class="label" x="8" y=(Px(area.top - 42.0)) { (measure.axis_label()) }
@@ -112,6 +105,15 @@ fn columns_named(area: &Area, x: &Axis, width: f64) -> Markup {
             (x.name())
         }
     }
+}
+
+/// The least and the greatest estimate; not numbers if there is none.
+fn ends(estimates: &[Estimate]) -> (f64, f64) {
+    let values = estimates.iter().map(|estimate| estimate.value);
+    let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    // Of NaN and a number, the functions return the number.
+    let least = finite.iter().copied().fold(f64::NAN, f64::min);
+    (least, finite.iter().copied().fold(f64::NAN, f64::max))
 }
 
 /// What is written into a field: the estimate, whose unit is above the map.

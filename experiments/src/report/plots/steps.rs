@@ -264,24 +264,31 @@ fn figure(
         @for (index, curve) in curves.iter().enumerate() { (drawn(&area, &kind.x, curve, index)) }
         @if !alone { (end_labels(labels, &area, &heading, false)) }
     };
-    let metric = &measure.metric.label;
+    named(
+        measure,
+        kind,
+        panel,
+        if alone { "" } else { &heading },
+        body,
+    )
+}
+
+fn named(measure: &Measure<'_>, kind: &Kind, panel: &str, heading: &str, body: Markup) -> Figure {
+    let (metric, title) = (&measure.metric.label, kind.title);
     let within = if panel.is_empty() {
         String::new()
     } else {
         format!(", {panel}")
     };
-    let each = if alone {
-        String::new()
-    } else {
-        format!(", a curve for each {heading}")
+    let each = match heading {
+        "" => String::new(),
+        heading => format!(", a curve for each {heading}"),
     };
+    let file = slug(&format!("{}-{}{within}", measure.metric.name, kind.file));
     Figure {
-        file: format!(
-            "{}.svg",
-            slug(&format!("{}-{}{within}", measure.metric.name, kind.file))
-        ),
-        title: format!("{metric}, {}{within}", kind.title),
-        description: format!("The {} of {metric}{each}: {}.", kind.title, kind.y_label),
+        file: format!("{file}.svg"),
+        title: format!("{metric}, {title}{within}"),
+        description: format!("The {title} of {metric}{each}: {}.", kind.y_label),
         width: WIDTH,
         height: TOP + HEIGHT + BELOW,
         body,
