@@ -2,5 +2,6 @@
 
 mod common;
 mod logs;
+mod report;
 mod running;
 mod scenarios;

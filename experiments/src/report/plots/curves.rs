@@ -1,0 +1,336 @@
+//! Estimates over a factor: curves with bands over numbers, points with whiskers over words.
+
+use maud::{Markup, html};
+
+use super::{BELOW, HEIGHT, TOP, WIDTH, area};
+use crate::report::colours::DASHES;
+use crate::report::layout::{Axis, Curves, Panel};
+use crate::report::measure::{Measure, Study};
+use crate::report::numbers::Style;
+use crate::report::scale::{Scale, Spacing, Tick};
+use crate::report::svg::{
+    Area, EndLabel, Figure, Frame, end_label_room, end_labels, marker, measured_ticks, path,
+    shortened, slug, widest,
+};
+use crate::stats::Estimate;
+use crate::study::results;
+
+/// What is plotted of each cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// The estimate.
+    Estimate,
+    /// How much more it is than in the baseline.
+    Difference,
+}
+
+/// What all figures of one kind of one metric share.
+struct Plot<'a> {
+    study: &'a Study<'a>,
+    measure: &'a Measure<'a>,
+    shown: Shown,
+    y: Scale,
+}
+
+/// A cell's figure, where it goes; not a number if the cell has none.
+struct Point {
+    x: f64,
+    estimate: Estimate,
+    says: String,
+}
+
+/// One figure for each panel, all with the same vertical axis. None if no cell has any figure, as
+/// if there is no baseline.
+pub(super) fn all(
+    study: &Study<'_>,
+    measure: &Measure<'_>,
+    curves: &Curves,
+    shown: Shown,
+) -> Vec<Figure> {
+    let series = curves.panels.iter().flat_map(|panel| &panel.series);
+    let cells = series.flat_map(|series| series.cells.iter().copied());
+    let Some(plot) = Plot::new(study, measure, shown, cells) else {
+        return Vec::new();
+    };
+    let panels = curves.panels.iter();
+    panels.map(|panel| plot.figure(curves, panel)).collect()
+}
+
+/// For cells that lie anywhere: one figure for each factor, with a point for each cell.
+pub(super) fn scattered(study: &Study<'_>, measure: &Measure<'_>) -> Vec<Figure> {
+    let cells = 0..study.summary.cells.len();
+    let Some(plot) = Plot::new(study, measure, Shown::Estimate, cells) else {
+        return Vec::new();
+    };
+    let axes = study.layout.axes.iter().enumerate();
+    axes.map(|(along, axis)| plot.scatter(along, axis))
+        .collect()
+}
+
+impl<'a> Plot<'a> {
+    /// With an axis that holds the intervals of the cells.
+    fn new(
+        study: &'a Study<'a>,
+        measure: &'a Measure<'a>,
+        shown: Shown,
+        cells: impl Iterator<Item = usize>,
+    ) -> Option<Self> {
+        let y = Scale::between(0.0, 100.0);
+        let mut plot = Plot {
+            study,
+            measure,
+            shown,
+            y,
+        };
+        let estimates: Vec<Estimate> = cells.filter_map(|cell| plot.of_cell(cell)).collect();
+        if estimates.is_empty() {
+            return None;
+        }
+        if shown == Shown::Difference || measure.style == Style::Plain {
+            let ends = estimates
+                .iter()
+                .flat_map(|one| [one.value, one.low, one.high]);
+            let zero = (shown == Shown::Difference).then_some(0.0);
+            let scaled = ends.map(|end| measure.style.scaled(end)).chain(zero);
+            plot.y = Scale::measured(scaled);
+        }
+        Some(plot)
+    }
+
+    fn of_cell(&self, cell: usize) -> Option<Estimate> {
+        let summary = self.study.summary.cells.get(cell)?;
+        match self.shown {
+            Shown::Estimate => self.measure.estimate(summary),
+            Shown::Difference => self.measure.difference(summary),
+        }
+    }
+
+    fn point(&self, cell: usize, x: f64) -> Point {
+        let found = self.of_cell(cell).zip(self.study.summary.cells.get(cell));
+        let Some((estimate, summary)) = found else {
+            let (estimate, says) = (Estimate::unknown(f64::NAN), String::new());
+            return Point { x, estimate, says };
+        };
+        let says = match self.shown {
+            Shown::Estimate => self.measure.tooltip(self.study, summary, &estimate),
+            Shown::Difference => {
+                let style = self.measure.style.of_differences();
+                let (value, interval) = (style.signed(&estimate), style.interval(&estimate));
+                format!("{}: {value} ({interval})", self.study.cell_name(cell))
+            }
+        };
+        Point { x, estimate, says }
+    }
+
+    /// The y of a value in an area.
+    fn at(&self, area: &Area, value: f64) -> f64 {
+        area.y(self.y.place(self.measure.style.scaled(value)))
+    }
+
+    fn y_ticks(&self) -> Vec<Tick> {
+        let percent = self.measure.style == Style::Percent && self.shown == Shown::Estimate;
+        measured_ticks(&self.y, percent)
+    }
+
+    fn left_room(&self) -> f64 {
+        16.0 + widest(self.y_ticks().iter().map(|tick| tick.text.as_str()))
+    }
+
+    fn scatter(&self, along: usize, axis: &Axis) -> Figure {
+        let x = x_axis(axis);
+        let places = self.study.layout.places.iter().enumerate();
+        let points: Vec<Point> = places
+            .map(|(cell, place)| self.point(cell, x.place(axis, place[along])))
+            .collect();
+        let area = area(self.left_room(), 24.0);
+        let body = html! {
+            (self.frame(&area, axis, &x).draw())
+            @for point in &points { (self.whisker(&area, point, 0, 0.0)) }
+        };
+        let (metric, name) = (&self.measure.metric.label, axis.name());
+        let file = format!("{}-over-{name}", self.measure.metric.name);
+        let description = format!(
+            "The {} of {metric} in each cell, with its 95 % interval, over {name}.",
+            self.measure.what()
+        );
+        sized(&file, format!("{metric} over {name}"), description, body)
+    }
+
+    fn figure(&self, curves: &Curves, panel: &Panel) -> Figure {
+        let axes = &self.study.layout.axes;
+        let axis = &axes[curves.x];
+        let x = x_axis(axis);
+        let heading = curves.series.map_or("", |series| axes[series].name());
+        let heading = shortened(heading, 22);
+        let series = panel.series.iter();
+        let names: Vec<String> = series.map(|one| shortened(&one.name, 18)).collect();
+        let alone = curves.series.is_none();
+        let right = if alone {
+            let texts = axis.levels.iter().map(|level| level.text.as_str());
+            (widest(texts) / 2.0).clamp(16.0, 48.0)
+        } else {
+            end_label_room(names.iter().map(String::as_str), &heading)
+        };
+        let area = area(self.left_room(), right);
+        let mut marks = Vec::new();
+        let mut labels = Vec::new();
+        for (index, series) in panel.series.iter().enumerate() {
+            let level = |cell: usize| self.study.layout.places[cell][curves.x];
+            let cells = series.cells.iter().copied();
+            let points = cells.map(|cell| self.point(cell, x.place(axis, level(cell))));
+            let points: Vec<Point> = points.collect();
+            let last = points
+                .iter()
+                .rfind(|point| point.estimate.value.is_finite());
+            labels.extend(last.map(|point| EndLabel {
+                series: index,
+                y: self.at(&area, point.estimate.value),
+                text: names[index].clone(),
+            }));
+            let aside = 11.0 * (index as f64 - (panel.series.len() - 1) as f64 / 2.0);
+            marks.push(if axis.numeric {
+                self.curve(&area, &points, index)
+            } else {
+                html! { @for point in &points { (self.whisker(&area, point, index, aside)) } }
+            });
+        }
+        let body = html! {
+            (self.frame(&area, axis, &x).draw())
+            @if self.shown == Shown::Difference {
+                @let zero = self.at(&area, 0.0);
+                path class="axis" d=(path([(area.left, zero), (area.x(1.0), zero)])) {}
+            }
+            @for mark in &marks { (mark) }
+            @if !alone { (end_labels(labels, &area, &heading, true)) }
+        };
+        self.named(axis, &panel.name, if alone { "" } else { &heading }, body)
+    }
+
+    fn named(&self, axis: &Axis, panel: &str, heading: &str, body: Markup) -> Figure {
+        let (name, label) = (&self.measure.metric.name, &self.measure.metric.label);
+        let (file, what, title) = match self.shown {
+            Shown::Estimate => ("curves", self.measure.what(), label.clone()),
+            Shown::Difference => (
+                "differences",
+                "paired difference",
+                format!("{label}, difference"),
+            ),
+        };
+        let within = if panel.is_empty() {
+            String::new()
+        } else {
+            format!(", {panel}")
+        };
+        let each = match heading {
+            "" => String::new(),
+            heading => format!(", a curve for each {heading}"),
+        };
+        let over = axis.name();
+        let description = format!("The {what} of {label} over {over}{each}, with 95 % intervals.");
+        let title = format!("{title} over {over}{within}");
+        sized(&format!("{name}-{file}{within}"), title, description, body)
+    }
+
+    fn frame<'b>(&self, area: &Area, axis: &'b Axis, x: &Along) -> Frame<'b> {
+        let longest = match axis.numeric {
+            true => 12,
+            false => (area.width / 9.0) as usize / axis.levels.len(),
+        };
+        let x_ticks = axis.levels.iter().enumerate().map(|(level, about)| Tick {
+            at: x.place(axis, level),
+            text: shortened(&about.text, longest.max(4)),
+        });
+        Frame {
+            area: *area,
+            x_label: &axis.label,
+            x_ticks: x_ticks.collect(),
+            y_label: match self.shown {
+                Shown::Estimate => self.measure.axis_label(),
+                Shown::Difference if self.measure.style == Style::Percent => {
+                    "difference to the baseline (percentage points)".to_owned()
+                }
+                Shown::Difference => "difference to the baseline, same seeds".to_owned(),
+            },
+            y_ticks: self.y_ticks(),
+        }
+    }
+
+    /// A line through the estimates and a band over their intervals; both break where a cell has
+    /// none.
+    fn curve(&self, area: &Area, points: &[Point], series: usize) -> Markup {
+        let at = |point: &Point, value: f64| (area.x(point.x), self.at(area, value));
+        html! {
+            @for part in points.split(|point| !point.estimate.value.is_finite()) {
+                @let known: Vec<&Point> = part
+                    .iter()
+                    .filter(|point| point.estimate.low.is_finite())
+                    .collect();
+                @let upper = known.iter().map(|point| at(point, point.estimate.high));
+                @let lower = known.iter().rev().map(|point| at(point, point.estimate.low));
+                @if known.len() > 1 {
+                    path class={ "band s" (series) } d=(path(upper.chain(lower))) {}
+                }
+                @let line = part.iter().map(|point| at(point, point.estimate.value));
+                path class={ "line s" (series) } stroke-dasharray=(DASHES[series]) d=(path(line)) {}
+            }
+            @for point in points.iter().filter(|point| point.estimate.value.is_finite()) {
+                @let (x, y) = at(point, point.estimate.value);
+                (marker(series, x, y, &point.says))
+            }
+        }
+    }
+
+    /// A point with its interval, moved aside by some pixels.
+    fn whisker(&self, area: &Area, point: &Point, series: usize, aside: f64) -> Markup {
+        let Estimate { value, low, high } = point.estimate;
+        let x = area.x(point.x) + aside;
+        html! {
+            @if value.is_finite() {
+                @if low.is_finite() {
+                    path class={ "line s" (series) }
+                        d=(path([(x, self.at(area, low)), (x, self.at(area, high))])) {}
+                }
+                (marker(series, x, self.at(area, value), &point.says))
+            }
+        }
+    }
+}
+
+fn sized(file: &str, title: String, description: String, body: Markup) -> Figure {
+    Figure {
+        file: format!("{}.svg", slug(file)),
+        title,
+        description,
+        width: WIDTH,
+        height: TOP + HEIGHT + BELOW,
+        body,
+    }
+}
+
+/// A factor along x.
+struct Along {
+    scale: Scale,
+}
+
+fn x_axis(axis: &Axis) -> Along {
+    let values = axis.levels.iter().map(|level| level.value);
+    let spacing = match axis.scale {
+        results::Scale::Log => Spacing::Log,
+        results::Scale::Linear => Spacing::Linear,
+    };
+    Along {
+        scale: if axis.numeric {
+            Scale::over(values, spacing)
+        } else {
+            // Half a word's room at both ends.
+            Scale::between(-0.5, axis.levels.len() as f64 - 0.5)
+        },
+    }
+}
+
+impl Along {
+    fn place(&self, axis: &Axis, level: usize) -> f64 {
+        // A little room, so that markers at the ends do not lie on the axis.
+        0.03 + 0.94 * self.scale.place(axis.levels[level].value)
+    }
+}

@@ -1,0 +1,168 @@
+//! `farside report` on results folders as studies leave them.
+
+use std::path::Path;
+
+use farside_experiments::study::results::{
+    Cell, FORMAT, Factor, Manifest, MessageCounts, Metric, RunOutcome, RunRecord, Scale,
+};
+use serde_json::json;
+
+use crate::common::{farside, json, text};
+
+fn manifest() -> Manifest {
+    let cell = |loss: f64, text: &str| Cell {
+        values: vec![json!(loss)],
+        texts: vec![text.to_owned()],
+        sets: vec![format!("links.default.loss={text}")],
+    };
+    Manifest {
+        format: FORMAT,
+        code_version: "0.1.0".to_owned(),
+        study: "losses".to_owned(),
+        question: "Does loss slow a team down?".to_owned(),
+        scenario: "network/crater-dense".to_owned(),
+        scenario_text: "system = \"network\"\n".to_owned(),
+        files: Default::default(),
+        factors: vec![Factor {
+            name: "loss".to_owned(),
+            label: "message loss".to_owned(),
+            unit: String::new(),
+            scale: Scale::Linear,
+        }],
+        metrics: vec![Metric {
+            name: "time_ratio".to_owned(),
+            label: "time ratio".to_owned(),
+            unit: String::new(),
+        }],
+        baseline: Some(0),
+        cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
+        seeds: (1..=4).collect(),
+        stop: None,
+    }
+}
+
+fn record(cell: usize, seed: u64) -> RunRecord {
+    let outcome = RunOutcome::Done {
+        end: "completed".to_owned(),
+        end_detail: String::new(),
+        digest: format!("{cell}{seed}"),
+        sim_time_s: 100.5,
+        timed_out: false,
+        events: 10,
+        messages: MessageCounts {
+            sent: 10,
+            delivered: 9,
+            lost: 1,
+            lost_by_reason: [("loss".to_owned(), 1)].into(),
+            ..MessageCounts::default()
+        },
+        metrics: json!({ "time_ratio": 1.0 + cell as f64 + 0.25 * seed as f64 })
+            .as_object()
+            .cloned()
+            .unwrap_or_default(),
+        violations: Vec::new(),
+    };
+    RunRecord {
+        cell,
+        seed,
+        outcome,
+    }
+}
+
+fn fill(folder: &Path, manifest: &Manifest, records: &[RunRecord]) {
+    std::fs::create_dir_all(folder).unwrap();
+    let manifest = serde_json::to_string(manifest).unwrap();
+    std::fs::write(folder.join("manifest.json"), manifest).unwrap();
+    let lines: Vec<String> = records
+        .iter()
+        .map(|record| serde_json::to_string(record).unwrap() + "\n")
+        .collect();
+    std::fs::write(folder.join("runs.jsonl"), lines.concat()).unwrap();
+}
+
+fn all() -> Vec<RunRecord> {
+    let cells = 0..2;
+    cells
+        .flat_map(|cell| (1..=4).map(move |seed| record(cell, seed)))
+        .collect()
+}
+
+#[test]
+fn a_report_is_written_where_the_results_are() {
+    let folder = tempfile::tempdir().unwrap();
+    fill(&folder.path().join("out"), &manifest(), &all());
+    let output = farside(folder.path(), &["report", "out"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(
+        said.starts_with("8 runs\n") && said.contains("out/report.html"),
+        "{said}"
+    );
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    let page = read("report.html");
+    assert!(page.contains("Does loss slow a team down?"));
+    assert!(page.contains("farside reproduce out --cell 1 --seed 4 --out cell1-seed4.mcap"));
+    let rows = read("results.csv");
+    assert_eq!(rows.lines().count(), 9);
+    assert!(
+        rows.lines()
+            .nth(8)
+            .unwrap()
+            .starts_with("1,30%,4,done,completed,14,100.5,"),
+        "{rows}"
+    );
+    // Each seed is slower by exactly one.
+    let summary = read("summary.csv");
+    assert!(summary.contains(",4,1,1,1,"), "{summary}");
+    assert!(read("plots/time_ratio-curves.svg").starts_with("<?xml"));
+}
+
+#[test]
+fn shards_are_joined() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, one, other) = ("whole", "one", "other");
+    let all = all();
+    fill(&folder.path().join(whole), &manifest(), &all);
+    fill(&folder.path().join(one), &manifest(), &all[4..]);
+    fill(&folder.path().join(other), &manifest(), &all[..4]);
+    let output = farside(folder.path(), &["report", one, other]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output.stderr).contains("--out"),
+        "{}",
+        text(&output.stderr)
+    );
+    let output = farside(
+        folder.path(),
+        &["report", one, other, "--out", "joined", "--json"],
+    );
+    let document = json(&output);
+    assert_eq!(
+        (&document["runs"], &document["failed"]),
+        (&json!(8), &json!(0))
+    );
+    assert!(farside(folder.path(), &["report", whole]).status.success());
+    for name in ["results.csv", "summary.csv"] {
+        let read = |of: &str| std::fs::read(folder.path().join(of).join(name)).unwrap();
+        assert_eq!(read("joined"), read(whole), "{name}");
+    }
+}
+
+#[test]
+fn other_folders_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = farside(folder.path(), &["report", "nowhere"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output.stderr).contains("nowhere"),
+        "{}",
+        text(&output.stderr)
+    );
+    fill(&folder.path().join("a"), &manifest(), &all());
+    let mut changed = manifest();
+    changed.question = "Another?".to_owned();
+    fill(&folder.path().join("b"), &changed, &all());
+    let output = farside(folder.path(), &["report", "a", "b", "--out", "c"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("c").exists());
+}
