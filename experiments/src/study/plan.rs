@@ -36,7 +36,7 @@ pub struct Study {
     source: Source,
     file: StudyFile,
     factors: Vec<FactorPlan>,
-    cells: Vec<Cell>,
+    pub(super) cells: Vec<Cell>,
 }
 
 /// A study that can run.

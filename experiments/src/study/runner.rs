@@ -383,11 +383,11 @@ impl<'a> Runs<'a> {
             _ => String::new(),
         };
         let advice = "an earlier start recorded this; if the cause is mended, remove the folder";
-        Err(self.cell_fails(cell, format!("{error}\n  {advice}")))
+        Err(self.cell_fails(cell, seed, format!("{error}\n  {advice}")))
     }
 
-    fn cell_fails(&self, cell: usize, error: String) -> StudyError {
-        let (place, runs) = self.hopeless(cell).unwrap_or_default();
+    fn cell_fails(&self, cell: usize, seed: u64, error: String) -> StudyError {
+        let (_, runs) = self.hopeless(cell).unwrap_or_default();
         let factors = self.manifest.factors.iter();
         let values = factors.zip(&self.manifest.cells[cell].texts);
         let values: Vec<String> = values
@@ -397,7 +397,7 @@ impl<'a> Runs<'a> {
             cell,
             values: values.join(", "),
             runs,
-            seed: self.manifest.seeds[place],
+            seed,
             error,
         }
     }
@@ -465,7 +465,7 @@ impl Runs<'_> {
             && self.trouble.is_none()
             && self.hopeless(cell).is_some()
         {
-            self.trouble = Some(self.cell_fails(cell, error));
+            self.trouble = Some(self.cell_fails(cell, seed, error));
         }
         self.tell();
     }
