@@ -20,6 +20,7 @@
 pub mod cli;
 mod commands;
 pub mod scenario;
+pub mod stats;
 pub mod study;
 pub mod system;
 mod wall;

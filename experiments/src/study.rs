@@ -42,6 +42,7 @@ mod runner;
 pub(crate) mod standin;
 mod stop;
 mod store;
+pub mod summary;
 
 pub use builtin::{builtin_names, builtin_text};
 pub use error::{StoreError, StudyError};
@@ -53,5 +54,7 @@ pub use store::Shard;
 pub(crate) use reproduce::{Reproduction, find_run, reproduce};
 pub(crate) use store::replace;
 
+#[cfg(test)]
+pub(crate) mod fabricated;
 #[cfg(test)]
 mod tests;

@@ -5,16 +5,18 @@ use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use crate::scenario::{Assembled, Scenario};
 
 use super::error::StudyError;
 use super::execute::{Executed, Interrupts, execute};
-use super::metrics;
 use super::plan::Plan;
 use super::pool::{self, Dispatch};
 use super::results::{Manifest, Metric, Results, RunOutcome, RunRecord};
 use super::stop::{self, Sample};
 use super::store::{Found, Shard, Store, Times};
+use super::summary::values::value_of;
 
 /// If the first so many runs of a cell all fail, the study stops.
 const FAILURES: usize = 3;
@@ -510,17 +512,8 @@ impl Results {
 
 /// What a run says about the metric that decides when a cell has seeds enough.
 fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
-    let RunOutcome::Done {
-        metrics, messages, ..
-    } = outcome
-    else {
-        return Sample::None;
-    };
-    if let Some(count) = metrics::of_the_kernel(messages, metric) {
-        return Sample::Number(count as f64);
-    }
-    match metrics.get(metric) {
-        Some(serde_json::Value::Bool(flag)) => Sample::Flag(*flag),
+    match value_of(outcome, metric).as_deref() {
+        Some(Value::Bool(flag)) => Sample::Flag(*flag),
         Some(value) => value.as_f64().map_or(Sample::None, Sample::Number),
         None => Sample::None,
     }

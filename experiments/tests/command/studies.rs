@@ -45,7 +45,7 @@ fn a_study_says_how_each_cell_fares() {
     for (cell, loss) in [(0, 0.0), (1, 0.3)] {
         let cell = &said["cells"][cell];
         assert_eq!(
-            (cell["values"]["loss"].as_f64(), cell["n"].as_u64()),
+            (cell["factors"]["loss"].as_f64(), cell["n"].as_u64()),
             (Some(loss), Some(4))
         );
         assert_eq!(cell["totals"]["collisions"], 0);

@@ -213,8 +213,8 @@ fn metrics_are_known_after_the_first_run() {
             "x.toml:3:12: metrics.0: unknown value \"vlaue\"; did you mean \"value\"?",
         ),
         (
-            "['value', 'words']",
-            "x.toml:3:21: metrics.1: unknown value \"words\"",
+            "['value', 'table']",
+            "x.toml:3:21: metrics.1: unknown value \"table\"",
         ),
         ("['messages.lots']", "did you mean \"messages.lost\"?"),
     ] {

@@ -160,7 +160,8 @@ impl Settings for ToyScenario {
             results.metrics.insert("value".to_owned(), value.into());
             let list = vec![Some(0.1 + value), None];
             results.metrics.insert("list".to_owned(), list.into());
-            results.metrics.insert("words".to_owned(), "few".into());
+            let table = serde_json::json!({ "x": 1 });
+            results.metrics.insert("table".to_owned(), table);
             results
         }))
     }

@@ -1,0 +1,138 @@
+//! What a run says under a metric's name, and of which kind it is.
+
+use std::borrow::Cow;
+
+use serde_json::Value;
+
+use crate::stats::survival::Observation;
+use crate::study::results::{MessageCounts, Results, RunOutcome, RunRecord};
+
+/// What a metric's values are, in all cells alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Numbers, summed up by their mean.
+    Number,
+    /// True or false, summed up as a rate.
+    Rate,
+    /// Lists of numbers, summed up as a distribution.
+    List,
+    /// Words, which are counted.
+    Text,
+    /// No run reports it.
+    Absent,
+}
+
+/// What a run says under a metric's name: one of the system's, or, where the system has none of
+/// that name, what the kernel counts: `messages.sent` (`delivered`, `lost`, `duplicated`,
+/// `in_flight`), `messages.lost.loss` and so on for each reason, `events`, `sim_time_s`,
+/// `violations`. None for a run that failed or does not know it; `null` is none too.
+pub fn value_of<'a>(outcome: &'a RunOutcome, name: &str) -> Option<Cow<'a, Value>> {
+    let RunOutcome::Done {
+        sim_time_s,
+        events,
+        messages,
+        metrics,
+        violations,
+        ..
+    } = outcome
+    else {
+        return None;
+    };
+    if let Some(value) = metrics.get(name) {
+        return (!value.is_null()).then_some(Cow::Borrowed(value));
+    }
+    let number = match name {
+        "events" => Value::from(*events),
+        "sim_time_s" => Value::from(*sim_time_s),
+        "violations" => Value::from(violations.len()),
+        name => Value::from(message_count(messages, name.strip_prefix("messages.")?)?),
+    };
+    Some(Cow::Owned(number))
+}
+
+fn message_count(messages: &MessageCounts, name: &str) -> Option<u64> {
+    Some(match name {
+        "sent" => messages.sent,
+        "delivered" => messages.delivered,
+        "lost" => messages.lost,
+        "duplicated" => messages.duplicated,
+        "in_flight" => messages.in_flight,
+        name => {
+            let reason = name
+                .strip_prefix("lost_by_reason.")
+                .or_else(|| name.strip_prefix("lost."))?;
+            // A reason that never struck is not listed.
+            messages.lost_by_reason.get(reason).copied().unwrap_or(0)
+        }
+    })
+}
+
+/// A run's value as a number; true is 1 and false 0. None for one that is not finite.
+pub fn number_of(run: &RunRecord, name: &str) -> Option<f64> {
+    let value = value_of(&run.outcome, name)?;
+    let number = match value.as_ref() {
+        Value::Bool(yes) => Some(f64::from(u8::from(*yes))),
+        value => value.as_f64(),
+    };
+    number.filter(|number| number.is_finite())
+}
+
+/// The kind of a metric, from what all runs say. One list makes it lists, one word makes it words;
+/// numbers and truth values together are numbers.
+pub fn kind_of(results: &Results, name: &str) -> Kind {
+    let mut kind = Kind::Absent;
+    for run in &results.runs {
+        let Some(value) = value_of(&run.outcome, name) else {
+            continue;
+        };
+        match (value.as_ref(), kind) {
+            (Value::Array(_), _) => return Kind::List,
+            (Value::String(_) | Value::Object(_), _) => kind = Kind::Text,
+            (Value::Number(_), Kind::Absent | Kind::Rate) => kind = Kind::Number,
+            (Value::Bool(_), Kind::Absent) => kind = Kind::Rate,
+            _ => {}
+        }
+    }
+    kind
+}
+
+/// What the runs of a cell say under the name of a list, as things that were watched: rovers, say,
+/// until they arrived. A `null` in a run whose time was over is censored at its end. In a run that
+/// ended otherwise it never happens: it is watched for ever. `runs` are one cell's.
+pub fn observations(runs: &[RunRecord], name: &str) -> Vec<Observation> {
+    let mut observations = Vec::new();
+    for (group, run) in runs.iter().enumerate() {
+        let Some(value) = value_of(&run.outcome, name) else {
+            continue;
+        };
+        let (Value::Array(values), RunOutcome::Done { sim_time_s, .. }) =
+            (value.as_ref(), &run.outcome)
+        else {
+            continue;
+        };
+        let (sim_time_s, timed_out) = (*sim_time_s, timed_out(run));
+        observations.extend(values.iter().map(|value| match value.as_f64() {
+            Some(time) => Observation {
+                time,
+                happened: true,
+                group,
+            },
+            None => Observation {
+                time: if timed_out { sim_time_s } else { f64::INFINITY },
+                happened: false,
+                group,
+            },
+        }));
+    }
+    observations
+}
+
+fn timed_out(run: &RunRecord) -> bool {
+    matches!(
+        run.outcome,
+        RunOutcome::Done {
+            timed_out: true,
+            ..
+        }
+    )
+}
