@@ -38,14 +38,11 @@ mod plan;
 mod pool;
 mod reproduce;
 pub mod results;
-pub mod summary;
-
-#[cfg(test)]
-pub(crate) mod fabricated;
 mod runner;
 pub(crate) mod standin;
 mod stop;
 mod store;
+pub mod summary;
 
 pub use builtin::{builtin_names, builtin_text};
 pub use error::{StoreError, StudyError};
@@ -57,5 +54,7 @@ pub use store::Shard;
 pub(crate) use reproduce::{Reproduction, find_run, reproduce};
 pub(crate) use store::replace;
 
+#[cfg(test)]
+pub(crate) mod fabricated;
 #[cfg(test)]
 mod tests;

@@ -40,7 +40,7 @@ pub(crate) struct Args {
 struct Document {
     study: String,
     cell: usize,
-    values: Map<String, Value>,
+    factors: Map<String, Value>,
     seed: u64,
     /// `same` or `different`.
     result: &'static str,
@@ -117,7 +117,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let document = Document {
         study: manifest.study.clone(),
         cell: record.cell,
-        values: names
+        factors: names
             .zip(manifest.cells[record.cell].values.iter().cloned())
             .collect(),
         seed: record.seed,

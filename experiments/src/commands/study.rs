@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 use super::{CommandError, interrupt, print, print_json};
 use crate::cli::Exit;
 use crate::study::results::{Results, RunOutcome};
+use crate::study::summary::summarise;
 use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study, standin};
 use crate::system::Registry;
 
@@ -125,7 +126,7 @@ fn tell(
         |run| matches!(&run.outcome, RunOutcome::Done { violations, .. } if !violations.is_empty()),
     );
     let violated: Vec<_> = violated.collect();
-    let cells = serde_json::to_value(standin::summarise(results))?;
+    let cells = serde_json::to_value(summarise(results).cells)?;
     let cells = with_totals(cells, results);
     let document = Document {
         study: manifest.study.clone(),
@@ -199,7 +200,7 @@ fn with_totals(mut cells: Value, results: &Results) -> Value {
     cells
 }
 
-/// The means of each cell, for people.
+/// The figures of each cell, for people.
 fn text(results: &Results, document: &Document) -> String {
     let manifest = &results.manifest;
     let mut rows = Vec::new();
@@ -212,8 +213,9 @@ fn text(results: &Results, document: &Document) -> String {
         row.extend(cell.texts.iter().cloned());
         row.push(results.of_cell(index).len().to_string());
         for metric in &manifest.metrics {
-            let mean = document.cells[index]["metrics"][&metric.name]["mean"].as_f64();
-            row.push(mean.map_or_else(|| "-".to_owned(), short));
+            let said = &document.cells[index]["metrics"][&metric.name];
+            let figure = said["mean"].as_f64().or_else(|| said["median"].as_f64());
+            row.push(figure.map_or_else(|| "-".to_owned(), short));
         }
         rows.push(row);
     }
@@ -228,7 +230,7 @@ fn text(results: &Results, document: &Document) -> String {
         missing => format!("{runs} runs in {out}{failed}; {missing} are left to other shards"),
     };
     format!(
-        "{study}: {question}\n\n{}\nmeans; {after}\n",
+        "{study}: {question}\n\n{}\nmeans, of lists the medians; {after}\n",
         columns(&rows)
     )
 }

@@ -50,7 +50,7 @@ pub enum StudyError {
         values: String,
         /// How many failed.
         runs: usize,
-        /// The first seed that failed.
+        /// A seed that failed.
         seed: u64,
         /// Why it did.
         error: String,

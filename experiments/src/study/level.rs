@@ -127,7 +127,9 @@ pub(super) fn set_argument(key: &str, value: &toml::Value) -> String {
 /// The number in base units that the text is, if it is a quantity.
 fn quantity(text: &str) -> Option<(f64, Dimension)> {
     if let Ok(duration) = units::parse_duration(text) {
-        return Some((duration.as_secs_f64(), Dimension::Duration));
+        // One rounding: 600 ms are 0.6 s, as people write it.
+        let seconds = duration.as_nanos() as f64 / 1e9;
+        return Some((seconds, Dimension::Duration));
     }
     if let Ok(fraction) = units::parse_fraction(text) {
         return Some((fraction, Dimension::Percent));

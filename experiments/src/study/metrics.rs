@@ -3,10 +3,13 @@
 use serde_json::{Map, Value};
 
 use super::file::MetricFile;
-use super::results::{MessageCounts, Metric};
+use super::results::Metric;
 
-/// What the kernel counts in every run, whatever its system.
-const KERNEL: [&str; 5] = [
+/// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
+const KERNEL: [&str; 8] = [
+    "events",
+    "sim_time_s",
+    "violations",
     "messages.sent",
     "messages.delivered",
     "messages.lost",
@@ -15,13 +18,14 @@ const KERNEL: [&str; 5] = [
 ];
 
 /// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 20] = [
+const KNOWN: [(&str, &str, &str); 23] = [
     ("arrival_s", "time to the goal", "s"),
     ("arrived", "rovers at their goals", "rovers"),
     ("collisions", "collisions", ""),
     ("completed", "all rovers at their goals", ""),
     ("cycles", "planning cycles", "cycles"),
     ("deadlocked", "standstill", ""),
+    ("events", "events", "events"),
     ("intervention_rate", "cycles with an intervention", ""),
     ("interventions", "interventions", "cycles"),
     ("max_plus_iterations", "max-plus iterations per cycle", ""),
@@ -43,7 +47,9 @@ const KNOWN: [(&str, &str, &str); 20] = [
     ("messages.sent", "messages sent", "messages"),
     ("path_ratio", "steps over the shortest path", ""),
     ("rovers", "rovers", "rovers"),
+    ("sim_time_s", "virtual time", "s"),
     ("time_ratio", "time over the shortest path", ""),
+    ("violations", "violations", ""),
 ];
 
 /// A metric with what the study leaves open filled in.
@@ -57,27 +63,21 @@ pub(super) fn metric(file: &MetricFile) -> Metric {
     }
 }
 
-/// What the kernel counts under this name.
-pub(super) fn of_the_kernel(messages: &MessageCounts, name: &str) -> Option<u64> {
-    match name {
-        "messages.sent" => Some(messages.sent),
-        "messages.delivered" => Some(messages.delivered),
-        "messages.lost" => Some(messages.lost),
-        "messages.duplicated" => Some(messages.duplicated),
-        "messages.in_flight" => Some(messages.in_flight),
-        _ => None,
-    }
-}
-
-/// Whether it can be summed up: a number, true or false, a list of numbers; or nothing yet.
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers; or nothing yet.
 fn is_measure(value: &Value) -> bool {
     match value {
-        Value::Number(_) | Value::Bool(_) | Value::Null => true,
+        Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,
         Value::Array(entries) => entries
             .iter()
             .all(|entry| entry.is_number() || entry.is_null()),
-        Value::String(_) | Value::Object(_) => false,
+        Value::Object(_) => false,
     }
+}
+
+/// Whether a run with these results can be measured by it.
+pub(super) fn is_measurable(results: &Map<String, Value>, name: &str) -> bool {
+    let lost_for = |reason: &str| !reason.is_empty();
+    measurable(results).contains(&name) || name.strip_prefix("messages.lost.").is_some_and(lost_for)
 }
 
 /// What a run with these results can be measured by.

@@ -36,7 +36,7 @@ pub struct Study {
     source: Source,
     file: StudyFile,
     factors: Vec<FactorPlan>,
-    cells: Vec<Cell>,
+    pub(super) cells: Vec<Cell>,
 }
 
 /// A study that can run.
@@ -412,20 +412,18 @@ impl Plan {
     /// Checks that a run which ended like this has what the study measures.
     pub(super) fn check_metrics(&self, results: &Map<String, Value>) -> Result<(), ScenarioError> {
         let blame = Blame(&self.source);
-        let known = metrics::measurable(results);
         for (index, metric) in self.manifest.metrics.iter().enumerate() {
             let name = metric.name.as_str();
-            if !known.contains(&name) {
+            if !metrics::is_measurable(results, name) {
+                let known = metrics::measurable(results);
                 return Err(blame.unknown(&format!("metrics.{index}"), name, &known));
             }
         }
         if let Some(stop) = &self.manifest.stop
-            && results.get(&stop.metric).is_some_and(Value::is_array)
+            && let Some(Value::Array(_) | Value::String(_)) = results.get(&stop.metric)
         {
-            let message = format!(
-                "{} is a list of numbers: expected a number, or true or false",
-                stop.metric
-            );
+            let metric = &stop.metric;
+            let message = format!("{metric}: expected a metric that is a number, or true or false");
             return Err(blame.invalid("stop.metric", message));
         }
         Ok(())

@@ -5,16 +5,18 @@ use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde_json::Value;
+
 use crate::scenario::{Assembled, Scenario};
 
 use super::error::StudyError;
 use super::execute::{Executed, Interrupts, execute};
-use super::metrics;
 use super::plan::Plan;
 use super::pool::{self, Dispatch};
 use super::results::{Manifest, Metric, Results, RunOutcome, RunRecord};
 use super::stop::{self, Sample};
 use super::store::{Found, Shard, Store, Times};
+use super::summary::values::value_of;
 
 /// If the first so many runs of a cell all fail, the study stops.
 const FAILURES: usize = 3;
@@ -383,11 +385,11 @@ impl<'a> Runs<'a> {
             _ => String::new(),
         };
         let advice = "an earlier start recorded this; if the cause is mended, remove the folder";
-        Err(self.cell_fails(cell, format!("{error}\n  {advice}")))
+        Err(self.cell_fails(cell, seed, format!("{error}\n  {advice}")))
     }
 
-    fn cell_fails(&self, cell: usize, error: String) -> StudyError {
-        let (place, runs) = self.hopeless(cell).unwrap_or_default();
+    fn cell_fails(&self, cell: usize, seed: u64, error: String) -> StudyError {
+        let (_, runs) = self.hopeless(cell).unwrap_or_default();
         let factors = self.manifest.factors.iter();
         let values = factors.zip(&self.manifest.cells[cell].texts);
         let values: Vec<String> = values
@@ -397,7 +399,7 @@ impl<'a> Runs<'a> {
             cell,
             values: values.join(", "),
             runs,
-            seed: self.manifest.seeds[place],
+            seed,
             error,
         }
     }
@@ -465,7 +467,7 @@ impl Runs<'_> {
             && self.trouble.is_none()
             && self.hopeless(cell).is_some()
         {
-            self.trouble = Some(self.cell_fails(cell, error));
+            self.trouble = Some(self.cell_fails(cell, seed, error));
         }
         self.tell();
     }
@@ -510,17 +512,8 @@ impl Results {
 
 /// What a run says about the metric that decides when a cell has seeds enough.
 fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
-    let RunOutcome::Done {
-        metrics, messages, ..
-    } = outcome
-    else {
-        return Sample::None;
-    };
-    if let Some(count) = metrics::of_the_kernel(messages, metric) {
-        return Sample::Number(count as f64);
-    }
-    match metrics.get(metric) {
-        Some(serde_json::Value::Bool(flag)) => Sample::Flag(*flag),
+    match value_of(outcome, metric).as_deref() {
+        Some(Value::Bool(flag)) => Sample::Flag(*flag),
         Some(value) => value.as_f64().map_or(Sample::None, Sample::Number),
         None => Sample::None,
     }

@@ -1,13 +1,9 @@
-//! Stand-ins until the report's own are there: `report::csv::results_csv` and
-//! `study::summary::summarise`.
+//! Stands in for `report::csv::results_csv` until that is there.
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
 use serde_json::Value;
 
-use super::metrics::of_the_kernel;
 use super::results::{Results, RunOutcome};
+use super::summary::values::value_of;
 
 /// A line for each run: the cell's factor values, the seed, what came of it.
 pub(crate) fn results_csv(results: &Results) -> String {
@@ -26,7 +22,7 @@ pub(crate) fn results_csv(results: &Results) -> String {
             RunOutcome::Done { digest, .. } => {
                 fields.extend(["done".to_owned(), digest.clone()]);
                 for metric in &manifest.metrics {
-                    let value = value(&run.outcome, &metric.name);
+                    let value = value_of(&run.outcome, &metric.name);
                     fields.push(value.map_or_else(String::new, |value| value.to_string()));
                 }
             }
@@ -45,82 +41,4 @@ fn line(fields: &[String]) -> String {
         }
     });
     quoted.collect::<Vec<_>>().join(",") + "\n"
-}
-
-fn value(outcome: &RunOutcome, name: &str) -> Option<Value> {
-    let RunOutcome::Done {
-        metrics, messages, ..
-    } = outcome
-    else {
-        return None;
-    };
-    let counted = of_the_kernel(messages, name).map(Value::from);
-    counted.or_else(|| metrics.get(name).cloned())
-}
-
-/// A cell, summed up.
-#[derive(Debug, Serialize)]
-pub(crate) struct CellSummary {
-    cell: usize,
-    values: BTreeMap<String, Value>,
-    n: usize,
-    failed: usize,
-    metrics: BTreeMap<String, Estimate>,
-}
-
-#[derive(Debug, Serialize)]
-struct Estimate {
-    mean: f64,
-    ci_low: f64,
-    ci_high: f64,
-}
-
-/// Each cell's means, with the normal approximation's 95 % intervals.
-pub(crate) fn summarise(results: &Results) -> Vec<CellSummary> {
-    let manifest = &results.manifest;
-    let cells = manifest.cells.iter().enumerate();
-    cells
-        .map(|(cell, of)| {
-            let runs = results.of_cell(cell);
-            let failed =
-                |run: &&super::results::RunRecord| matches!(run.outcome, RunOutcome::Failed { .. });
-            let failed = runs.iter().filter(failed).count();
-            let names = manifest.factors.iter().map(|factor| factor.name.clone());
-            let metrics = manifest.metrics.iter().filter_map(|metric| {
-                let values: Vec<f64> = runs
-                    .iter()
-                    .filter_map(|run| value(&run.outcome, &metric.name))
-                    .flat_map(|value| match value {
-                        Value::Array(entries) => entries,
-                        Value::Bool(flag) => vec![Value::from(u8::from(flag))],
-                        other => vec![other],
-                    })
-                    .filter_map(|value| value.as_f64())
-                    .collect();
-                Some((metric.name.clone(), estimate(&values)?))
-            });
-            CellSummary {
-                cell,
-                values: names.zip(of.values.iter().cloned()).collect(),
-                n: runs.len() - failed,
-                failed,
-                metrics: metrics.collect(),
-            }
-        })
-        .collect()
-}
-
-fn estimate(values: &[f64]) -> Option<Estimate> {
-    if values.is_empty() {
-        return None;
-    }
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
-    let half = 1.96 * (squares / (n - 1.0).max(1.0) / n).sqrt();
-    Some(Estimate {
-        mean,
-        ci_low: mean - half,
-        ci_high: mean + half,
-    })
 }
