@@ -265,6 +265,7 @@ impl Scenario {
         let mut files = self.files.clone();
         let mut setup = Setup {
             seed: self.shared.seed,
+            until: self.shared.until,
             sim: &mut sim,
             links: &mut links,
             files: &mut files,

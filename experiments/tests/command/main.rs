@@ -4,3 +4,4 @@ mod common;
 mod logs;
 mod running;
 mod scenarios;
+mod traffic;
