@@ -228,3 +228,40 @@ impl FlowTally {
         Some(delay_ns)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn ages_are_those_told_instant_by_instant(
+            messages in prop::collection::vec((0u64..60, 0u64..40), 1..12),
+            rest in 0u64..20,
+        ) {
+            // (arrival, sent) of messages that overtake each other, in order of arrival.
+            let mut arrivals: Vec<(u64, u64)> =
+                messages.iter().map(|(sent, delay)| (sent + delay, *sent)).collect();
+            arrivals.sort_unstable();
+            let (first, end) = (arrivals[0].0, arrivals[arrivals.len() - 1].0 + rest);
+            let mut age = Age::default();
+            for (at, sent) in &arrivals {
+                age.arrival(SimTime::from_nanos(*at), SimTime::from_nanos(*sent));
+            }
+            let freshest = |at: u64| {
+                let known = arrivals.iter().filter(|(arrival, _)| *arrival <= at);
+                known.map(|(_, sent)| *sent).max().unwrap()
+            };
+            // Over a nanosecond the age grows by one, so its mean is half of one more.
+            let twice: u64 = (first..end).map(|at| 2 * (at - freshest(at)) + 1).sum();
+            let mean_s = age.mean_s(SimTime::from_nanos(end));
+            let told = (end > first).then(|| twice as f64 / (2 * (end - first)) as f64 / 1e9);
+            prop_assert_eq!(mean_s, told);
+            // The greatest age is reached just before a fresh arrival, or at the end.
+            let just_before = (first + 1..=end).map(|at| at - freshest(at - 1));
+            let peak = just_before.chain([first - freshest(first)]).max();
+            prop_assert_eq!(Some(age.until(SimTime::from_nanos(end)).peak_ns), peak);
+        }
+    }
+}
