@@ -8,7 +8,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, check, diff, info, recover, report, reproduce, run, scenarios, studies, study, verify,
+    CommandError, check, diff, info, recover, report, reproduce, run, scenarios, studies, study,
+    verify,
 };
 use crate::system::Registry;
 

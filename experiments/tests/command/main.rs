@@ -1,8 +1,10 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
 mod common;
+mod contacts;
 mod logs;
 mod report;
 mod running;
 mod scenarios;
 mod studies;
+mod traffic;

@@ -90,6 +90,17 @@ fn a_range_holds_for_the_way_back_unless_that_is_given() {
 }
 
 #[test]
+fn a_node_is_at_no_distance_from_itself_unless_a_range_says_so() {
+    let plan = ion("a range +5 +9 1 1 2\na contact +0 +10 1 1 1");
+    let parts = [
+        window(0, 5, 8, 0),
+        window(5, 9, 8, 2_000),
+        window(9, 10, 8, 0),
+    ];
+    assert_eq!(plan.contact_windows("1", "1"), parts);
+}
+
+#[test]
 fn a_range_that_goes_on_at_the_same_distance_parts_nothing() {
     let plan = ion("a range +0 +5 1 2 1\na range +5 +10 1 2 1\na contact +0 +10 1 2 1");
     assert_eq!(plan.contact_windows("1", "2"), [window(0, 10, 8, 1_000)]);

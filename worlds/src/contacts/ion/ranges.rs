@@ -102,9 +102,13 @@ impl Ranges {
                 _ => {
                     let covering = back.partition_point(|range| range.stop <= at);
                     let covering = back.get(covering).filter(|range| range.start <= at);
-                    let covering = covering.ok_or(at)?;
                     let until = next_given.map_or(u64::MAX, |range| range.start);
-                    (covering.stop.min(until), covering.owlt_ns)
+                    match covering {
+                        Some(range) => (range.stop.min(until), range.owlt_ns),
+                        // A node needs no range to know how far it is from itself.
+                        None if from == to => (until, 0),
+                        None => return Err(at),
+                    }
                 }
             };
             match open {
