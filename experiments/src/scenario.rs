@@ -10,12 +10,15 @@ mod crash;
 mod error;
 mod source;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
+use farside_actors::radio::RadioConfig;
 use farside_actors::units;
 use farside_logs::Scene;
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -33,13 +36,15 @@ pub(crate) use source::Source;
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The keys that every system shares.
-const SHARED_KEYS: [&str; 9] = [
+const SHARED_KEYS: [&str; 11] = [
     "system",
     "description",
     "seed",
     "until",
     "contacts",
     "links",
+    "radios",
+    "places",
     "degrade",
     "crash",
     "log",
@@ -70,6 +75,12 @@ pub struct Shared {
     /// The parameters of the links.
     #[serde(default)]
     pub links: LinksConfig,
+    /// The radios that links may go through, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub radios: BTreeMap<String, RadioConfig>,
+    /// Where hosts stand at first, where the system does not say: x east, y north, z up.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub places: BTreeMap<String, [Coordinate; 3]>,
     /// When links are worse.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub degrade: Vec<Degrade>,
@@ -79,6 +90,29 @@ pub struct Shared {
     /// What the log holds.
     #[serde(default)]
     pub log: LogSettings,
+}
+
+/// A coordinate as scenarios write it, in metres: a length that may be negative.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Coordinate(pub f64);
+
+impl TryFrom<String> for Coordinate {
+    type Error = units::UnitError;
+
+    fn try_from(text: String) -> Result<Self, units::UnitError> {
+        match text.trim_start().strip_prefix('-') {
+            Some(rest) => units::parse_length_m(rest).map(|length_m| Coordinate(-length_m)),
+            None => units::parse_length_m(&text).map(Coordinate),
+        }
+    }
+}
+
+impl From<Coordinate> for String {
+    fn from(coordinate: Coordinate) -> String {
+        let sign = if coordinate.0 < 0.0 { "-" } else { "" };
+        format!("{sign}{}", units::print_length_m(coordinate.0.abs()))
+    }
 }
 
 /// The `[log]` table.
@@ -282,6 +316,12 @@ impl Scenario {
         let mut sim = Simulation::new(seed);
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
+        links.until(self.shared.until);
+        let radios = links.radios(&self.shared.radios);
+        radios.map_err(|error| wrong(error.into()))?;
+        for (host, [x, y, z]) in &self.shared.places {
+            links.place(host, Point3::new(x.0, y.0, z.0));
+        }
         let mut files = self.files.clone();
         let contacts = self.shared.contacts.as_ref();
         let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
@@ -301,6 +341,7 @@ impl Scenario {
         let conclude = self.settings.assemble(&mut setup);
         let (goal, scene) = (setup.goal, setup.scene);
         let conclude = conclude.map_err(wrong)?;
+        self.check_places(&sim)?;
         links
             .finish(&mut sim)
             .map_err(|error| wrong(error.into()))?;
@@ -334,6 +375,23 @@ impl Scenario {
                 by.starts_with('@') && *reason == reason_of(until)
             }
             _ => false,
+        }
+    }
+
+    fn check_places(&self, sim: &Simulation) -> Result<(), ScenarioError> {
+        let known = |name: &str| sim.host_names().any(|host| host == name);
+        match self.shared.places.keys().find(|name| !known(name)) {
+            None => Ok(()),
+            Some(name) => {
+                let key = ["places".to_owned(), name.clone()];
+                Err(ScenarioError::UnknownValue {
+                    place: self.source.place_of_key(&key),
+                    key: key.join("."),
+                    found: name.clone(),
+                    nearest: nearest(name, sim.host_names()),
+                    expected: format!("the name of one of {} hosts", sim.host_names().count()),
+                })
+            }
         }
     }
 
