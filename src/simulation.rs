@@ -238,6 +238,16 @@ impl Simulation {
         self.actors.iter().map(|actor| actor.name.as_str())
     }
 
+    /// The names of all hosts declared so far, in order of declaration.
+    pub fn host_names(&self) -> impl Iterator<Item = &str> {
+        self.hosts.iter().map(|host| host.name.as_str())
+    }
+
+    /// The names of all links declared so far, in order of declaration.
+    pub fn link_names(&self) -> impl Iterator<Item = &str> {
+        self.links.iter().map(|link| link.name.as_str())
+    }
+
     /// [`Simulation::crash_at`] for the actor of this name, as scenarios give it.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
-//! Links, rovers, sensor nodes and planners for Farside.
+//! Links, rovers, sensor nodes, planners and plain traffic for Farside.
 
 pub mod link;
 pub mod network;
+pub mod traffic;
 pub mod units;

@@ -5,6 +5,7 @@
 //! with its place, what was found, what was expected and the nearest valid name.
 
 mod builtin;
+pub mod contacts;
 mod error;
 mod source;
 
@@ -20,6 +21,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
+use contacts::{ContactsConfig, LinkContacts};
 pub use error::ScenarioError;
 pub use source::Place;
 use source::Source;
@@ -28,11 +30,12 @@ use source::Source;
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The keys that every system shares.
-const SHARED_KEYS: [&str; 8] = [
+const SHARED_KEYS: [&str; 9] = [
     "system",
     "description",
     "seed",
     "until",
+    "contacts",
     "links",
     "degrade",
     "crash",
@@ -58,6 +61,9 @@ pub struct Shared {
         skip_serializing_if = "Option::is_none"
     )]
     pub until: Option<SimDuration>,
+    /// A contact plan that says when the links of its hosts are there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contacts: Option<ContactsConfig>,
     /// The parameters of the links.
     #[serde(default)]
     pub links: LinksConfig,
@@ -130,6 +136,10 @@ pub struct Assembled {
     pub scene: Option<Box<dyn Scene>>,
     /// The files that were read, for the log.
     pub files: Files,
+    /// The contacts of its links, if the scenario has a plan.
+    pub contacts: Option<LinkContacts>,
+    /// What became of the files that other programs wrote, a line at a time, for people.
+    pub notes: Vec<String>,
 }
 
 impl Scenario {
@@ -263,8 +273,15 @@ impl Scenario {
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
         let mut files = self.files.clone();
+        let contacts = self.shared.contacts.as_ref();
+        let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
+        let contacts = contacts.transpose().map_err(wrong)?;
+        if let Some(contacts) = &contacts {
+            contacts::hand_over(contacts, &mut links);
+        }
         let mut setup = Setup {
             seed: self.shared.seed,
+            until: self.shared.until,
             sim: &mut sim,
             links: &mut links,
             files: &mut files,
@@ -275,6 +292,11 @@ impl Scenario {
         let (goal, scene) = (setup.goal, setup.scene);
         let conclude = conclude.map_err(wrong)?;
         links.finish().map_err(|error| wrong(error.into()))?;
+        let mut notes = Vec::new();
+        if let Some(contacts) = &contacts {
+            contacts.check_hosts(&sim).map_err(wrong)?;
+            notes.extend(contacts.notes(&sim));
+        }
         for (index, crash) in self.shared.crash.iter().enumerate() {
             self.plan_crash(&mut sim, index, crash)?;
         }
@@ -287,6 +309,8 @@ impl Scenario {
             goal,
             scene,
             files,
+            contacts,
+            notes,
         })
     }
 

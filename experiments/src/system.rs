@@ -1,5 +1,5 @@
-//! Systems: what a scenario can run. The network-guided one is built in; a binary of your own
-//! registers its own and calls the same command line.
+//! Systems: what a scenario can run. The network-guided one and open-loop traffic are built in; a
+//! binary of your own registers its own and calls the same command line.
 //!
 //! ```no_run
 //! use farside_experiments::{cli, system::Registry};
@@ -13,7 +13,7 @@
 
 mod files;
 
-use farside::{Report, Simulation};
+use farside::{Report, SimDuration, Simulation};
 use farside_actors::link::{LinkBuilder, LinkConfigError};
 use farside_logs::Scene;
 use serde_json::{Map, Value};
@@ -57,6 +57,8 @@ pub trait Settings {
 pub struct Setup<'a> {
     /// The run's seed, for worlds that are generated from it.
     pub seed: u64,
+    /// When the run stops at the latest, if the scenario says.
+    pub until: Option<SimDuration>,
     /// The simulation to fill.
     pub sim: &'a mut Simulation,
     /// Builds links as the scenario has them.
@@ -166,7 +168,9 @@ impl Registry {
 
     /// Knows the systems that are built in.
     pub fn builtin() -> Self {
-        Registry::empty().with(network::Network)
+        Registry::empty()
+            .with(network::Network)
+            .with(traffic::Traffic)
     }
 
     /// Knows `system` too; of two with one name, the later one.
@@ -195,3 +199,4 @@ impl Registry {
 }
 
 mod network;
+mod traffic;

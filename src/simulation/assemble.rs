@@ -76,7 +76,7 @@ impl Simulation {
                 .map(|a| (a.type_id, a.type_name))
                 .collect(),
             places,
-            host_names: self.host_names(),
+            host_names: self.process_names(),
             routes: self.routes(&ranked)?,
             links,
             kind_of_type: kinds.of_type,
@@ -243,8 +243,8 @@ impl Simulation {
         (of_host, shared, count)
     }
 
-    /// Hosts, then shared links, each of which is a host of its own.
-    fn host_names(&self) -> Vec<String> {
+    /// The names of hosts, then of shared links, each of which is a host of its own.
+    fn process_names(&self) -> Vec<String> {
         let shared = self.links.iter().filter(|link| link.host.is_none());
         let hosts = self.hosts.iter().map(|host| host.name.clone());
         hosts.chain(shared.map(|link| link.name.clone())).collect()

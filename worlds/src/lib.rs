@@ -1,9 +1,10 @@
-//! Terrain, roadmaps and sensor networks for Farside.
+//! Terrain, roadmaps, sensor networks and contact plans for Farside.
 //!
 //! A world is what rovers drive on and what radio nodes stand in: it holds no time, sends no
 //! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
 //! a [`SensorNetwork`] over it. Both lie in a generated [`Crater`], whose [`HeightField`] tells a
-//! radio link what the ground hides.
+//! radio link what the ground hides. [`contacts`] reads when which node hears which, as ION, HDTN
+//! and mahimahi write it down.
 //!
 //! ```
 //! use farside_worlds::{Roadmap, SensorNetwork};
@@ -17,6 +18,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod contacts;
 pub mod crater;
 pub mod error;
 pub mod generate;
@@ -25,6 +27,7 @@ pub mod rocks;
 pub mod sensors;
 pub mod terrain;
 
+pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, ContactWindow};
 pub use crater::{Crater, CraterSettings, Hazard};
 pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
 pub use roadmap::{Endpoints, Roadmap, VertexId};

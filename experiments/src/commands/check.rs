@@ -1,4 +1,4 @@
-//! `farside check`: read, check, print the resolved scenario.
+//! `farside check`: read, check, print the resolved scenario, and what became of its files.
 
 use super::{CommandError, print};
 use crate::cli::Exit;
@@ -17,7 +17,15 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     // Much of what can be wrong shows only in the world that is built.
-    scenario.assemble()?;
-    print(scenario.resolved()?)?;
+    let assembled = scenario.assemble()?;
+    let mut text = scenario.resolved()?;
+    // Comments, so that what is printed is still the scenario.
+    if !assembled.notes.is_empty() {
+        text.push('\n');
+    }
+    for note in &assembled.notes {
+        text.push_str(&format!("# {note}\n"));
+    }
+    print(text)?;
     Ok(Exit::Done)
 }

@@ -1,7 +1,7 @@
 //! The scenarios that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 2] = [
+const BUILTIN: [(&str, &str); 4] = [
     (
         "network/crater-dense",
         include_str!("../../scenarios/network/crater-dense.toml"),
@@ -9,6 +9,14 @@ const BUILTIN: [(&str, &str); 2] = [
     (
         "network/crater-sparse",
         include_str!("../../scenarios/network/crater-sparse.toml"),
+    ),
+    (
+        "traffic/contact-plan",
+        include_str!("../../scenarios/traffic/contact-plan.toml"),
+    ),
+    (
+        "traffic/open-loop",
+        include_str!("../../scenarios/traffic/open-loop.toml"),
     ),
 ];
 

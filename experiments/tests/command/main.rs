@@ -1,6 +1,8 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
 mod common;
+mod contacts;
 mod logs;
 mod running;
 mod scenarios;
+mod traffic;

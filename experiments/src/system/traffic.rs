@@ -1,0 +1,106 @@
+//! Open-loop traffic, as scenarios see it: `[traffic]`.
+
+use farside_actors::traffic::{self, TrafficConfig, TrafficError, TrafficMetrics};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Conclude, Results, Settings, Setup, SetupError, System};
+
+/// The most flows that the summary shows one by one.
+const MAX_SHOWN: usize = 12;
+
+pub(super) struct Traffic;
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct TrafficScenario {
+    traffic: TrafficConfig,
+}
+
+impl System for Traffic {
+    fn name(&self) -> &str {
+        "traffic"
+    }
+
+    fn sections(&self) -> &[&str] {
+        &["traffic"]
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(TrafficScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for TrafficScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError> {
+        let mut flows = self.traffic.flows.iter();
+        let endless = flows.position(|flow| flow.stop.is_none());
+        if let (Some(index), None) = (endless, setup.until) {
+            let message = "neither stop nor the scenario's until is given: it would never end";
+            return Err(SetupError::value(&format!("traffic.flow.{index}"), message));
+        }
+        let links = &mut *setup.links;
+        let mut connect = |sim: &mut farside::Simulation, from: Host<'_>, to: Host<'_>| {
+            links.connect(sim, from, to);
+        };
+        let traffic = traffic::assemble(setup.sim, &self.traffic, setup.seed, &mut connect);
+        let traffic = traffic.map_err(wrong)?;
+        Ok(Box::new(move |report| {
+            results(&traffic.metrics(report.end_time))
+        }))
+    }
+}
+
+type Host<'a> = (farside::HostId, &'a str);
+
+fn wrong(error: TrafficError) -> SetupError {
+    SetupError::value(&format!("traffic.{}", error.key), error.message)
+}
+
+fn results(metrics: &TrafficMetrics) -> Results {
+    let mut results = Results::default();
+    // A struct of plain numbers and lists is always a JSON object.
+    if let Ok(Value::Object(all)) = serde_json::to_value(metrics) {
+        results.metrics = all;
+    }
+    let mut line = |label: &str, text: String| {
+        results.summary.push((label.to_owned(), text));
+    };
+    let (sent, delivered) = (metrics.sent, metrics.delivered);
+    line("messages delivered", format!("{delivered} of {sent}"));
+    line("delay, mean", seconds(metrics.delay_mean_s));
+    line("delay, 95 %", seconds(metrics.delay_p95_s));
+    line("delay, longest", seconds(metrics.delay_max_s));
+    let age = [metrics.age_of_information_mean_s, metrics.age_peak_s];
+    line("age, mean", seconds(age[0]));
+    line("age, greatest", seconds(age[1]));
+    if let Some(goodput) = metrics.goodput_bit_per_s {
+        line("goodput", format!("{goodput:.0} bit/s"));
+    }
+    line("duplicates", metrics.duplicates.to_string());
+    line("reordered", metrics.reordered.to_string());
+    for flow in metrics.by_flow.iter().take(MAX_SHOWN) {
+        let (delay, age) = (seconds(flow.delay_mean_s), seconds(flow.age_mean_s));
+        let text = format!(
+            "{} of {}, delay {delay}, age {age}",
+            flow.delivered, flow.sent
+        );
+        line(&flow.name, text);
+    }
+    let rest = metrics.by_flow.len().saturating_sub(MAX_SHOWN);
+    if rest > 0 {
+        line("and", format!("{rest} more flows"));
+    }
+    results
+}
+
+fn seconds(seconds: Option<f64>) -> String {
+    seconds.map_or_else(|| "-".to_owned(), |seconds| format!("{seconds:.3} s"))
+}

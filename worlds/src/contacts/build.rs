@@ -1,0 +1,211 @@
+//! From contacts in the order of a file to a plan in canonical order: what both formats share.
+
+use std::collections::BTreeMap;
+
+use farside::{SimDuration, SimTime};
+
+use super::decimal::NumberError;
+use super::error::shown;
+use super::{
+    ContactError, ContactPlan, ContactProblem, ContactWindow, MAX_CONTACTS, MAX_RATE_BIT_PER_S,
+    Node, Note, Pair,
+};
+
+/// The most characters of a node's name.
+const MAX_NAME: usize = 64;
+
+/// A contact as a file has it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RawContact {
+    pub(super) from: u32,
+    pub(super) to: u32,
+    pub(super) window: ContactWindow,
+    pub(super) confidence: Option<f64>,
+    pub(super) line: usize,
+}
+
+/// The nodes of a file, each once, numbered as they first appear.
+#[derive(Default)]
+pub(super) struct Nodes {
+    known: BTreeMap<String, u32>,
+    all: Vec<Node>,
+}
+
+impl Nodes {
+    /// The node's number. `None` if the text is no name of a node.
+    pub(super) fn number(&mut self, text: &str, line: usize) -> Option<u32> {
+        let name = canonical_name(text)?;
+        if let Some(number) = self.known.get(&name) {
+            return Some(*number);
+        }
+        let number = u32::try_from(self.all.len()).ok()?;
+        self.known.insert(name.clone(), number);
+        self.all.push(Node { name, line });
+        Some(number)
+    }
+
+    pub(super) fn name(&self, number: u32) -> &str {
+        &self.all[number as usize].name
+    }
+
+    /// Whether a range from `a` to `b` says nothing about the way back: between numbers, if the
+    /// first is the greater one.
+    pub(super) fn is_one_way(&self, a: u32, b: u32) -> bool {
+        match (node_order(self.name(a)), node_order(self.name(b))) {
+            (NodeOrder::Number(a), NodeOrder::Number(b)) => a > b,
+            _ => false,
+        }
+    }
+}
+
+/// Where a node stands among others: numbers first.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum NodeOrder<'a> {
+    Number(u64),
+    Name(&'a str),
+}
+
+pub(super) fn node_order(name: &str) -> NodeOrder<'_> {
+    match name.parse() {
+        Ok(number) if name.bytes().all(|byte| byte.is_ascii_digit()) => NodeOrder::Number(number),
+        _ => NodeOrder::Name(name),
+    }
+}
+
+/// What a node's name may be.
+pub(super) const NODE_EXPECTED: &str =
+    "a node's number below 2^64, or a name of letters, digits, `_`, `-`, `.`, `:` or `/`";
+
+/// The name as plans have it; of numbers the leading zeros go.
+fn canonical_name(text: &str) -> Option<String> {
+    if !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit()) {
+        return text.parse::<u64>().ok().map(|number| number.to_string());
+    }
+    let good = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/');
+    let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    let fits = text.chars().count() <= MAX_NAME;
+    (begins && fits && text.chars().all(good)).then(|| text.to_owned())
+}
+
+/// Checks that something ends after it begins.
+pub(super) fn check_order(line: usize, start: u64, end: u64) -> Result<(), ContactError> {
+    if start < end {
+        return Ok(());
+    }
+    let text = |nanos| SimTime::from_nanos(nanos).to_string();
+    let problem = ContactProblem::EndsBeforeItBegins {
+        start: text(start),
+        end: text(end),
+    };
+    Err(ContactError::at(line, problem))
+}
+
+/// Checks a rate: not zero, and none that nobody means.
+pub(super) fn is_sane_rate(bit_per_s: u64) -> bool {
+    (1..=MAX_RATE_BIT_PER_S).contains(&bit_per_s)
+}
+
+/// A number that cannot be, with what was expected in general, or what exactly is wrong.
+pub(super) fn bad_number(
+    field: &'static str,
+    found: &str,
+    error: NumberError,
+    expected: &'static str,
+) -> ContactProblem {
+    ContactProblem::Field {
+        field,
+        found: shown(found),
+        expected: match error {
+            NumberError::NotANumber => expected,
+            NumberError::Negative => "a number that is not negative",
+            NumberError::TooFine => "a number without so many decimal places",
+            NumberError::TooLarge => "a smaller number",
+        },
+    }
+}
+
+/// One more entry, unless there are too many.
+pub(super) fn push<T>(
+    entries: &mut Vec<T>,
+    entry: T,
+    what: &'static str,
+    line: usize,
+) -> Result<(), ContactError> {
+    if entries.len() == MAX_CONTACTS {
+        let limit = MAX_CONTACTS;
+        return Err(ContactError::at(
+            line,
+            ContactProblem::TooMany { what, limit },
+        ));
+    }
+    entries.push(entry);
+    Ok(())
+}
+
+/// The plan of these contacts.
+pub(super) fn plan(
+    mut nodes: Nodes,
+    mut contacts: Vec<RawContact>,
+) -> Result<ContactPlan, ContactError> {
+    if contacts.is_empty() {
+        return Err(ContactError::Empty { what: "contact" });
+    }
+    let mut order: Vec<u32> = (0..nodes.all.len() as u32).collect();
+    order.sort_by(|a, b| node_order(nodes.name(*a)).cmp(&node_order(nodes.name(*b))));
+    let mut rank = vec![0u32; order.len()];
+    for (place, number) in order.iter().enumerate() {
+        rank[*number as usize] = place as u32;
+    }
+    for contact in &mut contacts {
+        contact.from = rank[contact.from as usize];
+        contact.to = rank[contact.to as usize];
+    }
+    contacts.sort_by_key(|c| (c.from, c.to, c.window.start, c.line));
+    nodes
+        .all
+        .sort_by(|a, b| node_order(&a.name).cmp(&node_order(&b.name)));
+    // Sorted by their start, contacts of which none overlaps the next do not overlap at all.
+    for two in contacts.windows(2) {
+        let (a, b) = (&two[0], &two[1]);
+        if (a.from, a.to) == (b.from, b.to) && b.window.start < a.window.end {
+            let problem = ContactProblem::Overlap {
+                from: nodes.all[a.from as usize].name.clone(),
+                to: nodes.all[a.to as usize].name.clone(),
+                other_line: a.line.min(b.line),
+            };
+            return Err(ContactError::at(a.line.max(b.line), problem));
+        }
+    }
+    let mut pairs: Vec<Pair> = Vec::new();
+    for (at, contact) in contacts.iter().enumerate() {
+        match pairs.last_mut() {
+            Some(last) if (last.from, last.to) == (contact.from, contact.to) => last.end = at + 1,
+            _ => pairs.push(Pair {
+                from: contact.from,
+                to: contact.to,
+                first: at,
+                end: at + 1,
+            }),
+        }
+    }
+    let note = |contact: &RawContact| Note {
+        confidence: contact.confidence,
+        line: contact.line,
+    };
+    Ok(ContactPlan {
+        nodes: nodes.all,
+        pairs,
+        windows: contacts.iter().map(|contact| contact.window).collect(),
+        notes: contacts.iter().map(note).collect(),
+    })
+}
+
+/// A window from numbers that were checked.
+pub(super) fn window(start: u64, end: u64, rate_bit_per_s: u64, owlt: u64) -> ContactWindow {
+    ContactWindow {
+        start: SimTime::from_nanos(start),
+        end: SimTime::from_nanos(end),
+        rate_bit_per_s,
+        owlt: SimDuration::from_nanos(owlt),
+    }
+}
