@@ -279,6 +279,8 @@ impl Scenario {
         if let Some(contacts) = &contacts {
             contacts::hand_over(contacts, &mut links);
         }
+        let traces = links.read_traces(|name| contacts::read_trace(name, &mut files));
+        traces.map_err(|error| wrong(error.into()))?;
         let mut setup = Setup {
             seed: self.shared.seed,
             until: self.shared.until,

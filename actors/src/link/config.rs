@@ -214,6 +214,14 @@ pub enum LinkConfigError {
         /// The most there may be.
         limit: usize,
     },
+    /// A trace that cannot be read.
+    #[error("{message}")]
+    BadTrace {
+        /// Where in the scenario.
+        key: Vec<String>,
+        /// What is wrong with it.
+        message: String,
+    },
     /// A degradation that leaves everything as it is.
     #[error("it changes nothing: expected a link's parameters, such as latency, loss or outage")]
     ChangesNothing {
@@ -234,6 +242,7 @@ impl LinkConfigError {
             | LinkConfigError::NoSuchLink { key, .. }
             | LinkConfigError::EndsBeforeItBegins { key, .. }
             | LinkConfigError::TooMany { key, .. }
+            | LinkConfigError::BadTrace { key, .. }
             | LinkConfigError::ChangesNothing { key } => key,
         }
     }

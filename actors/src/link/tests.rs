@@ -58,8 +58,8 @@ struct Source {
 }
 
 impl Source {
-    fn new(sinks: Vec<Address<Sink>>, sends: &[Send]) -> Self {
-        let mut sends = sends.to_vec().into_iter();
+    fn new(sinks: Vec<Address<Sink>>, sends: Vec<Send>) -> Self {
+        let mut sends = sends.into_iter();
         let next = sends.next();
         Source { sinks, sends, next }
     }
@@ -142,7 +142,9 @@ fn run(
     let sink = |(host, name): (&HostId, &&str)| sim.actor(*host, &format!("sink_{name}"), |_| Sink);
     let sinks: Vec<Address<Sink>> = hosts.iter().zip(to).map(sink).collect();
     let sends = sends.to_vec();
-    sim.actor(a, "source", move |_| Source::new(sinks.clone(), &sends));
+    sim.actor(a, "source", move |_| {
+        Source::new(sinks.clone(), sends.clone())
+    });
     connect(&mut sim, a, &hosts);
     let seen = Arc::new(Mutex::new(Vec::new()));
     sim.observe(Fates(seen.clone()));

@@ -168,7 +168,7 @@ fn mistakes_in_links_have_a_place_and_the_nearest_name() {
             12,
             &["an end after its start"],
         ),
-        ("trace = [5, 3]", 9, &["none is before the one before it"]),
+        ("trace = [5, 3]", 9, &["3 ms after 5 ms"]),
     ] {
         let checks = [(default(line), 3), (pattern(line), 3), (degrade(line), 5)];
         for (text, row) in checks {
@@ -202,6 +202,39 @@ fn every_parameter_of_links_can_be_set() {
     let again = parse(&resolved, &[]).unwrap();
     assert_eq!(again.shared(), scenario.shared());
     scenario.assemble().unwrap();
+}
+
+#[test]
+fn links_follow_the_plan_and_the_trace() {
+    let text = builtin_text("traffic/contact-plan").unwrap();
+    let lost = |sets: &[&str]| {
+        let scenario = parse(text, &[&["until=6h"], sets].concat()).unwrap();
+        let counts = scenario.assemble().unwrap().sim.run(Executor::Inline);
+        let counts = counts.unwrap().counts;
+        (counts.delivered, counts.lost_by_reason)
+    };
+    let (planned, reasons) = lost(&[]);
+    assert!(planned > 0 && reasons["no_contact"] > 0, "{reasons:?}");
+    let (held, reasons) = lost(&["links.default.store_and_forward=true"]);
+    assert!(
+        held > planned && !reasons.contains_key("no_contact"),
+        "{reasons:?}"
+    );
+    // What `[links]` says is above the plan.
+    let open = "links.*.contacts=off";
+    let (free, reasons) = lost(&[open]);
+    assert!(free > held && reasons.is_empty(), "{reasons:?}");
+    let (traced, _) = lost(&[open, "links.*.trace=rover-radio", "links.*.queue=0"]);
+    assert!(traced > planned && traced <= free);
+    let message = refused(text, &["links.default.trace=rover-raido"]);
+    assert!(
+        message.starts_with("--set links.default.trace=rover-raido: "),
+        "{message}"
+    );
+    assert!(
+        message.contains("did you mean \"rover-radio\"?"),
+        "{message}"
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What holds whatever the parameters, and whenever they change.
 
+use farside_worlds::contacts::CapacityTrace;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
@@ -68,7 +69,10 @@ fn trace() -> impl Strategy<Value = Trace> {
     vec(0..50u64, 1..6).prop_map(|mut stamps| {
         stamps.sort_unstable();
         stamps.push(stamps[stamps.len() - 1] + 1);
-        Trace::new(stamps).unwrap()
+        let lines: Vec<String> = stamps.iter().map(u64::to_string).collect();
+        CapacityTrace::from_mahimahi(lines.join("\n").as_bytes())
+            .unwrap()
+            .into()
     })
 }
 
