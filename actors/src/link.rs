@@ -44,8 +44,8 @@
 //! | `rate` | | data rate | unlimited | bits on the air |
 //! | `overhead` | | data size | 0 | bytes beside the message |
 //! | `queue` | `limit` | messages or data size | unlimited | drop-tail, behind the one being sent; netem counts that one too |
-//! | `trace` | | milliseconds | off | mahimahi's delivery opportunities, in place of `rate` |
-//! | `contacts` | | [`Contacts`] | always | windows with rate and light time; reason `no_contact` |
+//! | `trace` | | [`Trace`] | off | mahimahi's delivery opportunities, in place of `rate`: a file, a built-in name, milliseconds |
+//! | `contacts` | | [`Contacts`] | the scenario's plan | windows with rate and light time; reason `no_contact` |
 //! | `store_and_forward` | | bool | false | wait for the end of an outage, for a contact |
 //! | `retries` | | number | 0 | stop-and-wait repetitions |
 //! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
@@ -87,6 +87,7 @@ mod preset;
 mod queue;
 mod stage;
 mod timeline;
+mod trace;
 mod transmit;
 
 use std::sync::Arc;
@@ -100,13 +101,14 @@ pub use build::LinkBuilder;
 pub use burst::Burst;
 pub use change::LinkChange;
 pub use config::{Degrade, LinkConfigError, LinksConfig};
-pub use contacts::{Contact, Contacts, Trace, Window};
+pub use contacts::{Contact, Contacts, Window};
 pub use jitter::JitterShape;
 pub use params::{LinkOverrides, LinkParams};
 pub use preset::Preset;
 pub use queue::QueueLimit;
 pub use stage::packet_error_rate;
 pub use timeline::Timeline;
+pub use trace::Trace;
 pub(crate) use transmit::difference;
 pub use transmit::{Attempt, Path, Sent, Transmitter};
 

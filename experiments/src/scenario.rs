@@ -329,6 +329,8 @@ impl Scenario {
         if let Some(contacts) = &contacts {
             contacts::hand_over(contacts, &mut links);
         }
+        let traces = links.read_traces(|name| contacts::read_trace(name, &mut files));
+        traces.map_err(|error| wrong(error.into()))?;
         let mut setup = Setup {
             seed,
             until: self.shared.until,
@@ -351,7 +353,7 @@ impl Scenario {
             notes.extend(contacts.notes(&sim));
         }
         for (index, crash) in self.shared.crash.iter().enumerate() {
-            let planned = crash.plan(&mut sim, self.shared.seed, index, self.shared.until);
+            let planned = crash.plan(&mut sim, seed, index, self.shared.until);
             planned.map_err(|mistake| self.crash_error(index, mistake))?;
         }
         if let Some(until) = self.shared.until {

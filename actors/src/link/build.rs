@@ -5,11 +5,13 @@ use std::sync::Arc;
 
 use farside::{HostId, SimDuration, SimTime, Simulation};
 use farside_worlds::HeightField;
+use farside_worlds::contacts::CapacityTrace;
 use globset::{Glob, GlobMatcher};
 use nalgebra::Point3;
 
 use super::{
-    Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig, Timeline,
+    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig,
+    Timeline, Trace,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
 
@@ -81,9 +83,14 @@ pub struct LinkBuilder {
     until: Option<SimDuration>,
     /// The first mistake that a link met.
     mistake: Option<LinkConfigError>,
+    /// The contacts from one host to another, where a plan has any say.
+    plan: Option<Box<Plan>>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<Known>,
 }
+
+/// The contacts from one host to another, by their names.
+type Plan = dyn Fn(&str, &str) -> Option<Contacts>;
 
 /// The timeline of all links with one base and one set of degradations.
 struct Known {
@@ -123,6 +130,7 @@ impl LinkBuilder {
             terrain: None,
             until: None,
             mistake: None,
+            plan: None,
             known: Vec::new(),
         };
         for (text, over) in &links.patterns {
@@ -155,6 +163,41 @@ impl LinkBuilder {
         Ok(builder)
     }
 
+    /// Gives links the contacts of a plan, beneath what `[links]` says of them: `contacts` there
+    /// replaces the plan's. `None` leaves a link alone; no contacts at all close it.
+    pub fn set_plan(&mut self, plan: impl Fn(&str, &str) -> Option<Contacts> + 'static) {
+        self.plan = Some(Box::new(plan));
+    }
+
+    /// Reads the traces that parameters name, each once.
+    ///
+    /// # Errors
+    /// When `read` says so; the error has the place of the key.
+    pub fn read_traces(
+        &mut self,
+        mut read: impl FnMut(&str) -> Result<CapacityTrace, String>,
+    ) -> Result<(), LinkConfigError> {
+        let mut known = BTreeMap::new();
+        for (mut key, trace) in self.traces() {
+            let Some(name) = trace.name().map(str::to_owned) else {
+                continue;
+            };
+            let capacity = match known.get(&name) {
+                Some(known) => Arc::clone(known),
+                None => match read(&name) {
+                    Ok(capacity) => Arc::new(capacity),
+                    Err(message) => {
+                        key.push("trace".to_owned());
+                        return Err(LinkConfigError::Value { key, message });
+                    }
+                },
+            };
+            trace.read(capacity.clone());
+            known.insert(name, capacity);
+        }
+        Ok(())
+    }
+
     /// The radios that links may go through, by name; with a `terrain` to stand on.
     ///
     /// # Errors
@@ -177,6 +220,32 @@ impl LinkBuilder {
             self.radios.push(RadioBuilder::new(name, config.clone()));
         }
         Ok(())
+    }
+
+    /// All traces, with the keys of the tables they are in.
+    fn traces(&mut self) -> Vec<(Vec<String>, &mut Trace)> {
+        let place = |pattern: &Pattern| match pattern.key.as_slice() {
+            // A degradation's pattern is one of its keys.
+            [degrade, index, _] => vec![degrade.clone(), index.clone()],
+            key => key.to_vec(),
+        };
+        let mut all = Vec::new();
+        if let Some(trace) = &mut self.default.trace {
+            all.push((vec!["links".to_owned(), "default".to_owned()], trace));
+        }
+        for (pattern, over) in &mut self.overrides {
+            all.extend(
+                over.trace
+                    .iter_mut()
+                    .flatten()
+                    .map(|trace| (place(pattern), trace)),
+            );
+        }
+        for (pattern, degrade) in &mut self.degrades {
+            let trace = degrade.over.trace.iter_mut().flatten();
+            all.extend(trace.map(|trace| (place(pattern), trace)));
+        }
+        all
     }
 
     /// The ground that radios look over.
@@ -208,7 +277,7 @@ impl LinkBuilder {
         (to_host, to): (HostId, &str),
     ) {
         let name = format!("{from}-{to}");
-        let timeline = self.resolve(&name);
+        let timeline = self.resolve(from, to);
         let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
             changes.push((at, LinkChange::planned(before.1, params)));
@@ -249,11 +318,14 @@ impl LinkBuilder {
         });
     }
 
-    /// What the link of this name has, and when: for who builds a carrier of another kind around a
+    /// What the link `{from}-{to}` has, and when: for who builds a carrier of another kind around a
     /// [`super::Transmitter`].
-    pub fn resolve(&mut self, name: &str) -> Arc<Timeline> {
-        let name = name.to_owned();
+    pub fn resolve(&mut self, from: &str, to: &str) -> Arc<Timeline> {
+        let name = format!("{from}-{to}");
         let mut base = self.default.clone();
+        if base.contacts.is_none() {
+            base.contacts = self.plan.as_ref().and_then(|plan| plan(from, to));
+        }
         for (pattern, over) in &mut self.overrides {
             if pattern.matches(&name) {
                 base = base.with(over);
@@ -305,7 +377,7 @@ impl LinkBuilder {
     ///
     /// # Errors
     /// When one has not (the error has the nearest name), a link names a radio that there is not, or
-    /// a radio must know where a host is that has no place.
+    /// a radio must know where a host is that has no place; when a trace was not read.
     pub fn finish(mut self, sim: &mut Simulation) -> Result<(), LinkConfigError> {
         if let Some(mistake) = self.mistake.take() {
             return Err(mistake);
@@ -316,7 +388,12 @@ impl LinkBuilder {
             let declared = radio.declare(sim, &self.hosts, &self.places_m, terrain);
             declared.map_err(|message| LinkConfigError::Value { key, message })?;
         }
-
+        let unread = |(_, trace): &(Vec<String>, &mut Trace)| trace.capacity().is_none();
+        if let Some((mut key, trace)) = self.traces().into_iter().find(unread) {
+            key.push("trace".to_owned());
+            let message = format!("{:?} was not read", trace.name().unwrap_or_default());
+            return Err(LinkConfigError::Value { key, message });
+        }
         let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
         let degrades = self.degrades.iter().map(|(pattern, _)| pattern);
         match overrides.chain(degrades).find(|pattern| !pattern.used) {

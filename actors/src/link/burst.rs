@@ -520,10 +520,7 @@ mod tests {
             ("p = 1\nr = 1", "changes by chance"),
             ("p = 0\nr = 0", "changes by chance"),
             ("p13 = 0.9\np14 = 0.9", "at most 1 each"),
-            (
-                "p13 = 0.5\np31 = 0\np32 = 0.5\np23 = 0",
-                "leaves every state",
-            ),
+            ("p13 = 0\np31 = 0", "leaves every state"),
             ("loss = 0.1\nlength = '1ns'\nslot = '1h'", "slots"),
             ("p = 0.1\nslot = '0s'", "more than that"),
             ("", "expected { loss, length }"),

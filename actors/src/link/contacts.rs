@@ -1,8 +1,9 @@
-//! When a link can transmit at all: contact windows, and traces of delivery opportunities.
+//! When a link can transmit at all: its contacts.
 
 use std::sync::Arc;
 
 use farside::{SimDuration, SimTime};
+use farside_worlds::contacts::ContactWindow;
 use serde::{Deserialize, Serialize};
 
 use crate::units;
@@ -185,6 +186,30 @@ impl Contacts {
         })
     }
 
+    /// The contacts of a plan, in its order.
+    ///
+    /// ```
+    /// use farside_actors::link::Contacts;
+    /// use farside_worlds::contacts::ContactPlan;
+    /// let text = b"a range +0 +3600 1 2 1.28\na contact +60 +120 1 2 16000";
+    /// let plan = ContactPlan::from_ion(text).unwrap();
+    /// let contacts = Contacts::of_plan(plan.contact_windows("1", "2"));
+    /// assert_eq!(contacts.windows()[0].rate, Some(128_000));
+    /// ```
+    pub fn of_plan(windows: &[ContactWindow]) -> Self {
+        // Plans keep the contacts of a pair in order and apart, and know no rate of zero.
+        let windows = windows.iter().map(|window| Contact {
+            start: window.start.since(SimTime::ZERO),
+            end: window.end.since(SimTime::ZERO),
+            rate: Some(window.rate_bit_per_s),
+            owlt: Some(window.owlt),
+        });
+        Contacts {
+            every: None,
+            windows: windows.collect(),
+        }
+    }
+
     /// How many contacts there are, repetitions apart.
     pub fn len(&self) -> usize {
         self.windows.len()
@@ -253,138 +278,6 @@ fn occurrence(window: &Contact, base: SimTime) -> Window {
     }
 }
 
-/// A recorded capacity, as mahimahi's link shell reads it: instants in milliseconds, each an
-/// opportunity to deliver 1500 bytes, repeated after the last one.
-///
-/// A message may take the rest of an opportunity that the one before it left over, if it was there
-/// in time; otherwise the rest is wasted.
-///
-/// Source: mahimahi(1), mm-link; Netravali et al., USENIX ATC 2015.
-///
-/// ```
-/// use farside_actors::link::Trace;
-/// // 1500 bytes each 10 ms are 1.2 Mbit/s.
-/// let trace = Trace::new(vec![10]).unwrap();
-/// assert_eq!(trace.mean_rate_bit_per_s(), 1.2e6);
-/// assert!(Trace::new(vec![]).is_err());
-/// ```
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<u64>", into = "Vec<u64>")]
-pub struct Trace {
-    stamps_ms: Arc<[u64]>,
-}
-
-/// What one opportunity delivers.
-const OPPORTUNITY_BYTES: u64 = 1500;
-
-/// The latest instant of a trace, a year.
-const MAX_STAMP_MS: u64 = 366 * 86_400_000;
-
-/// An opportunity that is partly used: its number, and the bytes left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Opportunity {
-    number: u64,
-    left_bytes: u64,
-}
-
-impl TryFrom<Vec<u64>> for Trace {
-    type Error = String;
-
-    fn try_from(stamps_ms: Vec<u64>) -> Result<Self, String> {
-        Trace::new(stamps_ms)
-    }
-}
-
-impl From<Trace> for Vec<u64> {
-    fn from(trace: Trace) -> Self {
-        trace.stamps_ms.to_vec()
-    }
-}
-
-impl Trace {
-    /// A trace with an opportunity at each of these milliseconds, repeated after the last.
-    ///
-    /// # Errors
-    /// When there are none, one is before the one before it, or the last is 0 or beyond a year.
-    pub fn new(stamps_ms: Vec<u64>) -> Result<Self, String> {
-        let Some(last) = stamps_ms.last() else {
-            return Err("expected at least one delivery opportunity".to_owned());
-        };
-        if !(1..=MAX_STAMP_MS).contains(last) {
-            return Err(format!(
-                "the last opportunity at {last} ms: expected from 1 to {MAX_STAMP_MS}"
-            ));
-        }
-        if !stamps_ms.is_sorted() {
-            return Err("expected instants of which none is before the one before it".to_owned());
-        }
-        Ok(Trace {
-            stamps_ms: stamps_ms.into(),
-        })
-    }
-
-    /// The mean rate over one repetition: opportunities of 1500 bytes over its length.
-    pub fn mean_rate_bit_per_s(&self) -> f64 {
-        let bits = (self.stamps_ms.len() as u64 * OPPORTUNITY_BYTES * 8) as f64;
-        bits / (self.period_ms() as f64 * 1e-3)
-    }
-
-    fn period_ms(&self) -> u64 {
-        self.stamps_ms.last().copied().unwrap_or(1)
-    }
-
-    fn instant(&self, number: u64) -> SimTime {
-        let n = self.stamps_ms.len() as u64;
-        let ms = (number / n)
-            .saturating_mul(self.period_ms())
-            .saturating_add(self.stamps_ms[(number % n) as usize]);
-        SimTime::from_nanos(ms.saturating_mul(1_000_000))
-    }
-
-    /// The number of the first opportunity at or after `at`.
-    fn next(&self, at: SimTime) -> u64 {
-        let n = self.stamps_ms.len() as u64;
-        let ms = at.as_nanos().div_ceil(1_000_000);
-        // The last opportunity of a repetition falls together with the start of the next.
-        let cycle = (ms / self.period_ms()).saturating_sub(u64::from(ms % self.period_ms() == 0));
-        let within = ms - cycle * self.period_ms();
-        let before = self.stamps_ms.partition_point(|stamp| *stamp < within);
-        cycle * n + before as u64
-    }
-
-    /// When `bytes` that may go from `ready` on have gone, and what they leave of the last
-    /// opportunity.
-    pub(super) fn delivered(
-        &self,
-        ready: SimTime,
-        bytes: u64,
-        used: Option<Opportunity>,
-    ) -> (SimTime, Opportunity) {
-        let mut number = self.next(ready);
-        let mut left_bytes = OPPORTUNITY_BYTES;
-        if let Some(used) = used.filter(|used| used.number >= number) {
-            number = used.number;
-            left_bytes = used.left_bytes;
-        }
-        let missing = bytes.saturating_sub(left_bytes);
-        let more = missing.div_ceil(OPPORTUNITY_BYTES);
-        let last = number.saturating_add(more);
-        let left_bytes = left_bytes + more * OPPORTUNITY_BYTES - bytes;
-        let rest = if left_bytes == 0 {
-            Opportunity {
-                number: last + 1,
-                left_bytes: OPPORTUNITY_BYTES,
-            }
-        } else {
-            Opportunity {
-                number: last,
-                left_bytes,
-            }
-        };
-        (self.instant(last), rest)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -431,28 +324,5 @@ mod tests {
             let error = toml::from_str::<Contacts>(text).unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");
         }
-    }
-
-    #[test]
-    fn opportunities_are_shared_and_repeat() {
-        let trace = Trace::new(vec![2, 2, 5]).unwrap();
-        let instants: Vec<u64> = (0..7)
-            .map(|n| trace.instant(n).as_nanos() / 1_000_000)
-            .collect();
-        assert_eq!(instants, [2, 2, 5, 7, 7, 10, 12]);
-        assert_eq!(
-            [0, 2, 3, 5, 6, 10].map(|ms| trace.next(at(ms))),
-            [0, 0, 2, 2, 3, 5]
-        );
-        // 1000 bytes leave 500, which 500 more take at the same instant.
-        let (done, rest) = trace.delivered(at(0), 1000, None);
-        assert_eq!(done, at(2));
-        let (done, rest) = trace.delivered(at(1), 500, Some(rest));
-        assert_eq!(done, at(2));
-        let (done, rest) = trace.delivered(at(1), 1501, Some(rest));
-        assert_eq!(done, at(5));
-        assert_eq!(rest.left_bytes, 1499);
-        // Who comes after it has no part in it.
-        assert_eq!(trace.delivered(at(6), 10, Some(rest)).0, at(7));
     }
 }

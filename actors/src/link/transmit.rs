@@ -12,9 +12,9 @@ use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
 use super::burst::Known;
-use super::contacts::Opportunity;
 use super::stage::{self, Draws, Purpose};
 use super::timeline::Timeline;
+use super::trace::{self, Opportunity, Trace};
 use super::{BURST, CORRUPT, LOSS, LinkChange, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
 
 /// What the world between two antennas adds to the parameters of a link. The default adds nothing.
@@ -34,6 +34,8 @@ pub struct Path {
     pub loss: f64,
     /// Why it is lost then.
     pub reason: &'static str,
+    /// The most bits per second that it carries, if that is less than the link's rate.
+    pub rate: Option<u64>,
 }
 
 impl Default for Path {
@@ -42,6 +44,7 @@ impl Default for Path {
             propagation: SimDuration::ZERO,
             loss: 0.0,
             reason: "range",
+            rate: None,
         }
     }
 }
@@ -73,6 +76,19 @@ impl Attempt {
     pub fn answered(&self) -> SimTime {
         self.end + self.answer + self.answer
     }
+
+    /// How it was carried, from its start on: what came before, a caller adds.
+    pub fn parts(&self) -> Carriage {
+        let way = self.at.since(self.end);
+        Carriage {
+            serialization: self.end.since(self.start),
+            propagation: self.propagation,
+            jitter_ns: difference(way, self.propagation),
+            attempts: u32::from(self.sent),
+            energy_j: self.energy_j,
+            ..Carriage::default()
+        }
+    }
 }
 
 /// What became of a message: when, why not, and how it was carried.
@@ -98,7 +114,56 @@ impl Sent {
     }
 }
 
-/// The sending end of a link. See the module's page.
+/// The sending end of a link: a [`Timeline`] of parameters, and what it was asked to send so far.
+///
+/// Ask it for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something
+/// else decides when the channel is free and who collides, for one transmission at a time
+/// ([`Transmitter::opening`], [`Transmitter::attempt`], [`Transmitter::in_order`]). What the geometry
+/// adds comes in a [`Path`].
+///
+/// ```
+/// use std::collections::BTreeMap;
+/// use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
+/// use farside::{SimDuration, SimTime};
+/// use farside_actors::link::{LinkParams, Path, Transmitter};
+///
+/// /// One channel for both directions: while one side sends, the other waits.
+/// struct HalfDuplex {
+///     sides: BTreeMap<String, Transmitter>,
+///     free: SimTime,
+///     distance_m: f64,
+/// }
+///
+/// impl Carrier for HalfDuplex {
+///     type Change = NoChange;
+///
+///     fn min_delay(&self) -> SimDuration {
+///         self.sides.values().map(Transmitter::min_delay).min().unwrap_or_default()
+///     }
+///
+///     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+///         let propagation = SimDuration::from_secs_f64(self.distance_m / 299_792_458.0);
+///         let path = Path { propagation, ..Path::default() };
+///         let Some(side) = self.sides.get_mut(parcel.sender_host()) else {
+///             return verdicts.lose("range");
+///         };
+///         for copy in 0..side.copies(parcel) {
+///             let sent = side.send(parcel, copy, self.free, &path);
+///             self.free = side.free_at();
+///             sent.tell(parcel.now(), verdicts);
+///         }
+///     }
+///
+///     fn change(&mut self, _change: NoChange, _now: SimTime) {}
+/// }
+///
+/// let radio: LinkParams = toml::from_str("rate = '128kbit/s'\nlatency = '1ms'")?;
+/// let side = |name: &str| (name.to_owned(), Transmitter::new(radio.clone()));
+/// let sides = ["base", "rover"].map(side).into();
+/// let channel = HalfDuplex { sides, free: SimTime::ZERO, distance_m: 3e5 };
+/// assert_eq!(channel.min_delay(), SimDuration::from_millis(1));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Transmitter {
     timeline: Arc<Timeline>,
@@ -200,21 +265,29 @@ impl Transmitter {
     }
 
     /// How long the message is on the air if it begins at `start`.
-    pub fn airtime(&self, parcel: &Parcel<'_>, start: SimTime) -> SimDuration {
-        self.air(parcel, start).0
+    pub fn airtime(&self, parcel: &Parcel<'_>, start: SimTime, path: &Path) -> SimDuration {
+        self.air(parcel, start, path).0
     }
 
-    fn air(&self, parcel: &Parcel<'_>, start: SimTime) -> (SimDuration, Option<Opportunity>) {
+    fn air(
+        &self,
+        parcel: &Parcel<'_>,
+        start: SimTime,
+        path: &Path,
+    ) -> (SimDuration, Option<Opportunity>) {
         let index = self.timeline.index(start);
         let params = &self.timeline.spans[index].params;
         let own = self.timeline.window(start).and_then(|window| window.rate);
-        if let (None, Some(trace)) = (own, &params.trace) {
+        let trace = params.trace.as_ref().and_then(Trace::capacity);
+        if let (None, Some(trace)) = (own, trace) {
             let used = self.opportunity.filter(|(span, _)| *span == index);
             let bytes = bytes(params, parcel);
-            let (end, rest) = trace.delivered(start, bytes, used.map(|(_, used)| used));
+            let used = used.map(|(_, used)| used);
+            let (end, rest) = trace::delivered(trace, start, bytes, used);
             return (end.since(start), Some(rest));
         }
-        let airtime = match own.or(params.rate) {
+        let link = own.or(params.rate);
+        let airtime = match link.into_iter().chain(path.rate).min() {
             Some(rate) => super::transmission_time(bytes(params, parcel), rate),
             None => SimDuration::ZERO,
         };
@@ -226,7 +299,7 @@ impl Transmitter {
         let now = parcel.now();
         let deviate = self.step_jitter(parcel, copy);
         let ready = now.max(from).max(self.free);
-        let start = self.opening(parcel, ready);
+        let start = self.opening(parcel, ready, path);
         let first = start.unwrap_or(ready);
         if let Some(refused) = self.enqueue(parcel, first) {
             return refused;
@@ -271,12 +344,13 @@ impl Transmitter {
             carriage.energy_j += attempt.energy_j;
             let timeout = self.timeline.at(start).timeout.unwrap_or_default();
             let gives_up = (start + timeout).max(attempt.answered());
-            if attempt.failed.is_some() && number < retries {
-                if let Ok(next) = self.opening(parcel, gives_up) {
-                    number += 1;
-                    start = next;
-                    continue;
-                }
+            if attempt.failed.is_some()
+                && number < retries
+                && let Ok(next) = self.opening(parcel, gives_up, path)
+            {
+                number += 1;
+                start = next;
+                continue;
             }
             self.free = match (retries, attempt.failed) {
                 (0, _) => attempt.end,
@@ -286,15 +360,16 @@ impl Transmitter {
             if attempt.failed.is_none() {
                 attempt.at = self.in_order(parcel, attempt.at);
             }
-            carriage.retries = start.since(first);
-            carriage.serialization = attempt.end.since(start);
-            carriage.propagation = attempt.propagation;
-            let way = attempt.at.since(attempt.end);
-            carriage.jitter_ns = difference(way, attempt.propagation);
             return Sent {
                 at: attempt.at,
                 lost: attempt.failed,
-                carriage,
+                carriage: Carriage {
+                    queue: carriage.queue,
+                    retries: start.since(first),
+                    attempts: carriage.attempts,
+                    energy_j: carriage.energy_j,
+                    ..attempt.parts()
+                },
             };
         }
     }
@@ -346,7 +421,7 @@ impl Transmitter {
             attempt.failed = Some(closed.reason);
             return attempt;
         }
-        let (airtime, rest) = self.air(parcel, start);
+        let (airtime, rest) = self.air(parcel, start, path);
         self.opportunity = rest.map(|rest| (index, rest));
         let cut = timeline.cut(start, start + airtime);
         attempt.sent = true;
@@ -364,27 +439,11 @@ impl Transmitter {
             Some(light) => params.least_way(light),
             None => span.floor,
         };
-        let way = match deviate {
-            Some(z) if params.jitter_correlation > 0.0 => {
-                let deviation = params.jitter_shape.of_normal(z);
-                jitter::shifted(latency, params.jitter, deviation).max(floor)
-            }
-            _ => stage::way(params, latency, floor, parcel, draws),
-        };
-        let mut way = way + path.propagation;
-        if draws.happens(parcel, Purpose::Reorder, params.reorder) {
-            way = way + params.reorder_by.unwrap_or(latency);
-        }
+        let way = way(params, latency, floor, parcel, draws, deviate) + path.propagation;
         attempt.propagation = propagation;
         // Only a change that nobody declared can be faster than what the run counts on.
         attempt.at = (attempt.end + way).max(parcel.now() + self.floor);
-        let wrong = match params.ber {
-            0.0 => 0.0,
-            ber => packet_error_rate(ber, bytes(params, parcel)),
-        };
-        if draws.happens(parcel, Purpose::Corrupt, params.corrupt)
-            || draws.happens(parcel, Purpose::BitErrors, wrong)
-        {
+        if is_corrupt(params, parcel, draws) {
             attempt.failed = Some(CORRUPT);
         }
         attempt
@@ -434,7 +493,15 @@ impl Transmitter {
 
     /// The first instant from `ready` on at which the message can be transmitted as a whole; or at
     /// once, if it does not wait for that.
-    pub fn opening(&self, parcel: &Parcel<'_>, ready: SimTime) -> Result<SimTime, &'static str> {
+    ///
+    /// # Errors
+    /// With the reason, if no such instant comes.
+    pub fn opening(
+        &self,
+        parcel: &Parcel<'_>,
+        ready: SimTime,
+        path: &Path,
+    ) -> Result<SimTime, &'static str> {
         let timeline = &self.timeline;
         let mut at = ready;
         let mut tries = 0;
@@ -448,7 +515,7 @@ impl Transmitter {
             looked = index;
             let (next, reason) = match timeline.closed(at) {
                 Some(closed) => (closed.until, closed.reason),
-                None => match timeline.cut(at, at + self.airtime(parcel, at)) {
+                None => match timeline.cut(at, at + self.airtime(parcel, at, path)) {
                     None => return Ok(at),
                     Some((cut, reason)) => (Some(cut), reason),
                 },
@@ -504,6 +571,38 @@ impl Transmitter {
         }
         self.deviate
     }
+}
+
+/// How long a copy is on its way, without the path's own propagation.
+fn way(
+    params: &LinkParams,
+    latency: SimDuration,
+    floor: SimDuration,
+    parcel: &Parcel<'_>,
+    draws: Draws,
+    deviate: Option<f64>,
+) -> SimDuration {
+    let way = match deviate {
+        Some(z) if params.jitter_correlation > 0.0 => {
+            let deviation = params.jitter_shape.of_normal(z);
+            jitter::shifted(latency, params.jitter, deviation).max(floor)
+        }
+        _ => stage::way(params, latency, floor, parcel, draws),
+    };
+    match draws.happens(parcel, Purpose::Reorder, params.reorder) {
+        true => way + params.reorder_by.unwrap_or(latency),
+        false => way,
+    }
+}
+
+/// Whether a copy arrives with wrong bits.
+fn is_corrupt(params: &LinkParams, parcel: &Parcel<'_>, draws: Draws) -> bool {
+    let wrong = match params.ber {
+        0.0 => 0.0,
+        ber => packet_error_rate(ber, bytes(params, parcel)),
+    };
+    draws.happens(parcel, Purpose::Corrupt, params.corrupt)
+        || draws.happens(parcel, Purpose::BitErrors, wrong)
 }
 
 /// The bytes on the air.

@@ -72,8 +72,10 @@ impl Radio {
     /// Transmits if the link is open and the channel free, or waits for that.
     fn contend(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
         let now = parcel.now();
-        let directed = self.frames[at as usize].directed as usize;
-        let opening = self.directed[directed].transmitter.opening(parcel, now);
+        let directed = self.frames[at as usize].directed;
+        let path = self.path(parcel, directed, now);
+        let link = &self.directed[directed as usize];
+        let opening = link.transmitter.opening(parcel, now, &path);
         let next = match opening {
             Err(reason) => {
                 let carriage = self.carriage(parcel, at, now);

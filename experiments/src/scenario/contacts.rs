@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use farside::{SimDuration, SimTime, Simulation};
-use farside_actors::link::LinkBuilder;
+use farside_actors::link::{Contacts, LinkBuilder};
 use farside_actors::units;
 use farside_worlds::contacts::{
     Builtin, CapacityTrace, ContactFormat, ContactPlan, ContactWindow, MAX_FILE_BYTES, PlanSummary,
@@ -223,12 +223,10 @@ impl LinkContacts {
     }
 }
 
-/// Hands the windows to what builds links. TO BE CONNECTED: links do not know windows yet, so this
-/// says so and does nothing. Once they do, each link `{from}-{to}` gets
-/// [`LinkContacts::windows`]`(from, to)` unless that is `None`, beneath what `[links]` says of it.
-pub(super) fn hand_over(contacts: &LinkContacts, _links: &mut LinkBuilder) {
-    let file = &contacts.file;
-    tracing::warn!("{file}: links do not follow contact windows yet; the plan is checked only");
+/// Hands the windows to what builds links, beneath what `[links]` says of them.
+pub(super) fn hand_over(contacts: &LinkContacts, links: &mut LinkBuilder) {
+    let contacts = contacts.clone();
+    links.set_plan(move |from, to| contacts.windows(from, to).map(Contacts::of_plan));
 }
 
 /// Reads a capacity trace: a mahimahi file, or without a dot, the name of a built-in trace.

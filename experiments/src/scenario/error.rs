@@ -156,12 +156,14 @@ impl ScenarioError {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.start);
         let key = source.key_at(&span);
-        let message = in_words(shortened(one_line(error.message())));
+        // Shortened only where it is shown: the names at its end are all needed to find the nearest.
+        let message = in_words(one_line(error.message()));
         let names = backticked(&message);
         let unknown = ["unknown field", "unknown variant"]
             .iter()
             .position(|start| message.starts_with(start));
         let (Some(unknown), Some((found, expected))) = (unknown, names.split_first()) else {
+            let message = shortened(message);
             return ScenarioError::Invalid {
                 place,
                 key,

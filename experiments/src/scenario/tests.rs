@@ -124,12 +124,128 @@ fn wrong_units_types_and_ranges_are_refused_where_they_stand() {
 }
 
 #[test]
+fn mistakes_in_links_have_a_place_and_the_nearest_name() {
+    let default = |line: &str| format!("system = 'network'\n[links.default]\n{line}");
+    let degrade =
+        |line: &str| format!("system = 'network'\n[[degrade]]\nat = '5s'\nlinks = '*'\n{line}");
+    let pattern = |line: &str| format!("system = 'network'\n[links.'node_*-*']\n{line}");
+    for (line, column, parts) in [
+        (
+            "store_and_foward = true",
+            1,
+            &["did you mean \"store_and_forward\"?"][..],
+        ),
+        ("retrys = 3", 1, &["did you mean \"retries\"?"]),
+        (
+            "preset = 'mars-realy'",
+            10,
+            &["did you mean \"mars-relay\"?", "subsurface-mesh"],
+        ),
+        ("jitter_shape = 'parteo'", 16, &["did you mean \"pareto\"?"]),
+        (
+            "jitter_shape = { table = [1, 0] }",
+            16,
+            &["none is below the one before"],
+        ),
+        ("rate = 128", 8, &["a bare number has no unit"]),
+        ("rate = '0bit/s'", 8, &["more than that"]),
+        (
+            "tx_power = '5m'",
+            12,
+            &["\"m\" is none of its units uW, mW, W, kW"],
+        ),
+        ("queue = -1", 9, &["a number of messages from 0 on"]),
+        ("retries = 100000", 11, &["at most 1000"]),
+        (
+            "burst = { loss = 0.1, lenght = '4ms' }",
+            23,
+            &["did you mean \"length\"?"],
+        ),
+        ("burst = { loss = 0.1 }", 9, &["the mean length of a burst"]),
+        ("burst = 3", 9, &["expected a table"]),
+        (
+            "contacts = [{ start = '5s', end = '3s' }]",
+            12,
+            &["an end after its start"],
+        ),
+        ("trace = [5, 3]", 9, &["3 ms after 5 ms"]),
+    ] {
+        let checks = [(default(line), 3), (pattern(line), 3), (degrade(line), 5)];
+        for (text, row) in checks {
+            check(&text, &format!("x.toml:{row}:{column}: "), parts);
+        }
+    }
+    let twice = default("delay = '5ms'\nlatency = '6ms'");
+    check(&twice, "x.toml:4:1: ", &["duplicate field `latency`"]);
+}
+
+#[test]
+fn every_parameter_of_links_can_be_set() {
+    let text = builtin_text("network/crater-dense").unwrap();
+    let sets = [
+        "links.default.preset=mars-relay",
+        "links.default.contacts=off",
+        "links.default.burst={ loss = 0.1, length = '40ms' }",
+        "links.default.burst.loss=0.2",
+        "links.default.limit=20",
+        "links.default.distribution=normal",
+        "links.*-rover_01.preset=perfect",
+        "links.*-rover_01.rate=1Mbit/s",
+        "degrade=[{ at = '2s', links = 'node_*-*', preset = 'subsurface-mesh', fifo = true }]",
+    ];
+    let scenario = parse(text, &sets).unwrap();
+    let links = &scenario.shared().links;
+    assert_eq!(links.default.rate, Some(128_000));
+    assert_eq!(links.default.contacts, None);
+    assert!((links.default.burst.as_ref().unwrap().mean_loss() - 0.2).abs() < 1e-9);
+    let resolved = scenario.resolved().unwrap();
+    let again = parse(&resolved, &[]).unwrap();
+    assert_eq!(again.shared(), scenario.shared());
+    scenario.assemble().unwrap();
+}
+
+#[test]
+fn links_follow_the_plan_and_the_trace() {
+    let text = builtin_text("traffic/contact-plan").unwrap();
+    let lost = |sets: &[&str]| {
+        let scenario = parse(text, &[&["until=6h"], sets].concat()).unwrap();
+        let counts = scenario.assemble().unwrap().sim.run(Executor::Inline);
+        let counts = counts.unwrap().counts;
+        (counts.delivered, counts.lost_by_reason)
+    };
+    let (planned, reasons) = lost(&[]);
+    assert!(planned > 0 && reasons["no_contact"] > 0, "{reasons:?}");
+    let (held, reasons) = lost(&["links.default.store_and_forward=true"]);
+    assert!(
+        held > planned && !reasons.contains_key("no_contact"),
+        "{reasons:?}"
+    );
+    // What `[links]` says is above the plan.
+    let open = "links.*.contacts=off";
+    let (free, reasons) = lost(&[open]);
+    assert!(free > held && reasons.is_empty(), "{reasons:?}");
+    let (traced, _) = lost(&[open, "links.*.trace=rover-radio", "links.*.queue=0"]);
+    assert!(traced > planned && traced <= free);
+    let message = refused(text, &["links.default.trace=rover-raido"]);
+    assert!(
+        message.starts_with("--set links.default.trace=rover-raido: "),
+        "{message}"
+    );
+    assert!(
+        message.contains("did you mean \"rover-radio\"?"),
+        "{message}"
+    );
+}
+
+#[test]
 fn a_set_is_blamed_by_name() {
     let text = builtin_text("network/crater-dense").unwrap();
     for (set, part) in [
         ("links.default.loss=1.5", "from 0 to 1"),
         ("links.defualt.loss=0.5", "did you mean \"default\"?"),
         ("links.default.los=0.5", "did you mean \"loss\"?"),
+        ("links.default.burst.loss=0.5", "the mean length of a burst"),
+        ("links.default.preset=moon", "expected one of perfect"),
         ("team.rovers=0", "from 1 to"),
         ("world.nodes=229", "1 to 228"),
         ("tame.rovers=5", "did you mean \"team\"?"),
