@@ -8,7 +8,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, check, diff, info, recover, reproduce, run, scenarios, studies, study, verify,
+    CommandError, check, diff, info, recover, report, reproduce, run, scenarios, studies, study,
+    verify,
 };
 use crate::system::Registry;
 
@@ -63,6 +64,8 @@ enum Command {
     Studies(studies::Args),
     /// Run one run of a study again, log every message, and compare with its record
     Reproduce(reproduce::Args),
+    /// Write up a study: a page with plots, and tables for other programs
+    Report(report::Args),
     /// Save what can be saved of a cut or damaged log
     Recover(recover::Args),
     /// Print completions for a shell
@@ -123,6 +126,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => studies::run(&args),
         Command::Reproduce(args) => reproduce::run(&args, registry),
+        Command::Report(args) => report::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

@@ -6,6 +6,7 @@ pub(crate) mod info;
 mod interrupt;
 mod progress;
 pub(crate) mod recover;
+pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod run;
 pub(crate) mod scenarios;
@@ -50,6 +51,15 @@ pub(crate) enum CommandError {
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
+    /// Arguments that do not go together.
+    #[error("{0}")]
+    Arguments(String),
+    /// A file that cannot be written.
+    #[error("{}: cannot write it: {source}", .path.display())]
+    Write {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     /// Standard output.
     #[error("cannot write to standard output: {0}")]
     Output(#[source] std::io::Error),
@@ -69,10 +79,12 @@ impl CommandError {
             | CommandError::Store(_)
             | CommandError::Scenario(_)
             | CommandError::Log(_)
-            | CommandError::NotRepeatable { .. } => Exit::Wrong,
-            CommandError::Build(_) | CommandError::Output(_) | CommandError::Json(_) => {
-                Exit::Failed
-            }
+            | CommandError::NotRepeatable { .. }
+            | CommandError::Arguments(_) => Exit::Wrong,
+            CommandError::Build(_)
+            | CommandError::Write { .. }
+            | CommandError::Output(_)
+            | CommandError::Json(_) => Exit::Failed,
         }
     }
 }

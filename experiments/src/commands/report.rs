@@ -1,0 +1,111 @@
+//! `farside report`: what a study found, as a page, plots and tables.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::{CommandError, print, print_json};
+use crate::cli::Exit;
+use crate::report::{self, Report};
+use crate::study::results::{Results, RunRecord};
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The results folder of a study; several, if its runs were shared among machines
+    #[arg(value_name = "DIR", required = true)]
+    folders: Vec<PathBuf>,
+    /// Where to write the report, instead of into the results folder; needed with several
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print what was written where as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `report --json` prints.
+#[derive(Serialize)]
+struct Document {
+    page: String,
+    results_csv: String,
+    summary_csv: String,
+    plots: Vec<String>,
+    runs: usize,
+    failed: usize,
+}
+
+pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+    let [first, others @ ..] = args.folders.as_slice() else {
+        return Err(CommandError::Arguments("which results folder?".to_owned()));
+    };
+    let out = match &args.out {
+        Some(out) => out,
+        None if others.is_empty() => first,
+        None => {
+            let message = "--out: several results folders need a folder for their report";
+            return Err(CommandError::Arguments(message.to_owned()));
+        }
+    };
+    let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
+    let Some(results) = Results::merge(parts?)? else {
+        return Err(CommandError::Arguments("which results folder?".to_owned()));
+    };
+    let report = report::build(&results, &first.display().to_string());
+    let document = write(&report, out, &results)?;
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print(text(&document))?;
+    }
+    Ok(Exit::Done)
+}
+
+fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, CommandError> {
+    let plots = out.join("plots");
+    std::fs::create_dir_all(&plots).map_err(|source| CommandError::Write {
+        path: plots.clone(),
+        source,
+    })?;
+    let write = |path: PathBuf, text: &str| match std::fs::write(&path, text) {
+        Ok(()) => Ok(path.display().to_string()),
+        Err(source) => Err(CommandError::Write { path, source }),
+    };
+    let results_csv = write(out.join("results.csv"), &report.results_csv)?;
+    let summary_csv = write(out.join("summary.csv"), &report.summary_csv)?;
+    let figures = report.figures.iter();
+    let plots: Result<Vec<String>, CommandError> = figures
+        .map(|figure| write(plots.join(&figure.file), &figure.standalone()))
+        .collect();
+    let failed = |run: &&RunRecord| {
+        matches!(
+            run.outcome,
+            crate::study::results::RunOutcome::Failed { .. }
+        )
+    };
+    Ok(Document {
+        results_csv,
+        summary_csv,
+        plots: plots?,
+        // The page comes last: where it is, the rest is too.
+        page: write(out.join("report.html"), &report.page)?,
+        runs: results.runs.len(),
+        failed: results.runs.iter().filter(failed).count(),
+    })
+}
+
+fn text(document: &Document) -> String {
+    let failed = match document.failed {
+        0 => String::new(),
+        failed => format!(", {failed} of them failed"),
+    };
+    let plots = match document.plots.as_slice() {
+        [] => "none".to_owned(),
+        [first, ..] => {
+            let folder = Path::new(first).parent().unwrap_or(Path::new("."));
+            format!("{} in {}", document.plots.len(), folder.display())
+        }
+    };
+    format!(
+        "{} runs{failed}\n  page     {}\n  runs     {}\n  figures  {}\n  plots    {plots}\n",
+        document.runs, document.page, document.results_csv, document.summary_csv
+    )
+}

@@ -1,0 +1,149 @@
+//! Figures as people read them: as many digits as the interval deserves, and no more.
+
+use crate::stats::Estimate;
+
+/// The most decimals that are ever written.
+const MOST_DECIMALS: usize = 6;
+
+/// A number with `decimals`, thousands apart from 10,000 on, and a real minus.
+pub(super) fn decimal(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return if value == f64::INFINITY {
+            "never".to_owned()
+        } else {
+            "–".to_owned()
+        };
+    }
+    let text = format!("{:.*}", decimals, value.abs());
+    let (whole, rest) = text.split_at(text.find('.').unwrap_or(text.len()));
+    let mut out = String::new();
+    // What rounds to zero has no sign.
+    if value < 0.0 && text.bytes().any(|byte| (b'1'..=b'9').contains(&byte)) {
+        out.push('−');
+    }
+    for (at, digit) in whole.chars().enumerate() {
+        if at > 0 && whole.len() > 4 && (whole.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out + rest
+}
+
+/// How many decimals show a step of this size with two digits.
+pub(super) fn decimals_for(step: f64) -> usize {
+    if !step.is_finite() || step <= 0.0 {
+        return 3;
+    }
+    let digits = 1.0 - libm::floor(libm::log10(step));
+    (digits.max(0.0) as usize).min(MOST_DECIMALS)
+}
+
+/// A number of which nothing says how exact it is: about three digits.
+pub(super) fn plain(value: f64) -> String {
+    if value == value.trunc() && value.abs() < 1e15 {
+        return decimal(value, 0);
+    }
+    decimal(value, decimals_for(value.abs() / 10.0))
+}
+
+/// How a metric's figures are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Style {
+    /// As they are.
+    Plain,
+    /// As percent: rates.
+    Percent,
+}
+
+impl Style {
+    /// The number that is written: 30 for a rate of 0.3.
+    pub(super) fn scaled(self, value: f64) -> f64 {
+        match self {
+            Style::Plain => value,
+            Style::Percent => 100.0 * value,
+        }
+    }
+
+    /// One figure, with the digits that its interval deserves.
+    pub(super) fn value(self, estimate: &Estimate) -> String {
+        let (value, decimals) = self.parts(estimate);
+        self.unit(match decimals {
+            Some(decimals) => decimal(value, decimals),
+            None => plain(value),
+        })
+    }
+
+    /// The interval: `1.32 to 1.48`, or that it is unknown.
+    pub(super) fn interval(self, estimate: &Estimate) -> String {
+        let ends = [estimate.low, estimate.high].map(|end| self.scaled(end));
+        match self.parts(estimate).1 {
+            Some(decimals) => {
+                let [low, high] = ends.map(|end| decimal(end, decimals));
+                self.unit(format!("{low} to {high}"))
+            }
+            // The median of what never happens to half of them has a lower end alone.
+            None if ends[0].is_finite() => format!("from {}", self.unit(plain(ends[0]))),
+            None => "unknown".to_owned(),
+        }
+    }
+
+    /// The same with a sign: a difference.
+    pub(super) fn signed(self, estimate: &Estimate) -> String {
+        let text = self.value(estimate);
+        if estimate.value > 0.0 && text.bytes().any(|byte| (b'1'..=b'9').contains(&byte)) {
+            format!("+{text}")
+        } else {
+            text
+        }
+    }
+
+    fn parts(self, estimate: &Estimate) -> (f64, Option<usize>) {
+        let value = self.scaled(estimate.value);
+        let width = self.scaled(estimate.width());
+        let decimals = if width > 0.0 {
+            // One digit of the width, or two if the first is small.
+            decimals_for(3.0 * width)
+        } else if value == value.trunc() {
+            0
+        } else {
+            decimals_for(value.abs() / 10.0)
+        };
+        (value, width.is_finite().then_some(decimals))
+    }
+
+    fn unit(self, text: String) -> String {
+        match self {
+            Style::Plain => text,
+            Style::Percent => format!("{text} %"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_the_digits_they_deserve() {
+        let estimate = |value: f64, low: f64, high: f64| Estimate { value, low, high };
+        let wide = estimate(1.4132, 1.3, 1.5);
+        assert_eq!(Style::Plain.value(&wide), "1.41");
+        assert_eq!(Style::Plain.interval(&wide), "1.30 to 1.50");
+        let large = estimate(41234.4, 40100.0, 42800.0);
+        assert_eq!(Style::Plain.value(&large), "41,234");
+        let rate = estimate(0.9, 0.744, 0.965);
+        assert_eq!(Style::Percent.value(&rate), "90 %");
+        assert_eq!(Style::Percent.interval(&rate), "74 to 96 %");
+        let less = estimate(-0.51, -0.6, -0.4);
+        assert_eq!((Style::Plain.signed(&less)).as_str(), "−0.51");
+        assert_eq!(Style::Plain.signed(&wide), "+1.41");
+        assert_eq!(Style::Plain.signed(&estimate(0.0, 0.0, 0.0)), "0");
+        assert_eq!(Style::Plain.interval(&Estimate::unknown(2.0)), "unknown");
+        assert_eq!(Style::Plain.value(&Estimate::unknown(f64::NAN)), "–");
+        assert_eq!(
+            [plain(0.0), plain(12345.0), plain(0.01234)],
+            ["0", "12,345", "0.0123"]
+        );
+    }
+}

@@ -1,0 +1,153 @@
+//! The page that people read: one file, with its figures and its style, that loads nothing.
+
+mod method;
+mod runs;
+mod tables;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::measure::{Measure, Study};
+use super::numbers::plain;
+use super::plots::{self, Plots};
+use super::svg::{Figure, slug};
+use crate::study::results::Metric;
+use crate::study::summary::values::Kind;
+
+/// The page, and the figures that are on it.
+pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
+    let measures = study.measures();
+    let plotted: Vec<Plots> = measures
+        .iter()
+        .map(|measure| plots::of_metric(study, measure))
+        .collect();
+    let losses = plots::losses(study);
+    let manifest = &study.results.manifest;
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                // Nothing is loaded from anywhere, not even an icon.
+                link rel="icon" href="data:,";
+                title { (manifest.study) ": " (manifest.question) }
+                style { (PreEscaped(super::FIGURE_STYLE)) (PreEscaped(super::PAGE_STYLE)) }
+            }
+            body {
+                header {
+                    h1 { "Study " (manifest.study) }
+                    p class="question" { (manifest.question) }
+                }
+                (runs::what_was_run(study))
+                (contents(&measures, losses.is_some()))
+                main {
+                    section id="cells" {
+                        h2 { "All cells" }
+                        (tables::overview(study, &measures))
+                    }
+                    @for (measure, plots) in measures.iter().zip(&plotted) {
+                        (metric_section(study, measure, plots))
+                    }
+                    @if let Some(losses) = &losses { (losses_section(study, losses)) }
+                    (runs::trouble(study))
+                    (runs::commands(study, folder))
+                    (method::section(study))
+                    (runs::scenario(study))
+                }
+            }
+        }
+    };
+    let figures = plotted
+        .into_iter()
+        .flat_map(|plots| plots.figures)
+        .chain(losses);
+    (markup.into_string(), figures.collect())
+}
+
+/// Where a metric's section is.
+fn anchor(metric: &Metric) -> String {
+    format!("metric-{}", slug(&metric.name))
+}
+
+fn contents(measures: &[Measure<'_>], losses: bool) -> Markup {
+    html! {
+        nav aria-label="Contents" {
+            ul {
+                li { a href="#cells" { "All cells" } }
+                @for measure in measures {
+                    li { a href={ "#" (anchor(measure.metric)) } { (measure.metric.label) } }
+                }
+                @if losses { li { a href="#losses" { "Losses" } } }
+                li { a href="#again" { "Run again" } }
+                li { a href="#method" { "How figures are made" } }
+                li { a href="#scenario" { "Scenario" } }
+            }
+        }
+    }
+}
+
+fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Markup {
+    html! {
+        section id=(anchor(measure.metric)) {
+            h2 { (capital(&measure.metric.label)) }
+            @if let Some(sentence) = measure.constant(study.summary) {
+                p { (sentence) }
+            } @else {
+                (tables::overall(study, measure))
+                @if !plots.figures.is_empty() {
+                    div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
+                }
+                @for note in &plots.notes { p class="note" { (note) } }
+                @if measure.kind == Kind::Text {
+                    (tables::of_metric(study, measure))
+                } @else {
+                    details {
+                        summary { "Table: " (measure.metric.label) " in each cell" }
+                        (tables::of_metric(study, measure))
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn losses_section(study: &Study<'_>, figure: &Figure) -> Markup {
+    let cells = study.summary.cells.iter();
+    let lost: u64 = cells.map(|cell| cell.messages.lost).sum();
+    html! {
+        section id="losses" {
+            h2 { (figure.title) }
+            p class="note" {
+                (plain(lost as f64)) " copies of messages were lost in all. Bars show the share of \
+                 all copies in the runs of a cell together; what was under way when a run ended \
+                 counts as not lost."
+            }
+            div class="figures" { (placed(figure)) }
+        }
+    }
+}
+
+/// A heading of a label, which begins small.
+fn capital(label: &str) -> String {
+    let mut letters = label.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+/// A figure in the page. What is wider than a column or higher than a screen scrolls by itself.
+fn placed(figure: &Figure) -> Markup {
+    let class = match figure {
+        Figure { width, .. } if *width > plots::WIDTH + 1.0 => "wide",
+        Figure { height, .. } if *height > 900.0 => "tall",
+        _ => "",
+    };
+    html! {
+        figure class=[(!class.is_empty()).then_some(class)]
+            tabindex=[(!class.is_empty()).then_some("0")] {
+            figcaption { (capital(&figure.title)) }
+            (figure.inline())
+        }
+    }
+}

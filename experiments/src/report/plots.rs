@@ -1,0 +1,71 @@
+//! The plots of a study.
+
+mod curves;
+mod heat;
+mod losses;
+mod steps;
+
+use super::layout::Shape;
+use super::measure::{Measure, Study};
+use super::svg::{Area, Figure};
+use crate::study::summary::values::Kind;
+
+/// The width of a figure that stands beside others; on a phone it fills the page.
+pub(super) const WIDTH: f64 = 480.0;
+/// The room above a plot, for what its axes measure.
+pub(super) const TOP: f64 = 46.0;
+/// The room below, for ticks and the axis' label.
+pub(super) const BELOW: f64 = 52.0;
+/// The height of curves.
+pub(super) const HEIGHT: f64 = 238.0;
+
+/// The figures of one metric, and what is to be said of them.
+pub(super) struct Plots {
+    pub(super) figures: Vec<Figure>,
+    pub(super) notes: Vec<String>,
+}
+
+/// All figures of a metric. One that is constant, or made of words, has none.
+pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
+    let mut plots = Plots {
+        figures: Vec::new(),
+        notes: Vec::new(),
+    };
+    let plotted = matches!(measure.kind, Kind::Number | Kind::Rate | Kind::List);
+    if !plotted || measure.constant(study.summary).is_some() {
+        return plots;
+    }
+    match study.layout.shape {
+        Shape::Single => {}
+        Shape::Scattered => plots.figures.extend(curves::scattered(study, measure)),
+        Shape::Grid | Shape::Row => {
+            if let Some(curves) = study.layout.curves() {
+                plots.figures.extend(curves::all(study, measure, &curves));
+                if curves.more {
+                    plots.notes.push(
+                        "There are more curves than can be told apart; an even choice is shown, \
+                         and the table has all."
+                            .to_owned(),
+                    );
+                }
+            }
+            plots.figures.extend(heat::map(study, measure));
+        }
+    }
+    if measure.kind == Kind::List {
+        steps::distributions(study, measure, &mut plots);
+    }
+    plots
+}
+
+pub(super) use losses::figure as losses;
+
+/// The area of a plot with so much room left and right of it.
+fn area(left: f64, right: f64) -> Area {
+    Area {
+        left,
+        top: TOP,
+        width: WIDTH - left - right,
+        height: HEIGHT,
+    }
+}

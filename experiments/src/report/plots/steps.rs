@@ -1,0 +1,322 @@
+//! Steps: survival curves of what happens some time, and distributions of what is measured.
+
+use maud::{Markup, html};
+
+use super::{BELOW, HEIGHT, Plots, TOP, WIDTH, area};
+use crate::report::colours::DASHES;
+use crate::report::layout::{Panel, Series, spread};
+use crate::report::measure::{Measure, Study};
+use crate::report::scale::Scale;
+use crate::report::svg::{
+    Area, EndLabel, Figure, Frame, end_label_room, end_labels, measured_ticks, path, shortened,
+    slug,
+};
+use crate::stats::distribution::Ecdf;
+use crate::stats::survival::kaplan_meier;
+use crate::study::summary::values::observations;
+
+/// One cell's curve: from a first share on, at each x a new one with its interval.
+struct Steps {
+    name: String,
+    first: f64,
+    steps: Vec<Step>,
+}
+
+struct Step {
+    x: f64,
+    share: f64,
+    low: f64,
+    high: f64,
+}
+
+/// What the curves of all panels share.
+struct Kind {
+    /// What the file's name ends with.
+    file: &'static str,
+    y_label: String,
+    title: &'static str,
+    x: Scale,
+}
+
+/// Survival curves, if anything listed had not happened when its run ended; the distribution if all
+/// had.
+pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mut Plots) {
+    let name = &measure.metric.name;
+    let all_happened = study
+        .results
+        .manifest
+        .cells
+        .iter()
+        .enumerate()
+        .all(|(cell, _)| {
+            observations(study.results.of_cell(cell), name)
+                .iter()
+                .all(|one| one.happened)
+        });
+    let (series, panels) = panels(study);
+    let curves: Vec<(&Panel, Vec<Steps>)> = panels
+        .iter()
+        .map(|panel| {
+            let curve = |series: &Series| {
+                let cell = series.cells.first().copied().unwrap_or(0);
+                steps(study, name, cell, &series.name, all_happened)
+            };
+            (panel, panel.series.iter().map(curve).collect())
+        })
+        .collect();
+    let all = || curves.iter().flat_map(|(_, curves)| curves);
+    let kind = if all_happened {
+        // A long tail would press all else to the left; it is cut where every curve is near 1.
+        let ends = all().map(|curve| {
+            let near = curve.steps.iter().find(|step| step.share >= 0.99);
+            near.map_or(0.0, |step| step.x)
+        });
+        let starts = all()
+            .filter_map(|curve| curve.steps.first())
+            .map(|step| step.x);
+        Kind {
+            file: "ecdf",
+            y_label: "share of all values, at or below".to_owned(),
+            title: "distribution",
+            x: Scale::measured(ends.chain(starts)),
+        }
+    } else {
+        let ends = all()
+            .filter_map(|curve| curve.steps.last())
+            .map(|step| step.x);
+        Kind {
+            file: "survival",
+            y_label: "still outstanding".to_owned(),
+            title: "survival",
+            x: Scale::measured(ends.chain([0.0])),
+        }
+    };
+    if all_happened {
+        plots.notes.push(
+            "Distributions pool the lists of all runs of a cell. They are cut at the right where \
+             99.5 % of each cell is past."
+                .to_owned(),
+        );
+    } else {
+        plots.notes.push(
+            "Survival curves are those of Kaplan and Meier. What had not happened when a run's \
+             time was over is censored there, as it might still have. In a run that ended \
+             otherwise, such as a team at a standstill, it never happens, and stays at risk to the \
+             end. Bands take whole runs as what varies by chance."
+                .to_owned(),
+        );
+    }
+    let figures = curves
+        .into_iter()
+        .map(|(panel, curves)| figure(study, measure, &kind, &panel.name, series, curves));
+    plots.figures.extend(figures);
+}
+
+/// Panels with one cell for each curve: those along the curves' factor are parted by the factor
+/// along x, because here x is taken.
+fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
+    let one = |name: String, cell: usize| Series {
+        name,
+        cells: vec![cell],
+    };
+    let Some(curves) = study.layout.curves() else {
+        let cells = spread(study.summary.cells.len(), 5);
+        let name = |cell: usize| {
+            if study.summary.cells.len() == 1 {
+                String::new()
+            } else {
+                format!("cell {cell}")
+            }
+        };
+        let series = cells
+            .into_iter()
+            .map(|cell| one(name(cell), cell))
+            .collect();
+        return (
+            None,
+            vec![Panel {
+                name: String::new(),
+                series,
+            }],
+        );
+    };
+    let axis = &study.layout.axes[curves.x];
+    let text = |cell: usize| {
+        axis.levels[study.layout.places[cell][curves.x]]
+            .text
+            .clone()
+    };
+    let Some(by) = curves.series else {
+        let cells = curves.panels.iter().flat_map(|panel| &panel.series);
+        let cells: Vec<usize> = cells
+            .flat_map(|series| series.cells.iter().copied())
+            .collect();
+        let shown = spread(cells.len(), 5).into_iter().map(|index| cells[index]);
+        let series = shown.map(|cell| one(text(cell), cell)).collect();
+        return (
+            Some(curves.x),
+            vec![Panel {
+                name: String::new(),
+                series,
+            }],
+        );
+    };
+    let along = &study.layout.axes[by];
+    let mut parted = Vec::new();
+    for panel in &curves.panels {
+        for index in spread(panel.series.len(), 5) {
+            let series = &panel.series[index];
+            let shown = spread(series.cells.len(), 5)
+                .into_iter()
+                .map(|at| series.cells[at]);
+            let mut name = format!("{} {}", along.name(), series.name);
+            if !panel.name.is_empty() {
+                name = format!("{}, {name}", panel.name);
+            }
+            let series = shown.map(|cell| one(text(cell), cell)).collect();
+            parted.push(Panel { name, series });
+        }
+    }
+    let chosen = spread(parted.len(), 6)
+        .into_iter()
+        .map(|index| parted[index].clone());
+    (Some(curves.x), chosen.collect())
+}
+
+fn steps(study: &Study<'_>, metric: &str, cell: usize, name: &str, all_happened: bool) -> Steps {
+    let observations = observations(study.results.of_cell(cell), metric);
+    let steps = if all_happened {
+        let times: Vec<f64> = observations.iter().map(|one| one.time).collect();
+        let steps = Ecdf::new(&times);
+        let step = |(x, share)| Step {
+            x,
+            share,
+            low: share,
+            high: share,
+        };
+        steps.steps().map(step).collect()
+    } else {
+        let survival = kaplan_meier(&observations);
+        let steps = survival.steps.iter().map(|step| Step {
+            x: step.time,
+            share: step.remaining.value,
+            low: step.remaining.low,
+            high: step.remaining.high,
+        });
+        steps.collect()
+    };
+    Steps {
+        name: name.to_owned(),
+        first: if all_happened { 0.0 } else { 1.0 },
+        steps,
+    }
+}
+
+fn figure(
+    study: &Study<'_>,
+    measure: &Measure<'_>,
+    kind: &Kind,
+    panel: &str,
+    series: Option<usize>,
+    curves: Vec<Steps>,
+) -> Figure {
+    let heading = series.map_or("", |axis| study.layout.axes[axis].name());
+    let heading = shortened(heading, 22);
+    let alone = curves.len() == 1 && curves[0].name.is_empty();
+    let names: Vec<String> = curves
+        .iter()
+        .map(|curve| shortened(&curve.name, 18))
+        .collect();
+    let right = if alone {
+        28.0
+    } else {
+        end_label_room(names.iter().map(String::as_str), &heading)
+    };
+    let area = area(62.0, right);
+    let y = Scale::between(0.0, 100.0);
+    let labels = curves
+        .iter()
+        .zip(&names)
+        .enumerate()
+        .map(|(index, (curve, name))| {
+            let shown = curve.steps.iter().rfind(|step| step.x <= kind.x.high());
+            let share = shown.map_or(curve.first, |step| step.share);
+            EndLabel {
+                series: index,
+                y: area.y(share),
+                text: name.clone(),
+            }
+        });
+    let labels = labels.collect();
+    let x_label = match measure.metric.unit.as_str() {
+        "" => measure.metric.label.clone(),
+        unit => format!("{} ({unit})", measure.metric.label),
+    };
+    let frame = Frame {
+        area,
+        x_label: &x_label,
+        x_ticks: kind.x.ticks(4.0),
+        y_label: kind.y_label.clone(),
+        y_ticks: measured_ticks(&y, true),
+    };
+    let body = html! {
+        (frame.draw())
+        @for (index, curve) in curves.iter().enumerate() { (drawn(&area, &kind.x, curve, index)) }
+        @if !alone { (end_labels(labels, &area, &heading, false)) }
+    };
+    let metric = &measure.metric.label;
+    let within = if panel.is_empty() {
+        String::new()
+    } else {
+        format!(", {panel}")
+    };
+    let each = if alone {
+        String::new()
+    } else {
+        format!(", a curve for each {heading}")
+    };
+    Figure {
+        file: format!(
+            "{}.svg",
+            slug(&format!("{}-{}{within}", measure.metric.name, kind.file))
+        ),
+        title: format!("{metric}, {}{within}", kind.title),
+        description: format!("The {} of {metric}{each}: {}.", kind.title, kind.y_label),
+        width: WIDTH,
+        height: TOP + HEIGHT + BELOW,
+        body,
+    }
+}
+
+/// The line in steps, over its band; of the steps within half a pixel, the last is drawn.
+fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize) -> Markup {
+    let series = series % DASHES.len();
+    let column = |step: &Step| (2.0 * area.x(x.place(step.x))) as usize;
+    let mut kept: Vec<&Step> = Vec::new();
+    let shown = curve.steps.iter().filter(|step| step.x <= x.high());
+    for step in shown {
+        if kept.last().is_some_and(|last| column(last) == column(step)) {
+            kept.pop();
+        }
+        kept.push(step);
+    }
+    let corners = |share: &dyn Fn(&Step) -> f64| {
+        let mut corners = vec![(area.left, area.y(curve.first))];
+        let mut before = curve.first;
+        for step in &kept {
+            let at = area.x(x.place(step.x));
+            corners.push((at, area.y(before)));
+            before = share(step);
+            corners.push((at, area.y(before)));
+        }
+        corners.push((area.x(1.0), area.y(before)));
+        corners
+    };
+    let upper = corners(&|step| step.high);
+    let lower = corners(&|step| step.low);
+    html! {
+        path class={ "band s" (series) } d=(path(upper.into_iter().chain(lower.into_iter().rev()))) {}
+        path class={ "line s" (series) } stroke-dasharray=(DASHES[series])
+            d=(path(corners(&|step| step.share))) { title { (curve.name) } }
+    }
+}

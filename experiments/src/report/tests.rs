@@ -1,0 +1,226 @@
+//! Pages of studies that no simulation made.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::*;
+use crate::study::fabricated::{self, bandwidth, latency, loss, planner};
+use crate::study::results::RunOutcome;
+
+fn latency_and_loss() -> Results {
+    fabricated::study("degradation", vec![latency(), loss()], 30)
+}
+
+/// Cells at random places, as a Latin hypercube has them.
+fn scattered() -> Results {
+    let mut results = fabricated::study("scattered", vec![latency(), loss()], 10);
+    let cells = results.manifest.cells.iter_mut().enumerate();
+    for (index, cell) in cells {
+        let (latency, loss) = (index as f64 * 0.05, ((index * 7) % 25) as f64 / 25.0);
+        cell.values = vec![json!(latency), json!(loss)];
+        cell.texts = vec![format!("{latency:.2}s"), format!("{loss:.2}")];
+    }
+    results
+}
+
+fn hostile() -> Results {
+    let mut results = fabricated::study("<script>alert(1)</script>", vec![planner(), loss()], 3);
+    let evil = "\"><img src=x onerror=alert(1)></style></title>&";
+    let manifest = &mut results.manifest;
+    manifest.question = evil.to_owned();
+    manifest.scenario = evil.to_owned();
+    manifest.scenario_text = format!("</pre>{evil}");
+    manifest.factors[0].label = evil.to_owned();
+    manifest.metrics[1].label = evil.to_owned();
+    manifest.cells[0].texts[0] = evil.to_owned();
+    manifest.cells[0].sets[0] = evil.to_owned();
+    results.runs[0].outcome = RunOutcome::Failed {
+        error: evil.to_owned(),
+    };
+    results
+}
+
+fn studies() -> Vec<(&'static str, Results)> {
+    let mut few = fabricated::study("few", vec![loss()], 1);
+    few.runs.truncate(2);
+    let mut none = latency_and_loss();
+    none.runs.clear();
+    vec![
+        ("latency-and-loss", latency_and_loss()),
+        (
+            "planners",
+            fabricated::study("planners", vec![planner(), loss()], 30),
+        ),
+        (
+            "bandwidth",
+            fabricated::study("bandwidth", vec![bandwidth()], 30),
+        ),
+        ("words", fabricated::study("words", vec![planner()], 30)),
+        (
+            "three",
+            fabricated::study("three", vec![latency(), loss(), planner()], 5),
+        ),
+        ("one", fabricated::study("one", vec![], 30)),
+        ("scattered", scattered()),
+        ("few", few),
+        ("none", none),
+        ("hostile", hostile()),
+    ]
+}
+
+/// Tags that are open at the end, or closed without being open: in well-formed markup, none.
+fn unbalanced(markup: &str) -> Option<String> {
+    const VOID: [&str; 3] = ["meta", "link", "br"];
+    let mut open: Vec<&str> = Vec::new();
+    for piece in markup.split('<').skip(1) {
+        let name: &str = piece.split([' ', '>', '\n']).next().unwrap_or("");
+        if let Some(closed) = name.strip_prefix('/') {
+            let last = open.pop();
+            if last != Some(closed) {
+                return Some(format!("{last:?} closed as {closed}"));
+            }
+        } else if !VOID.contains(&name) && !name.starts_with(['!', '?']) {
+            open.push(name);
+        }
+    }
+    open.pop().map(str::to_owned)
+}
+
+#[test]
+fn every_study_has_a_page() {
+    for (name, results) in studies() {
+        let report = build(&results, "runs");
+        assert_eq!(unbalanced(&report.page), None, "{name}");
+        assert!(!report.page.contains("NaN"), "{name}");
+        let mut files: Vec<&str> = report.figures.iter().map(|one| one.file.as_str()).collect();
+        files.sort_unstable();
+        let count = files.len();
+        files.dedup();
+        assert_eq!(files.len(), count, "{name}: {files:?}");
+        for figure in &report.figures {
+            let svg = figure.standalone();
+            assert_eq!(unbalanced(&svg), None, "{name}: {}", figure.file);
+            assert!(
+                !svg.contains("NaN") && !svg.contains("\"inf"),
+                "{name}: {}",
+                figure.file
+            );
+        }
+    }
+}
+
+#[test]
+fn the_same_results_give_the_same_bytes() {
+    let results = fabricated::study("same", vec![loss()], 8);
+    let (one, other) = (build(&results, "runs"), build(&results, "runs"));
+    assert_eq!(one.page, other.page);
+    assert_eq!(one.summary_csv, other.summary_csv);
+}
+
+#[test]
+fn foreign_text_is_harmless() {
+    let report = build(&hostile(), "$(rm -r ~)");
+    let figures = report.figures.iter().map(Figure::standalone);
+    for text in figures.chain([report.page.clone()]) {
+        for evil in ["<script", "<img", "</style></title>", "</pre>\""] {
+            assert!(!text.contains(evil), "{evil}");
+        }
+    }
+    assert!(
+        report
+            .page
+            .contains("farside reproduce '$(rm -r ~)' --cell 0 --seed 1")
+    );
+    assert!(report.figures.iter().all(|figure| {
+        figure
+            .file
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte))
+    }));
+}
+
+#[test]
+fn nothing_is_loaded_from_anywhere() {
+    let page = build(&latency_and_loss(), "runs").page;
+    for outside in ["src=", "@import", "url(", "<script", "http://", "https://"] {
+        let found = page.replace("http://www.w3.org/2000/svg", "");
+        assert!(!found.contains(outside), "{outside}");
+    }
+}
+
+#[test]
+fn a_page_says_what_there_is_to_say() {
+    let page = build(&latency_and_loss(), "runs/night").page;
+    for said in [
+        "every combination of one-way latency (5ms, 100ms, 250ms, 600ms, 1.3s)",
+        "collisions: 0 in all",
+        "a rate of more than",
+        "farside reproduce runs/night --cell 24 --seed 30 --out cell24-seed30.mcap",
+        "no &lt;path&gt; left &amp; none to give",
+        "Kaplan",
+        "rovers = 20",
+    ] {
+        assert!(page.contains(said), "{said}");
+    }
+}
+
+#[test]
+fn a_large_study_stays_small() {
+    let levels = |prefix: &'static str, count: u32| -> Vec<fabricated::Level> {
+        let level = |index: u32| {
+            let harm = f64::from(index) / f64::from(count);
+            // Names live as long as the test binary; there are thirty of them.
+            let text: &'static str = Box::leak(format!("{prefix}{index}").into_boxed_str());
+            (json!(index), text, harm)
+        };
+        (0..count).map(level).collect()
+    };
+    let scale = crate::study::results::Scale::Linear;
+    let factors = vec![
+        (
+            fabricated::factor("rows", "rows", "", scale),
+            levels("r", 20),
+        ),
+        (
+            fabricated::factor("columns", "columns", "", scale),
+            levels("c", 10),
+        ),
+    ];
+    let mut results = fabricated::study("large", factors, 100);
+    // Intervals take their time, and are no matter here.
+    results
+        .manifest
+        .metrics
+        .retain(|metric| metric.name != "messages.sent");
+    let report = build(&results, "runs/large");
+    assert!(report.page.len() < 4_000_000, "{}", report.page.len());
+    assert!(report.figures.len() < 60, "{}", report.figures.len());
+    if let Ok(folder) = std::env::var("FARSIDE_PAGES") {
+        write(&Path::new(&folder).join("large"), &report);
+    }
+}
+
+/// Writes all pages to the folder that `FARSIDE_PAGES` names, for eyes.
+#[test]
+#[ignore = "for eyes, not for asserts"]
+fn pages_to_look_at() {
+    let folder = std::env::var("FARSIDE_PAGES").expect("FARSIDE_PAGES names a folder");
+    for (name, results) in studies() {
+        write(
+            &Path::new(&folder).join(name),
+            &build(&results, &format!("runs/{name}")),
+        );
+    }
+}
+
+fn write(folder: &Path, report: &Report) {
+    let plots = folder.join("plots");
+    std::fs::create_dir_all(&plots).expect("a folder can be made");
+    std::fs::write(folder.join("report.html"), &report.page).expect("a page can be written");
+    std::fs::write(folder.join("results.csv"), &report.results_csv).expect("and a table");
+    std::fs::write(folder.join("summary.csv"), &report.summary_csv).expect("and another");
+    for figure in &report.figures {
+        std::fs::write(plots.join(&figure.file), figure.standalone()).expect("and a plot");
+    }
+}
