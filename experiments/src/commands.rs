@@ -51,9 +51,6 @@ pub(crate) enum CommandError {
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
-    /// A results folder that cannot be used.
-    #[error("{}: {message}", .path.display())]
-    Results { path: PathBuf, message: String },
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -83,7 +80,6 @@ impl CommandError {
             | CommandError::Scenario(_)
             | CommandError::Log(_)
             | CommandError::NotRepeatable { .. }
-            | CommandError::Results { .. }
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

@@ -39,7 +39,6 @@ mod pool;
 mod reproduce;
 pub mod results;
 mod runner;
-pub(crate) mod standin;
 mod stop;
 mod store;
 pub mod summary;

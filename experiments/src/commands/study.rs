@@ -9,9 +9,10 @@ use serde_json::{Map, Value};
 
 use super::{CommandError, interrupt, print, print_json};
 use crate::cli::Exit;
+use crate::report::csv::results_csv;
 use crate::study::results::{Results, RunOutcome};
 use crate::study::summary::summarise;
-use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study, standin};
+use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
 use crate::system::Registry;
 
 /// Drawings a second; more is unreadable.
@@ -95,7 +96,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let results = Results::load(&folder)?;
     let missing = results.missing();
     if missing == 0 {
-        let csv = standin::results_csv(&results);
+        let csv = results_csv(&results);
         study::replace(&folder.join("results.csv"), csv.as_bytes())?;
     }
     tell(args, &results, &folder, missing)

@@ -80,6 +80,12 @@ fn shards_and_jobs_give_the_same_table() {
     );
     let whole = read(folder.path(), "whole/results.csv");
     assert_eq!(whole, read(folder.path(), "parts/results.csv"));
+    // Each machine with a folder of its own: the report joins them, in any order.
+    study(folder.path(), &["--out", "a", "--shard", "1/2"]);
+    study(folder.path(), &["--out", "b", "--shard", "2/2"]);
+    let joined = farside(folder.path(), &["report", "b", "a", "--out", "joined"]);
+    assert_eq!(joined.status.code(), Some(0), "{}", text(&joined.stderr));
+    assert_eq!(whole, read(folder.path(), "joined/results.csv"));
     // More seeds go on from there.
     assert_eq!(
         study(folder.path(), &["--out", "parts", "--seeds", "5"])["runs"],
