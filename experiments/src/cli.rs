@@ -7,12 +7,15 @@ use clap::{CommandFactory, Parser, Subcommand};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
-use crate::commands::{CommandError, check, diff, info, recover, report, run, scenarios, verify};
+use crate::commands::{
+    CommandError, check, diff, info, recover, report, reproduce, run, scenarios, studies, study,
+    verify,
+};
 use crate::system::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done; for verify and diff: the same
+  0  done; for verify, diff and reproduce: the same
   1  the answer is \"different\" or \"violated\"
   2  the input is wrong
   3  the run failed or was interrupted; what was logged until then is readable";
@@ -22,7 +25,10 @@ Examples:
   farside run                                        50 rovers cross a crater; writes run.mcap
   farside run --set links.default.loss=30% --json    the same over worse links, for programs
   farside verify run.mcap                            run it again, compare every message
-  farside diff run.mcap worse.mcap                   the first message that differs, and why";
+  farside diff run.mcap worse.mcap                   the first message that differs, and why
+  farside study degradation/loss --seeds 5           how the team fares as messages are lost
+  farside reproduce results/degradation/loss --cell loss=30% --seed 3
+                                                     one run of it again, with its log";
 
 /// What happens to my team of rovers when the network goes bad, and why?
 ///
@@ -52,6 +58,12 @@ enum Command {
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
     Diff(diff::Args),
+    /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
+    Study(study::Args),
+    /// List the studies that are built in
+    Studies(studies::Args),
+    /// Run one run of a study again, log every message, and compare with its record
+    Reproduce(reproduce::Args),
     /// Write up a study: a page with plots, and tables for other programs
     Report(report::Args),
     /// Save what can be saved of a cut or damaged log
@@ -111,6 +123,9 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),
+        Command::Study(args) => study::run(&args, registry),
+        Command::Studies(args) => studies::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Completions { shell } => {

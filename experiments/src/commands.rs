@@ -7,8 +7,11 @@ mod interrupt;
 mod progress;
 pub(crate) mod recover;
 pub(crate) mod report;
+pub(crate) mod reproduce;
 pub(crate) mod run;
 pub(crate) mod scenarios;
+pub(crate) mod studies;
+pub(crate) mod study;
 mod table;
 pub(crate) mod verify;
 
@@ -22,6 +25,7 @@ use thiserror::Error;
 
 use crate::cli::Exit;
 use crate::scenario::ScenarioError;
+use crate::study::{StoreError, StudyError};
 
 /// The version that logs are stamped with.
 pub(crate) const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -32,6 +36,12 @@ pub(crate) enum CommandError {
     /// The scenario.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// A study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A results folder.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// A log that is read.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -41,9 +51,6 @@ pub(crate) enum CommandError {
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
-    /// A results folder that cannot be used.
-    #[error("{}: {message}", .path.display())]
-    Results { path: PathBuf, message: String },
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -65,10 +72,14 @@ impl CommandError {
     /// The exit code it deserves.
     pub(crate) fn exit(&self) -> Exit {
         match self {
-            CommandError::Scenario(_)
+            CommandError::Study(StudyError::CellFails { .. } | StudyError::Workers(_))
+            | CommandError::Study(StudyError::Store(StoreError::Io { .. }))
+            | CommandError::Store(StoreError::Io { .. }) => Exit::Failed,
+            CommandError::Study(_)
+            | CommandError::Store(_)
+            | CommandError::Scenario(_)
             | CommandError::Log(_)
             | CommandError::NotRepeatable { .. }
-            | CommandError::Results { .. }
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

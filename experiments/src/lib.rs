@@ -24,3 +24,4 @@ pub mod scenario;
 pub mod stats;
 pub mod study;
 pub mod system;
+mod wall;

@@ -10,7 +10,7 @@ mod source;
 
 use std::path::{Path, PathBuf};
 
-use farside::{SimDuration, SimTime, Simulation};
+use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::units;
 use farside_logs::Scene;
@@ -21,10 +21,11 @@ use toml::de::{DeTable, DeValue};
 use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
 pub use error::ScenarioError;
+pub(crate) use error::did_you_mean;
 pub use source::Place;
-use source::Source;
+pub(crate) use source::Source;
 
-/// The most bytes of a scenario that are read.
+/// The most bytes of a scenario or study that are read.
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The keys that every system shares.
@@ -155,7 +156,14 @@ impl Scenario {
             return Self::parse(scenario, text.to_owned(), sets, registry, files);
         }
         let path = Path::new(scenario);
-        let text = read(path, scenario)?;
+        let text = read(path, || {
+            let names = builtin_names();
+            ScenarioError::NotFound {
+                found: scenario.to_owned(),
+                nearest: nearest(scenario, names.iter().copied()),
+                known: names.join(", "),
+            }
+        })?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         Self::parse(scenario, text, sets, registry, Files::on_disk(folder))
     }
@@ -227,6 +235,16 @@ impl Scenario {
         self.shared.seed = seed;
     }
 
+    /// Where it reads files.
+    pub(crate) fn files(&self) -> &Files {
+        &self.files
+    }
+
+    /// Knows `files` from now on, and reads no other.
+    pub(crate) fn keep_files(&mut self, files: Files) {
+        self.files = files;
+    }
+
     /// Replaces the end, as `--until` does.
     pub fn set_until(&mut self, until: SimDuration) {
         self.shared.until = Some(until);
@@ -258,13 +276,21 @@ impl Scenario {
     /// When the settings cannot be: more nodes than vertices, a pattern that matches no link, a
     /// crash of an actor that does not exist.
     pub fn assemble(&self) -> Result<Assembled, ScenarioError> {
+        self.assemble_seeded(self.shared.seed)
+    }
+
+    /// Builds the simulation with another seed than the scenario's, as studies do.
+    ///
+    /// # Errors
+    /// Those of [`Scenario::assemble`].
+    pub fn assemble_seeded(&self, seed: u64) -> Result<Assembled, ScenarioError> {
         let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
-        let mut sim = Simulation::new(self.shared.seed);
+        let mut sim = Simulation::new(seed);
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
         let mut files = self.files.clone();
         let mut setup = Setup {
-            seed: self.shared.seed,
+            seed,
             sim: &mut sim,
             links: &mut links,
             files: &mut files,
@@ -279,7 +305,7 @@ impl Scenario {
             self.plan_crash(&mut sim, index, crash)?;
         }
         if let Some(until) = self.shared.until {
-            sim.stop_at(SimTime::ZERO + until, &format!("until {until}"));
+            sim.stop_at(SimTime::ZERO + until, &reason_of(until));
         }
         Ok(Assembled {
             sim,
@@ -288,6 +314,16 @@ impl Scenario {
             scene,
             files,
         })
+    }
+
+    /// Whether a run ended because its time was over.
+    pub(crate) fn is_time_out(&self, end: &End) -> bool {
+        match (end, self.shared.until) {
+            (End::Stopped { by, reason }, Some(until)) => {
+                by.starts_with('@') && *reason == reason_of(until)
+            }
+            _ => false,
+        }
     }
 
     fn plan_crash(
@@ -329,6 +365,11 @@ impl Scenario {
     }
 }
 
+/// Why a run stops whose time is over.
+fn reason_of(until: SimDuration) -> String {
+    format!("until {until}")
+}
+
 /// Takes the tables out of a table.
 trait SplitTables {
     fn split_tables(&mut self) -> toml::Table;
@@ -349,13 +390,16 @@ impl SplitTables for toml::Table {
     }
 }
 
-fn stem(name: &str) -> String {
+pub(crate) fn stem(name: &str) -> String {
     let stem = Path::new(name).file_stem();
     stem.map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into())
 }
 
-/// Reads a scenario file.
-fn read(path: &Path, scenario: &str) -> Result<String, ScenarioError> {
+/// Reads the text of a scenario or study.
+pub(crate) fn read(
+    path: &Path,
+    missing: impl FnOnce() -> ScenarioError,
+) -> Result<String, ScenarioError> {
     let io = |source| ScenarioError::Io {
         path: path.to_owned(),
         source,
@@ -366,12 +410,7 @@ fn read(path: &Path, scenario: &str) -> Result<String, ScenarioError> {
         }
         Ok(metadata) => metadata.len(),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let names = builtin_names();
-            return Err(ScenarioError::NotFound {
-                found: scenario.to_owned(),
-                nearest: nearest(scenario, names.iter().copied()),
-                known: names.join(", "),
-            });
+            return Err(missing());
         }
         Err(error) => return Err(io(error)),
     };

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{CommandError, print, print_json};
 use crate::cli::Exit;
 use crate::report::{self, Report};
-use crate::study::results::{Manifest, Results, RunRecord};
+use crate::study::results::{Results, RunRecord};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -45,19 +45,10 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
             return Err(CommandError::Arguments(message.to_owned()));
         }
     };
-    let mut results = load(first)?;
-    for folder in others {
-        let more = load(folder)?;
-        if more.manifest != results.manifest {
-            return Err(CommandError::Results {
-                path: folder.clone(),
-                message: format!("not of the same study as {}", first.display()),
-            });
-        }
-        results.runs.extend(more.runs);
-    }
-    results.runs.sort_by_key(|run| (run.cell, run.seed));
-    results.runs.dedup();
+    let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
+    let Some(results) = Results::merge(parts?)? else {
+        return Err(CommandError::Arguments("which results folder?".to_owned()));
+    };
     let report = report::build(&results, &first.display().to_string());
     let document = write(&report, out, &results)?;
     if args.json {
@@ -66,38 +57,6 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
         print(text(&document))?;
     }
     Ok(Exit::Done)
-}
-
-/// Reads a results folder. Stands in for `Results::load`, which comes with the study runner: to be
-/// replaced when the two meet.
-fn load(folder: &Path) -> Result<Results, CommandError> {
-    let wrong = |path: &Path, message: String| CommandError::Results {
-        path: path.to_owned(),
-        message,
-    };
-    let read = |path: &Path| {
-        std::fs::read_to_string(path)
-            .map_err(|error| wrong(path, format!("cannot read it: {error}")))
-    };
-    let path = folder.join("manifest.json");
-    let manifest: Manifest = serde_json::from_str(&read(&path)?)
-        .map_err(|error| wrong(&path, format!("not a study's manifest: {error}")))?;
-    let entries = std::fs::read_dir(folder).map_err(|error| wrong(folder, error.to_string()))?;
-    let names = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut paths: Vec<PathBuf> = names
-        .filter(|path| path.extension().is_some_and(|ending| ending == "jsonl"))
-        .collect();
-    paths.sort();
-    let mut runs: Vec<RunRecord> = Vec::new();
-    for path in paths {
-        for (index, line) in read(&path)?.lines().enumerate() {
-            let record = serde_json::from_str(line)
-                .map_err(|error| wrong(&path, format!("line {}: {error}", index + 1)))?;
-            runs.push(record);
-        }
-    }
-    runs.sort_by_key(|run| (run.cell, run.seed));
-    Ok(Results { manifest, runs })
 }
 
 fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, CommandError> {

@@ -16,6 +16,7 @@ use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
 use crate::scenario::{Assembled, Scenario};
 use crate::system::{Registry, Results};
+use crate::wall::timed;
 
 /// Attachments that are the scenario's files have names that start with this.
 pub(super) const FILE_PREFIX: &str = "files/";
@@ -177,17 +178,6 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     }
 }
 
-/// The result and the wall time it took [s].
-#[allow(
-    clippy::disallowed_types,
-    reason = "how long a run takes is for people to know; no simulated code sees it"
-)]
-pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let start = std::time::Instant::now();
-    let result = work();
-    (result, start.elapsed().as_secs_f64())
-}
-
 fn threads(executor: Executor) -> usize {
     match executor {
         Executor::Inline => 1,
@@ -195,7 +185,7 @@ fn threads(executor: Executor) -> usize {
     }
 }
 
-fn log_options(
+pub(super) fn log_options(
     scenario: &Scenario,
     assembled: &Assembled,
     executor: Executor,

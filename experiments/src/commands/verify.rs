@@ -7,11 +7,12 @@ use farside::SimDuration;
 use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome};
 use serde::Serialize;
 
-use super::run::{ExecutorName, FILE_PREFIX, timed};
+use super::run::{ExecutorName, FILE_PREFIX};
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
 use crate::scenario::{Scenario, ScenarioError};
 use crate::system::{Files, Registry};
+use crate::wall::timed;
 
 /// The attachment that holds the resolved scenario.
 const SCENARIO: &str = "scenario.toml";

@@ -5,3 +5,4 @@ mod logs;
 mod report;
 mod running;
 mod scenarios;
+mod studies;

@@ -1,0 +1,201 @@
+//! `farside reproduce`: one run of a study again, logged, and compared with its record.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use farside::Executor;
+use farside_logs::LogWriter;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::run::log_options;
+use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
+use crate::cli::Exit;
+use crate::scenario::{Assembled, Scenario};
+use crate::study::results::{Manifest, Results, RunOutcome};
+use crate::study::{Interrupts, Reproduction, find_run, reproduce};
+use crate::system::Registry;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The study's results folder
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// The cell: its number, or factor values as in loss=0.3,latency=600ms
+    #[arg(long, value_name = "C")]
+    cell: String,
+    /// The seed
+    #[arg(long, value_name = "S")]
+    seed: u64,
+    /// Where to write the log
+    #[arg(long, value_name = "RUN.mcap", default_value = "run.mcap")]
+    out: PathBuf,
+    /// Print the result as one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `reproduce --json` prints.
+#[derive(Serialize)]
+struct Document {
+    study: String,
+    cell: usize,
+    factors: Map<String, Value>,
+    seed: u64,
+    /// `same` or `different`.
+    result: &'static str,
+    differences: Vec<Difference>,
+    run: RunOutcome,
+    log: String,
+    notes: Vec<String>,
+}
+
+/// A part of the record that is not what the run again gives.
+#[derive(Serialize)]
+struct Difference {
+    part: String,
+    recorded: String,
+    rerun: String,
+}
+
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let results = Results::load(&args.folder)?;
+    let manifest = &results.manifest;
+    let record = find_run(&results, &args.cell, args.seed)?;
+    let interrupts = Interrupts::default();
+    let raised = interrupts.clone();
+    interrupt::on_interrupt(move || raised.raise());
+    let mut trouble = None;
+    let again = reproduce(
+        manifest,
+        record,
+        registry,
+        &interrupts,
+        |scenario, assembled| {
+            let observed = observe(args, scenario, assembled);
+            observed.map_err(|error| {
+                let text = error.to_string();
+                trouble = Some(error);
+                text
+            })
+        },
+    )?;
+    if let Some(error) = trouble {
+        return Err(error);
+    }
+    let Some(Reproduction {
+        outcome,
+        differences,
+        unrecorded,
+    }) = again
+    else {
+        let _ = writeln!(
+            std::io::stderr(),
+            "interrupted before the end: nothing is compared"
+        );
+        return Ok(Exit::Failed);
+    };
+    if let Some(error) = unrecorded {
+        let log = args.out.display();
+        // A result of its own: neither the same nor different.
+        let _ = writeln!(
+            std::io::stderr(),
+            "error: {log}: cannot be recorded: {error}"
+        );
+        return Ok(Exit::Failed);
+    }
+    let differences: Vec<Difference> = differences
+        .into_iter()
+        .map(|(part, recorded, rerun)| Difference {
+            part,
+            recorded,
+            rerun,
+        })
+        .collect();
+    let same = differences.is_empty();
+    let names = manifest.factors.iter().map(|factor| factor.name.clone());
+    let document = Document {
+        study: manifest.study.clone(),
+        cell: record.cell,
+        factors: names
+            .zip(manifest.cells[record.cell].values.iter().cloned())
+            .collect(),
+        seed: record.seed,
+        result: if same { "same" } else { "different" },
+        differences,
+        run: outcome,
+        log: args.out.display().to_string(),
+        notes: notes(manifest),
+    };
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print(text(manifest, &document))?;
+    }
+    Ok(if same { Exit::Done } else { Exit::Different })
+}
+
+fn observe(
+    args: &Args,
+    scenario: &Scenario,
+    assembled: &mut Assembled,
+) -> Result<(), CommandError> {
+    let mut options = log_options(scenario, assembled, Executor::Inline)?;
+    let draws = scenario.shared().log.viewer;
+    options.scene = assembled.scene.take().filter(|_| draws);
+    assembled
+        .sim
+        .observe(LogWriter::create(&args.out, options)?);
+    let goal = assembled.goal.take();
+    progress::show(&mut assembled.sim, goal, scenario.shared().until);
+    Ok(())
+}
+
+/// What the reader should know beside the outcome.
+fn notes(manifest: &Manifest) -> Vec<String> {
+    let version = &manifest.code_version;
+    let note = format!(
+        "the results are from version {version}, this is {CODE_VERSION}: they need not agree"
+    );
+    if version == CODE_VERSION {
+        Vec::new()
+    } else {
+        vec![note]
+    }
+}
+
+fn text(manifest: &Manifest, document: &Document) -> String {
+    let cell = &manifest.cells[document.cell];
+    let factors = manifest.factors.iter().zip(&cell.texts);
+    let values: Vec<String> = factors
+        .map(|(factor, text)| format!("{} = {text}", factor.name))
+        .collect();
+    let (number, seed, log) = (document.cell, document.seed, &document.log);
+    let mut text = format!("cell {number} ({}), seed {seed}: ", values.join(", "));
+    if document.differences.is_empty() {
+        match &document.run {
+            RunOutcome::Done { digest, .. } => {
+                text.push_str(&format!("the same, digest {digest}, log {log}\n"));
+            }
+            RunOutcome::Failed { error } => {
+                text.push_str(&format!("fails the same, log {log}\n  {error}\n"));
+            }
+        }
+    } else {
+        text.push_str(&format!("DIFFERENT, log {log}\n"));
+        for difference in &document.differences {
+            let Difference {
+                part,
+                recorded,
+                rerun,
+            } = difference;
+            text.push_str(&format!(
+                "  {part}\n    recorded   {recorded}\n    run again  {rerun}\n"
+            ));
+        }
+    }
+    for note in &document.notes {
+        text.push_str(&format!("  note: {note}\n"));
+    }
+    text
+}

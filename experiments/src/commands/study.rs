@@ -1,0 +1,298 @@
+//! `farside study`: run a study, as far as its folder does not hold its runs already.
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::{CommandError, interrupt, print, print_json};
+use crate::cli::Exit;
+use crate::report::csv::results_csv;
+use crate::study::results::{Results, RunOutcome};
+use crate::study::summary::summarise;
+use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
+use crate::system::Registry;
+
+/// Drawings a second; more is unreadable.
+const DRAWINGS_HZ: u8 = 10;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// A built-in study (see `farside studies`) or a TOML file
+    study: String,
+    /// The folder for results; started again, the study goes on with what is there
+    /// [default: results/STUDY]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// How many runs at once; as many as there are cores unless given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// How many seeds each cell has, instead of the study's; more may be added later
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: Option<u64>,
+    /// Do only this part of the runs, as in 1/4; parts may go to folders of their own
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Set a key of the scenario in every cell, as in team.rovers=25; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Go on where a cell's first runs all fail; failed runs are then no reason to exit with 3
+    #[arg(long)]
+    keep_going: bool,
+    /// Print the result as one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `study --json` prints.
+#[derive(Serialize)]
+struct Document {
+    study: String,
+    question: String,
+    scenario: String,
+    out: String,
+    /// Runs that are done, in the whole folder.
+    runs: usize,
+    /// How many of them failed.
+    failed: usize,
+    /// Runs that are still to do, by other shards.
+    missing: usize,
+    /// Runs in which something happened that must never happen.
+    violated: usize,
+    cells: Value,
+}
+
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let study = Study::open(&args.study)?;
+    let folder = Path::new("results").join(study.name());
+    let folder = args.out.clone().unwrap_or(folder);
+    let plan = study.plan(&args.sets, args.seeds, registry)?;
+    let mut options = RunOptions::new(folder.clone());
+    options.shard = args.shard.unwrap_or(Shard::WHOLE);
+    options.keep_going = args.keep_going;
+    if let Some(jobs) = args.jobs {
+        options.jobs = usize::from(jobs);
+    }
+    let interrupts = Interrupts::default();
+    let raised = interrupts.clone();
+    interrupt::on_interrupt(move || raised.raise());
+    let bar = bar();
+    let mut last = Progress::default();
+    let ended = study::run(plan, &options, &interrupts, &mut |progress| {
+        last = progress;
+        draw(bar.as_ref(), progress);
+    });
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
+    if ended? == Ended::Interrupted {
+        let text = interrupted(args, last, &folder);
+        // The exit code says so too.
+        let _ = writeln!(std::io::stderr(), "{text}");
+        return Ok(Exit::Failed);
+    }
+    let results = Results::load(&folder)?;
+    let missing = results.missing();
+    if missing == 0 {
+        let csv = results_csv(&results);
+        study::replace(&folder.join("results.csv"), csv.as_bytes())?;
+    }
+    tell(args, &results, &folder, missing)
+}
+
+fn interrupted(args: &Args, progress: Progress, folder: &Path) -> String {
+    let (done, total) = (progress.done, progress.total);
+    let study = &args.study;
+    format!(
+        "interrupted: {done} of {total} runs are done, in {}\n  the same command goes on from there: \
+         farside study {study} ...",
+        folder.display()
+    )
+}
+
+/// Prints the result, and says with what to exit.
+fn tell(
+    args: &Args,
+    results: &Results,
+    folder: &Path,
+    missing: usize,
+) -> Result<Exit, CommandError> {
+    let manifest = &results.manifest;
+    let failures = |outcome: &RunOutcome| matches!(outcome, RunOutcome::Failed { .. });
+    let failed = results.runs.iter().filter(|run| failures(&run.outcome));
+    let failed: Vec<_> = failed.collect();
+    let violated = results.runs.iter().filter(
+        |run| matches!(&run.outcome, RunOutcome::Done { violations, .. } if !violations.is_empty()),
+    );
+    let violated: Vec<_> = violated.collect();
+    let cells = serde_json::to_value(summarise(results).cells)?;
+    let cells = with_totals(cells, results);
+    let document = Document {
+        study: manifest.study.clone(),
+        question: manifest.question.clone(),
+        scenario: manifest.scenario.clone(),
+        out: folder.display().to_string(),
+        runs: results.runs.len(),
+        failed: failed.len(),
+        missing,
+        violated: violated.len(),
+        cells,
+    };
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print(text(results, &document))?;
+    }
+    let say = |text: String| {
+        // The exit code says so too.
+        let _ = writeln!(std::io::stderr(), "{text}");
+    };
+    for run in violated.iter().take(3) {
+        let (cell, seed) = (run.cell, run.seed);
+        if let RunOutcome::Done { violations, .. } = &run.outcome {
+            say(format!(
+                "VIOLATED: cell {cell}, seed {seed}: {}",
+                violations.join("; ")
+            ));
+        }
+    }
+    for run in failed.iter().take(3) {
+        let (cell, seed) = (run.cell, run.seed);
+        if let RunOutcome::Failed { error } = &run.outcome {
+            say(format!("FAILED: cell {cell}, seed {seed}: {error}"));
+        }
+    }
+    Ok(if !failed.is_empty() && !args.keep_going {
+        Exit::Failed
+    } else if !violated.is_empty() {
+        Exit::Different
+    } else {
+        Exit::Done
+    })
+}
+
+/// Adds to each cell what metrics that count add up to: whether there was any collision at all is
+/// no matter of means.
+fn with_totals(mut cells: Value, results: &Results) -> Value {
+    let metrics = &results.manifest.metrics;
+    let entries = cells.as_array_mut().into_iter().flatten();
+    for (index, cell) in entries.enumerate() {
+        let mut totals = Map::new();
+        for metric in metrics {
+            let counts: Option<Vec<u64>> = results
+                .of_cell(index)
+                .iter()
+                .filter_map(|run| match &run.outcome {
+                    RunOutcome::Done { metrics, .. } => metrics.get(&metric.name),
+                    RunOutcome::Failed { .. } => None,
+                })
+                .map(Value::as_u64)
+                .collect();
+            if let Some(counts) = counts.filter(|counts| !counts.is_empty()) {
+                totals.insert(metric.name.clone(), counts.iter().sum::<u64>().into());
+            }
+        }
+        if let Some(cell) = cell.as_object_mut() {
+            cell.insert("totals".to_owned(), totals.into());
+        }
+    }
+    cells
+}
+
+/// The figures of each cell, for people.
+fn text(results: &Results, document: &Document) -> String {
+    let manifest = &results.manifest;
+    let mut rows = Vec::new();
+    let factors = manifest.factors.iter().map(|factor| factor.name.clone());
+    let metrics = manifest.metrics.iter().map(|metric| metric.name.clone());
+    let head = ["cell".to_owned()].into_iter().chain(factors);
+    rows.push(head.chain(["runs".to_owned()]).chain(metrics).collect());
+    for (index, cell) in manifest.cells.iter().enumerate() {
+        let mut row = vec![index.to_string()];
+        row.extend(cell.texts.iter().cloned());
+        row.push(results.of_cell(index).len().to_string());
+        for metric in &manifest.metrics {
+            let said = &document.cells[index]["metrics"][&metric.name];
+            let figure = said["mean"].as_f64().or_else(|| said["median"].as_f64());
+            row.push(figure.map_or_else(|| "-".to_owned(), short));
+        }
+        rows.push(row);
+    }
+    let (study, question, out) = (&document.study, &document.question, &document.out);
+    let runs = document.runs;
+    let failed = match document.failed {
+        0 => String::new(),
+        failed => format!(", {failed} of them failed"),
+    };
+    let after = match document.missing {
+        0 => format!("{runs} runs{failed}; {out}/results.csv has each of them"),
+        missing => format!("{runs} runs in {out}{failed}; {missing} are left to other shards"),
+    };
+    format!(
+        "{study}: {question}\n\n{}\nmeans, of lists the medians; {after}\n",
+        columns(&rows)
+    )
+}
+
+/// A number with four digits.
+fn short(number: f64) -> String {
+    let digits = match number.abs() {
+        x if x >= 1000.0 => 0,
+        x if x >= 100.0 => 1,
+        x if x >= 10.0 => 2,
+        _ => 3,
+    };
+    format!("{number:.digits$}")
+}
+
+fn columns(rows: &[Vec<String>]) -> String {
+    let count = rows.first().map_or(0, Vec::len);
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max();
+    let widths: Vec<usize> = (0..count)
+        .map(|column| width(column).unwrap_or(0))
+        .collect();
+    let mut out = String::new();
+    for row in rows {
+        let fields = row.iter().zip(&widths);
+        let fields: Vec<String> = fields
+            .map(|(text, width)| format!("{text:>width$}"))
+            .collect();
+        out.push_str("  ");
+        out.push_str(&fields.join("  "));
+        out.push('\n');
+    }
+    out
+}
+
+/// The progress bar, if stderr is a terminal.
+fn bar() -> Option<ProgressBar> {
+    if !std::io::stderr().is_terminal() {
+        return None;
+    }
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(DRAWINGS_HZ));
+    // A template that is a constant is valid, or was never seen working.
+    let style = ProgressStyle::with_template("{wide_bar} {pos} of {len} runs{msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    Some(bar)
+}
+
+fn draw(bar: Option<&ProgressBar>, progress: Progress) {
+    let Some(bar) = bar else {
+        return;
+    };
+    bar.set_length(progress.total as u64);
+    bar.set_position(progress.done as u64);
+    let wall_s = bar.elapsed().as_secs_f64();
+    if progress.since_start > 0 && wall_s > 0.1 {
+        let rate = progress.since_start as f64 / wall_s;
+        let left = progress.total.saturating_sub(progress.done) as f64 / rate;
+        let left = HumanDuration(std::time::Duration::from_secs_f64(left));
+        let failed = match progress.failed {
+            0 => String::new(),
+            failed => format!(", {failed} failed"),
+        };
+        bar.set_message(format!("{failed}, {rate:.1}/s, {left:#} left"));
+    }
+}

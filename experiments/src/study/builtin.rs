@@ -1,0 +1,39 @@
+//! The studies that are built in.
+
+/// Names and texts, sorted by name.
+const BUILTIN: [(&str, &str); 3] = [
+    (
+        "degradation/latency",
+        include_str!("../../studies/degradation/latency.toml"),
+    ),
+    (
+        "degradation/loss",
+        include_str!("../../studies/degradation/loss.toml"),
+    ),
+    (
+        "degradation/loss-x-latency",
+        include_str!("../../studies/degradation/loss-x-latency.toml"),
+    ),
+];
+
+/// The names of all built-in studies, sorted.
+///
+/// ```
+/// use farside_experiments::study::builtin_names;
+/// assert!(builtin_names().contains(&"degradation/loss"));
+/// ```
+pub fn builtin_names() -> Vec<&'static str> {
+    BUILTIN.iter().map(|(name, _)| *name).collect()
+}
+
+/// The text of a built-in study.
+///
+/// ```
+/// use farside_experiments::study::builtin_text;
+/// assert!(builtin_text("degradation/loss").unwrap().contains("links.default.loss"));
+/// assert_eq!(builtin_text("degradation/moon"), None);
+/// ```
+pub fn builtin_text(name: &str) -> Option<&'static str> {
+    let found = BUILTIN.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| *text)
+}

@@ -1,0 +1,229 @@
+//! Reading results folders, and joining those of several machines.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::error::StoreError;
+use super::results::{FORMAT, Manifest, Results, RunOutcome, RunRecord};
+use super::store::io;
+
+/// The file that says what is run.
+pub(super) const MANIFEST: &str = "manifest.json";
+
+impl Results {
+    /// Reads a results folder, all its shards, as far as it goes.
+    ///
+    /// # Errors
+    /// When it is none, is of another format, or holds a line that is no record; the error names the
+    /// line. A last line that is cut is no error: its run was not done.
+    pub fn load(folder: &Path) -> Result<Results, StoreError> {
+        let manifest = manifest(folder)?;
+        let runs = runs(folder, &manifest)?;
+        Ok(Results { manifest, runs })
+    }
+
+    /// Joins the results of one study from several folders; their order does not matter.
+    ///
+    /// ```
+    /// # use farside_experiments::study::results::*;
+    /// # let manifest = Manifest { format: FORMAT, code_version: "0".into(), study: "s".into(),
+    /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
+    /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
+    /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
+    /// #     stop: None };
+    /// let run = |seed| RunRecord { cell: 0, seed, outcome: RunOutcome::Failed { error: "x".into() } };
+    /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
+    /// let whole = Results::merge([half(2), half(1)])?.unwrap();
+    /// assert_eq!(whole.runs, [run(1), run(2)]);
+    /// # Ok::<(), farside_experiments::study::StoreError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When they are of different studies, or two records of one run differ. None at all give
+    /// `None`.
+    pub fn merge(parts: impl IntoIterator<Item = Results>) -> Result<Option<Results>, StoreError> {
+        let mut parts = parts.into_iter();
+        let Some(mut whole) = parts.next() else {
+            return Ok(None);
+        };
+        for part in parts {
+            if part.manifest != whole.manifest {
+                return Err(StoreError::Unlike {
+                    difference: difference(&whole.manifest, &part.manifest),
+                });
+            }
+            whole.runs.extend(part.runs);
+        }
+        whole.runs = in_order(whole.runs)?;
+        Ok(Some(whole))
+    }
+}
+
+/// The manifest of a results folder.
+pub(super) fn manifest(folder: &Path) -> Result<Manifest, StoreError> {
+    let path = folder.join(MANIFEST);
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(StoreError::NoManifest {
+                path: folder.to_owned(),
+            });
+        }
+        Err(error) => return Err(io(&path, "cannot read it")(error)),
+    };
+    let corrupt = |error: serde_json::Error| StoreError::Corrupt {
+        path: path.clone(),
+        line: None,
+        message: format!("not a study's manifest: {error}"),
+    };
+    // The format decides what else there can be, so it is looked at first.
+    let value: Value = serde_json::from_slice(&bytes).map_err(corrupt)?;
+    match value.get("format") {
+        Some(format) if format.as_u64() != Some(u64::from(FORMAT)) => Err(StoreError::Format {
+            path,
+            found: format.to_string(),
+            expected: FORMAT,
+        }),
+        _ => serde_json::from_value(value).map_err(corrupt),
+    }
+}
+
+/// All records in a folder, in order.
+pub(super) fn runs(folder: &Path, manifest: &Manifest) -> Result<Vec<RunRecord>, StoreError> {
+    let mut names = Vec::new();
+    let entries = std::fs::read_dir(folder).map_err(io(folder, "cannot read it"))?;
+    for entry in entries {
+        let entry = entry.map_err(io(folder, "cannot read it"))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let ours = name == "runs.jsonl" || name.starts_with("runs-") && name.ends_with(".jsonl");
+        if ours {
+            names.push(name);
+        }
+    }
+    names.sort();
+    let mut runs = Vec::new();
+    for name in names {
+        let path = folder.join(name);
+        let bytes = std::fs::read(&path).map_err(io(&path, "cannot read it"))?;
+        records(&path, &bytes, manifest, &mut runs)?;
+    }
+    in_order(runs)
+}
+
+/// The records of one file; a last line that is cut is none.
+fn records(
+    path: &Path,
+    bytes: &[u8],
+    manifest: &Manifest,
+    runs: &mut Vec<RunRecord>,
+) -> Result<(), StoreError> {
+    let corrupt = |line: usize, message: String| StoreError::Corrupt {
+        path: path.to_owned(),
+        line: Some(line),
+        message,
+    };
+    let Some(whole) = bytes.iter().rposition(|byte| *byte == b'\n') else {
+        return Ok(());
+    };
+    for (index, line) in bytes[..whole].split(|byte| *byte == b'\n').enumerate() {
+        let record: RunRecord = serde_json::from_slice(line).map_err(|error| {
+            corrupt(
+                index + 1,
+                format!(
+                    "not a record of a run: {error}\n  remove the line, and the study runs it again"
+                ),
+            )
+        })?;
+        if record.cell >= manifest.cells.len() {
+            let (cell, last) = (record.cell, manifest.cells.len() - 1);
+            return Err(corrupt(
+                index + 1,
+                format!("cell {cell}: the last one is {last}"),
+            ));
+        }
+        if !manifest.seeds.contains(&record.seed) {
+            let message = format!("seed {}: the study has no such seed", record.seed);
+            return Err(corrupt(index + 1, message));
+        }
+        runs.push(record);
+    }
+    Ok(())
+}
+
+/// The records in order of (cell, seed), each run once.
+fn in_order(mut runs: Vec<RunRecord>) -> Result<Vec<RunRecord>, StoreError> {
+    runs.sort_by_key(|run| (run.cell, run.seed));
+    for pair in runs.windows(2) {
+        let [a, b] = pair else { continue };
+        if (a.cell, a.seed) == (b.cell, b.seed) && a != b {
+            let mut outcomes = [a, b].map(|run| told(&run.outcome));
+            if outcomes[0] == outcomes[1] {
+                outcomes = [a, b].map(|run| format!("{:?}", run.outcome));
+            }
+            outcomes.sort();
+            let [one, other] = outcomes;
+            return Err(StoreError::Conflict {
+                cell: a.cell,
+                seed: a.seed,
+                a: one,
+                b: other,
+            });
+        }
+    }
+    runs.dedup();
+    Ok(runs)
+}
+
+fn told(outcome: &RunOutcome) -> String {
+    match outcome {
+        RunOutcome::Done { digest, .. } => format!("digest {digest}"),
+        RunOutcome::Failed { error } => format!("failed: {error}"),
+    }
+}
+
+/// What differs between two manifests, for people; `a` is what is there.
+pub(super) fn difference(a: &Manifest, b: &Manifest) -> String {
+    let texts = [
+        ("code version", &a.code_version, &b.code_version),
+        ("study", &a.study, &b.study),
+        ("scenario", &a.scenario, &b.scenario),
+        ("question", &a.question, &b.question),
+    ];
+    let mut found = Vec::new();
+    for (what, there, here) in texts {
+        if there != here {
+            found.push(format!("{what} {there:?} there, {here:?} here"));
+        }
+    }
+    if a.scenario_text != b.scenario_text {
+        let mut lines = a.scenario_text.lines().zip(b.scenario_text.lines());
+        let line = lines.find(|(there, here)| there != here);
+        found.push(match line {
+            Some((there, here)) => format!("the scenario: {there:?} there, {here:?} here"),
+            None => "the scenario: one has more lines".to_owned(),
+        });
+    }
+    if a.seeds != b.seeds {
+        let (there, here) = (a.seeds.len(), b.seeds.len());
+        found.push(if there == here {
+            "the seeds".to_owned()
+        } else {
+            format!("{there} seeds there, {here} here")
+        });
+    }
+    let parts = [
+        ("the files that the scenario reads", a.files != b.files),
+        ("the factors", a.factors != b.factors),
+        ("the cells", a.cells != b.cells),
+        ("the metrics", a.metrics != b.metrics),
+        ("the baseline", a.baseline != b.baseline),
+        ("the stopping rule", a.stop != b.stop),
+    ];
+    for (what, differs) in parts {
+        if differs {
+            found.push(what.to_owned());
+        }
+    }
+    found.join("; ")
+}

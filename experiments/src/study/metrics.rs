@@ -1,0 +1,88 @@
+//! Metrics: labels and units of those that are known, and which a run has.
+
+use serde_json::{Map, Value};
+
+use super::file::MetricFile;
+use super::results::Metric;
+
+/// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
+const KERNEL: [&str; 8] = [
+    "events",
+    "sim_time_s",
+    "violations",
+    "messages.sent",
+    "messages.delivered",
+    "messages.lost",
+    "messages.duplicated",
+    "messages.in_flight",
+];
+
+/// Labels and units of metrics whose names say too little, by name.
+const KNOWN: [(&str, &str, &str); 23] = [
+    ("arrival_s", "time to the goal", "s"),
+    ("arrived", "rovers at their goals", "rovers"),
+    ("collisions", "collisions", ""),
+    ("completed", "all rovers at their goals", ""),
+    ("cycles", "planning cycles", "cycles"),
+    ("deadlocked", "standstill", ""),
+    ("events", "events", "events"),
+    ("intervention_rate", "cycles with an intervention", ""),
+    ("interventions", "interventions", "cycles"),
+    ("max_plus_iterations", "max-plus iterations per cycle", ""),
+    ("mean_backtracks", "moves back per rover", ""),
+    ("mean_steps", "steps per rover", ""),
+    ("mean_stops", "stops per rover", ""),
+    ("messages.delivered", "message copies delivered", "messages"),
+    (
+        "messages.duplicated",
+        "message copies duplicated",
+        "messages",
+    ),
+    (
+        "messages.in_flight",
+        "message copies under way at the end",
+        "messages",
+    ),
+    ("messages.lost", "message copies lost", "messages"),
+    ("messages.sent", "messages sent", "messages"),
+    ("path_ratio", "steps over the shortest path", ""),
+    ("rovers", "rovers", "rovers"),
+    ("sim_time_s", "virtual time", "s"),
+    ("time_ratio", "time over the shortest path", ""),
+    ("violations", "violations", ""),
+];
+
+/// A metric with what the study leaves open filled in.
+pub(super) fn metric(file: &MetricFile) -> Metric {
+    let known = KNOWN.iter().find(|(name, ..)| *name == file.name);
+    let (label, unit) = known.map_or((file.name.as_str(), ""), |(_, label, unit)| (label, unit));
+    Metric {
+        name: file.name.clone(),
+        label: file.label.clone().unwrap_or_else(|| label.to_owned()),
+        unit: file.unit.clone().unwrap_or_else(|| unit.to_owned()),
+    }
+}
+
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers; or nothing yet.
+fn is_measure(value: &Value) -> bool {
+    match value {
+        Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,
+        Value::Array(entries) => entries
+            .iter()
+            .all(|entry| entry.is_number() || entry.is_null()),
+        Value::Object(_) => false,
+    }
+}
+
+/// Whether a run with these results can be measured by it.
+pub(super) fn is_measurable(results: &Map<String, Value>, name: &str) -> bool {
+    let lost_for = |reason: &str| !reason.is_empty();
+    measurable(results).contains(&name) || name.strip_prefix("messages.lost.").is_some_and(lost_for)
+}
+
+/// What a run with these results can be measured by.
+pub(super) fn measurable(results: &Map<String, Value>) -> Vec<&str> {
+    let of_the_system = results.iter().filter(|(_, value)| is_measure(value));
+    let names = of_the_system.map(|(name, _)| name.as_str());
+    names.chain(KERNEL).collect()
+}
