@@ -6,7 +6,7 @@ use super::colours::SERIES;
 use crate::study::results::{Manifest, Scale};
 
 /// The most plots of one kind for one metric; with more, a choice of them is shown.
-const PANELS: usize = 6;
+pub(super) const PANELS: usize = 6;
 
 /// A factor that takes more than one value.
 #[derive(Clone, Debug)]

@@ -43,10 +43,13 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
             if let Some(curves) = study.layout.curves() {
                 let all = |shown| curves::all(study, measure, &curves, shown);
                 plots.figures.extend(all(Shown::Estimate));
-                // A heat map has the place of the differences; the table has both.
+                // Differences are plotted where that is no flood of plots; tables always have them.
                 match heat::map(study, measure) {
                     Some(map) => plots.figures.push(map),
-                    None => plots.figures.extend(all(Shown::Difference)),
+                    None if curves.panels.len() == 1 => {
+                        plots.figures.extend(all(Shown::Difference));
+                    }
+                    None => {}
                 }
                 if curves.more {
                     plots.notes.push(

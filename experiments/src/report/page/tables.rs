@@ -74,17 +74,21 @@ fn overview_field(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
             @if estimate.width() != 0.0 { small { (measure.style.interval(&estimate)) } }
             // Nothing more is to be said of what never varies.
             @if let Some(difference) = measure.difference(cell).filter(|one| one.width() != 0.0) {
-                (marked(measure.style.of_differences(), &difference))
+                (marked(measure.style.of_differences(), &difference, measure.n(cell)))
             }
         }
     }
 }
 
+/// From so many runs on a difference is marked: with five, chance alone has all of them on one side
+/// of 0 in one case of sixteen, and a bootstrap of values on one side is sure of it.
+const MARKED_FROM: usize = 6;
+
 /// A difference, marked if its interval leaves out 0.
-fn marked(style: Style, difference: &Estimate) -> Markup {
-    let sure = difference.low > 0.0 || difference.high < 0.0;
-    let known = difference.is_known();
-    let sign = match (sure && known, difference.value > 0.0) {
+fn marked(style: Style, difference: &Estimate, runs: usize) -> Markup {
+    let apart = difference.low > 0.0 || difference.high < 0.0;
+    let sure = apart && difference.is_known() && runs >= MARKED_FROM;
+    let sign = match (sure, difference.value > 0.0) {
         (true, true) => "\u{a0}▲",
         (true, false) => "\u{a0}▼",
         _ => "",

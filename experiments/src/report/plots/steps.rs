@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::{BELOW, HEIGHT, Plots, TOP, WIDTH, area};
-use crate::report::colours::DASHES;
-use crate::report::layout::{Panel, Series, spread};
+use crate::report::colours::{DASHES, SERIES};
+use crate::report::layout::{PANELS, Panel, Series, spread};
 use crate::report::measure::{Measure, Study};
 use crate::report::scale::Scale;
 use crate::report::svg::{
@@ -37,6 +37,14 @@ struct Kind {
     title: &'static str,
     x: Scale,
 }
+
+const DISTRIBUTION: &str = "Distributions pool the lists of all runs of a cell. They are cut at the right, where at least \
+     99 % of each cell is past.";
+
+const SURVIVAL: &str = "Survival curves are those of Kaplan and Meier. What had not happened when a run's time was over \
+     is censored there, as it might still have. In a run that ended otherwise, such as a team at a \
+     standstill, it never happens, and stays at risk to the end. Bands take whole runs as what varies \
+     by chance.";
 
 /// Survival curves, if anything listed had not happened when its run ended; the distribution if all
 /// had.
@@ -91,20 +99,13 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
             x: Scale::measured(ends.chain([0.0])),
         }
     };
-    if all_happened {
-        plots.notes.push(
-            "Distributions pool the lists of all runs of a cell. They are cut at the right where \
-             99.5 % of each cell is past."
-                .to_owned(),
-        );
-    } else {
-        plots.notes.push(
-            "Survival curves are those of Kaplan and Meier. What had not happened when a run's \
-             time was over is censored there, as it might still have. In a run that ended \
-             otherwise, such as a team at a standstill, it never happens, and stays at risk to the \
-             end. Bands take whole runs as what varies by chance."
-                .to_owned(),
-        );
+    plots
+        .notes
+        .push(if all_happened { DISTRIBUTION } else { SURVIVAL }.to_owned());
+    let shown: usize = curves.iter().map(|(_, curves)| curves.len()).sum();
+    if shown < study.summary.cells.len() {
+        let note = "There are more cells than are plotted here; an even choice is shown.";
+        plots.notes.push(note.to_owned());
     }
     let figures = curves
         .into_iter()
@@ -120,7 +121,7 @@ fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
         cells: vec![cell],
     };
     let Some(curves) = study.layout.curves() else {
-        let cells = spread(study.summary.cells.len(), 5);
+        let cells = spread(study.summary.cells.len(), SERIES);
         let name = |cell: usize| {
             if study.summary.cells.len() == 1 {
                 String::new()
@@ -151,7 +152,9 @@ fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
         let cells: Vec<usize> = cells
             .flat_map(|series| series.cells.iter().copied())
             .collect();
-        let shown = spread(cells.len(), 5).into_iter().map(|index| cells[index]);
+        let shown = spread(cells.len(), SERIES)
+            .into_iter()
+            .map(|index| cells[index]);
         let series = shown.map(|cell| one(text(cell), cell)).collect();
         return (
             Some(curves.x),
@@ -164,9 +167,9 @@ fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
     let along = &study.layout.axes[by];
     let mut parted = Vec::new();
     for panel in &curves.panels {
-        for index in spread(panel.series.len(), 5) {
+        for index in spread(panel.series.len(), PANELS) {
             let series = &panel.series[index];
-            let shown = spread(series.cells.len(), 5)
+            let shown = spread(series.cells.len(), SERIES)
                 .into_iter()
                 .map(|at| series.cells[at]);
             let mut name = format!("{} {}", along.name(), series.name);
@@ -177,7 +180,7 @@ fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
             parted.push(Panel { name, series });
         }
     }
-    let chosen = spread(parted.len(), 6)
+    let chosen = spread(parted.len(), PANELS)
         .into_iter()
         .map(|index| parted[index].clone());
     (Some(curves.x), chosen.collect())
