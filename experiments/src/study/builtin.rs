@@ -1,7 +1,11 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 3] = [
+const BUILTIN: [(&str, &str); 5] = [
+    (
+        "degradation/bursts",
+        include_str!("../../studies/degradation/bursts.toml"),
+    ),
     (
         "degradation/latency",
         include_str!("../../studies/degradation/latency.toml"),
@@ -13,6 +17,10 @@ const BUILTIN: [(&str, &str); 3] = [
     (
         "degradation/loss-x-latency",
         include_str!("../../studies/degradation/loss-x-latency.toml"),
+    ),
+    (
+        "degradation/node-failure",
+        include_str!("../../studies/degradation/node-failure.toml"),
     ),
 ];
 
