@@ -12,7 +12,7 @@ use super::route::{Flow, TrafficPlan};
 /// ```
 /// use farside_actors::traffic::TrafficMetrics;
 /// let metrics = TrafficMetrics { sent: 4, delivered: 3, ..TrafficMetrics::default() };
-/// assert!(metrics.delays_s.is_empty());
+/// assert!(metrics.delays_s.is_empty() && metrics.delay_mean_s.is_none());
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrafficMetrics {
