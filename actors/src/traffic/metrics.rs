@@ -12,7 +12,7 @@ use super::route::{Flow, TrafficPlan};
 /// ```
 /// use farside_actors::traffic::TrafficMetrics;
 /// let metrics = TrafficMetrics { sent: 4, delivered: 3, ..TrafficMetrics::default() };
-/// assert!(metrics.delays_s.is_empty());
+/// assert!(metrics.delays_s.is_empty() && metrics.delay_mean_s.is_none());
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrafficMetrics {
@@ -141,7 +141,6 @@ impl FlowMetrics {
             Some((last, _)) if is_over => last,
             _ => end,
         };
-        let age = tally.age.until(until);
         FlowMetrics {
             name: flow.to_string(),
             sent: tally.sent,
@@ -150,7 +149,7 @@ impl FlowMetrics {
             delay_mean_s: mean_s(tally.delay_sum_ns, tally.delivered),
             delay_max_s: (tally.delivered > 0).then(|| seconds(tally.delay_max_ns)),
             age_mean_s: tally.age.mean_s(until),
-            age_peak_s: age.fresh.map(|_| seconds(age.peak_ns)),
+            age_peak_s: tally.age.peak_ns(until).map(seconds),
             duplicates: tally.duplicates,
             reordered: tally.reordered,
         }

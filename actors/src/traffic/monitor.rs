@@ -59,8 +59,8 @@ pub(super) struct Age {
     /// Twice the age integrated over time since the first arrival, up to the last fresh one
     /// \[ns^2\].
     pub(super) twice_area: u128,
-    /// The greatest age so far \[ns\].
-    pub(super) peak_ns: u64,
+    /// The greatest age up to the last fresh arrival \[ns\].
+    peak_ns: u64,
 }
 
 impl Age {
@@ -72,7 +72,6 @@ impl Age {
             Some(_) => *self = self.until(now),
         }
         self.fresh = Some((now, sent));
-        self.peak_ns = self.peak_ns.max(now.since(sent).as_nanos());
     }
 
     /// The same with the time up to `now` counted.
@@ -80,10 +79,19 @@ impl Age {
         if let Some((since, sent)) = self.fresh {
             let square = |time: SimTime| u128::from(time.since(sent).as_nanos()).pow(2);
             self.twice_area = self.twice_area.saturating_add(square(now) - square(since));
-            self.peak_ns = self.peak_ns.max(now.since(sent).as_nanos());
+            // Of several that arrive at once the freshest counts: no age without time.
+            if now > since {
+                self.peak_ns = self.peak_ns.max(now.since(sent).as_nanos());
+            }
             self.fresh = Some((now, sent));
         }
         self
+    }
+
+    /// The greatest age up to `end` \[ns\]; `None` if nothing has arrived.
+    pub(super) fn peak_ns(self, end: SimTime) -> Option<u64> {
+        let (_, sent) = self.fresh?;
+        Some(self.peak_ns.max(end.since(sent).as_nanos()))
     }
 
     /// The mean age up to `end` \[s\]; `None` if no time has passed since the first arrival.
@@ -226,5 +234,42 @@ impl FlowTally {
         self.latest = self.latest.max(Some(number));
         self.age.arrival(now, sent);
         Some(delay_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn ages_are_those_told_instant_by_instant(
+            messages in prop::collection::vec((0u64..60, 0u64..40), 1..12),
+            rest in 0u64..20,
+        ) {
+            // (arrival, sent) of messages that overtake each other, in order of arrival.
+            let mut arrivals: Vec<(u64, u64)> =
+                messages.iter().map(|(sent, delay)| (sent + delay, *sent)).collect();
+            arrivals.sort_unstable();
+            let (first, end) = (arrivals[0].0, arrivals[arrivals.len() - 1].0 + rest);
+            let mut age = Age::default();
+            for (at, sent) in &arrivals {
+                age.arrival(SimTime::from_nanos(*at), SimTime::from_nanos(*sent));
+            }
+            let freshest = |at: u64| {
+                let known = arrivals.iter().filter(|(arrival, _)| *arrival <= at);
+                known.map(|(_, sent)| *sent).max().unwrap()
+            };
+            // Over a nanosecond the age grows by one, so its mean is half of one more.
+            let twice: u64 = (first..end).map(|at| 2 * (at - freshest(at)) + 1).sum();
+            let mean_s = age.mean_s(SimTime::from_nanos(end));
+            let told = (end > first).then(|| twice as f64 / (2 * (end - first)) as f64 / 1e9);
+            prop_assert_eq!(mean_s, told);
+            // The greatest age is reached just before a fresh arrival, or at the end.
+            let just_before = (first + 1..=end).map(|at| at - freshest(at - 1));
+            let peak = just_before.chain([first - freshest(first)]).max();
+            prop_assert_eq!(age.peak_ns(SimTime::from_nanos(end)), peak);
+        }
     }
 }

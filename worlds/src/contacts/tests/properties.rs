@@ -44,6 +44,20 @@ fn plans() -> impl Strategy<Value = ContactPlan> {
     })
 }
 
+/// Some spans of time, one after the other: start, end and a small number.
+fn spans() -> impl Strategy<Value = Vec<(u64, u64, u64)>> {
+    let span = (prop_oneof![Just(0u64), 1..6u64], 1..12u64, 0..4u64);
+    prop::collection::vec(span, 0..6).prop_map(|spans| {
+        let mut end = 0;
+        let next = |(gap, length, number)| {
+            let start = end + gap;
+            end = start + length;
+            (start, end, number)
+        };
+        spans.into_iter().map(next).collect()
+    })
+}
+
 /// The light time and rate at an instant, told by looking at every line.
 fn at_instant(text: &str, from: u64, to: u64, at: u64) -> Option<(u64, u64)> {
     let lines = || text.lines().map(|line| line.split(' ').collect::<Vec<_>>());
@@ -89,24 +103,38 @@ proptest! {
 
     #[test]
     fn every_instant_of_a_contact_has_the_range_that_covers_it(
-        ranges in prop::collection::vec((0u64..2, 0u64..30, 1u64..40, 0u64..4), 0..6),
-        contacts in prop::collection::vec((0u64..2, 0u64..40, 1u64..30), 1..4),
+        forward in spans(),
+        back in spans(),
+        contacts in [spans(), spans()],
     ) {
         let mut text = String::new();
-        for (way, start, length, owlt) in ranges {
-            let (a, b) = if way == 0 { (1, 2) } else { (2, 1) };
-            text += &format!("a range +{start} +{} {a} {b} {owlt}\n", start + length);
+        for (a, b, spans) in [(1, 2, forward), (2, 1, back)] {
+            for (start, end, owlt) in spans {
+                text += &format!("a range +{start} +{end} {a} {b} {owlt}\n");
+            }
         }
-        for (index, (way, start, length)) in contacts.into_iter().enumerate() {
-            let (a, b) = if way == 0 { (1, 2) } else { (2, 1) };
-            let end = start + length;
-            text += &format!("a contact +{start} +{end} {a} {b} {}\n", index + 1);
+        let ranges = text.clone();
+        for ((a, b), spans) in [(1, 2), (2, 1)].into_iter().zip(contacts) {
+            for (start, end, rate) in spans {
+                // What no range covers is refused, for good reason; the rest must be right.
+                let line = format!("a contact +{start} +{end} {a} {b} {}\n", rate + 1);
+                let is_covered = ContactPlan::from_ion(format!("{ranges}{line}").as_bytes()).is_ok();
+                let told = (start..end).all(|at| {
+                    at_instant(&format!("{ranges}{line}"), a, b, at).is_some()
+                });
+                prop_assert_eq!(is_covered, told, "{}{}", ranges, line);
+                if is_covered {
+                    text += &line;
+                }
+            }
         }
-        // What overlaps or is not covered is refused; what is read must be right.
-        let Ok(plan) = ContactPlan::from_ion(text.as_bytes()) else { return Ok(()) };
+        let Ok(plan) = ContactPlan::from_ion(text.as_bytes()) else {
+            prop_assert!(!text.contains("contact"));
+            return Ok(());
+        };
         for (from, to) in [(1, 2), (2, 1)] {
             let windows = plan.contact_windows(&from.to_string(), &to.to_string());
-            for at in 0..80 {
+            for at in 0..110 {
                 let instant = SimTime::ZERO + SimDuration::from_secs(at);
                 let open = windows.iter().find(|w| w.start <= instant && instant < w.end);
                 let told = open.map(|w| (w.rate_bit_per_s, w.owlt.as_nanos() / 1_000_000_000));
@@ -136,9 +164,9 @@ proptest! {
         for (n, at) in all.iter().enumerate() {
             prop_assert_eq!(ms(trace.opportunity(n as u64)), *at);
         }
-        // Half a millisecond tells `at` from `after`.
-        for half in [0, 500_000] {
-            let instant = SimTime::from_nanos(from * 1_000_000 + half);
+        // A nanosecond tells `at` from `after`.
+        for more in [0, 1, 500_000, 999_999] {
+            let instant = SimTime::from_nanos(from * 1_000_000 + more);
             let first = all.iter().position(|at| at * 1_000_000 >= instant.as_nanos()).unwrap();
             prop_assert_eq!(trace.first_from(instant), first as u64);
             prop_assert_eq!(ms(trace.next_opportunity(instant)), all[first]);
