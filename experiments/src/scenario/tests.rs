@@ -2,6 +2,7 @@
 //! scenarios that give the same run.
 
 use farside::Executor;
+use farside_actors::link::Preset;
 
 use super::*;
 
@@ -202,6 +203,22 @@ fn every_parameter_of_links_can_be_set() {
     let again = parse(&resolved, &[]).unwrap();
     assert_eq!(again.shared(), scenario.shared());
     scenario.assemble().unwrap();
+}
+
+#[test]
+fn every_preset_carries_traffic() {
+    let text = builtin_text("traffic/open-loop").unwrap();
+    for name in Preset::names() {
+        let preset = format!("links.default.preset={name}");
+        let scenario = parse(text, &["until=30min", &preset, "links.default.tx_power=1W"]).unwrap();
+        let report = scenario
+            .assemble()
+            .unwrap()
+            .sim
+            .run(Executor::Inline)
+            .unwrap();
+        assert!(report.counts.delivered > 0, "{name}");
+    }
 }
 
 #[test]

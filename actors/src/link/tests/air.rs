@@ -154,6 +154,39 @@ fn what_waits_meets_what_holds_when_it_is_sent() {
 }
 
 #[test]
+fn what_waits_has_the_parameters_of_its_own_transmission() {
+    let text = "
+        links.default = { rate = '1bit/s', latency = '1s', loss = 1.0 }
+        [[degrade]]
+        at = '5min'
+        links = '*'
+        rate = '2bit/s'
+        latency = '7s'
+        loss = 0.0
+        tx_power = '3W'
+    ";
+    let seen = scenario(
+        15,
+        &[Send {
+            at: SimTime::ZERO,
+            pad: 43,
+        }; 2],
+        &["b"],
+        text,
+    );
+    let secs = SimDuration::from_secs;
+    // The first, 360 bits, goes at 1 bit/s whatever comes; the second finds all changed.
+    assert_eq!((seen[0].reason, seen[0].delay), (LOSS, secs(360)));
+    let parts = seen[1].parts();
+    assert_eq!((seen[1].reason, parts.queue), ("", secs(360)));
+    assert_eq!(
+        (parts.serialization, parts.propagation),
+        (secs(180), secs(7))
+    );
+    assert_eq!((seen[0].parts().energy_j, parts.energy_j), (0.0, 540.0));
+}
+
+#[test]
 fn messages_wait_for_the_contact_they_fit_into() {
     let windows = "[{ start = '1s', end = '2s', rate = '800bit/s' }, \
         { start = '5s', end = '9s', rate = '400bit/s', owlt = '300ms' }]";
