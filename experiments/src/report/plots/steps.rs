@@ -298,10 +298,10 @@ fn named(measure: &Measure<'_>, kind: &Kind, panel: &str, heading: &str, body: M
     }
 }
 
-/// The line in steps, over its band; of the steps within half a pixel, the last is drawn.
+/// The line in steps, over its band; of the steps within a pixel, the last is drawn.
 fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize) -> Markup {
     let series = series % DASHES.len();
-    let column = |step: &Step| (2.0 * area.x(x.place(step.x))) as usize;
+    let column = |step: &Step| area.x(x.place(step.x)) as usize;
     let mut kept: Vec<&Step> = Vec::new();
     let shown = curve.steps.iter().filter(|step| step.x <= x.high());
     for step in shown {
@@ -324,8 +324,12 @@ fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize) -> Markup {
     };
     let upper = corners(&|step| step.high);
     let lower = corners(&|step| step.low);
+    // Distributions have no intervals.
+    let banded = upper != lower;
     html! {
-        path class={ "band s" (series) } d=(path(upper.into_iter().chain(lower.into_iter().rev()))) {}
+        @if banded {
+            path class={ "band s" (series) } d=(path(upper.into_iter().chain(lower.into_iter().rev()))) {}
+        }
         path class={ "line s" (series) } stroke-dasharray=(DASHES[series])
             d=(path(corners(&|step| step.share))) { title { (curve.name) } }
     }
