@@ -12,7 +12,7 @@ use super::run::log_options;
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
 use crate::scenario::{Assembled, Scenario};
-use crate::study::results::{Manifest, Results, RunOutcome};
+use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
 use crate::study::{Interrupts, Reproduction, find_run, reproduce};
 use crate::system::Registry;
 
@@ -104,6 +104,23 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         );
         return Ok(Exit::Failed);
     }
+    let document = document(args, manifest, record, outcome, differences);
+    let same = document.differences.is_empty();
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print(text(manifest, &document))?;
+    }
+    Ok(if same { Exit::Done } else { Exit::Different })
+}
+
+fn document(
+    args: &Args,
+    manifest: &Manifest,
+    record: &RunRecord,
+    outcome: RunOutcome,
+    differences: Vec<(String, String, String)>,
+) -> Document {
     let differences: Vec<Difference> = differences
         .into_iter()
         .map(|(part, recorded, rerun)| Difference {
@@ -114,7 +131,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         .collect();
     let same = differences.is_empty();
     let names = manifest.factors.iter().map(|factor| factor.name.clone());
-    let document = Document {
+    Document {
         study: manifest.study.clone(),
         cell: record.cell,
         factors: names
@@ -126,13 +143,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         run: outcome,
         log: args.out.display().to_string(),
         notes: notes(manifest),
-    };
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print(text(manifest, &document))?;
     }
-    Ok(if same { Exit::Done } else { Exit::Different })
 }
 
 fn observe(

@@ -153,25 +153,30 @@ fn a_killed_study_goes_on_and_ends_the_same() {
     }
 }
 
-#[test]
-fn a_run_is_reproduced_from_the_folder_alone() {
-    let folder = tempfile::tempdir().unwrap();
+/// Runs a study over a roadmap and a scenario in files of their own.
+fn run_on_a_ring(folder: &Path) {
     let map = "name = 'ring'\nboundary = [0, 2]\nedges = [[0, 1], [1, 2], [2, 3], [0, 3]]\n\
         positions_m = [[0, 0], [50, 0], [50, 50], [0, 50]]";
-    write(folder.path(), "ring.toml", map);
+    write(folder, "ring.toml", map);
     let scenario = "system = 'network'\nuntil = '30s'\nworld.roadmap = 'ring.toml'\n\
         world.nodes = 2\nteam.rovers = 2";
-    write(folder.path(), "mine.toml", scenario);
+    write(folder, "mine.toml", scenario);
     let text_of = SMALL.replace("network/crater-dense", "mine.toml");
     write(
-        folder.path(),
+        folder,
         "small.toml",
         &text_of.replace("team.rovers = 3", "team.rovers = 2"),
     );
     study(
-        folder.path(),
+        folder,
         &["--out", "out", "--set", "links.default.latency=8ms"],
     );
+}
+
+#[test]
+fn a_run_is_reproduced_from_the_folder_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    run_on_a_ring(folder.path());
     for file in ["ring.toml", "mine.toml", "small.toml"] {
         std::fs::remove_file(folder.path().join(file)).unwrap();
     }
