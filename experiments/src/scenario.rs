@@ -329,7 +329,12 @@ impl Scenario {
         if let Some(contacts) = &contacts {
             contacts::hand_over(contacts, &mut links);
         }
-        let traces = links.read_traces(|name| contacts::read_trace(name, &mut files));
+        let mut notes = Vec::new();
+        let traces = links.read_traces(|name| {
+            let trace = contacts::read_trace(name, &mut files)?;
+            notes.push(format!("trace {name:?}: {trace}"));
+            Ok(trace)
+        });
         traces.map_err(|error| wrong(error.into()))?;
         let mut setup = Setup {
             seed,
@@ -347,7 +352,6 @@ impl Scenario {
         links
             .finish(&mut sim)
             .map_err(|error| wrong(error.into()))?;
-        let mut notes = Vec::new();
         if let Some(contacts) = &contacts {
             contacts.check_hosts(&sim).map_err(wrong)?;
             notes.extend(contacts.notes(&sim));

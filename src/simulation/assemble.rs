@@ -38,19 +38,7 @@ impl Simulation {
         let (engine_of_host, engine_of_shared, engine_count) = self.deal(split);
         let places = self.place(&ranked, &engine_of_host, engine_of_shared, engine_count);
         let look_ahead = self.look_ahead();
-        let mut links: FixedMap<EntityId, LinkPlan> = FixedMap::default();
-        for (link, entity) in self.links.iter().zip(&ranked.links) {
-            let min_delay = link.carrier.min_delay();
-            let change_kind = kinds.of_type[&link.change.type_id];
-            links.insert(
-                *entity,
-                LinkPlan {
-                    min_delay,
-                    shared: link.host.is_none(),
-                    change_kind,
-                },
-            );
-        }
+        let links = self.link_plans(&ranked, &kinds);
         let wants: Vec<_> = self
             .observers
             .iter()
@@ -106,6 +94,18 @@ impl Simulation {
             observers,
             interrupt,
         })
+    }
+
+    fn link_plans(&self, ranked: &Ranked, kinds: &Kinds) -> FixedMap<EntityId, LinkPlan> {
+        let plan = |(link, entity): (&LinkDecl, &EntityId)| {
+            let plan = LinkPlan {
+                min_delay: link.carrier.min_delay(),
+                shared: link.host.is_none(),
+                change_kind: kinds.of_type[&link.change.type_id],
+            };
+            (*entity, plan)
+        };
+        self.links.iter().zip(&ranked.links).map(plan).collect()
     }
 
     fn check_names(&self) -> Result<(), BuildError> {

@@ -169,7 +169,7 @@ pub struct Assignment {
 }
 
 /// A rover's state as it records it at every change: the truth, not what a node believes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverState {
     /// Who, where, after how many steps. With `moving_to`, it is on the edge between the two
     /// vertices.
@@ -178,6 +178,8 @@ pub struct RoverState {
     pub entry: VertexId,
     /// Where it wants to go.
     pub goal: VertexId,
+    /// What links have charged it so far for what it transmitted \[J\].
+    pub transmit_energy_j: f64,
 }
 
 /// What a node records of itself once in each cycle, when vertices are granted.

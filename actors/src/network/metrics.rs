@@ -36,6 +36,9 @@ pub struct NetworkMetrics {
     /// When each rover reached its goal, in seconds of virtual time, rover by rover; none for those
     /// that had not when the run ended.
     pub arrival_s: Vec<Option<f64>>,
+    /// What links charged all rovers for what they transmitted, each until the last change that it
+    /// recorded \[J\]; 0 unless links have a `tx_power`.
+    pub transmit_energy_j: f64,
     /// Times a rover claimed a vertex that another one had, or took an edge against another.
     pub collisions: u32,
     /// How the team came to a standstill, if it did.

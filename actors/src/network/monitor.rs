@@ -25,6 +25,7 @@ struct Track {
     entered: Option<u32>,
     arrived: Option<u32>,
     arrived_at: Option<SimTime>,
+    transmit_energy_j: f64,
     /// Moves begun.
     moves: u32,
     backtracks: u32,
@@ -141,6 +142,7 @@ impl Score {
     /// A rover's change.
     fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
+        self.tracks[at].transmit_energy_j = state.transmit_energy_j;
         let (vertex, moving_to) = (state.whereabouts.vertex, state.whereabouts.moving_to);
         let old = self.tracks[at].clone();
         if (old.vertex, old.moving_to) == (vertex, moving_to) {
@@ -252,6 +254,8 @@ impl Score {
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
         metrics.deadlocked = self.deadlock != Deadlock::None;
+        let energies_j = self.tracks.iter().map(|track| track.transmit_energy_j);
+        metrics.transmit_energy_j = energies_j.sum();
         metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
         metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {

@@ -54,11 +54,13 @@ impl Rover {
 
     fn record(&self, ctx: &mut Context<'_, Self>) {
         let whereabouts = ctx.durable::<RoverMemory>().whereabouts(self.id);
-        ctx.sample(&RoverState {
+        let state = RoverState {
             whereabouts,
             entry: self.entry,
             goal: self.goal,
-        });
+            transmit_energy_j: ctx.transmit_energy_j(),
+        };
+        ctx.sample(&state);
     }
 
     /// Begins to drive along the edge from `here`.

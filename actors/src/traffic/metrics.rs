@@ -50,6 +50,9 @@ pub struct TrafficMetrics {
     pub duplicates: u64,
     /// Messages that arrived after a later one of their flow.
     pub reordered: u64,
+    /// What transmissions took from those who sent, of messages whose fate is known \[J\]; 0 unless
+    /// links have a `tx_power`.
+    pub transmit_energy_j: f64,
     /// The delays \[s\], sorted. Of more than 10,000 a sample in which each is as likely as any.
     pub delays_s: Vec<f64>,
     /// Each flow by itself.
@@ -126,6 +129,7 @@ impl TrafficMetrics {
             goodput_bit_per_s: (!span.is_zero()).then(|| bytes as f64 * 8.0 / span.as_secs_f64()),
             duplicates: sum(|flow| flow.duplicates),
             reordered: sum(|flow| flow.reordered),
+            transmit_energy_j: tally.transmit_energy_j,
             delays_s: delays_ns.iter().map(|ns| seconds(*ns)).collect(),
             by_flow,
         }

@@ -23,6 +23,8 @@ pub(super) struct Tally {
     pub(super) delays_ns: Vec<u64>,
     /// How many delays there were, kept or not.
     delays: u64,
+    /// What transmissions took from those who sent \[J\].
+    pub(super) transmit_energy_j: f64,
     sampler: Stream,
 }
 
@@ -130,6 +132,7 @@ impl Monitor {
             flows: plan.flows.iter().map(|_| FlowTally::default()).collect(),
             delays_ns: Vec::new(),
             delays: 0,
+            transmit_energy_j: 0.0,
             sampler: RandomKey::new(seed).text("traffic delays").stream(),
         }));
         let monitor = Monitor {
@@ -172,6 +175,7 @@ impl Observer for Monitor {
 
 impl Tally {
     fn count(&mut self, ends: &Ends, number: u32, record: &Record<'_>) {
+        self.transmit_energy_j += record.carriage.map_or(0.0, |carriage| carriage.energy_j);
         let flow = &mut self.flows[ends.flow];
         let is_first_hop = record.sender == ends.source;
         // Every message has a copy 0, which has one fate on each hop.

@@ -265,6 +265,12 @@ impl Axis {
         if numeric {
             levels.sort_by(|(_, a), (_, b)| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         }
+        // Texts such as "600ms" have their unit; bare numbers have that of the factor.
+        let bare = levels.iter().all(|(text, _)| text.parse::<f64>().is_ok());
+        let label = match (bare, about.unit.as_str()) {
+            (true, unit) if !unit.is_empty() => format!("{} ({unit})", about.label),
+            _ => about.label.clone(),
+        };
         let numbered = levels.into_iter().enumerate();
         let level = |(place, (text, number)): (usize, (String, Option<f64>))| Level {
             text,
@@ -272,7 +278,7 @@ impl Axis {
         };
         Axis {
             factor,
-            label: about.label.clone(),
+            label,
             levels: numbered.map(level).collect(),
             numeric,
             scale: about.scale,

@@ -230,9 +230,10 @@ fn links_follow_the_plan_and_the_trace() {
         let counts = counts.unwrap().counts;
         (counts.delivered, counts.lost_by_reason)
     };
-    let (planned, reasons) = lost(&[]);
+    let unheld = "links.default.store_and_forward=false";
+    let (planned, reasons) = lost(&[unheld]);
     assert!(planned > 0 && reasons["no_contact"] > 0, "{reasons:?}");
-    let (held, reasons) = lost(&["links.default.store_and_forward=true"]);
+    let (held, reasons) = lost(&[]);
     assert!(
         held > planned && !reasons.contains_key("no_contact"),
         "{reasons:?}"

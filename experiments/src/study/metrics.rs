@@ -45,10 +45,18 @@ const KNOWN: [(&str, &str, &str); 23] = [
     ),
     ("messages.lost", "message copies lost", "messages"),
     ("messages.sent", "messages sent", "messages"),
-    ("path_ratio", "steps over the shortest path", ""),
+    (
+        "path_ratio",
+        "steps of those that arrived over the shortest path",
+        "",
+    ),
     ("rovers", "rovers", "rovers"),
     ("sim_time_s", "virtual time", "s"),
-    ("time_ratio", "time over the shortest path", ""),
+    (
+        "time_ratio",
+        "time of those that arrived over the shortest path",
+        "",
+    ),
     ("violations", "violations", ""),
 ];
 

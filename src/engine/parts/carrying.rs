@@ -1,0 +1,291 @@
+//! Messages and links: a link is shown a message, and what it decides becomes events; an actor tells
+//! a link something.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::num::NonZeroU64;
+
+use super::{Effect, Parts};
+use crate::carrier::{Carriage, Parcel, Verdict, Verdicts};
+use crate::engine::{CellState, Class, Head, Pending, Side};
+use crate::fault::FaultCause;
+use crate::key::{EntityId, EventKey};
+use crate::message::Sealed;
+use crate::plan::{Kind, KindIndex};
+use crate::time::{SimDuration, SimTime};
+
+impl Parts {
+    /// Lets `link` decide the fate of a message, now; `held` if it held it before. Returns what the
+    /// sender is charged at once, in joules: what an own link asks for.
+    pub(crate) fn carry(
+        &mut self,
+        link: EntityId,
+        head: Head,
+        letter: Sealed,
+        held: Option<Side>,
+    ) -> f64 {
+        self.carrying = Some(link);
+        let plan = self.plan.clone();
+        let Some(kind) = head.kind.map(|kind| plan.kind(kind)) else {
+            return 0.0;
+        };
+        let parcel = Parcel {
+            plan: &plan,
+            now: self.key.time,
+            sent: head.sent(self.key),
+            link,
+            sender: head.sender,
+            receiver: head.receiver,
+            kind,
+            ordinal: head.ordinal,
+            repeat: head.repeat,
+            copy: head.copy,
+            token: held.map(|held| held.token),
+            match_key: head.match_key,
+            letter: &letter,
+            size: Cell::new(None),
+        };
+        let mut verdicts = std::mem::take(&mut self.verdicts);
+        let cell = &mut self.links[plan.place(link).local as usize];
+        cell.carrier.carry(&parcel, &mut verdicts);
+        let mut count = cell.count;
+        self.execute(link, &mut count, head, letter, kind, &verdicts);
+        self.links[plan.place(link).local as usize].count = count;
+        let charge_j = std::mem::take(&mut verdicts.charge_j);
+        verdicts.list.clear();
+        self.verdicts = verdicts;
+        if self.fault.is_none() {
+            self.carrying = None;
+        }
+        // Only while its sender is at hand can a message's cost be charged at once, and whether it
+        // is must not hang on how hosts are dealt to engines.
+        if charge_j == 0.0 || held.is_none() && !self.is_shared(link) {
+            return charge_j;
+        }
+        self.charge_later(link, head.sender, charge_j);
+        0.0
+    }
+
+    fn is_shared(&self, link: EntityId) -> bool {
+        self.plan.links.get(&link).is_some_and(|link| link.shared)
+    }
+
+    fn charge_later(&mut self, link: EntityId, sender: EntityId, energy_j: f64) {
+        let plan = self.plan.clone();
+        let min_delay = plan.links.get(&link).map(|link| link.min_delay);
+        let cell = &mut self.links[plan.place(link).local as usize];
+        let mut count = cell.count;
+        let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
+        self.links[plan.place(link).local as usize].count = count;
+        let carriage = Carriage {
+            energy_j,
+            ..Carriage::default()
+        };
+        let pending = Pending {
+            class: Class::Charge,
+            head: Head::of_entity(sender),
+            letter: None,
+            side: Some(Side {
+                carriage: Some(carriage),
+                ..Side::default()
+            }),
+        };
+        self.schedule_with(plan.place(sender).engine, key, pending);
+    }
+
+    /// Asks for a change of a link on behalf of an actor.
+    pub(crate) fn ask_change(
+        &mut self,
+        state: &mut CellState,
+        me: EntityId,
+        link: EntityId,
+        letter: Sealed,
+    ) {
+        let (mine, its) = (self.plan.place(me), self.plan.place(link));
+        if self.fault.is_some() {
+            return;
+        }
+        if mine.host != its.host && !self.is_shared(link) {
+            return self.raise(FaultCause::NoRoute {
+                from: self.plan.host_name(me).to_owned(),
+                to: self.plan.host_name(link).to_owned(),
+                receiver: self.plan.name(link).to_owned(),
+                kind: "a change".to_owned(),
+            });
+        }
+        let kind = self.plan.links.get(&link).map(|link| link.change_kind);
+        let flow = state.next_in_flow(link.0, kind.unwrap_or(KindIndex::MAX), None);
+        let head = Head {
+            receiver: link,
+            kind,
+            ordinal: flow.0,
+            cause: Some(self.key),
+            ..Head::of_entity(me)
+        };
+        let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
+        self.schedule(its.engine, key, Class::Tell, head, Some(letter));
+    }
+
+    /// Gives a link a change.
+    pub(crate) fn tell(&mut self, link: EntityId, change: Box<dyn Any + Send>, now: SimTime) {
+        let local = self.plan.place(link).local as usize;
+        self.links[local].carrier.change(change, now);
+    }
+
+    /// Turns a link's verdicts into events, the last copy with the letter itself.
+    fn execute(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        head: Head,
+        letter: Sealed,
+        kind: &Kind,
+        verdicts: &Verdicts,
+    ) {
+        let mut letter = Some(letter);
+        // Of the messages that a link decides about, only those that it held have a side.
+        let held = head.has_side;
+        // Only a hand-over is an event of its own between the cause and this, unless it was held.
+        let handed_over = head.cause.filter(|cause| *cause != self.key && !held);
+        let handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
+        let scheduled_by = held.then_some(self.key);
+        for (copy, verdict) in verdicts.list.iter().enumerate() {
+            let last = copy + 1 == verdicts.list.len();
+            let Some(own) = (if last {
+                letter.take()
+            } else {
+                self.copy_of(letter.as_ref(), kind)
+            }) else {
+                return;
+            };
+            let head = Head {
+                copy: head.copy + copy as u32,
+                handed_over,
+                ..head
+            };
+            if let Err(cause) = self.obey(link, count, *verdict, (head, own, kind), scheduled_by) {
+                return self.raise(cause);
+            }
+        }
+        if verdicts.list.is_empty() {
+            self.raise(FaultCause::NoFate {
+                link: self.plan.name(link).to_owned(),
+                kind: kind.name().to_owned(),
+                sender: self.plan.name(head.sender).to_owned(),
+            });
+        }
+    }
+
+    /// Does to one copy what the link decided.
+    #[inline(always)]
+    fn obey(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        verdict: Verdict,
+        (mut head, letter, kind): (Head, Sealed, &Kind),
+        scheduled_by: Option<EventKey>,
+    ) -> Result<(), FaultCause> {
+        let side = |carriage: Option<Carriage>| {
+            (carriage.is_some() || scheduled_by.is_some()).then_some(Side {
+                carriage,
+                scheduled_by,
+                token: 0,
+            })
+        };
+        let (class, engine, after, side) = match verdict {
+            Verdict::Deliver { after, carriage } => {
+                self.check_delay(link, after)?;
+                let engine = self.plan.place(head.receiver).engine;
+                (Class::Message, engine, after, side(carriage))
+            }
+            Verdict::Hold { after, token } => {
+                let side = Side {
+                    carriage: None,
+                    scheduled_by,
+                    token,
+                };
+                (Class::Held, self.index, after, Some(side))
+            }
+            Verdict::Lose {
+                after,
+                reason,
+                carriage,
+            } => {
+                head.reason = self.plan.intern(reason);
+                if after.is_zero() {
+                    self.lose(head, &letter, kind, side(carriage));
+                    return Ok(());
+                }
+                (Class::LateLoss, self.index, after, side(carriage))
+            }
+        };
+        let key = self.later_key(link, count, after);
+        let pending = Pending {
+            class,
+            head,
+            letter: Some(letter),
+            side,
+        };
+        self.schedule_with(engine, key, pending);
+        Ok(())
+    }
+
+    /// A further copy of a message, through its encoding.
+    fn copy_of(&mut self, letter: Option<&Sealed>, kind: &Kind) -> Option<Sealed> {
+        let letter = letter?;
+        let mut bytes = Vec::new();
+        let encoded = letter
+            .0
+            .encode(kind.schema(), &mut bytes)
+            .map_err(|error| error.to_string());
+        let copy = encoded.and_then(|()| {
+            letter
+                .0
+                .decode(kind.schema(), &bytes)
+                .map_err(|error| error.to_string())
+        });
+        match copy {
+            Ok(copy) => Some(copy),
+            Err(error) => {
+                self.raise(FaultCause::Encoding {
+                    kind: kind.name().to_owned(),
+                    error,
+                });
+                None
+            }
+        }
+    }
+
+    fn check_delay(&self, link: EntityId, actual: SimDuration) -> Result<(), FaultCause> {
+        let declared = self
+            .plan
+            .links
+            .get(&link)
+            .map_or(SimDuration::ZERO, |link| link.min_delay);
+        if actual >= declared || !self.plan.check_min_delay {
+            return Ok(());
+        }
+        let link = self.plan.name(link).to_owned();
+        Err(FaultCause::UndercutsMinDelay {
+            link,
+            declared,
+            actual,
+        })
+    }
+
+    fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind, side: Option<Side>) {
+        let start = self.effect_bytes.len();
+        if self.plan.recording()
+            && let Err(error) = letter.0.encode(kind.schema(), &mut self.effect_bytes)
+        {
+            let (kind, error) = (kind.name().to_owned(), error.to_string());
+            return self.raise(FaultCause::Encoding { kind, error });
+        }
+        self.effects.push(Effect::Lost {
+            head,
+            body: start..self.effect_bytes.len(),
+            side: side.map(Box::new),
+        });
+    }
+}
