@@ -8,8 +8,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, check, diff, info, recover, report, reproduce, run, scenarios, studies, study,
-    verify,
+    CommandError, builtin, check, diff, info, recover, report, reproduce, run, study, verify,
 };
 use crate::system::Registry;
 
@@ -51,7 +50,7 @@ enum Command {
     /// Read a scenario, check it, and print it with all defaults filled in
     Check(check::Args),
     /// List the scenarios that are built in
-    Scenarios(scenarios::Args),
+    Scenarios(builtin::Args),
     /// Say what is in a log
     Info(info::Args),
     /// Run a log's scenario again and compare every message
@@ -61,7 +60,7 @@ enum Command {
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
     Study(study::Args),
     /// List the studies that are built in
-    Studies(studies::Args),
+    Studies(builtin::Args),
     /// Run one run of a study again, log every message, and compare with its record
     Reproduce(reproduce::Args),
     /// Write up a study: a page with plots, and tables for other programs
@@ -119,12 +118,12 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
     match command {
         Command::Run(args) => run::run(&args, registry),
         Command::Check(args) => check::run(&args, registry),
-        Command::Scenarios(args) => scenarios::run(&args),
+        Command::Scenarios(args) => builtin::scenarios(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),
         Command::Study(args) => study::run(&args, registry),
-        Command::Studies(args) => studies::run(&args),
+        Command::Studies(args) => builtin::studies(&args),
         Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args),
         Command::Recover(args) => recover::run(&args),

@@ -1,5 +1,6 @@
 //! The commands, one file each, and what they share: errors and output.
 
+pub(crate) mod builtin;
 pub(crate) mod check;
 pub(crate) mod diff;
 pub(crate) mod info;
@@ -9,8 +10,6 @@ pub(crate) mod recover;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod run;
-pub(crate) mod scenarios;
-pub(crate) mod studies;
 pub(crate) mod study;
 mod table;
 pub(crate) mod verify;

@@ -1,10 +1,14 @@
 //! The scenarios that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 4] = [
+const BUILTIN: [(&str, &str); 5] = [
     (
         "network/crater-dense",
         include_str!("../../scenarios/network/crater-dense.toml"),
+    ),
+    (
+        "network/crater-radio",
+        include_str!("../../scenarios/network/crater-radio.toml"),
     ),
     (
         "network/crater-sparse",
