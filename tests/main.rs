@@ -8,3 +8,4 @@ mod house;
 mod layering;
 mod network_safety;
 mod network_team;
+mod scenarios;
