@@ -6,7 +6,7 @@
 //! told where stations are ([`RadioChange::Moves`]), keeps the channels, and asks each link's
 //! [`Transmitter`] for what is the link's own.
 //!
-//! On a channel, a message is a frame that waits in its station's line, contends, is on the air for
+//! On a channel, a message is a frame that waits in its link's line, contends, is on the air for
 //! as long as its link's rate says, and then arrives, or is spoiled and tried again. Each of these
 //! steps is an event in which the radio holds the message ([`farside::Verdicts::hold`]); what they
 //! cost in delay is in [`farside::Carriage`].
@@ -67,7 +67,7 @@ pub enum RadioChange {
 /// A frame's way through its station and its channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Phase {
-    /// Others of the same station come first.
+    /// Others of the same link come first.
     #[default]
     InLine,
     /// Next, as soon as it may.
@@ -81,6 +81,12 @@ struct Frame {
     directed: u32,
     from: Station,
     copy: u32,
+    /// With overhead.
+    bytes: u64,
+    /// How long it would be on the air, as things stood when it came.
+    airtime: SimDuration,
+    /// The airtime of all messages of its link that came before.
+    offset: SimDuration,
     phase: Phase,
     /// Transmissions so far.
     attempts: u32,
@@ -101,12 +107,17 @@ struct Directed {
     to: Station,
     channel: u32,
     transmitter: Transmitter,
+    /// Frames in order; the first contends or is on the air.
+    line: VecDeque<u32>,
+    /// The airtime of all messages so far.
+    airtime: SimDuration,
+    /// When the answer to the last frame is there, if it waits for answers.
+    free: SimTime,
 }
 
 struct Place {
     host: String,
     track: Track,
-    line: VecDeque<u32>,
 }
 
 /// A radio system: a shared link. See the module's front page.
@@ -151,7 +162,6 @@ impl Radio {
         self.places.push(Place {
             host: host.to_owned(),
             track: Track::fixed(place_m),
-            line: VecDeque::new(),
         });
         self.station_of_host[index] = self.places.len() as u32;
     }
@@ -188,6 +198,9 @@ impl Radio {
             to,
             channel,
             transmitter,
+            line: VecDeque::new(),
+            airtime: SimDuration::ZERO,
+            free: SimTime::ZERO,
         });
         self.by_pair[from as usize * count + to as usize] = self.directed.len() as u32;
     }

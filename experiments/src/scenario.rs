@@ -159,6 +159,8 @@ pub struct Assembled {
     pub contacts: Option<LinkContacts>,
     /// What became of the files that other programs wrote, a line at a time, for people.
     pub notes: Vec<String>,
+    /// What the scenario says of links that has no effect, for people.
+    pub remarks: Vec<String>,
 }
 
 impl Scenario {
@@ -349,6 +351,8 @@ impl Scenario {
         let (goal, scene) = (setup.goal, setup.scene);
         let conclude = conclude.map_err(wrong)?;
         self.check_places(&sim)?;
+        let remarks = links.remarks().into_iter();
+        let remarks = remarks.map(|remark| format!("links: {remark}")).collect();
         links
             .finish(&mut sim)
             .map_err(|error| wrong(error.into()))?;
@@ -371,6 +375,7 @@ impl Scenario {
             files,
             contacts,
             notes,
+            remarks,
         })
     }
 

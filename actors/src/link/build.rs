@@ -298,6 +298,12 @@ impl LinkBuilder {
         }
     }
 
+    /// What the links declared so far are told that has no effect.
+    pub fn remarks(&self) -> BTreeSet<&'static str> {
+        let params = self.known.iter().flat_map(|known| known.timeline.iter());
+        params.flat_map(|(_, params)| params.remarks()).collect()
+    }
+
     fn no_such_radio(&mut self, link: &str, wanted: &str) {
         let names = || self.radios.iter().map(RadioBuilder::name);
         let nearest = names().min_by_key(|name| strsim::damerau_levenshtein(name, wanted));

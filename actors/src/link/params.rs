@@ -263,6 +263,42 @@ impl LinkParams {
         self.least_way_of_all() + sending
     }
 
+    /// What is said here and has no effect without something else that is not said.
+    ///
+    /// ```
+    /// use farside_actors::link::LinkParams;
+    /// let params: LinkParams = toml::from_str("tx_power = '5W'")?;
+    /// assert_eq!(params.remarks(), ["tx_power without a rate: a transmission takes no time, so no energy"]);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    pub fn remarks(&self) -> Vec<&'static str> {
+        let timed = self.rate.is_some() || self.trace.is_some() || self.contacts.is_some();
+        let all = [
+            (
+                self.tx_power_w > 0.0 && !timed,
+                "tx_power without a rate: a transmission takes no time, so no energy",
+            ),
+            (
+                self.queue.is_some() && !timed && !self.store_and_forward && self.retries == 0,
+                "queue without a rate: nothing ever waits",
+            ),
+            (
+                self.timeout.is_some() && self.retries == 0,
+                "timeout without retries: nobody waits for an answer",
+            ),
+            (
+                self.reorder_by.is_some() && self.reorder == 0.0,
+                "reorder_by without reorder: nothing is held back",
+            ),
+            (
+                self.jitter_correlation > 0.0 && self.jitter.is_zero(),
+                "jitter_correlation without jitter: there is nothing to correlate",
+            ),
+        ];
+        let said = all.into_iter().filter(|(holds, _)| *holds);
+        said.map(|(_, remark)| remark).collect()
+    }
+
     /// The least time on the way, over all contacts.
     pub(super) fn least_way_of_all(&self) -> SimDuration {
         let windows = self.contacts.iter().flat_map(Contacts::windows);

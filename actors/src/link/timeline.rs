@@ -164,6 +164,17 @@ impl Timeline {
         delays(false).or(delays(true)).unwrap_or_default()
     }
 
+    /// Whether transmissions take time, whatever parameters hold.
+    pub(crate) fn takes_time(&self) -> bool {
+        let timed = |params: &LinkParams| {
+            let all_timed = |c: &super::Contacts| c.windows().iter().all(|w| w.rate.is_some());
+            params.rate.is_some()
+                || params.trace.is_some()
+                || params.contacts.as_ref().is_some_and(all_timed)
+        };
+        self.spans.iter().all(|span| timed(&span.params))
+    }
+
     /// The least time on the way over all parameters, without what a transmission takes.
     pub(super) fn least_way(&self) -> SimDuration {
         let spans = self.spans.iter().map(|span| span.params.least_way_of_all());

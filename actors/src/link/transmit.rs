@@ -254,6 +254,22 @@ impl Transmitter {
         self.free
     }
 
+    /// The bytes of the message with the link's overhead.
+    pub fn bytes(&self, parcel: &Parcel<'_>) -> u64 {
+        bytes(self.timeline.at(parcel.now()), parcel)
+    }
+
+    /// Until when messages of one size have one airtime, as far as is known at `now`: `now` itself
+    /// where contacts, a trace or an outage decide.
+    pub fn steady_until(&self, now: SimTime) -> SimTime {
+        let index = self.timeline.index(now);
+        let params = &self.timeline.spans[index].params;
+        if params.contacts.is_some() || params.trace.is_some() || params.outage {
+            return now;
+        }
+        self.timeline.end_of(index).unwrap_or(SimTime::MAX)
+    }
+
     /// How many copies of the message set out, by the parameters of its arrival at the link: one
     /// where it is lost at once.
     pub fn copies(&self, parcel: &Parcel<'_>) -> u32 {

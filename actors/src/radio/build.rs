@@ -7,7 +7,7 @@ use farside::{HostId, SimTime, Simulation};
 use farside_worlds::HeightField;
 use nalgebra::Point3;
 
-use super::{Radio, RadioChange, RadioConfig};
+use super::{Access, Radio, RadioChange, RadioConfig};
 use crate::link::{LinkChange, Timeline};
 
 /// Collects what goes through one radio, and declares it.
@@ -71,6 +71,15 @@ impl RadioBuilder {
             return Ok(());
         }
         let needs_places = self.config.needs_places();
+        if self.config.access != Access::FullDuplex
+            && let Some(link) = self.links.iter().find(|link| !link.timeline.takes_time())
+        {
+            return Err(format!(
+                "its channel is shared, and link {:?} has no rate: expected one, for without \
+                 transmissions take no time and never meet",
+                link.name
+            ));
+        }
         if self.config.line_of_sight && terrain.is_none() {
             return Err(
                 "line_of_sight: expected a world with terrain, such as a built-in crater"

@@ -53,10 +53,12 @@ pub enum Sharing {
 /// | `window_max` | ... up to so many | 256 |
 /// | `sense_delay` | `csma`: who began less than this ago is not heard yet | 0 s |
 /// | `capture_db` | with `path_loss`: by how much a signal must exceed each other one | 10 |
-/// | `queue` | messages that wait in a station, drop-tail (`queue_full`) | 64 |
+/// | `queue` | messages that wait for a link that has no `queue` of its own, where a channel is shared (`queue_full`) | 64 |
 ///
 /// A link goes through a radio by `radio = "NAME"` among its own parameters, which go on to apply:
-/// its rate decides how long it is on the air, its retries what happens after a collision.
+/// its rate decides how long it is on the air, its retries what happens after a collision, its queue
+/// what waits. A station transmits one message at a time, whatever link it is for; a link with retries
+/// stops and waits for each answer, and the station's other links go on meanwhile.
 ///
 /// ```
 /// use farside_actors::radio::{Access, RadioConfig};
@@ -106,7 +108,7 @@ pub struct RadioConfig {
     pub sense_delay: SimDuration,
     /// By how many dB a signal must exceed each other one to be understood.
     pub capture_db: f64,
-    /// How many messages wait in a station.
+    /// How many messages wait for a link that has no `queue` of its own, where a channel is shared.
     pub queue: u32,
     /// How the signal fades with distance; without, it does not.
     #[serde(skip_serializing_if = "Option::is_none")]

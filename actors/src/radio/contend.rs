@@ -1,4 +1,4 @@
-//! A frame's way through its station's line and its channel: wait, contend, be on the air, arrive
+//! A frame's way through its link's line and its channel: wait, contend, be on the air, arrive
 //! or try again.
 
 use farside::carrier::{Carriage, Parcel, Verdicts};
@@ -9,23 +9,52 @@ use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
 use crate::link::{Attempt, QUEUE_FULL, difference};
 
 impl Radio {
-    /// Takes the copies of a message into its station's line.
+    /// Takes the copies of a message into its link's line.
     pub(super) fn accept(&mut self, parcel: &Parcel<'_>, directed: u32, verdicts: &mut Verdicts) {
-        let link = &self.directed[directed as usize];
-        let from = link.from;
-        for copy in 0..link.transmitter.copies(parcel) {
-            if self.places[from as usize].line.len() >= self.config.queue as usize {
+        let now = parcel.now();
+        let path = self.path(parcel, directed, now);
+        let transmitter = &self.directed[directed as usize].transmitter;
+        let bytes = transmitter.bytes(parcel);
+        let airtime = transmitter.airtime(parcel, now, &path);
+        for copy in 0..transmitter.copies(parcel) {
+            if self.is_full(directed, bytes, now) {
                 verdicts.lose(QUEUE_FULL);
                 continue;
             }
             let at = self.frame(Frame {
                 directed,
-                from,
+                from: self.directed[directed as usize].from,
                 copy,
+                bytes,
+                airtime,
+                offset: self.directed[directed as usize].airtime,
                 ..Frame::default()
             });
-            self.places[from as usize].line.push_back(at);
+            let link = &mut self.directed[directed as usize];
+            link.airtime = link.airtime + airtime;
+            link.line.push_back(at);
             self.resume(parcel, at, verdicts);
+        }
+    }
+
+    /// Whether there is no room for so many bytes behind those that wait: by the link's own
+    /// `queue`, or if it has none, by the radio's.
+    fn is_full(&self, directed: u32, bytes: u64, now: SimTime) -> bool {
+        let link = &self.directed[directed as usize];
+        if link.line.is_empty() {
+            return false;
+        }
+        // Only the first can be on the air.
+        let first = &self.frames[link.line[0] as usize];
+        let on_air = usize::from(first.phase == Phase::OnAir);
+        let messages = (link.line.len() - on_air) as u64 + 1;
+        match link.transmitter.timeline().at(now).queue {
+            None => messages > u64::from(self.config.queue),
+            Some(limit) => {
+                let waiting = link.line.iter().skip(on_air);
+                let waiting = waiting.map(|at| self.frames[*at as usize].bytes);
+                !limit.allows(messages, waiting.sum::<u64>() + bytes)
+            }
         }
     }
 
@@ -48,20 +77,33 @@ impl Radio {
         let frame = self.frames[at as usize];
         match frame.phase {
             Phase::InLine => {
-                let line = &self.places[frame.from as usize].line;
-                let place = line.iter().position(|known| *known == at).unwrap_or(0);
-                if place == 0 {
+                let first = self.directed[frame.directed as usize].line[0];
+                if first == at {
                     self.frames[at as usize].phase = Phase::Contending;
                     self.contend(parcel, at, verdicts);
                 } else {
-                    // Nothing changes for this one before something happens to the one ahead.
-                    let ahead = self.frames[line[place - 1] as usize].next;
-                    self.hold_until(parcel.now(), ahead, at, verdicts);
+                    let next = self.turn_of(at, first, parcel.now());
+                    self.hold_until(parcel.now(), next, at, verdicts);
                 }
             }
             Phase::Contending => self.contend(parcel, at, verdicts),
             Phase::OnAir => self.leave_air(parcel, at, verdicts),
         }
+    }
+
+    /// The soonest that a frame can have its turn behind the `first` of its line: when all ahead of
+    /// it have been on the air, as long as nothing changes airtimes; else, when something happens to
+    /// the first.
+    fn turn_of(&self, at: u32, first: u32, now: SimTime) -> SimTime {
+        let (frame, first) = (&self.frames[at as usize], &self.frames[first as usize]);
+        let ahead = match first.phase {
+            // It is off the air at `next`.
+            Phase::OnAir => frame.offset - first.offset - first.airtime,
+            _ => frame.offset - first.offset,
+        };
+        let transmitter = &self.directed[frame.directed as usize].transmitter;
+        let steady_until = transmitter.steady_until(now);
+        (first.next + ahead).min(steady_until.max(first.next))
     }
 
     fn hold_until(&mut self, now: SimTime, next: SimTime, at: u32, verdicts: &mut Verdicts) {
@@ -76,7 +118,9 @@ impl Radio {
         let path = self.path(parcel, directed, now);
         let link = &self.directed[directed as usize];
         let opening = link.transmitter.opening(parcel, now, &path);
+        let free = link.free;
         let next = match opening {
+            _ if free > now => Some(free),
             Err(reason) => {
                 let carriage = self.carriage(parcel, at, now);
                 verdicts.lose_as(SimDuration::ZERO, reason, carriage);
@@ -95,6 +139,8 @@ impl Radio {
     fn wait_for(&mut self, parcel: &Parcel<'_>, at: u32, now: SimTime) -> Option<SimTime> {
         let frame = self.frames[at as usize];
         let channel = &self.channels[self.directed[frame.directed as usize].channel as usize];
+        // A station transmits one frame at a time.
+        let own = channel.busy_until(now, |other| other.from == frame.from);
         match self.config.access {
             Access::FullDuplex => None,
             Access::Scheduled => {
@@ -106,6 +152,7 @@ impl Radio {
                     .filter(|free| *free > now);
                 busy.or(turned)
             }
+            Access::Aloha if own.is_some() => own,
             Access::Aloha if self.config.slotted => {
                 let over = now.as_nanos() % self.config.slot.as_nanos();
                 (over != 0).then(|| now + (self.config.slot - SimDuration::from_nanos(over)))
@@ -175,6 +222,10 @@ impl Radio {
         };
         let Some(reason) = failed else {
             let arrival = link.transmitter.in_order(parcel, attempt.at);
+            if link.transmitter.timeline().at(frame.start).retries > 0 {
+                // It stops and waits, as it would if there were no answer.
+                link.free = attempt.answered();
+            }
             self.arrive(parcel, at, &attempt, arrival, verdicts);
             return self.done(at);
         };
@@ -240,8 +291,8 @@ impl Radio {
 
     /// Forgets a frame that came first in its line.
     fn done(&mut self, at: u32) {
-        let line = &mut self.places[self.frames[at as usize].from as usize].line;
-        let first = line.pop_front();
+        let directed = self.frames[at as usize].directed;
+        let first = self.directed[directed as usize].line.pop_front();
         debug_assert_eq!(first, Some(at), "only the first of a line is sent");
         self.free.push(at);
     }

@@ -12,7 +12,7 @@ use nalgebra::{Point2, Point3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::link::LinkParams;
+use crate::link::{LinkOverrides, LinkParams, QueueLimit};
 
 /// A link that is on the air for 10 ms with each message (a [`Frame`] is 9 bytes, which leaves 1241
 /// of 1250 at 1 Mbit/s), and takes 2 W meanwhile.
@@ -367,6 +367,125 @@ fn what_a_shared_radio_charges_reaches_the_sender() {
         (energy_j - each_j).abs() < 0.2 * each_j,
         "{energy_j} {each_j}"
     );
+}
+
+/// The waits and arrivals of one link, in order.
+fn of_link<'a>(fates: &'a [Fate], from: &str) -> Vec<&'a Fate> {
+    fates.iter().filter(|fate| fate.link.0 == from).collect()
+}
+
+#[test]
+fn a_links_own_queue_limits_what_waits_for_a_shared_channel() {
+    let mut team = Team::new("access = 'scheduled'\nqueue = 1000", ring(2));
+    team.mean_s = 0.005;
+    team.until_s = 20;
+    team.link.queue = Some(QueueLimit::Messages(2));
+    let (_, fates, _) = team.run(Executor::Inline);
+    assert!(share(&fates, "queue_full") > 0.5);
+    // Two of its own wait, one is sent, and the other station has as many.
+    let longest = fates.iter().map(|f| f.time.since(f.sent)).max();
+    assert!(longest < Some(SimDuration::from_millis(75)), "{longest:?}");
+    team.link.queue = Some(QueueLimit::Bytes(2500));
+    let (_, bytes, _) = team.run(Executor::Inline);
+    assert_eq!(share(&fates, "queue_full"), share(&bytes, "queue_full"));
+}
+
+#[test]
+fn a_link_with_retries_stops_and_waits_whatever_carries_it() {
+    for access in ["full-duplex", "scheduled", "csma"] {
+        let mut team = Team::new(&format!("access = '{access}'"), ring(2));
+        team.mean_s = 0.01;
+        team.until_s = 60;
+        team.link.latency = SimDuration::from_millis(500);
+        team.link.retries = 2;
+        let (_, fates, _) = team.run(Executor::Inline);
+        let arrivals = of_link(&fates, "s0").into_iter();
+        let times: Vec<SimTime> = arrivals
+            .filter(|f| f.reason.is_empty())
+            .map(|f| f.time)
+            .collect();
+        assert!(times.len() > 20, "{access}");
+        for pair in times.windows(2) {
+            // 10 ms on the air, 500 ms there, 500 ms back.
+            let gap = pair[1].since(pair[0]);
+            assert!(gap >= SimDuration::from_millis(1010), "{access}: {gap}");
+        }
+    }
+}
+
+#[test]
+fn one_link_that_waits_does_not_stop_the_others_of_its_station() {
+    // Station 0 is in the middle; the contact of its link to 2 is far away.
+    let stations = (0..3)
+        .map(|i| (Point3::origin(), if i == 0 { 1 } else { 0 }))
+        .collect();
+    for access in ["full-duplex", "scheduled", "aloha", "csma"] {
+        let team = Team::new(&format!("access = '{access}'"), Vec::clone(&stations));
+        let mut sim = Simulation::new(1);
+        let mut radio = Radio::new(team.radio, None);
+        let hosts: Vec<_> = (0..3).map(|i| sim.host(&format!("s{i}"))).collect();
+        for (i, host) in hosts.iter().enumerate() {
+            radio.station(host.index(), &format!("s{i}"), Point3::origin());
+        }
+        let late = "store_and_forward = true\ncontacts = [{ start = '30s', end = '60s' }]";
+        let late: LinkOverrides = toml::from_str(late).unwrap();
+        radio.link("s0-s1", 0, 1, Timeline::new(plain()));
+        radio.link("s0-s2", 0, 2, Timeline::new(plain().with(&late)));
+        for (i, host) in hosts.iter().enumerate().take(2) {
+            let (to, mean_s) = (format!("s{}", 2 - i), if i == 0 { 1.0 } else { 1e9 });
+            let energy = Arc::default();
+            sim.actor(*host, &format!("s{i}"), move |_| Source {
+                to: to.clone(),
+                mean_s,
+                sent: 0,
+                energy: Arc::clone(&energy),
+            });
+        }
+        let energy: Arc<Mutex<f64>> = Arc::default();
+        for (name, to, mean_s) in [("s2", "s0", 1e9), ("other", "s1", 1.0)] {
+            let host = sim.host(if name == "other" { "s0" } else { name });
+            let (to, energy) = (to.to_owned(), energy.clone());
+            sim.actor(host, name, move |_| Source {
+                to: to.clone(),
+                mean_s,
+                sent: 0,
+                energy: energy.clone(),
+            });
+        }
+        let link = sim.shared_link("radio", radio);
+        sim.route(hosts[0], hosts[1], link);
+        sim.route(hosts[0], hosts[2], link);
+        let fates = Fates::default();
+        sim.observe(fates.clone());
+        sim.stop_at(SimTime::from_secs(60), "the end");
+        sim.run(Executor::Inline).unwrap();
+        let fates = fates.list.lock().unwrap();
+        let (waiting, open) = (of_link(&fates, "s0"), of_link(&fates, "other"));
+        assert!(waiting.len() > 20 && open.len() > 40, "{access}");
+        assert!(
+            waiting.iter().all(|f| f.time > SimTime::from_secs(30)),
+            "{access}"
+        );
+        let quick = |f: &&Fate| f.time.since(f.sent) < SimDuration::from_secs(1);
+        assert!(
+            open.iter()
+                .filter(|f| f.time < SimTime::from_secs(30))
+                .all(quick),
+            "{access}"
+        );
+    }
+}
+
+/// What waits is looked at now and then, not whenever anything happens.
+#[test]
+fn a_long_line_costs_a_few_events_a_message() {
+    let mut team = Team::new("access = 'scheduled'\nqueue = 100000", ring(2));
+    team.mean_s = 0.002;
+    team.until_s = 20;
+    let (report, fates, _) = team.run(Executor::Inline);
+    assert!(report.counts.in_flight > 15_000 && fates.len() > 1900);
+    let events_each = report.counts.events as f64 / report.counts.sent as f64;
+    assert!(events_each < 12.0, "{events_each} events for each message");
 }
 
 proptest! {

@@ -20,11 +20,10 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let assembled = scenario.assemble()?;
     let mut text = scenario.resolved()?;
     // Comments, so that what is printed is still the scenario.
-    if !assembled.notes.is_empty() {
-        text.push('\n');
-    }
-    for note in &assembled.notes {
-        text.push_str(&format!("# {note}\n"));
+    let notes = assembled.notes.iter().chain(&assembled.remarks);
+    for (at, note) in notes.enumerate() {
+        let gap = if at == 0 { "\n" } else { "" };
+        text.push_str(&format!("{gap}# {note}\n"));
     }
     print(text)?;
     Ok(Exit::Done)

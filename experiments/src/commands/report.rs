@@ -30,6 +30,7 @@ struct Document {
     summary_csv: String,
     plots: Vec<String>,
     runs: usize,
+    missing: usize,
     failed: usize,
 }
 
@@ -88,6 +89,7 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
         // The page comes last: where it is, the rest is too.
         page: write(out.join("report.html"), &report.page)?,
         runs: results.runs.len(),
+        missing: results.missing(),
         failed: results.runs.iter().filter(failed).count(),
     })
 }
@@ -104,8 +106,12 @@ fn text(document: &Document) -> String {
             format!("{} in {}", document.plots.len(), folder.display())
         }
     };
+    let missing = match document.missing {
+        0 => String::new(),
+        missing => format!(" of {}, the rest are not made yet", document.runs + missing),
+    };
     format!(
-        "{} runs{failed}\n  page     {}\n  runs     {}\n  figures  {}\n  plots    {plots}\n",
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n  plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )
 }

@@ -136,6 +136,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         scenario.shared().seed
     );
     let mut assembled = scenario.assemble()?;
+    for remark in &assembled.remarks {
+        tracing::warn!("{remark}");
+    }
     assembled.sim.tie_seed(args.tie_seed);
     let log = (!args.no_log).then_some(&args.out);
     if let Some(path) = log {

@@ -105,6 +105,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 fn interrupted(args: &Args, progress: Progress, folder: &Path) -> String {
     let (done, total) = (progress.done, progress.total);
     let study = &args.study;
+    if total == 0 {
+        return "interrupted in the first run, before anything was written".to_owned();
+    }
     format!(
         "interrupted: {done} of {total} runs are done, in {}\n  the same command goes on from there: \
          farside study {study} ...",

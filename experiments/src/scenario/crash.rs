@@ -18,7 +18,7 @@ const MAX_EVENTS: usize = 100_000;
 /// |---|---|---|
 /// | `actor` | a name, or a pattern over names (`node_*`) | needed |
 /// | `fraction` | the share of the actors that match, rounded to whole ones | all |
-/// | `at` | when it crashes, or from when on | 0 s |
+/// | `at` | when it crashes, or with `mtbf` from when on | needed; with `mtbf` 0 s |
 /// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
 /// | `restart` | when it is started again | never |
 /// | `restart_after` | how long after the crash it is started again | never |
@@ -43,8 +43,12 @@ pub struct Crash {
     #[serde(default = "all", with = "units::fraction")]
     pub fraction: f64,
     /// When it crashes, from the start of the run.
-    #[serde(default, with = "units::duration")]
-    pub at: SimDuration,
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub at: Option<SimDuration>,
     /// How much later than `at` it may be.
     #[serde(
         default,
@@ -103,8 +107,13 @@ fn mistake(key: &'static str, message: impl ToString) -> Mistake {
 impl Crash {
     /// Finds what can be found without knowing the actors.
     pub(super) fn check(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
+        if self.at.is_none() && self.mtbf.is_none() {
+            let message =
+                "this key is missing: expected when it crashes, as in at = \"60s\", or `mtbf`";
+            return Err(mistake("at", message));
+        }
         if let Some(restart) = self.restart {
-            let last = self.at + self.within.unwrap_or(SimDuration::ZERO);
+            let last = self.from() + self.within.unwrap_or(SimDuration::ZERO);
             if restart <= last {
                 let message = format!("{restart}: expected a time after the crash at {last}");
                 return Err(mistake("restart", message));
@@ -145,6 +154,10 @@ impl Crash {
             return Err(mistake("mtbf", message));
         }
         Ok(())
+    }
+
+    fn from(&self) -> SimDuration {
+        self.at.unwrap_or(SimDuration::ZERO)
     }
 
     /// Plans this entry's crashes and restarts; `index` is its place among the entries.
@@ -223,13 +236,13 @@ impl Crash {
         let mut stream = draws.text("times").stream();
         let Some(mtbf) = self.mtbf else {
             let later = self.within.map_or(0.0, SimDuration::as_secs_f64) * stream.uniform();
-            let down = self.at + SimDuration::from_secs_f64(later);
+            let down = self.from() + SimDuration::from_secs_f64(later);
             let up = self.restart.or(self.restart_after.map(|wait| down + wait));
             return vec![(down, up)];
         };
         let mut times = Vec::new();
         let until = until.unwrap_or(SimDuration::ZERO);
-        let mut now = self.at;
+        let mut now = self.from();
         while times.len() < MAX_EVENTS {
             let down = now + SimDuration::from_secs_f64(stream.exponential(mtbf.as_secs_f64()));
             if down >= until {
@@ -324,11 +337,12 @@ mod tests {
         let key = |text: &str| wrong(text).unwrap_err().key;
         assert_eq!(key("at = '5s'\nrestart = '5s'"), "restart");
         assert_eq!(key("at = '5s'\nwithin = '5s'\nrestart = '9s'"), "restart");
-        assert_eq!(key("mttr = '5s'"), "mttr");
+        assert_eq!(key("restart_after = '5s'"), "at");
+        assert_eq!(key("at = '5s'\nmttr = '5s'"), "mttr");
         assert_eq!(key("mtbf = '5s'\nwithin = '1s'"), "mtbf");
         assert_eq!(key("mtbf = '0s'"), "mtbf");
         assert_eq!(key("mtbf = '1ns'\nmttr = '1ns'"), "mtbf");
-        assert_eq!(key("restart_after = '0s'"), "restart_after");
+        assert_eq!(key("at = '5s'\nrestart_after = '0s'"), "restart_after");
         assert_eq!(
             crash("actor = 'x'\nmtbf = '5s'")
                 .check(None)

@@ -72,7 +72,7 @@ fn scenarios_and_completions_are_listed() {
     let listed = farside(folder.path(), &["scenarios"]);
     assert!(text(&listed.stdout).contains("network/crater-dense   50 rovers"));
     let listed = json(&farside(folder.path(), &["scenarios", "--json"]));
-    assert_eq!(listed[1]["name"], "network/crater-sparse");
+    assert_eq!(listed[1]["name"], "network/crater-radio");
     let script = farside(folder.path(), &["completions", "bash"]);
     assert!(text(&script.stdout).contains("_farside"));
 }
