@@ -14,7 +14,7 @@ use std::sync::Arc;
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Priority, TeamConfig, WorldConfig, assemble,
+    Deadlock, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig, assemble,
 };
 use farside_worlds::{Endpoints, Roadmap};
 
@@ -82,6 +82,15 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
         };
         let network = &mut options.network;
         match key {
+            "policy" => {
+                network.policy = match value {
+                    "complete" => Policy::Complete,
+                    _ => Policy::Paper,
+                }
+            }
+            "routes" => network.routes = value.parse()?,
+            "ahead" => network.grants_ahead = value.parse()?,
+            "passive" => network.passive_window = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
             "rovers" => options.rovers = numbers(value)?,
