@@ -196,7 +196,7 @@ impl Default for NetworkConfig {
             priority: Priority::default(),
             acceleration: true,
             acceleration_chains: false,
-            routes: 5,
+            routes: 8,
             grants_ahead: 2,
             passive_window: 20,
             active_window: 300,

@@ -19,8 +19,8 @@ use super::lng::LocalGraph;
 use super::messages::{
     Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
 };
-use super::reservation::messages::Relay;
 use super::reservation::RegistryDue;
+use super::reservation::messages::Relay;
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;

@@ -56,6 +56,9 @@ pub(crate) struct Duty {
 pub(crate) struct News {
     /// Vertices that are free now.
     pub(crate) freed: Vec<VertexId>,
+    /// Where rovers came from that have left again without ever being heard here: the owners of
+    /// those vertices cannot know.
+    pub(crate) unheard: Vec<VertexId>,
     /// The rover was heard for the first time at the vertex it was granted.
     pub(crate) arrived: bool,
 }
@@ -192,6 +195,10 @@ impl Ledger {
                 || held.step == fact.step && (!here || fact.moving_to.is_some())
                 || held.step == fact.step + 1 && elsewhere;
             if free {
+                let unheard = held
+                    .previous
+                    .filter(|_| !held.arrived && held.step < fact.step);
+                news.unheard.extend(unheard);
                 slot.occupant = None;
                 news.freed.push(slot.vertex);
             } else if held.step == fact.step {
@@ -280,7 +287,9 @@ impl RoverMemory {
         let step = self.step;
         self.ahead.retain(|kept| kept.step > step);
         let stands = self.moving_to.is_none();
-        self.ahead.iter().find(|kept| stands && kept.step == step + 1)
+        self.ahead
+            .iter()
+            .find(|kept| stands && kept.step == step + 1)
     }
 
     /// Obeys a grant, if it is for the next step and leads from here: into the roadmap at `entry`,

@@ -148,28 +148,26 @@ impl Ground<'_> {
     }
 }
 
-/// The way that ends with the label at `last`, each visit begun as late as the arrival at the end
-/// allows, so that a rover waits where it is least in the way: as early on its way as can be, best
-/// of all before it enters. The last visit ends at `end`.
-pub fn latest_way(labels: &[Label], last: u32, end: u64) -> Vec<TimedVisit> {
+/// The way that ends with the label at `last`: each visit begins as early as can be, but the first
+/// one as late as the second allows, so that a rover that comes from outside waits there and not in
+/// the way of others. The last visit ends at `end`.
+pub fn way_to(labels: &[Label], last: u32, end: u64) -> Vec<TimedVisit> {
     let mut way = Vec::new();
-    let (mut at, mut end) = (last, end);
-    let mut start = labels[last as usize].start;
-    loop {
+    let (mut next, mut end) = (Some(last), end);
+    while let Some(at) = next {
         let label = labels[at as usize];
-        let parent = label.parent.map(|p| (p, labels[p as usize]));
-        if let Some((_, before)) = parent {
-            start = start.min(before.until);
-        }
+        next = label.parent;
+        let start = match next {
+            // Where the way begins and ends at once there is nothing to wait for.
+            None if !way.is_empty() => end - (label.ready - label.start),
+            _ => label.start,
+        };
         way.push(TimedVisit {
             vertex: label.vertex,
             start,
             end,
         });
-        let Some((place, before)) = parent else { break };
         end = start;
-        start -= before.ready - before.start;
-        at = place;
     }
     way.reverse();
     way

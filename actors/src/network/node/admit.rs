@@ -70,6 +70,9 @@ impl Node {
     fn hear(&mut self, ctx: &mut Context<'_, Self>, fact: &Whereabouts, goal: Option<VertexId>) {
         let news = ctx.durable::<Ledger>().hear(fact, goal, self.cycle);
         if self.site.config.policy == Policy::Complete {
+            for &previous in &news.unheard {
+                self.report_departure(ctx, *fact, Some(previous));
+            }
             if !news.freed.is_empty() {
                 self.departed(ctx, &news.freed);
             }

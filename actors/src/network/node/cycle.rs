@@ -7,8 +7,8 @@ use farside_worlds::VertexId;
 
 use super::{Node, Phase, PhaseBegins};
 use crate::network::assignment::Request;
-use crate::network::config::Policy;
 use crate::network::candidates::{CandidatePath, FirstStep, candidates};
+use crate::network::config::Policy;
 use crate::network::messages::{
     Assignment, Assignments, CandidatePaths, Departed, Grant, Locations, RoverId, RoverPaths,
 };

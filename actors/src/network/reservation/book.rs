@@ -52,7 +52,12 @@ impl Book {
     /// The visits at `v` as (start, end); none if it is not in the book.
     pub(super) fn busy(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
         let visits = &self.pages[self.page(v)?].1;
-        Some(visits.iter().map(|visit| (visit.start, visit.end)).collect())
+        Some(
+            visits
+                .iter()
+                .map(|visit| (visit.start, visit.end))
+                .collect(),
+        )
     }
 
     /// Whether `visits` (with their vertices) may all be entered: apart in time from all others, and

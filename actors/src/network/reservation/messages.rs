@@ -16,6 +16,10 @@ pub struct Relay {
     pub taken: u64,
     /// Items taken beyond that.
     pub beyond: Vec<u64>,
+    /// When this was sent \[ns\].
+    pub sent: u64,
+    /// When the message was sent that this answers, by its sender's clock \[ns\].
+    pub echo: Option<u64>,
     /// New and repeated items.
     pub items: Vec<Numbered>,
 }

@@ -11,9 +11,7 @@ use super::relay::Line;
 use super::routes::routes;
 use crate::network::assemble::Site;
 use crate::network::messages::RoverId;
-use crate::planning::safe_intervals::{
-    FOREVER, Ground, Label, TimedVisit, latest_way, prune,
-};
+use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit, prune, way_to};
 
 /// The most labels that a probe hands on from one node to the next, so that messages stay small.
 const MAX_FRONTIER: usize = 24;
@@ -95,7 +93,8 @@ impl Registry {
     fn gap(&self) -> u64 {
         let measured = self.lines.values().filter(|line| line.is_measured());
         let (sum, count) = measured.fold((0, 0), |(sum, n), line| (sum + line.round_trip(), n + 1));
-        if count == 0 { FIRST_GAP } else { (sum / count).max(1) }
+        let mean: Option<u64> = sum.checked_div(count);
+        mean.map_or(FIRST_GAP, |gap| gap.max(1))
     }
 
     /// Begins a walk for the first rover of each own queue that has none.
@@ -126,7 +125,12 @@ impl Registry {
         let dwell = desk.site.config.cycle.as_nanos();
         let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
         let site = desk.site;
-        let routes = routes(&site.roadmap, &site.sensors, (entry, goal), site.config.routes);
+        let routes = routes(
+            &site.roadmap,
+            &site.sensors,
+            (entry, goal),
+            site.config.routes,
+        );
         let probes = routes.len() as u32;
         for route in routes {
             let probe = Probe {
@@ -211,14 +215,21 @@ impl Registry {
             self.offers.insert(rover, offers);
         }
         let gap = self.gap();
-        let Some(offers) = self.offers.get_mut(&rover) else { return };
+        let Some(offers) = self.offers.get_mut(&rover) else {
+            return;
+        };
         offers.heard += 1;
-        let arrivals = (0..).zip(labels).filter(|(_, label)| label.vertex == probe.goal);
+        let arrivals = (0..)
+            .zip(labels)
+            .filter(|(_, label)| label.vertex == probe.goal);
         if let Some((at, label)) = arrivals.min_by_key(|(_, label)| label.ready)
-            && offers.best.as_ref().is_none_or(|(ready, _)| label.ready < *ready)
+            && offers
+                .best
+                .as_ref()
+                .is_none_or(|(ready, _)| label.ready < *ready)
         {
             let end = label.ready.saturating_add(gap).min(label.until);
-            offers.best = Some((label.ready, latest_way(labels, at, end)));
+            offers.best = Some((label.ready, way_to(labels, at, end)));
         }
         if offers.heard >= offers.probes {
             self.decide(desk, rover);
@@ -228,7 +239,11 @@ impl Registry {
     /// Decides what has waited for long enough.
     pub(super) fn decide_overdue(&mut self, desk: &Desk<'_>) {
         let overdue = |o: &Offers| !o.decided && o.deadline <= desk.now && o.best.is_some();
-        let rovers = self.offers.iter().filter(|(_, o)| overdue(o)).map(|(&r, _)| r);
+        let rovers = self
+            .offers
+            .iter()
+            .filter(|(_, o)| overdue(o))
+            .map(|(&r, _)| r);
         for rover in rovers.collect::<Vec<_>>() {
             self.decide(desk, rover);
         }
@@ -243,13 +258,26 @@ impl Registry {
         match offers.best.take() {
             Some((_, way)) => {
                 let at = way.len() as u32 - 1;
-                let reserve = Reserve { walk, first_step, way, at };
+                let reserve = Reserve {
+                    walk,
+                    first_step,
+                    way,
+                    at,
+                };
                 self.reserve(desk, reserve);
             }
             None => {
                 let route = offers.route.clone();
                 let at = route.len() as u32 - 1;
-                self.fail(desk, Settle { walk, verdict: Verdict::Failed, route, at });
+                self.fail(
+                    desk,
+                    Settle {
+                        walk,
+                        verdict: Verdict::Failed,
+                        route,
+                        at,
+                    },
+                );
             }
         }
     }
@@ -259,7 +287,11 @@ impl Registry {
         self.book.strike_earlier(&reserve.walk);
         let hi = reserve.at as usize;
         let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.node;
-        let part = reserve.way[..=hi].iter().rev().take_while(|visit| mine(visit)).count();
+        let part = reserve.way[..=hi]
+            .iter()
+            .rev()
+            .take_while(|visit| mine(visit))
+            .count();
         let lo = hi + 1 - part;
         match self.book.check(&reserve.walk, &reserve.way[lo..=hi]) {
             Ok(()) => {}
@@ -309,11 +341,25 @@ impl Registry {
         let route = owners(desk, &reserve.way);
         let at = owners(desk, &reserve.way[..=lo]).len() as u32 - 1;
         let walk = reserve.walk;
-        let released = Settle { walk, verdict: Verdict::Released, route: route.clone(), at };
+        let released = Settle {
+            walk,
+            verdict: Verdict::Released,
+            route: route.clone(),
+            at,
+        };
         self.forward(released);
         // A route may pass this node twice.
         self.book.strike(&walk);
-        self.fail(desk, Settle { walk, verdict: Verdict::Failed, route, at });
+        self.unpark(desk);
+        self.fail(
+            desk,
+            Settle {
+                walk,
+                verdict: Verdict::Failed,
+                route,
+                at,
+            },
+        );
     }
 
     fn forward(&mut self, settle: Settle) {
@@ -359,11 +405,18 @@ impl Registry {
     fn served(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
         let current = |a: &&mut Applicant| a.walk.is_some_and(|(mine, _)| mine == reserve.walk);
         if let Some(applicant) = self.applicants.iter_mut().find(current) {
-            let started = applicant.walk.take().map_or(desk.now, |(_, started)| started);
+            let started = applicant
+                .walk
+                .take()
+                .map_or(desk.now, |(_, started)| started);
             applicant.served += 1;
             applicant.last_entry = reserve.way[0].start;
             let took = desk.now - started;
-            self.walk_time = if self.walk_time == 0 { took } else { (3 * self.walk_time + took) / 4 };
+            self.walk_time = if self.walk_time == 0 {
+                took
+            } else {
+                (3 * self.walk_time + took) / 4
+            };
         }
         self.apply(desk);
     }
@@ -371,7 +424,10 @@ impl Registry {
     /// When something is to be done without being told.
     pub(super) fn next_due(&self) -> Option<u64> {
         let lines = self.lines.values().filter_map(Line::next_due);
-        let open = self.offers.values().filter(|o| !o.decided && o.best.is_some());
+        let open = self
+            .offers
+            .values()
+            .filter(|o| !o.decided && o.best.is_some());
         lines.chain(open.map(|o| o.deadline)).min()
     }
 }
@@ -394,12 +450,16 @@ fn owners(desk: &Desk<'_>, way: &[TimedVisit]) -> Vec<NodeId> {
 fn frontier(labels: &[Label], borders: impl Fn(&Label) -> bool) -> Vec<u32> {
     let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
     for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
-        let found = best.entry((label.vertex, label.until)).or_insert((label.ready, at));
+        let found = best
+            .entry((label.vertex, label.until))
+            .or_insert((label.ready, at));
         *found = (*found).min((label.ready, at));
     }
     let mut all: Vec<(u64, u32)> = best.into_values().collect();
     all.sort_unstable();
-    let last = all.iter().position(|&(_, at)| labels[at as usize].until == FOREVER);
+    let last = all
+        .iter()
+        .position(|&(_, at)| labels[at as usize].until == FOREVER);
     if let Some(last) = last.filter(|&last| last >= MAX_FRONTIER) {
         all.swap(MAX_FRONTIER - 1, last);
     }

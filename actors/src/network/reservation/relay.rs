@@ -14,13 +14,13 @@ const LEAST_PATIENCE: u64 = 40_000_000;
 #[derive(Debug)]
 struct Pending {
     item: Item,
-    first_sent: u64,
-    repeat_at: u64,
-    repeats: u32,
+    /// When it is to be sent, again or for the first time [ns].
+    due: u64,
+    sent: u32,
 }
 
 /// One direction to, and one from, a neighbour.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Line {
     next: u64,
     pending: BTreeMap<u64, Pending>,
@@ -28,23 +28,10 @@ pub(super) struct Line {
     taken: u64,
     /// Taken beyond that.
     beyond: BTreeSet<u64>,
-    /// The neighbour is owed an acknowledgement.
-    owes: bool,
+    /// The neighbour is owed a receipt, for a message that it sent then [ns].
+    owes: Option<u64>,
     /// Smoothed round trip \[ns\].
     round_trip: Option<u64>,
-}
-
-impl Default for Line {
-    fn default() -> Self {
-        Line {
-            next: 0,
-            pending: BTreeMap::new(),
-            taken: 0,
-            beyond: BTreeSet::new(),
-            owes: false,
-            round_trip: None,
-        }
-    }
 }
 
 /// What acknowledges: all below `taken`, and these.
@@ -52,15 +39,16 @@ impl Default for Line {
 pub(super) struct Receipt {
     pub(super) taken: u64,
     pub(super) beyond: Vec<u64>,
+    /// When the message was sent that this answers, by the clock of its sender [ns].
+    pub(super) echo: Option<u64>,
 }
 
 impl Line {
     pub(super) fn post(&mut self, item: Item) {
         let pending = Pending {
             item,
-            first_sent: 0,
-            repeat_at: 0,
-            repeats: 0,
+            due: 0,
+            sent: 0,
         };
         self.pending.insert(self.next, pending);
         self.next += 1;
@@ -80,63 +68,54 @@ impl Line {
         let patience = (2 * self.round_trip()).max(LEAST_PATIENCE);
         let mut items = Vec::new();
         for (&number, pending) in &mut self.pending {
-            if pending.repeat_at > now {
+            if pending.due > now {
                 continue;
             }
-            if pending.first_sent == 0 {
-                pending.first_sent = now.max(1);
-            } else {
-                pending.repeats += 1;
-            }
-            // Each time it waits longer, up to eight times as long.
-            let factor = 1u64 << pending.repeats.min(3);
-            pending.repeat_at = now + patience * factor;
+            // Each time it waits longer, up to four times as long.
+            pending.due = now + (patience << pending.sent.min(2));
+            pending.sent += 1;
             let item = pending.item.clone();
             items.push(Numbered { number, item });
         }
-        if items.is_empty() && !self.owes {
+        let echo = self.owes.take();
+        if items.is_empty() && echo.is_none() {
             return None;
         }
-        self.owes = false;
         let receipt = Receipt {
             taken: self.taken,
             beyond: self.beyond.iter().copied().collect(),
+            echo,
         };
         Some((receipt, items))
     }
 
     /// When an item is to be repeated, if any is on its way.
     pub(super) fn next_due(&self) -> Option<u64> {
-        self.pending.values().map(|p| p.repeat_at).min()
+        self.pending.values().map(|p| p.due).min()
     }
 
     /// After a crash nobody knows what was on its way: all is repeated.
     pub(super) fn restart(&mut self) {
         for pending in self.pending.values_mut() {
-            pending.repeat_at = 0;
-            pending.repeats += 1;
+            pending.due = 0;
         }
     }
 
+    /// A receipt has come. What it echoes says how long a round trip takes, however often things were
+    /// repeated.
     pub(super) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {
-        let done = |number: u64| number < receipt.taken || receipt.beyond.contains(&number);
-        for (&number, pending) in &self.pending {
-            // An item that was repeated does not say which of its copies is answered.
-            if done(number) && pending.repeats == 0 && pending.first_sent > 0 {
-                let sample = now.saturating_sub(pending.first_sent);
-                let smoothed = self.round_trip.map_or(sample, |old| (7 * old + sample) / 8);
-                self.round_trip = Some(smoothed);
-            } else if done(number) && self.round_trip.is_none() {
-                // Better than no measurement: on slow links every first item is repeated.
-                self.round_trip = Some(now.saturating_sub(pending.first_sent));
-            }
+        if let Some(sent) = receipt.echo {
+            let sample = now.saturating_sub(sent);
+            let smoothed = self.round_trip.map_or(sample, |old| (7 * old + sample) / 8);
+            self.round_trip = Some(smoothed);
         }
+        let done = |number: u64| number < receipt.taken || receipt.beyond.contains(&number);
         self.pending.retain(|&number, _| !done(number));
     }
 
-    /// Takes an item, unless it was taken before.
-    pub(super) fn take(&mut self, numbered: Numbered) -> Option<Item> {
-        self.owes = true;
+    /// Takes an item of a message sent at `sent`, unless it was taken before.
+    pub(super) fn take(&mut self, sent: u64, numbered: Numbered) -> Option<Item> {
+        self.owes = Some(sent);
         let Numbered { number, item } = numbered;
         if number < self.taken || !self.beyond.insert(number) {
             return None;

@@ -54,14 +54,26 @@ impl Node {
         registry.decide_overdue(&desk);
         let next_grant = self.grant_heads(ctx, &mut registry, now);
         for (&to, line) in &mut registry.lines {
-            let Some((Receipt { taken, beyond }, items)) = line.due(now) else {
+            let Some((
+                Receipt {
+                    taken,
+                    beyond,
+                    echo,
+                },
+                items,
+            )) = line.due(now)
+            else {
                 continue;
             };
-            let Some(at) = self.neighbor(to) else { continue };
+            let Some(at) = self.neighbor(to) else {
+                continue;
+            };
             let relay = Relay {
                 node: self.id,
                 taken,
                 beyond,
+                sent: now,
+                echo,
                 items,
             };
             ctx.send(self.neighbors[at].address, relay);
@@ -127,14 +139,26 @@ impl Handler<Relay> for Node {
             node,
             taken,
             beyond,
+            sent,
+            echo,
             items,
         } = relay;
         self.with_registry(ctx, |registry, desk| {
             let Some(line) = registry.lines.get_mut(&node) else {
                 return;
             };
-            line.acknowledged(&Receipt { taken, beyond }, desk.now);
-            let new: Vec<_> = items.into_iter().filter_map(|item| line.take(item)).collect();
+            line.acknowledged(
+                &Receipt {
+                    taken,
+                    beyond,
+                    echo,
+                },
+                desk.now,
+            );
+            let new: Vec<_> = items
+                .into_iter()
+                .filter_map(|item| line.take(sent, item))
+                .collect();
             for item in new {
                 registry.take(desk, item);
             }
