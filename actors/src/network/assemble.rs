@@ -38,6 +38,22 @@ pub enum NetworkError {
         /// Its exits.
         exits: usize,
     },
+    /// Two rovers cannot be in one place.
+    #[error("two rovers have the {what} {}", .vertex.0)]
+    Shared {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Where.
+        vertex: VertexId,
+    },
+    /// A vertex that the roadmap does not have.
+    #[error("a rover's {what} is vertex {}, which the roadmap does not have", .vertex.0)]
+    Outside {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Where.
+        vertex: VertexId,
+    },
     /// No actor has this name.
     #[error("no node or rover is called {name}; there are {first} to {last}")]
     UnknownActor {
@@ -58,8 +74,10 @@ pub(crate) struct Site {
     pub(crate) payoffs: Payoffs,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
-    /// Each rover's entry and goal.
+    /// Each rover's entry, or where it stands at first, and its goal.
     pub(crate) missions: Vec<(VertexId, VertexId)>,
+    /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
+    pub(crate) stays: bool,
     /// Who waits at each entry, in order.
     pub(crate) queues: Vec<(VertexId, Vec<RoverId>)>,
 }
@@ -68,6 +86,13 @@ impl Site {
     /// The planning cycle at `now`, from 0. Nodes' clocks are synchronous.
     pub(crate) fn cycle_at(&self, now: SimTime) -> u32 {
         u32::try_from(now.as_nanos() / self.config.cycle.as_nanos()).unwrap_or(u32::MAX)
+    }
+
+    /// Who stands where at the start.
+    pub(crate) fn standing(&self) -> impl Iterator<Item = (RoverId, VertexId)> + '_ {
+        let all = (0..).map(RoverId).zip(&self.missions);
+        all.filter(|_| self.stays)
+            .map(|(id, (start, _))| (id, *start))
     }
 
     /// Who waits at `entry`, in order.
@@ -122,11 +147,57 @@ pub fn assemble(
     seed: u64,
     connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
-    network.check()?;
     let missions = missions(world, &roadmap, team, seed)?;
+    assemble_missions(sim, roadmap, sensors, missions, false, network, connect)
+}
+
+/// The same with the missions given, for rovers that stand on the map from the start and stay at
+/// their goals: each rover's start and goal, no two starts and no two goals alike.
+///
+/// # Errors
+/// When a setting makes no sense, the team is empty, or two rovers would share a vertex at the start
+/// or the end.
+pub fn assemble_standing(
+    sim: &mut Simulation,
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    missions: Vec<(VertexId, VertexId)>,
+    network: &NetworkConfig,
+    connect: &mut Connect<'_>,
+) -> Result<Network, NetworkError> {
+    for (what, of) in [("start", 0), ("goal", 1)] {
+        let place = |mission: &(VertexId, VertexId)| [mission.0, mission.1][of];
+        let mut places: Vec<_> = missions.iter().map(place).collect();
+        places.sort_unstable();
+        if let Some(pair) = places.windows(2).find(|pair| pair[0] == pair[1]) {
+            let vertex = pair[0];
+            return Err(NetworkError::Shared { what, vertex });
+        }
+        if let Some(&vertex) = places.last().filter(|v| v.0 as usize >= roadmap.len()) {
+            return Err(NetworkError::Outside { what, vertex });
+        }
+    }
+    assemble_missions(sim, roadmap, sensors, missions, true, network, connect)
+}
+
+fn assemble_missions(
+    sim: &mut Simulation,
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    missions: Vec<(VertexId, VertexId)>,
+    stays: bool,
+    network: &NetworkConfig,
+    connect: &mut Connect<'_>,
+) -> Result<Network, NetworkError> {
+    network.check()?;
+    if missions.is_empty() {
+        return Err(NetworkError::NoRovers);
+    }
     let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
-        queues.entry(*entry).or_default().push(id);
+    if !stays {
+        for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
+            queues.entry(*entry).or_default().push(id);
+        }
     }
     let site = Arc::new(Site {
         payoffs: Payoffs::new(network, &roadmap),
@@ -137,6 +208,7 @@ pub fn assemble(
         roadmap,
         sensors,
         missions,
+        stays,
     });
     let nodes = declare_nodes(sim, &site);
     let rovers = declare_rovers(sim, &site);

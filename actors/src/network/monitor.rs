@@ -178,7 +178,11 @@ impl Score {
             let others = self.tracks.iter().enumerate().filter(|&(i, _)| i != at);
             self.collisions += others.filter(|(_, other)| clashes(other)).count() as u32;
         }
-        let all_gone = |t: &Track| t.arrived.is_some() && t.vertex.is_none();
+        let stays = site.stays;
+        let all_gone = |t: &Track| {
+            let there = stays && t.remaining == 0 && t.moving_to.is_none();
+            t.arrived.is_some() && (t.vertex.is_none() || there)
+        };
         if !self.ended && self.tracks.iter().all(all_gone) {
             self.ended = true;
             return Flow::Stop("all rovers have arrived".to_owned());

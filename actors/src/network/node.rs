@@ -141,7 +141,13 @@ impl Actor for Node {
             self.rovers.push(ctx.lookup::<Rover>(name)?);
         }
         let owned = self.site.sensors.owned(self.id);
-        ctx.durable::<Ledger>().open(owned, self.rovers.len());
+        let ledger = ctx.durable::<Ledger>();
+        let is_new = ledger.is_new();
+        ledger.open(owned, self.rovers.len());
+        for (rover, vertex) in self.site.standing().filter(|_| is_new) {
+            let goal = self.site.missions[rover.0 as usize].1;
+            ledger.stand(vertex, rover, goal);
+        }
         if self.site.config.policy == Policy::Complete {
             self.open_registry(ctx);
         }

@@ -126,6 +126,11 @@ impl Actor for Rover {
             self.nodes.push(ctx.lookup::<Node>(name)?);
         }
         self.radios = ctx.links();
+        let memory = ctx.durable::<RoverMemory>();
+        if self.site.stays && memory.step == 0 {
+            memory.vertex = Some(self.entry);
+            memory.step = 1;
+        }
         // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
         if ctx.durable::<RoverMemory>().moving_to.is_some() {
             self.drive(ctx);

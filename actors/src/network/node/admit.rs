@@ -145,7 +145,7 @@ impl Handler<Beacon> for Node {
         if expected {
             self.report_departure(ctx, fact, beacon.previous);
         }
-        if here == Some(goal) && fact.moving_to.is_none() {
+        if here == Some(goal) && fact.moving_to.is_none() && !self.site.stays {
             self.send_grant(ctx, fact.rover, fact.step + 1, None);
         }
         Ok(())

@@ -55,7 +55,9 @@ impl Node {
             self.send_grant(ctx, held.rover, held.step, Some(vertex));
         }
         let ledger = ctx.durable::<Ledger>();
-        let at_goal = |(v, held): &(VertexId, Occupant)| held.arrived && held.goal == Some(*v);
+        let stays = self.site.stays;
+        let at_goal =
+            |(v, held): &(VertexId, Occupant)| !stays && held.arrived && held.goal == Some(*v);
         let leaving: Vec<_> = ledger.occupied().filter(at_goal).map(|(_, h)| h).collect();
         for held in leaving {
             self.send_grant(ctx, held.rover, held.step + 1, None);

@@ -120,4 +120,6 @@ pub enum Verdict {
     Released,
     /// The same, for the node that began: it tries again. Goes backward.
     Failed,
+    /// There is no way as things stand. Goes backward.
+    NoWay,
 }

@@ -16,16 +16,37 @@ use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit, prune,
 /// The most labels that a probe hands on from one node to the next, so that messages stay small.
 const MAX_FRONTIER: usize = 24;
 
-/// A rover that wants to be let in, the first of its queue.
+/// A rover, or a queue of rovers, for which a way is sought.
 #[derive(Debug)]
 struct Applicant {
-    entry: VertexId,
-    /// How many of its queue have a way.
-    served: usize,
+    origin: Origin,
     /// The walk under way, and when its attempt began.
     walk: Option<(Walk, u64)>,
-    /// When the last one before is planned to come in.
-    last_entry: u64,
+    /// The next attempt, and when it begins.
+    again: Option<(Walk, u64)>,
+    /// Attempts that found no way at all.
+    in_vain: u32,
+}
+
+/// Where a way begins.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    /// At an entry; the rovers of its queue follow each other.
+    Queue {
+        entry: VertexId,
+        /// How many have a way.
+        served: usize,
+        /// When the last of these is planned to come in.
+        last_entry: u64,
+    },
+    /// Where a rover stands, that came there with `step`.
+    Stand {
+        rover: RoverId,
+        vertex: VertexId,
+        step: u32,
+    },
+    /// Nowhere: there is nothing left to seek.
+    Done,
 }
 
 /// What the owner of a goal has heard of the probes of one attempt.
@@ -71,17 +92,26 @@ impl Registry {
             for &neighbor in sensors.neighbors(desk.node) {
                 self.lines.insert(neighbor, Line::default());
             }
-            let own = |entry: &VertexId| sensors.owner(*entry) == desk.node;
+            let own = |v: &VertexId| sensors.owner(*v) == desk.node;
             let queues = desk.site.queues.iter().map(|(entry, _)| *entry);
-            self.applicants = queues
-                .filter(own)
-                .map(|entry| Applicant {
+            for entry in queues.filter(own) {
+                self.seek(Origin::Queue {
                     entry,
                     served: 0,
-                    walk: None,
                     last_entry: 0,
-                })
-                .collect();
+                });
+            }
+            let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
+            for (rover, vertex) in standing {
+                self.book.stand(vertex, rover, 1);
+                if desk.site.missions[rover.0 as usize].1 != vertex {
+                    self.seek(Origin::Stand {
+                        rover,
+                        vertex,
+                        step: 1,
+                    });
+                }
+            }
         } else {
             for line in self.lines.values_mut() {
                 line.restart();
@@ -97,21 +127,36 @@ impl Registry {
         mean.map_or(FIRST_GAP, |gap| gap.max(1))
     }
 
-    /// Begins a walk for the first rover of each own queue that has none.
+    fn seek(&mut self, origin: Origin) {
+        self.applicants.push(Applicant {
+            origin,
+            walk: None,
+            again: None,
+            in_vain: 0,
+        });
+    }
+
+    /// Begins a walk for each applicant that has none under way.
     pub(super) fn apply(&mut self, desk: &Desk<'_>) {
         for at in 0..self.applicants.len() {
-            if self.applicants[at].walk.is_some() {
+            let applicant = &self.applicants[at];
+            if applicant.walk.is_some() {
                 continue;
             }
-            let entry = self.applicants[at].entry;
-            let queue = desk.site.queue(entry);
-            if let Some(&rover) = queue.get(self.applicants[at].served) {
-                let walk = Walk {
-                    rover,
-                    attempt: 1,
-                    since: desk.now,
-                };
-                self.begin(desk, at, walk);
+            let rover = match applicant.origin {
+                Origin::Queue { entry, served, .. } => desk.site.queue(entry).get(served).copied(),
+                Origin::Stand { rover, .. } => Some(rover),
+                Origin::Done => None,
+            };
+            let first = |rover| Walk {
+                rover,
+                attempt: 1,
+                since: desk.now,
+            };
+            match (applicant.again, rover) {
+                (Some((walk, due)), _) if due <= desk.now => self.begin(desk, at, walk),
+                (None, Some(rover)) => self.begin(desk, at, first(rover)),
+                _ => {}
             }
         }
     }
@@ -119,11 +164,30 @@ impl Registry {
     fn begin(&mut self, desk: &Desk<'_>, at: usize, walk: Walk) {
         let applicant = &mut self.applicants[at];
         applicant.walk = Some((walk, desk.now));
-        let (entry, last_entry) = (applicant.entry, applicant.last_entry);
+        applicant.again = None;
         let goal = desk.site.missions[walk.rover.0 as usize].1;
-        let earliest = (desk.now + self.walk_time).max(last_entry + 1);
-        let dwell = desk.site.config.cycle.as_nanos();
-        let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
+        let soon = desk.now + self.walk_time;
+        let (labels, entry, first_step) = match applicant.origin {
+            Origin::Queue {
+                entry, last_entry, ..
+            } => {
+                let dwell = desk.site.config.cycle.as_nanos();
+                let earliest = soon.max(last_entry + 1);
+                let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
+                (labels, entry, 1)
+            }
+            Origin::Stand { vertex, step, .. } => {
+                let label = Label {
+                    vertex,
+                    start: soon,
+                    ready: soon,
+                    until: FOREVER,
+                    parent: None,
+                };
+                (vec![label], vertex, step)
+            }
+            Origin::Done => return,
+        };
         let site = desk.site;
         let routes = routes(
             &site.roadmap,
@@ -140,7 +204,7 @@ impl Registry {
                 route,
                 at: 0,
                 goal,
-                first_step: 1,
+                first_step,
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
@@ -219,16 +283,19 @@ impl Registry {
             return;
         };
         offers.heard += 1;
+        // Who stays needs the goal for ever.
+        let stays = desk.site.stays;
         let arrivals = (0..)
             .zip(labels)
-            .filter(|(_, label)| label.vertex == probe.goal);
+            .filter(|(_, label)| label.vertex == probe.goal && (!stays || label.until == FOREVER));
         if let Some((at, label)) = arrivals.min_by_key(|(_, label)| label.ready)
             && offers
                 .best
                 .as_ref()
                 .is_none_or(|(ready, _)| label.ready < *ready)
         {
-            let end = label.ready.saturating_add(gap).min(label.until);
+            let leaves = label.ready.saturating_add(gap).min(label.until);
+            let end = if stays { FOREVER } else { leaves };
             offers.best = Some((label.ready, way_to(labels, at, end)));
         }
         if offers.heard >= offers.probes {
@@ -268,16 +335,13 @@ impl Registry {
             }
             None => {
                 let route = offers.route.clone();
-                let at = route.len() as u32 - 1;
-                self.fail(
-                    desk,
-                    Settle {
-                        walk,
-                        verdict: Verdict::Failed,
-                        route,
-                        at,
-                    },
-                );
+                let settle = Settle {
+                    walk,
+                    verdict: Verdict::NoWay,
+                    at: route.len() as u32 - 1,
+                    route,
+                };
+                self.fail(desk, settle);
             }
         }
     }
@@ -293,7 +357,10 @@ impl Registry {
             .take_while(|visit| mine(visit))
             .count();
         let lo = hi + 1 - part;
-        match self.book.check(&reserve.walk, &reserve.way[lo..=hi]) {
+        // A rover that stands on the map has its first vertex already.
+        let stands = lo == 0 && desk.site.stays;
+        let first = lo + usize::from(stands);
+        match self.book.check(&reserve.walk, &reserve.way[first..=hi]) {
             Ok(()) => {}
             Err(Clash::Younger) => {
                 self.parked.push(reserve);
@@ -304,7 +371,7 @@ impl Registry {
                 return;
             }
         }
-        for i in lo..=hi {
+        for i in first..=hi {
             let TimedVisit { vertex, start, end } = reserve.way[i];
             let visit = Visit {
                 walk: reserve.walk,
@@ -325,6 +392,10 @@ impl Registry {
         }
         // The whole way is entered: from here on it holds.
         self.book.confirm(&reserve.walk);
+        if stands {
+            let TimedVisit { vertex, end, .. } = reserve.way[0];
+            self.book.leave_by(vertex, end);
+        }
         self.served(desk, &reserve);
         let settle = Settle {
             walk: reserve.walk,
@@ -378,15 +449,26 @@ impl Registry {
         }
         let walk = settle.walk;
         let current = |a: &Applicant| a.walk.is_some_and(|(mine, _)| mine == walk);
-        if let Some(at) = self.applicants.iter().position(current) {
-            let attempt = walk.attempt + 1;
-            self.begin(desk, at, Walk { attempt, ..walk });
+        let Some(at) = self.applicants.iter().position(current) else {
+            return;
+        };
+        let attempt = walk.attempt + 1;
+        let next = Walk { attempt, ..walk };
+        if settle.verdict == Verdict::Failed {
+            self.begin(desk, at, next);
+            return;
         }
+        // Nothing leads there as things stand: other rovers have to go first.
+        let applicant = &mut self.applicants[at];
+        applicant.walk = None;
+        let pause = desk.site.config.cycle.as_nanos() << applicant.in_vain.min(3);
+        applicant.in_vain += 1;
+        applicant.again = Some((next, desk.now + pause));
     }
 
     fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
         match settle.verdict {
-            Verdict::Failed => return self.fail(desk, settle),
+            Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
             Verdict::Confirmed => self.book.confirm(&settle.walk),
             Verdict::Released => self.book.strike(&settle.walk),
         }
@@ -403,21 +485,29 @@ impl Registry {
 
     /// The rover of this walk has its way: the next one of the queue is served.
     fn served(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
-        let current = |a: &&mut Applicant| a.walk.is_some_and(|(mine, _)| mine == reserve.walk);
-        if let Some(applicant) = self.applicants.iter_mut().find(current) {
-            let started = applicant
+        let current = |a: &Applicant| a.walk.is_some_and(|(mine, _)| mine == reserve.walk);
+        let Some(at) = self.applicants.iter().position(current) else {
+            return;
+        };
+        let applicant = &mut self.applicants[at];
+        let took = desk.now
+            - applicant
                 .walk
                 .take()
                 .map_or(desk.now, |(_, started)| started);
-            applicant.served += 1;
-            applicant.last_entry = reserve.way[0].start;
-            let took = desk.now - started;
-            self.walk_time = if self.walk_time == 0 {
-                took
-            } else {
-                (3 * self.walk_time + took) / 4
-            };
-        }
+        applicant.in_vain = 0;
+        applicant.origin = match applicant.origin {
+            Origin::Queue { entry, served, .. } => Origin::Queue {
+                entry,
+                served: served + 1,
+                last_entry: reserve.way[0].start,
+            },
+            Origin::Stand { .. } | Origin::Done => Origin::Done,
+        };
+        self.walk_time = match self.walk_time {
+            0 => took,
+            old => (3 * old + took) / 4,
+        };
         self.apply(desk);
     }
 
