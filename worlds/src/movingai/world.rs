@@ -162,8 +162,8 @@ impl GridWorld {
     /// let world = GridWorld::new("a.map", &map, 1.0, tasks.tasks())?;
     /// assert_eq!(
     ///     world.explain(&world.blocked()[0]),
-    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another task; \
-    ///      those met first are of line 3, from (1, 0) to (1, 0)"
+    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another task; the \
+    ///      best over (1, 0) of line 3"
     /// );
     /// # Ok::<(), farside_worlds::movingai::GridError>(())
     /// ```
@@ -172,23 +172,18 @@ impl GridWorld {
     /// When it is not of this world: a bug in the caller.
     pub fn explain(&self, blocked: &Blocked) -> String {
         let task = &self.lines[blocked.task];
-        let met: Vec<String> = blocked
-            .by
-            .iter()
-            .map(|&other| {
-                let GridTask {
-                    line, start, goal, ..
-                } = &self.lines[other];
-                format!("line {line}, from {start} to {goal}")
-            })
-            .collect();
+        let met = blocked.over.iter().map(|&(vertex, other)| {
+            let (cell, line) = (self.cell(vertex), self.lines[other].line);
+            format!("{cell} of line {line}")
+        });
+        let met: Vec<String> = met.collect();
         format!(
-            "line {}: every way from {} to {} leads over the start or goal of another task; those \
-             met first are of {}",
+            "line {}: every way from {} to {} leads over the start or goal of another task; the \
+             best over {}",
             task.line,
             task.start,
             task.goal,
-            met.join("; ")
+            met.join(", ")
         )
     }
 }

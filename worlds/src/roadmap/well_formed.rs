@@ -1,5 +1,7 @@
 //! Which sets of tasks need no luck: well-formed instances.
 
+use std::collections::VecDeque;
+
 use super::{Roadmap, VertexId};
 
 /// A task that keeps an instance from being well-formed: every path from its start to its goal
@@ -8,9 +10,10 @@ use super::{Roadmap, VertexId};
 pub struct Blocked {
     /// Which task, from 0.
     pub task: usize,
-    /// The tasks whose start or goal stands in the way first, sorted: one of these must be elsewhere
-    /// before anything is gained. At least one.
-    pub by: Vec<usize>,
+    /// Of a path that leads over as few starts and goals of others as any: these vertices in order
+    /// from the start, each with the task that begins or ends there (twice, if two do). At least
+    /// one. If these tasks were elsewhere, this one would not be blocked.
+    pub over: Vec<(VertexId, usize)>,
 }
 
 /// The tasks that keep an instance from being **well-formed**: those whose goal cannot be reached
@@ -37,7 +40,8 @@ pub struct Blocked {
 /// assert_eq!(well_formed(&map, &[(v(0), v(2)), (v(3), v(3))]), []);
 /// // The second rover stays in the first one's way.
 /// let stay = [(v(0), v(2)), (v(3), v(1))];
-/// assert_eq!(well_formed(&map, &stay), [Blocked { task: 0, by: vec![1] }]);
+/// let over = vec![(v(1), 1)];
+/// assert_eq!(well_formed(&map, &stay), [Blocked { task: 0, over }]);
 /// # Ok::<(), farside_worlds::RoadmapError>(())
 /// ```
 ///
@@ -51,11 +55,7 @@ pub fn well_formed(roadmap: &Roadmap, tasks: &[(VertexId, VertexId)]) -> Vec<Blo
             ends[goal.0 as usize].push(task);
         }
     }
-    let mut search = Search {
-        roadmap,
-        ends,
-        reached: vec![usize::MAX; roadmap.len()],
-    };
+    let search = Search { roadmap, ends };
     let all = tasks.iter().enumerate();
     all.filter_map(|(task, &(start, goal))| search.blocked(task, start, goal))
         .collect()
@@ -65,36 +65,48 @@ struct Search<'a> {
     roadmap: &'a Roadmap,
     /// The tasks that begin or end at each vertex, sorted.
     ends: Vec<Vec<usize>>,
-    /// The last task for which the vertex was looked at.
-    reached: Vec<usize>,
 }
 
 impl Search<'_> {
-    fn blocked(&mut self, task: usize, start: VertexId, goal: VertexId) -> Option<Blocked> {
-        let mut by = Vec::new();
-        let mut stack = vec![start];
-        self.reached[start.0 as usize] = task;
-        while let Some(here) = stack.pop() {
-            let others = self.ends[here.0 as usize].iter().copied();
-            let before = by.len();
-            by.extend(others.filter(|other| *other != task));
-            if by.len() > before {
+    /// The other tasks that begin or end at `v`.
+    fn others(&self, task: usize, v: VertexId) -> impl Iterator<Item = usize> {
+        let all = self.ends[v.0 as usize].iter().copied();
+        all.filter(move |other| *other != task)
+    }
+
+    fn blocked(&self, task: usize, start: VertexId, goal: VertexId) -> Option<Blocked> {
+        // A path over fewest ends of others: their vertices cost 1, all else costs nothing, so that
+        // a queue with two ends keeps the order. Searched from the goal, to be read from the start.
+        let taken = |v| self.others(task, v).next().is_some();
+        let mut next: Vec<Option<VertexId>> = vec![None; self.roadmap.len()];
+        let mut done = vec![false; self.roadmap.len()];
+        let mut queue = VecDeque::from([(goal, goal)]);
+        while let Some((here, towards)) = queue.pop_front() {
+            if std::mem::replace(&mut done[here.0 as usize], true) {
                 continue;
             }
-            if here == goal {
-                return None;
+            next[here.0 as usize] = Some(towards);
+            if here == start {
+                break;
             }
-            for &next in self.roadmap.neighbors(here) {
-                let last = &mut self.reached[next.0 as usize];
-                if *last != task {
-                    *last = task;
-                    stack.push(next);
+            for &beside in self.roadmap.neighbors(here) {
+                match taken(beside) {
+                    _ if done[beside.0 as usize] => {}
+                    true => queue.push_back((beside, here)),
+                    false => queue.push_front((beside, here)),
                 }
             }
         }
-        by.sort_unstable();
-        by.dedup();
-        Some(Blocked { task, by })
+        let mut over = Vec::new();
+        let mut here = start;
+        loop {
+            over.extend(self.others(task, here).map(|other| (here, other)));
+            if here == goal {
+                break;
+            }
+            here = next[here.0 as usize].expect("a roadmap is connected");
+        }
+        (!over.is_empty()).then_some(Blocked { task, over })
     }
 }
 
@@ -121,40 +133,56 @@ mod tests {
     }
 
     #[test]
-    fn who_is_met_first_is_named() {
+    fn those_in_the_way_are_named_in_order() {
         let map = line(7);
         let blocked = |pairs: &[(u32, u32)]| well_formed(&map, &tasks(pairs));
-        let is = |task, by: &[usize]| Blocked {
-            task,
-            by: by.to_vec(),
+        let is = |task, over: &[(u32, usize)]| {
+            let over = over.iter().map(|&(v, task)| (VertexId(v), task)).collect();
+            Blocked { task, over }
         };
         assert_eq!(blocked(&[]), []);
         assert_eq!(blocked(&[(0, 2), (4, 3), (5, 6)]), []);
-        // 1 and 2 both stand between, but 2 cannot matter before 1 does.
-        assert_eq!(blocked(&[(0, 6), (2, 2), (4, 5)]), [is(0, &[1])]);
-        // From both sides.
-        assert_eq!(blocked(&[(3, 6), (2, 2), (4, 4)]), [is(0, &[1, 2])]);
-        // One ends where the other begins; they cannot even change places in turn.
-        assert_eq!(blocked(&[(0, 3), (3, 5)]), [is(0, &[1]), is(1, &[0])]);
+        assert_eq!(
+            blocked(&[(0, 6), (2, 2), (5, 4)]),
+            [is(0, &[(2, 1), (4, 2), (5, 2)])]
+        );
+        // One ends where the other begins.
+        assert_eq!(
+            blocked(&[(0, 3), (3, 5)]),
+            [is(0, &[(3, 1)]), is(1, &[(3, 0)])]
+        );
+        // Two in one place.
+        assert_eq!(
+            blocked(&[(0, 2), (1, 3), (4, 1)])[0],
+            is(0, &[(1, 1), (1, 2)])
+        );
         // Who stays is in nobody's way but those who must pass.
         assert_eq!(blocked(&[(3, 3), (0, 1)]), []);
     }
 
-    /// Whether some simple path from `here` to `goal` avoids what is forbidden, by trying them all.
-    fn some_path(map: &Roadmap, here: VertexId, goal: VertexId, used: &mut Vec<VertexId>) -> bool {
+    /// The fewest vertices of `taken` on any simple path from `here` to `goal`, by trying them all.
+    fn fewest(
+        map: &Roadmap,
+        here: VertexId,
+        goal: VertexId,
+        taken: &[VertexId],
+        used: &mut Vec<VertexId>,
+    ) -> Option<usize> {
         if used.contains(&here) {
-            return false;
+            return None;
         }
+        let own = usize::from(taken.contains(&here));
         if here == goal {
-            return true;
+            return Some(own);
         }
         used.push(here);
-        let found = map
+        let rest = map
             .neighbors(here)
             .iter()
-            .any(|&next| some_path(map, next, goal, used));
+            .filter_map(|&next| fewest(map, next, goal, taken, used))
+            .min();
         used.pop();
-        found
+        rest.map(|rest| rest + own)
     }
 
     proptest! {
@@ -171,40 +199,30 @@ mod tests {
             let map = world.roadmap();
             let vertex = |pick: usize| VertexId((pick % map.len()) as u32);
             let tasks: Vec<_> = picks.iter().map(|&(a, b)| (vertex(a), vertex(b))).collect();
-            let found: Vec<usize> = well_formed(map, &tasks).iter().map(|b| b.task).collect();
-            let expected: Vec<usize> = (0..tasks.len())
-                .filter(|&task| {
-                    let mut others: Vec<VertexId> = tasks
-                        .iter()
-                        .enumerate()
-                        .filter(|(other, _)| *other != task)
-                        .flat_map(|(_, &(start, goal))| [start, goal])
-                        .collect();
-                    let (start, goal) = tasks[task];
-                    // Vertices that may not be used pass for used ones; the goal itself, too.
-                    others.contains(&goal) || !some_path(map, start, goal, &mut others)
-                })
-                .collect();
-            prop_assert_eq!(found, expected);
-        }
-
-        /// Moving one of those named away is needed: without the others, nothing changes.
-        #[test]
-        fn those_named_block_by_themselves(
-            seed: u64,
-            picks in prop::collection::vec((0usize..25, 0usize..25), 2..8),
-        ) {
-            let grid = crate::GridMap::random(5, 5, 0.2, seed).unwrap();
-            let world = crate::GridWorld::new("tiny.map", &grid, 1.0, &[]).unwrap();
-            let map = world.roadmap();
-            let vertex = |pick: usize| VertexId((pick % map.len()) as u32);
-            let tasks: Vec<_> = picks.iter().map(|&(a, b)| (vertex(a), vertex(b))).collect();
-            for blocked in well_formed(map, &tasks) {
-                let mut few = vec![tasks[blocked.task]];
-                few.extend(blocked.by.iter().map(|&other| tasks[other]));
-                let verdict = well_formed(map, &few);
-                prop_assert_eq!(verdict.first().map(|b| b.task), Some(0));
-                prop_assert_eq!(verdict[0].by.len(), blocked.by.len());
+            let found = well_formed(map, &tasks);
+            for (task, &(start, goal)) in tasks.iter().enumerate() {
+                let taken: Vec<VertexId> = tasks
+                    .iter()
+                    .enumerate()
+                    .filter(|(other, _)| *other != task)
+                    .flat_map(|(_, &(start, goal))| [start, goal])
+                    .collect();
+                let expected = fewest(map, start, goal, &taken, &mut Vec::new()).unwrap();
+                let blocked = found.iter().find(|blocked| blocked.task == task);
+                let mut over = blocked.map_or_else(Vec::new, |blocked| blocked.over.clone());
+                for &(v, other) in &over {
+                    let (start, goal) = tasks[other];
+                    prop_assert!(other != task && (v == start || v == goal));
+                }
+                // Without those named, nothing is in the way.
+                let mut fewer = vec![tasks[task]];
+                let named = |other: &usize| over.iter().any(|(_, named)| named == other);
+                let others = (0..tasks.len()).filter(|other| *other != task && !named(other));
+                fewer.extend(others.map(|other| tasks[other]));
+                let verdict = well_formed(map, &fewer);
+                prop_assert!(verdict.iter().all(|blocked| blocked.task != 0));
+                over.dedup_by_key(|(v, _)| *v);
+                prop_assert_eq!(over.len(), expected);
             }
         }
     }
