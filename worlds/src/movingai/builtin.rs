@@ -1,7 +1,8 @@
 //! The map that is built in, with its tasks.
 
 /// A map with tasks that is built in: a field of rubble made by this crate, of the size of the
-/// benchmark's `random-32-32-10`. Its first 71 tasks make a well-formed instance; the first 72 do not.
+/// benchmark's `random-32-32-10`. Its first 71 tasks make a well-formed instance; the first
+/// 72 do not.
 ///
 /// ```
 /// use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};

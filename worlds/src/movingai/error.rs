@@ -10,7 +10,8 @@ use crate::error::RoadmapError;
 ///
 /// ```
 /// use farside_worlds::movingai::GridMap;
-/// let error = GridMap::from_movingai(b"type octile\nheight 2\nwidth 3\nmap\n...\n..x\n").unwrap_err();
+/// let text = "type octile\nheight 2\nwidth 3\nmap\n...\n..x\n";
+/// let error = GridMap::from_movingai(text.as_bytes()).unwrap_err();
 /// assert_eq!(
 ///     error.to_string(),
 ///     "line 6, column 3: 'x' is no terrain: expected one of `.`, `G`, `S` (passable), `@`, `O`, \
@@ -171,7 +172,8 @@ pub enum GridProblem {
     },
     /// A character that stands for no terrain.
     #[error(
-        "{found:?} is no terrain: expected one of `.`, `G`, `S` (passable), `@`, `O`, `T`, `W` (not)"
+        "{found:?} is no terrain: expected one of `.`, `G`, `S` (passable), `@`, `O`, \
+         `T`, `W` (not)"
     )]
     Terrain {
         /// The character.

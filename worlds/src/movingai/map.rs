@@ -42,8 +42,10 @@ impl GridMap {
     ///
     /// ```
     /// use farside_worlds::movingai::GridMap;
-    /// let error = GridMap::from_movingai(b"type octile\nheight 3\nwidth 2\nmap\n..\n").unwrap_err();
-    /// assert_eq!(error.to_string(), "line 5: the file ends here: expected row 1 of rows 0 to 2 next");
+    /// let text = "type octile\nheight 3\nwidth 2\nmap\n..\n";
+    /// let error = GridMap::from_movingai(text.as_bytes()).unwrap_err();
+    /// let expected = "line 5: the file ends here: expected row 1 of rows 0 to 2 next";
+    /// assert_eq!(error.to_string(), expected);
     /// ```
     ///
     /// # Errors

@@ -154,24 +154,52 @@ fn each_mistake_in_a_task_has_its_line() {
     let form = "bucket map width height start-x start-y goal-x goal-y optimal-length, with tabs \
                 between";
     let cases = [
-        ("", "line 1: the file ends here: expected `version 1` next".to_owned()),
-        ("version 2\n", "line 1: \"version 2\": expected `version 1`".to_owned()),
-        ("0\ta.map\t3\t2\t0\t0\t1\t1\t1\n",
-            "line 1: \"0\\ta.map\\t3\\t2\\t0\\t0\\t1\\t1\\t1\": expected `version 1`".to_owned()),
-        ("version 1\n\n0\ta.map\t3\t2\t0\t0\t1\t1\n",
-            format!("line 3: the optimal length is missing: expected `{form}`")),
-        ("version 1\n0 a.map 3\u{2003}\n",
-            format!("line 2: the map height is missing: expected `{form}`")),
-        ("version 1\n0\ta.map\t3\t2\t0\t0\t1\t1\t1\t9\n",
-            format!("line 2, column 23: \"9\" is one field too many: expected `{form}`")),
-        ("version 1\n0\t\t3\t2\t0\t0\t1\t1\t1\n",
-            "line 2, column 3: map \"\": expected a file name".to_owned()),
-        ("version 1\n0 \u{e9}.map 3 2 +1 0 1 1 1\n",
-            "line 2, column 13: start x \"+1\": expected a whole number from 0 to 4294967295".to_owned()),
-        ("version 1\n0\ta.map\t3\t2\t0\t0\t1\t4294967296\t1\n",
-            "line 2, column 19: goal y \"4294967296\": expected a whole number from 0 to 4294967295".to_owned()),
-        ("version 1\n0\ta.map\t3\t2\t0\t0\t1\t1\tnan\n",
-            "line 2, column 21: optimal length \"nan\": expected a number of cells, 0 or more".to_owned()),
+        (
+            "",
+            "line 1: the file ends here: expected `version 1` next".to_owned(),
+        ),
+        (
+            "version 2\n",
+            "line 1: \"version 2\": expected `version 1`".to_owned(),
+        ),
+        (
+            "0\ta.map\t3\t2\t0\t0\t1\t1\t1\n",
+            "line 1: \"0\\ta.map\\t3\\t2\\t0\\t0\\t1\\t1\\t1\": expected `version 1`".to_owned(),
+        ),
+        (
+            "version 1\n\n0\ta.map\t3\t2\t0\t0\t1\t1\n",
+            format!("line 3: the optimal length is missing: expected `{form}`"),
+        ),
+        (
+            "version 1\n0 a.map 3\u{2003}\n",
+            format!("line 2: the map height is missing: expected `{form}`"),
+        ),
+        (
+            "version 1\n0\ta.map\t3\t2\t0\t0\t1\t1\t1\t9\n",
+            format!("line 2, column 23: \"9\" is one field too many: expected `{form}`"),
+        ),
+        (
+            "version 1\n0\t\t3\t2\t0\t0\t1\t1\t1\n",
+            "line 2, column 3: map \"\": expected a file name".to_owned(),
+        ),
+        (
+            "version 1\n0 \u{e9}.map 3 2 +1 0 1 1 1\n",
+            "line 2, column 13: start x \"+1\": expected a whole number from 0 to \
+             4294967295"
+                .to_owned(),
+        ),
+        (
+            "version 1\n0\ta.map\t3\t2\t0\t0\t1\t4294967296\t1\n",
+            "line 2, column 19: goal y \"4294967296\": expected a whole number from 0 to \
+             4294967295"
+                .to_owned(),
+        ),
+        (
+            "version 1\n0\ta.map\t3\t2\t0\t0\t1\t1\tnan\n",
+            "line 2, column 21: optimal length \"nan\": expected a number of \
+             cells, 0 or more"
+                .to_owned(),
+        ),
     ];
     for (text, expected) in cases {
         assert_eq!(tasks_error(text), expected);
