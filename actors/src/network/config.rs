@@ -18,8 +18,16 @@ use crate::units;
 #[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields, default, rename_all = "snake_case")]
 pub struct WorldConfig {
-    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`), or the path of a TOML file.
+    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), or the path of a
+    /// TOML file or of a MovingAI `.map`.
     pub roadmap: String,
+    /// How long the side of a cell of a MovingAI map is, in metres.
+    #[serde(rename = "cell", with = "units::length_m")]
+    pub cell_m: f64,
+    /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from the
+    /// start and stay at their goals. A built-in map of cells has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tasks: Option<String>,
     /// How many sensor nodes; at least 1.
     pub nodes: u32,
     /// The radio radius of each, in metres; by default one that nearly every placement can do with.
@@ -40,6 +48,8 @@ impl Default for WorldConfig {
     fn default() -> Self {
         WorldConfig {
             roadmap: "crater-dense".to_owned(),
+            cell_m: 10.0,
+            tasks: None,
             nodes: 28,
             radius_m: None,
             endpoints: Endpoints::default(),
@@ -70,7 +80,8 @@ impl WorldConfig {
 #[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields, default, rename_all = "snake_case")]
 pub struct TeamConfig {
-    /// How many rovers, all waiting at their entries at the start; at least 1.
+    /// How many rovers, all waiting at their entries at the start; at least 1. Where the world has
+    /// tasks, they do the first ones.
     pub rovers: u32,
 }
 
