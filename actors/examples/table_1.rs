@@ -6,15 +6,16 @@
 //!
 //! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
 //! `digest` (true, false), `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
-//! `factor`, `backtrack`, `leaf_wait`, `noise`.
+//! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `cycle_ms`, `motion` (cycles,
+//! continuous), `speed`, `acceleration_limit`, and the payoffs' `factor`, `backtrack`, `leaf_wait`, `noise`.
 
 use std::sync::Arc;
 
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig, assemble,
+    Deadlock, Motion, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig,
+    assemble,
 };
 use farside_worlds::{Endpoints, Roadmap};
 
@@ -90,6 +91,15 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             }
             "routes" => network.routes = value.parse()?,
             "ahead" => network.grants_ahead = value.parse()?,
+            "cycle_ms" => network.cycle = SimDuration::from_millis(value.parse()?),
+            "motion" => {
+                network.motion = match value {
+                    "continuous" => Motion::Continuous,
+                    _ => Motion::Cycles,
+                }
+            }
+            "speed" => network.speed = value.parse()?,
+            "acceleration_limit" => network.acceleration_limit = value.parse()?,
             "passive" => network.passive_window = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,

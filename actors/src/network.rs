@@ -50,7 +50,7 @@
 //! # Where what is
 //!
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`,
-//! `payoff`, `max_plus`, `assignment`. The protocol: [`messages`], `safety` (what owners and rovers
+//! `payoff`, `max_plus`, `assignment`. How long an edge takes: `motion`. The protocol: [`messages`], `safety` (what owners and rovers
 //! keep, and why no two rovers meet), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
@@ -62,7 +62,10 @@ mod max_plus;
 pub mod messages;
 mod metrics;
 mod monitor;
+mod motion;
 mod node;
+#[cfg(test)]
+mod open_tests;
 mod payoff;
 pub mod reservation;
 mod rover;
@@ -72,7 +75,9 @@ pub(crate) mod testing;
 
 pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing};
 pub use candidates::{CandidatePath, Destination, FirstStep};
-pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
+pub use config::{
+    ConfigError, Motion, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig,
+};
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
 pub use rover::Rover;

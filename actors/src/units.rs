@@ -29,7 +29,10 @@ mod with;
 use farside::SimDuration;
 use thiserror::Error;
 
-pub use with::{data_rate_bit_per_s, data_size_bytes, duration, fraction, length_m, power_w};
+pub use with::{
+    acceleration_m_per_s2, data_rate_bit_per_s, data_size_bytes, duration, fraction, length_m,
+    power_w, speed_m_per_s,
+};
 
 /// A text is not the quantity that was expected.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -116,6 +119,25 @@ const LENGTH: Quantity = Quantity {
         unit("cm", 1, -2),
         unit("m", 1, 0),
         unit("km", 1, 3),
+    ],
+};
+
+const SPEED: Quantity = Quantity {
+    expected: "a speed such as \"4m/s\" or \"20cm/s\"",
+    units: &[
+        unit("mm/s", 1, -3),
+        unit("cm/s", 1, -2),
+        unit("m/s", 1, 0),
+        unit("km/s", 1, 3),
+    ],
+};
+
+const ACCELERATION: Quantity = Quantity {
+    expected: "an acceleration such as \"1m/s2\" or \"20cm/s2\"",
+    units: &[
+        unit("mm/s2", 1, -3),
+        unit("cm/s2", 1, -2),
+        unit("m/s2", 1, 0),
     ],
 };
 
@@ -292,6 +314,48 @@ pub fn parse_length_m(text: &str) -> Result<f64, UnitError> {
 /// ```
 pub fn print_length_m(length_m: f64) -> String {
     format!("{length_m}m")
+}
+
+/// Reads a speed in metres in a second: `"4m/s"`, `"20cm/s"`.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_speed_m_per_s("20cm/s"), Ok(0.2));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_speed_m_per_s(text: &str) -> Result<f64, UnitError> {
+    SPEED.nearest(text)
+}
+
+/// Writes a speed so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_speed_m_per_s(0.2), "0.2m/s");
+/// ```
+pub fn print_speed_m_per_s(speed: f64) -> String {
+    format!("{speed}m/s")
+}
+
+/// Reads an acceleration in metres in a second, gained in each second: `"1m/s2"`, `"20cm/s2"`.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_acceleration_m_per_s2("20cm/s2"), Ok(0.2));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_acceleration_m_per_s2(text: &str) -> Result<f64, UnitError> {
+    ACCELERATION.nearest(text)
+}
+
+/// Writes an acceleration so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_acceleration_m_per_s2(0.2), "0.2m/s2");
+/// ```
+pub fn print_acceleration_m_per_s2(acceleration: f64) -> String {
+    format!("{acceleration}m/s2")
 }
 
 /// Reads a fraction: `"30%"` or `"0.3"`.

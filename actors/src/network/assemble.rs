@@ -8,11 +8,12 @@ use farside::random::RandomKey;
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
-use super::config::{ConfigError, NetworkConfig, TeamConfig, WorldConfig};
+use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
 use super::lng::LocalGraph;
 use super::messages::RoverId;
 use super::metrics::NetworkMetrics;
 use super::monitor::{Monitor, Score};
+use super::motion::Ways;
 use super::node::Node;
 use super::payoff::Payoffs;
 use super::rover::Rover;
@@ -54,6 +55,24 @@ pub enum NetworkError {
         /// Where.
         vertex: VertexId,
     },
+    /// Continuous motion along an edge takes longer than something that has to be longer.
+    #[error(
+        "the edge from vertex {} to {} is {length_m:.1} m long and takes {time}, but {limit_of} is \
+         {limit}: make that longer, or network.speed or network.acceleration_limit higher",
+        .edge.0.0, .edge.1.0
+    )]
+    SlowEdge {
+        /// The edge that takes longest.
+        edge: (VertexId, VertexId),
+        /// Its length \[m\].
+        length_m: f64,
+        /// From rest to rest.
+        time: SimDuration,
+        /// What is too short.
+        limit_of: &'static str,
+        /// How long that is.
+        limit: SimDuration,
+    },
     /// No actor has this name.
     #[error("no node or rover is called {name}; there are {first} to {last}")]
     UnknownActor {
@@ -71,6 +90,8 @@ pub(crate) struct Site {
     pub(crate) roadmap: Arc<Roadmap>,
     pub(crate) sensors: Arc<SensorNetwork>,
     pub(crate) config: NetworkConfig,
+    /// A cycle, or what the longest edge takes in continuous motion, if that is more.
+    pub(crate) longest_step: SimDuration,
     pub(crate) payoffs: Payoffs,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
@@ -105,6 +126,22 @@ impl Site {
     pub(crate) fn place_m(&self, vertex: VertexId) -> Point3<f64> {
         let at = self.roadmap.position_m(vertex);
         Point3::new(at.x, at.y, self.roadmap.height_m(vertex))
+    }
+
+    /// How edges are driven along.
+    pub(crate) fn ways(&self) -> Ways<'_> {
+        Ways {
+            roadmap: &self.roadmap,
+            config: &self.config,
+        }
+    }
+
+    /// From setting out along an edge to being ready to set out again, as plans reckon.
+    pub(crate) fn planned_step(&self, u: VertexId, v: VertexId) -> SimDuration {
+        match self.config.motion {
+            Motion::Cycles => self.config.cycle,
+            Motion::Continuous => self.ways().planned(u, v),
+        }
     }
 
     /// From `now` to the start of the next cycle; never zero.
@@ -190,6 +227,7 @@ fn assemble_missions(
     connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
     network.check()?;
+    let longest_step = longest_step(&roadmap, network)?;
     if missions.is_empty() {
         return Err(NetworkError::NoRovers);
     }
@@ -205,6 +243,7 @@ fn assemble_missions(
         rover_names: names("rover", missions.len()),
         config: network.clone(),
         queues: queues.into_iter().collect(),
+        longest_step,
         roadmap,
         sensors,
         missions,
@@ -221,6 +260,38 @@ fn assemble_missions(
         rovers,
         score,
     })
+}
+
+/// The longest that a step is planned to take.
+///
+/// # Errors
+/// When an edge takes so long that a cycle of the paper's policy has no time for it, or that driving
+/// along it would look like a deadlock.
+fn longest_step(roadmap: &Roadmap, config: &NetworkConfig) -> Result<SimDuration, NetworkError> {
+    let ways = Ways { roadmap, config };
+    let longest = ways
+        .longest()
+        .filter(|_| config.motion == Motion::Continuous);
+    let Some((edge, time)) = longest else {
+        return Ok(config.cycle);
+    };
+    let window = config.cycle * u64::from(config.passive_window);
+    let mut limits = vec![("network.passive_window", window)];
+    if config.policy == Policy::Paper {
+        // What a rover is granted at the end of a cycle's phases it has done before the next cycle.
+        let left = config.cycle.saturating_sub(config.decided_after());
+        limits.insert(0, ("what network.cycle leaves after its phases", left));
+    }
+    match limits.into_iter().find(|&(_, limit)| time >= limit) {
+        None => Ok(time.max(config.cycle)),
+        Some((limit_of, limit)) => Err(NetworkError::SlowEdge {
+            edge,
+            length_m: ways.length_m(edge.0, edge.1),
+            time,
+            limit_of,
+            limit,
+        }),
+    }
 }
 
 /// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of

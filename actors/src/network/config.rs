@@ -115,6 +115,21 @@ pub enum Priority {
     LowestId,
 }
 
+/// How rovers move along edges.
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Motion {
+    /// As in the paper: each edge takes [`NetworkConfig::traverse`], whatever its length, and at most one is
+    /// driven in a cycle.
+    #[default]
+    Cycles,
+    /// An edge takes as long as its length needs, with [`NetworkConfig::speed`] and
+    /// [`NetworkConfig::acceleration_limit`]. With the policy `complete` a rover that holds the grant for
+    /// the vertex after next does not stop between; with `paper` a cycle has to be long enough for
+    /// the longest edge.
+    Continuous,
+}
+
 /// The algorithm and its protocol.
 ///
 /// A cycle's schedule: after one `exchange` nodes tell their neighbours who is where (step 1), after
@@ -148,9 +163,21 @@ pub struct NetworkConfig {
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
     #[serde(with = "units::duration")]
     pub iteration_timeout: SimDuration,
-    /// How long a rover takes along an edge.
+    /// How long a rover takes along an edge, with `motion = "cycles"`.
     #[serde(with = "units::duration")]
     pub traverse: SimDuration,
+    /// Whether an edge takes time by its length.
+    pub motion: Motion,
+    /// The highest speed of continuous motion \[m/s\], in (0, 1000]. By default 4 m/s, what the rovers are
+    /// asked for that are to carry people on the Moon: an edge of 16 m, the median of the built-in
+    /// dense roadmap, then takes 8 s from rest to rest.
+    #[serde(with = "units::speed_m_per_s")]
+    pub speed: f64,
+    /// The highest acceleration of continuous motion, and the highest deceleration \[m/s2\], in
+    /// (0, 1000]. By default 1 m/s2: about what wheels on loose ground can pass on in the Moon's
+    /// gravity of 1.6 m/s2.
+    #[serde(with = "units::acceleration_m_per_s2")]
+    pub acceleration_limit: f64,
     /// C, the estimate of the longest path, in diameters of the roadmap.
     pub longest_path_factor: f64,
     /// What a path loses that leads back to the vertex just left.
@@ -174,7 +201,8 @@ pub struct NetworkConfig {
     pub acceleration_chains: bool,
     /// `complete`: along how many routes a walk looks for a way; at least 1.
     pub routes: u32,
-    /// `complete`: how many cycles before its planned time a vertex may be granted.
+    /// `complete`: how many cycles before its planned time a vertex may be granted. In continuous
+    /// motion, how many times what the longest edge takes, if that is more.
     pub grants_ahead: u32,
     /// Passive deadlock: no move and no entry for so many cycles.
     pub passive_window: u32,
@@ -198,6 +226,9 @@ impl Default for NetworkConfig {
             max_iterations: 100,
             iteration_timeout: SimDuration::from_millis(20),
             traverse: SimDuration::from_millis(200),
+            motion: Motion::default(),
+            speed: 4.0,
+            acceleration_limit: 1.0,
             longest_path_factor: 20.0,
             backtrack_penalty: 40.0,
             leaf_wait_penalty: 45.0,
@@ -293,6 +324,13 @@ impl NetworkConfig {
             ("cycle_limit", self.cycle_limit),
         ] {
             check(key, window > 0, window.to_string(), "at least 1")?;
+        }
+        for (key, limit) in [
+            ("speed", self.speed),
+            ("acceleration_limit", self.acceleration_limit),
+        ] {
+            let fits = limit > 0.0 && limit <= 1e3;
+            check(key, fits, limit.to_string(), "in (0, 1000]")?;
         }
         if self.decided_after() >= self.cycle {
             return Err(ConfigError::Schedule {

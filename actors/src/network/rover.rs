@@ -9,7 +9,7 @@ use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
 use super::assemble::Site;
-use super::config::{Policy, Sabotage};
+use super::config::{Motion, Policy, Sabotage};
 use super::messages::{Beacon, Grant, RoverId, RoverState};
 use super::node::Node;
 use super::safety::{Answer, RoverMemory};
@@ -27,6 +27,9 @@ pub struct Rover {
     nodes: Vec<Address<Node>>,
     /// What must know where it is.
     radios: Vec<LinkId<RadioChange>>,
+    /// How fast it is at the end of the edge under way, or at the vertex that it rolls through \[m/s\];
+    /// a crash stops it.
+    speed: f64,
 }
 
 /// Timer: a planning cycle begins.
@@ -54,6 +57,7 @@ impl Rover {
             goal,
             nodes: Vec::new(),
             radios: Vec::new(),
+            speed: 0.0,
         }
     }
 
@@ -69,13 +73,16 @@ impl Rover {
     }
 
     /// Begins to drive along the edge from `here`.
-    fn drive(&self, ctx: &mut Context<'_, Self>) {
-        ctx.timer(self.site.config.traverse, EdgeEnds);
+    fn drive(&mut self, ctx: &mut Context<'_, Self>) {
         let memory = ctx.durable::<RoverMemory>();
         let (Some(here), Some(next)) = (memory.vertex, memory.moving_to) else {
             return;
         };
-        let end = ctx.now() + self.site.config.traverse;
+        let beyond = memory.granted_beyond();
+        let drive = self.site.ways().drive((here, next), beyond, self.speed);
+        self.speed = drive.end;
+        ctx.timer(drive.time, EdgeEnds);
+        let end = ctx.now() + drive.time;
         for radio in &self.radios {
             let moves = RadioChange::Moves {
                 host: self.site.rover_names[self.id.0 as usize].clone(),
@@ -105,7 +112,7 @@ impl Rover {
     }
 
     /// Moves on without being told to: what [`Sabotage::MoveUnbidden`] is for.
-    fn misbehave(&self, ctx: &mut Context<'_, Self>, probability: f64) {
+    fn misbehave(&mut self, ctx: &mut Context<'_, Self>, probability: f64) {
         let unbidden = ctx.random("sabotage").chance(probability);
         let memory = ctx.durable::<RoverMemory>();
         let (Some(here), None, true) = (memory.vertex, memory.moving_to, unbidden) else {
@@ -182,11 +189,15 @@ impl Handler<Grant> for Rover {
 
 impl Rover {
     /// Takes the next step if it was granted ahead, and no sooner than a cycle after the last move
-    /// began.
+    /// began; in continuous motion at once, but for a cycle at the entry.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
-        let pace = self.site.config.cycle;
         let memory = ctx.durable::<RoverMemory>();
+        let goes_on = self.site.config.motion == Motion::Continuous && memory.previous.is_some();
+        let pace = match goes_on {
+            true => SimDuration::ZERO,
+            false => self.site.config.cycle,
+        };
         let Some(grant) = memory.next_granted().cloned() else {
             return;
         };

@@ -308,6 +308,13 @@ impl RoverMemory {
             .find(|kept| stands && kept.step == step + 1)
     }
 
+    /// Where the step after the one under way leads, if that was granted already.
+    pub(crate) fn granted_beyond(&self) -> Option<VertexId> {
+        let after = |kept: &&Grant| kept.step == self.step + 2;
+        self.moving_to?;
+        self.ahead.iter().find(after)?.to
+    }
+
     /// Obeys a grant, if it is for the next step and leads from here: into the roadmap at `entry`,
     /// along an edge, or out of it at `goal`.
     pub(crate) fn obey(

@@ -8,9 +8,11 @@ use serde::de::{Error, Visitor};
 use serde::{Deserializer, Serializer};
 
 use super::{
-    DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, POWER, UnitError, check_fraction,
-    parse_data_rate, parse_data_size, parse_duration, parse_fraction, parse_length_m,
-    parse_power_w, print_data_rate, print_data_size, print_length_m, print_power_w,
+    ACCELERATION, DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, POWER, SPEED, UnitError,
+    check_fraction, parse_acceleration_m_per_s2, parse_data_rate, parse_data_size, parse_duration,
+    parse_fraction, parse_length_m, parse_power_w, parse_speed_m_per_s,
+    print_acceleration_m_per_s2, print_data_rate, print_data_size, print_length_m, print_power_w,
+    print_speed_m_per_s,
 };
 
 /// How one quantity is read, from a text or from a bare number.
@@ -157,6 +159,24 @@ quantity! {
     text parse_length_m,
     number |number: f64| Err(LENGTH.no_unit(number)),
     write |value, to| to.collect_str(&print_length_m(*value))
+}
+
+quantity! {
+    /// Speeds: `"4m/s"` and metres in a second. Bare numbers are refused.
+    speed_m_per_s: f64, SpeedMPerS,
+    expected SPEED.expected,
+    text parse_speed_m_per_s,
+    number |number: f64| Err(SPEED.no_unit(number)),
+    write |value, to| to.collect_str(&print_speed_m_per_s(*value))
+}
+
+quantity! {
+    /// Accelerations: `"1m/s2"` and metres in a second, gained in each second. Bare numbers are refused.
+    acceleration_m_per_s2: f64, AccelerationMPerS2,
+    expected ACCELERATION.expected,
+    text parse_acceleration_m_per_s2,
+    number |number: f64| Err(ACCELERATION.no_unit(number)),
+    write |value, to| to.collect_str(&print_acceleration_m_per_s2(*value))
 }
 
 quantity! {

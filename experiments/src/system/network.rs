@@ -227,6 +227,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::NoRovers => "team.rovers",
         NetworkError::Endpoints { .. } => "world.endpoints",
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
+        NetworkError::SlowEdge { .. } => "network.speed",
         NetworkError::Config(ConfigError::Range { key, .. }) => KEYS
             .iter()
             .find(|known| known.ends_with(&format!(".{key}")))
@@ -236,11 +237,13 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 14] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
     "network.traverse",
+    "network.speed",
+    "network.acceleration_limit",
     "network.longest_path_factor",
     "network.backtrack_penalty",
     "network.collision_penalty_factor",

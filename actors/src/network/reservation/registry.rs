@@ -216,7 +216,7 @@ impl Registry {
         let ground = Ground {
             roadmap: &desk.site.roadmap,
             gap: self.gap(),
-            travel: &|_, _| desk.site.config.cycle.as_nanos(),
+            travel: &|u, v| desk.site.planned_step(u, v).as_nanos(),
             busy: &|v| self.book.busy(v),
         };
         with(&ground)

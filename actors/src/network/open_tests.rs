@@ -1,0 +1,233 @@
+//! The paper's open questions (section 5), on small teams: continuous motion, uncertain locations,
+//! roadmaps that nodes are given over the network, balanced loads.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
+use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
+use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside_worlds::{Roadmap, SensorNetwork, VertexId};
+
+use super::messages::{Beacon, RoverState};
+use super::testing::{grid, v};
+use super::*;
+
+/// A link of 5 ms that loses some.
+#[derive(Clone)]
+struct Lossy(f64);
+
+impl Carrier for Lossy {
+    type Change = NoChange;
+
+    fn min_delay(&self) -> SimDuration {
+        SimDuration::from_millis(5)
+    }
+
+    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        if parcel.random(0, 0, 0).uniform() < self.0 {
+            return verdicts.lose("loss");
+        }
+        verdicts.deliver(self.min_delay());
+    }
+
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+}
+
+/// What was seen of a run: rovers' changes, and what they said.
+#[derive(Default)]
+struct Seen {
+    changes: Vec<(SimTime, RoverState)>,
+    /// When each beacon was sent.
+    beacons: Vec<(SimTime, Beacon)>,
+}
+
+struct Witness(Arc<Mutex<Seen>>);
+
+impl Observer for Witness {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: true,
+            samples: true,
+            ..Wants::default()
+        }
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let Some(kind) = record.kind else {
+            return Ok(Flow::Continue);
+        };
+        let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
+        let mut seen = self.0.lock().unwrap();
+        if record.class == RecordClass::Sample && kind.name() == "RoverState" {
+            let state = kind.schema().decode(record.body).map_err(failed)?;
+            seen.changes.push((record.time(), state));
+        }
+        if record.class == RecordClass::Delivered && kind.name() == "Beacon" {
+            let beacon = kind.schema().decode(record.body).map_err(failed)?;
+            seen.beacons.push((record.sent, beacon));
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+struct Case {
+    map: Roadmap,
+    rovers: u32,
+    loss: f64,
+    seed: u64,
+    network: NetworkConfig,
+}
+
+impl Case {
+    fn new(network: NetworkConfig) -> Case {
+        Case {
+            map: grid(5, 4, &[(6, 7), (12, 13)]),
+            rovers: 6,
+            loss: 0.0,
+            seed: 1,
+            network,
+        }
+    }
+
+    fn world(&self) -> (WorldConfig, SensorNetwork) {
+        let world = WorldConfig {
+            nodes: 4,
+            radius_m: Some(60.0),
+            ..WorldConfig::default()
+        };
+        let sensors = world.place(&self.map, self.seed).unwrap();
+        (world, sensors)
+    }
+
+    fn run(&self) -> Result<(NetworkMetrics, Report, Seen), NetworkError> {
+        let (world, sensors) = self.world();
+        let mut sim = Simulation::new(self.seed);
+        let seen = Arc::new(Mutex::new(Seen::default()));
+        sim.observe(Witness(seen.clone()));
+        let loss = self.loss;
+        let mut connect =
+            |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+                sim.link(a, b, &format!("{from}-{to}"), Lossy(loss));
+            };
+        let network = assemble(
+            &mut sim,
+            &world,
+            Arc::new(self.map.clone()),
+            Arc::new(sensors),
+            &TeamConfig {
+                rovers: self.rovers,
+            },
+            &self.network,
+            self.seed,
+            &mut connect,
+        )?;
+        let report = sim.run(Executor::Inline).unwrap();
+        assert!(report.fault().is_none(), "{:?}", report.fault());
+        let seen = std::mem::take(&mut *seen.lock().unwrap());
+        Ok((network.metrics(), report, seen))
+    }
+
+    /// Runs until all have arrived, none has met another.
+    fn arrives(&self) -> (NetworkMetrics, Seen) {
+        let (metrics, report, seen) = self.run().unwrap();
+        let result = (metrics.arrived, metrics.collisions);
+        assert_eq!(result, (self.rovers, 0), "{}", report.end.detail());
+        (metrics, seen)
+    }
+}
+
+/// Each move: from where to where, when it began and ended.
+fn moves(seen: &Seen) -> Vec<(VertexId, VertexId, SimTime, SimTime)> {
+    let mut begun = BTreeMap::new();
+    let mut moves = Vec::new();
+    for (time, state) in &seen.changes {
+        let at = state.whereabouts;
+        let (Some(here), rover) = (at.vertex, at.rover) else {
+            continue;
+        };
+        if let Some((from, to, begin)) = begun.remove(&rover) {
+            assert_eq!(here, to);
+            moves.push((from, to, begin, *time));
+        }
+        if let Some(to) = at.moving_to {
+            begun.insert(rover, (here, to, *time));
+        }
+    }
+    moves
+}
+
+mod motion {
+    use super::*;
+
+    fn continuous(policy: Policy) -> NetworkConfig {
+        NetworkConfig {
+            policy,
+            motion: Motion::Continuous,
+            speed: 2.0,
+            acceleration_limit: 1.0,
+            cycle: SimDuration::from_secs(8),
+            ..NetworkConfig::default()
+        }
+    }
+
+    #[test]
+    fn edges_take_time_by_length() {
+        // Rest to rest over 10 m at 2 m/s and 1 m/s2.
+        let stops = SimDuration::from_secs(7).as_nanos();
+        for (policy, loss) in [
+            (Policy::Paper, 0.0),
+            (Policy::Complete, 0.0),
+            (Policy::Complete, 0.3),
+        ] {
+            let mut case = Case::new(continuous(policy));
+            case.loss = loss;
+            case.rovers = 4;
+            let (_, seen) = case.arrives();
+            let times: Vec<u64> = moves(&seen)
+                .iter()
+                .map(|(_, _, begin, end)| end.as_nanos() - begin.as_nanos())
+                .collect();
+            assert!(times.len() > 10);
+            // At full speed all along it takes 5 s.
+            assert!(times.iter().all(|t| (5_000_000_000..=stops).contains(t)));
+            let rolls = times.iter().any(|&t| t < stops);
+            assert_eq!(rolls, policy == Policy::Complete, "{policy:?}: {times:?}");
+        }
+    }
+
+    #[test]
+    fn who_rolls_goes_on_at_once() {
+        let (_, seen) = Case::new(continuous(Policy::Complete)).arrives();
+        let all = moves(&seen);
+        let mut rolled = 0;
+        for (from, to, begin, end) in &all {
+            let time = end.as_nanos() - begin.as_nanos();
+            let starts = all
+                .iter()
+                .any(|other| other.1 == *from && other.3 == *begin);
+            // From rest, and faster than from rest to rest: it does not stop at the end.
+            if !starts && time < 7_000_000_000 {
+                rolled += 1;
+                let next = all.iter().find(|other| other.0 == *to && other.2 == *end);
+                assert!(next.is_some(), "nobody leaves {to:?} at {end:?}");
+            }
+        }
+        assert!(rolled > 0);
+    }
+
+    #[test]
+    fn an_edge_that_takes_too_long_is_named() {
+        let mut network = continuous(Policy::Paper);
+        network.cycle = SimDuration::from_secs(7);
+        let error = Case::new(network).run().err().unwrap();
+        assert!(matches!(error, NetworkError::SlowEdge { .. }));
+        let text = error.to_string();
+        assert!(text.contains("is 10.0 m long and takes 7s"), "{text}");
+        assert!(text.contains("leaves after its phases is 6.3s"), "{text}");
+        let mut network = continuous(Policy::Complete);
+        (network.cycle, network.passive_window) = (SimDuration::from_secs(1), 7);
+        let text = Case::new(network).run().err().unwrap().to_string();
+        assert!(text.contains("network.passive_window is 7s"), "{text}");
+    }
+}
