@@ -5,7 +5,8 @@
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
 //! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `digest` (true, false), `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
+//! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
+//! `2M/s`), `damping`, `anytime`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
 //! `factor`, `backtrack`, `leaf_wait`, `noise`.
 
@@ -16,6 +17,7 @@ use farside::prelude::*;
 use farside_actors::network::{
     Deadlock, NetworkConfig, NetworkMetrics, Priority, TeamConfig, WorldConfig, assemble,
 };
+use farside_actors::units::parse_duration;
 use farside_worlds::{Endpoints, Roadmap};
 
 /// A link with uniform jitter and independent loss.
@@ -89,6 +91,12 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "latency_ms" => options.radio.latency = SimDuration::from_millis(value.parse()?),
             "jitter_ms" => options.radio.jitter = SimDuration::from_millis(value.parse()?),
             "digest" => options.digest = value.parse()?,
+            "processor" => network.processor = value.parse()?,
+            "damping" => network.damping = value.parse()?,
+            "anytime" => network.anytime = value.parse()?,
+            "cycle" => network.cycle = parse_duration(value)?,
+            "optimisation" => network.optimisation = parse_duration(value)?,
+            "iteration_timeout" => network.iteration_timeout = parse_duration(value)?,
             "iterations" => network.max_iterations = value.parse()?,
             "cycle_limit" => network.cycle_limit = value.parse()?,
             "active_window" => network.active_window = value.parse()?,
@@ -166,6 +174,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     (1..=options.seeds).map(|seed| run(&options, map, nodes, rovers, seed));
                 let results = results.collect::<Result<Vec<_>, _>>()?;
                 print_cell(map, nodes, rovers, &results);
+                for (_, report) in results.iter().filter(|_| options.digest) {
+                    println!("    {}", report.digest);
+                }
             }
         }
     }

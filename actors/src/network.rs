@@ -64,6 +64,7 @@ mod metrics;
 mod monitor;
 mod node;
 mod payoff;
+mod processor;
 mod rover;
 mod safety;
 #[cfg(test)]
@@ -74,4 +75,5 @@ pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
+pub use processor::Processor;
 pub use rover::Rover;

@@ -112,9 +112,7 @@ impl Node {
                 );
             }
         }
-        let payoffs = self.site.payoffs;
-        let tolerance = self.site.config.convergence as f32;
-        self.optimiser.pose(self.id, payoffs, tolerance, rovers);
+        self.pose(ctx, rovers);
     }
 
     /// The rovers that this node plans for: on its vertices, with somewhere to go, and not known to
