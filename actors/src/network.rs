@@ -69,6 +69,7 @@ mod rover;
 mod safety;
 #[cfg(test)]
 mod testing;
+mod timing;
 
 pub use assemble::{Connect, Network, NetworkError, assemble};
 pub use candidates::{CandidatePath, Destination, FirstStep};
@@ -77,3 +78,4 @@ pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
 pub use processor::Processor;
 pub use rover::Rover;
+pub use timing::Timing;

@@ -198,9 +198,16 @@ impl MaxPlus {
         let mut base = Vec::new();
         for i in 0..self.own {
             let moved = std::mem::take(&mut self.moved[i]);
-            let total = if moved { self.total(i) } else { Vec::new() };
+            let damped = self.rules.damping > 0.0;
+            let total = if moved || damped {
+                self.total(i)
+            } else {
+                Vec::new()
+            };
             for edge in &mut self.edges[i] {
-                if !moved && (self.rules.damping == 0.0 || !edge.changed) {
+                // A damped message goes on to approach what it was made of.
+                let same = !(moved || damped && edge.changed);
+                if same {
                     edge.changed = false;
                     continue;
                 }
@@ -303,137 +310,4 @@ fn first_best(values: &[f32]) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::network::candidates::Destination;
-    use farside::random::{RandomKey, Stream};
-
-    fn payoffs() -> Payoffs {
-        Payoffs {
-            longest: 100.0,
-            backtrack: 40.0,
-            leaf_wait: 45.0,
-            imminent: -1000.0,
-        }
-    }
-
-    /// Random paths on 6 vertices; whether they make sense on a roadmap does not matter here.
-    fn random_paths(stream: &mut Stream) -> Vec<CandidatePath> {
-        let count = 2 + stream.below(3);
-        (0..count)
-            .map(|_| {
-                let vertices = (0..2 + stream.below(3))
-                    .map(|_| farside_worlds::VertexId(stream.below(6) as u32))
-                    .collect();
-                CandidatePath {
-                    destination: Destination::Leaf,
-                    vertices,
-                    payoff: stream.uniform_in(0.0, 50.0) as f32,
-                }
-            })
-            .collect()
-    }
-
-    /// The joint choice that maximises Q, by trying all.
-    fn exhaustive(rovers: &[Vec<CandidatePath>], pairs: &[(usize, usize)]) -> Vec<usize> {
-        let mut best = (f32::NEG_INFINITY, vec![]);
-        let mut choice = vec![0; rovers.len()];
-        loop {
-            let mut q: f32 = choice.iter().zip(rovers).map(|(&c, r)| r[c].payoff).sum();
-            for &(i, j) in pairs {
-                let (a, b) = (&rovers[i][choice[i]], &rovers[j][choice[j]]);
-                q += payoffs().pairwise(a.payoff + b.payoff, collision(a, b));
-            }
-            if q > best.0 {
-                best = (q, choice.clone());
-            }
-            let Some(at) = (0..choice.len()).find(|&i| choice[i] + 1 < rovers[i].len()) else {
-                return best.1;
-            };
-            choice[at] += 1;
-            choice[..at].fill(0);
-        }
-    }
-
-    fn problem(node: u32, rovers: &[(u32, &Vec<CandidatePath>)]) -> MaxPlus {
-        let rovers = rovers
-            .iter()
-            .map(|&(id, paths)| (RoverId(id), paths.clone()));
-        MaxPlus::new(NodeId(node), payoffs(), 1e-3, rovers.collect())
-    }
-
-    #[test]
-    fn two_rovers_of_one_node_get_the_best_pair() {
-        let mut stream = RandomKey::new(5).text("pair").stream();
-        for _ in 0..200 {
-            let rovers = [random_paths(&mut stream), random_paths(&mut stream)];
-            let mut one = problem(0, &[(0, &rovers[0]), (1, &rovers[1])]);
-            while one.iterate() {}
-            let chosen: Vec<_> = one.best().map(|(_, path)| path.clone()).collect();
-            let best = exhaustive(&rovers, &[(0, 1)]);
-            assert_eq!(
-                chosen,
-                [rovers[0][best[0]].clone(), rovers[1][best[1]].clone()]
-            );
-        }
-    }
-
-    /// A chain a - b - c over three nodes, where a and c do not hear each other: a tree.
-    #[test]
-    fn a_chain_of_nodes_finds_the_exhaustive_optimum() {
-        let mut stream = RandomKey::new(6).text("chain").stream();
-        for _ in 0..200 {
-            let rovers: Vec<_> = (0..3).map(|_| random_paths(&mut stream)).collect();
-            let mut nodes: Vec<_> = (0..3)
-                .map(|i| problem(i, &[(i, &rovers[i as usize])]))
-                .collect();
-            for (a, b) in [(0, 1), (1, 0), (1, 2), (2, 1)] {
-                let agent = (RoverId(b as u32), rovers[b].clone());
-                nodes[a].add(NodeId(b as u32), vec![agent]);
-            }
-            for _ in 0..6 {
-                for node in &mut nodes {
-                    node.iterate();
-                }
-                for (a, b) in [(0, 1), (1, 0), (1, 2), (2, 1)] {
-                    for vector in nodes[a].changed_for(NodeId(b as u32)) {
-                        nodes[b].receive(&vector);
-                    }
-                }
-            }
-            assert!(
-                nodes.iter_mut().all(|node| !node.iterate()),
-                "a tree converges"
-            );
-            let best = exhaustive(&rovers, &[(0, 1), (1, 2)]);
-            for (i, node) in nodes.iter().enumerate() {
-                assert_eq!(node.best().next().unwrap().1, &rovers[i][best[i]]);
-            }
-        }
-    }
-
-    #[test]
-    fn vectors_that_fit_no_edge_are_refused() {
-        let mut stream = RandomKey::new(7).text("refuse").stream();
-        let rovers = [random_paths(&mut stream), random_paths(&mut stream)];
-        let mut one = problem(0, &[(0, &rovers[0])]);
-        assert!(one.is_trivial());
-        one.add(
-            NodeId(1),
-            vec![(RoverId(1), rovers[1].clone()), (RoverId(1), vec![])],
-        );
-        assert!(!one.is_trivial());
-        let vector = |from, to, values| Vector {
-            from: RoverId(from),
-            to: RoverId(to),
-            values,
-        };
-        let fitting = vec![1.0; rovers[0].len()];
-        assert!(!one.receive(&vector(2, 0, fitting.clone())));
-        assert!(!one.receive(&vector(1, 3, fitting.clone())));
-        assert!(!one.receive(&vector(1, 0, vec![f32::NAN; rovers[0].len()])));
-        assert!(!one.receive(&vector(1, 0, vec![1.0; 9])));
-        assert!(one.receive(&vector(1, 0, fitting.clone())));
-        assert!(!one.receive(&vector(1, 0, fitting)), "no news");
-    }
-}
+mod tests;

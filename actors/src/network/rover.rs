@@ -140,7 +140,7 @@ impl Handler<CycleStarts> for Rover {
         let memory = ctx.durable::<RoverMemory>();
         let has_left = memory.vertex.is_none() && memory.step > 0;
         if !has_left {
-            ctx.timer(self.site.config.cycle, CycleStarts);
+            ctx.timer(self.site.timing.cycle, CycleStarts);
         }
         Ok(())
     }

@@ -16,14 +16,14 @@ use crate::network::safety::{Ledger, Occupant};
 impl Node {
     /// A cycle begins: what was lost is said again, and queues are served.
     pub(super) fn listen(&mut self, ctx: &mut Context<'_, Self>) {
-        let config = &self.site.config;
+        let timing = &self.site.timing;
         self.cycle = self.site.cycle_at(ctx.now());
         for (phase, delay) in [
-            (Phase::Locate, config.exchange),
-            (Phase::Propose, config.exchange * 2),
-            (Phase::Optimise, config.exchange * 3),
-            (Phase::Assign, config.exchange * 3 + config.optimisation),
-            (Phase::Admit, config.decided_after()),
+            (Phase::Locate, timing.exchange),
+            (Phase::Propose, timing.exchange * 2),
+            (Phase::Optimise, timing.exchange * 3),
+            (Phase::Assign, timing.exchange * 3 + timing.optimisation),
+            (Phase::Admit, timing.decided_after()),
             (Phase::Listen, self.site.until_next_cycle(ctx.now())),
         ] {
             ctx.timer(delay, PhaseBegins { phase });

@@ -138,7 +138,7 @@ impl Node {
         }
         if free(&self.optimiser) {
             if self.optimiser.overdue.is_none() {
-                let timeout = self.site.config.iteration_timeout;
+                let timeout = self.site.timing.iteration_timeout;
                 self.optimiser.overdue = Some(ctx.timer(timeout, IterationOverdue));
             }
         } else if let Some(timer) = self.optimiser.overdue.take() {
