@@ -135,8 +135,8 @@ pub struct NetworkConfig {
     pub optimisation: Option<SimDuration>,
     /// The most iterations of max-plus in a cycle (the paper: 100).
     pub max_iterations: u32,
-    /// How fast each node computes: pairs of candidate paths a second, or `"unlimited"`. The
-    /// optimisation uses what is ready in its time.
+    /// How fast each node computes: pairs of candidate paths a second, `"paper"` or `"unlimited"`.
+    /// The optimisation uses what is ready in its time.
     pub processor: Processor,
     /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as computed.
     /// 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum on DCOPs

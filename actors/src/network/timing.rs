@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(timing.optimisation, SimDuration::from_millis(1500));
         assert_eq!(timing.cycle, SimDuration::from_millis(1975));
         let text = toml::to_string(&network).unwrap();
-        assert!(text.contains("cycle = \"auto\"") && text.contains("optimisation = \"1500ms\""));
+        assert!(text.contains("cycle = \"auto\"") && text.contains("optimisation = \"1.5s\""));
         assert_eq!(toml::from_str::<NetworkConfig>(&text).unwrap(), network);
         let error = toml::from_str::<NetworkConfig>("cycle = 3").unwrap_err();
         assert!(error.message().contains("or \"auto\""), "{error}");
