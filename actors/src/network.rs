@@ -64,15 +64,19 @@ mod metrics;
 mod monitor;
 mod node;
 mod payoff;
+mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
 #[cfg(test)]
 pub(crate) mod testing;
+mod timing;
 
 pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
+pub use processor::Processor;
 pub use rover::Rover;
+pub use timing::Timing;

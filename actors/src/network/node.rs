@@ -85,6 +85,13 @@ pub struct PhaseBegins {
 #[doc(hidden)]
 pub struct IterationOverdue;
 
+/// Timer: the processor is done with payoffs or an iteration of max-plus in this cycle.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct ProcessorDone {
+    cycle: u32,
+}
+
 impl Node {
     pub(crate) fn new(site: Arc<Site>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
         Node {
@@ -126,6 +133,7 @@ impl Actor for Node {
         IterationOverdue,
         Relay,
         RegistryDue,
+        ProcessorDone,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {

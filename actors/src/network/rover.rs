@@ -153,7 +153,7 @@ impl Handler<CycleStarts> for Rover {
         let memory = ctx.durable::<RoverMemory>();
         let has_left = memory.vertex.is_none() && memory.step > 0;
         if !has_left {
-            ctx.timer(self.site.config.cycle, CycleStarts);
+            ctx.timer(self.site.timing.cycle, CycleStarts);
         }
         Ok(())
     }
@@ -185,7 +185,7 @@ impl Rover {
     /// began.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
-        let pace = self.site.config.cycle;
+        let pace = self.site.timing.cycle;
         let memory = ctx.durable::<RoverMemory>();
         let Some(grant) = memory.next_granted().cloned() else {
             return;

@@ -171,7 +171,7 @@ impl Registry {
             Origin::Queue {
                 entry, last_entry, ..
             } => {
-                let dwell = desk.site.config.cycle.as_nanos();
+                let dwell = desk.site.timing.cycle.as_nanos();
                 let earliest = soon.max(last_entry + 1);
                 let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
                 (labels, entry, 1)
@@ -216,7 +216,7 @@ impl Registry {
         let ground = Ground {
             roadmap: &desk.site.roadmap,
             gap: self.gap(),
-            travel: &|_, _| desk.site.config.cycle.as_nanos(),
+            travel: &|_, _| desk.site.timing.cycle.as_nanos(),
             busy: &|v| self.book.busy(v),
         };
         with(&ground)
@@ -461,7 +461,7 @@ impl Registry {
         // Nothing leads there as things stand: other rovers have to go first.
         let applicant = &mut self.applicants[at];
         applicant.walk = None;
-        let pause = desk.site.config.cycle.as_nanos() << applicant.in_vain.min(3);
+        let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(3);
         applicant.in_vain += 1;
         applicant.again = Some((next, desk.now + pause));
     }

@@ -91,7 +91,7 @@ impl Node {
         now: u64,
     ) -> Option<u64> {
         let config = &self.site.config;
-        let ahead = config.cycle.as_nanos() * u64::from(config.grants_ahead);
+        let ahead = self.site.timing.cycle.as_nanos() * u64::from(config.grants_ahead);
         let mut next = None::<u64>;
         for (vertex, visit) in registry.book.heads() {
             let due = visit.start.saturating_sub(ahead);
