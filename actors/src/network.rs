@@ -67,9 +67,9 @@ mod payoff;
 mod rover;
 mod safety;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
-pub use assemble::{Connect, Network, NetworkError, assemble};
+pub use assemble::{Connect, Network, NetworkError, assemble, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};

@@ -154,8 +154,21 @@ fn names(kind: &str, count: usize) -> Vec<String> {
         .collect()
 }
 
-/// An entry and a goal for each rover, at random.
-fn missions(
+/// An entry and a goal for each rover, at random: what [`assemble`] gives its rovers, for planners
+/// that are to be held against it. Of `world` only the endpoints are read.
+///
+/// ```
+/// use farside_actors::network::{TeamConfig, WorldConfig, missions};
+/// use farside_worlds::Roadmap;
+/// let map = Roadmap::builtin("crater-dense")?;
+/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
+/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the team is empty, or the roadmap's boundary has no two places to drive between.
+pub fn missions(
     world: &WorldConfig,
     roadmap: &Roadmap,
     team: &TeamConfig,
