@@ -12,8 +12,8 @@ use super::table::Table;
 /// Plans one rover after the other, each round those before it. With several orders to try it stops
 /// at the first in which all find a way.
 ///
-/// With [`Rules::Queues`] a rover enters in the first cycle in which its predecessor has left the
-/// entry and nobody planned before it is there; it may not wait outside for a clear way. With
+/// With [`Rules::Queues`] a rover enters in the first cycle in which nobody planned before it is at
+/// its entry, its predecessors among them; it may not wait outside for a clear way. With
 /// [`Rules::OnMap`] it starts in cycle 0, where somebody planned before it may already be driving
 /// through. A rover that finds no way is named as a failure, has no trip, and is in nobody's way:
 /// the others are planned as if it were not there.
@@ -41,17 +41,9 @@ fn in_order(problem: &Problem<'_>, order: &[usize]) -> Outcome {
     let rovers = problem.missions().len();
     let mut table = Table::new(problem.roadmap(), rovers, problem.rules());
     let mut failures = Vec::new();
-    // The first cycle in which each queue has left its entry.
-    let mut free = vec![0; problem.roadmap().len()];
     for &rover in order {
-        let entry = problem.missions()[rover].entry;
-        let free = &mut free[entry.0 as usize];
-        match plan_one(problem, &table, rover, *free) {
-            Ok(trip) => {
-                let at_entry = trip.vertices.iter().take_while(|&&v| v == entry);
-                *free = trip.entered + at_entry.count() as u32;
-                table.insert(rover, trip);
-            }
+        match plan_one(problem, &table, rover) {
+            Ok(trip) => table.insert(rover, trip),
             Err(failure) => failures.push(failure),
         }
     }
@@ -64,17 +56,11 @@ fn in_order(problem: &Problem<'_>, order: &[usize]) -> Outcome {
     }
 }
 
-fn plan_one(
-    problem: &Problem<'_>,
-    table: &Table,
-    rover: usize,
-    free: u32,
-) -> Result<Trip, Failure> {
+fn plan_one(problem: &Problem<'_>, table: &Table, rover: usize) -> Result<Trip, Failure> {
     let mission = problem.missions()[rover];
-    let mut start = match problem.rules() {
-        Rules::Queues => free,
-        Rules::OnMap => 0,
-    };
+    // A predecessor has taken the first cycle in which it found the entry free, so that the next one
+    // comes after it.
+    let mut start = 0;
     while let Some(stay) = table.stay_at(mission.entry, start) {
         if problem.rules() == Rules::OnMap {
             let (blockers, cycle) = (vec![stay.rover], start);
