@@ -1,5 +1,6 @@
-//! Centralised multi-robot path planning on a roadmap: the baselines that the network-guided
-//! system is held against. Pure computation: no messages, no clock, no links.
+//! Planning on roadmaps in space and time, without messages: the baselines that the network-guided
+//! system is held against, centralised and in whole cycles. [`safe_intervals`] is apart: a search in
+//! continuous time that nodes can share among them.
 //!
 //! | planner | what it is |
 //! |---|---|
@@ -49,6 +50,7 @@ mod plan;
 mod prioritised;
 mod problem;
 mod reference;
+pub mod safe_intervals;
 mod sipp;
 mod space_time;
 mod table;
