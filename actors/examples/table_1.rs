@@ -89,6 +89,8 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "policy" => {
                 network.policy = match value {
                     "complete" => Policy::Complete,
+                    "reference" => Policy::Reference,
+                    "prioritised" => Policy::Prioritised,
                     _ => Policy::Paper,
                 }
             }

@@ -68,11 +68,12 @@ mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
+mod schedule;
 #[cfg(test)]
 pub(crate) mod testing;
 mod timing;
 
-pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing};
+pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};

@@ -16,6 +16,7 @@ use super::monitor::{Monitor, Score};
 use super::node::Node;
 use super::payoff::Payoffs;
 use super::rover::Rover;
+use super::schedule::Schedule;
 use super::timing::Timing;
 
 /// Why a system could not be assembled, or has no such actor.
@@ -39,6 +40,9 @@ pub enum NetworkError {
         /// Its exits.
         exits: usize,
     },
+    /// A policy that plans for the whole team ahead has no plan.
+    #[error("no plan for the whole team: {0}")]
+    NoPlan(String),
     /// Two rovers cannot be in one place.
     #[error("two rovers have the {what} {}", .vertex.0)]
     Shared {
@@ -73,6 +77,9 @@ pub(crate) struct Site {
     pub(crate) sensors: Arc<SensorNetwork>,
     pub(crate) config: NetworkConfig,
     pub(crate) timing: Timing,
+    /// Cycles that may pass without progress because messages take so long: a way is reserved in
+    /// some tens of messages one after the other.
+    pub(crate) patience: u32,
     pub(crate) payoffs: Payoffs,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
@@ -80,6 +87,8 @@ pub(crate) struct Site {
     pub(crate) missions: Vec<(VertexId, VertexId)>,
     /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
     pub(crate) stays: bool,
+    /// The plan of a policy that plans ahead.
+    pub(crate) schedule: Option<Schedule>,
     /// Who waits at each entry, in order.
     pub(crate) queues: Vec<(VertexId, Vec<RoverId>)>,
 }
@@ -204,9 +213,13 @@ fn assemble_missions(
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
     declare_links(sim, &sensors, (&node_names, &rover_names), connect);
+    let timing = network.timing(sim.slowest_link())?;
+    let schedule = Schedule::of(network, &timing, &roadmap, &missions, stays);
     let site = Arc::new(Site {
         payoffs: Payoffs::new(network, &roadmap),
-        timing: network.timing(sim.slowest_link())?,
+        schedule: schedule.map_err(NetworkError::NoPlan)?,
+        patience: network.patience(sim.slowest_link(), &timing),
+        timing,
         node_names,
         rover_names,
         config: network.clone(),
@@ -237,8 +250,21 @@ fn names(kind: &str, count: usize) -> Vec<String> {
         .collect()
 }
 
-/// An entry and a goal for each rover, at random.
-fn missions(
+/// An entry and a goal for each rover, at random: what [`assemble`] gives its rovers, for planners
+/// that are to be held against it. Of `world` only the endpoints are read.
+///
+/// ```
+/// use farside_actors::network::{TeamConfig, WorldConfig, missions};
+/// use farside_worlds::Roadmap;
+/// let map = Roadmap::builtin("crater-dense")?;
+/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
+/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the team is empty, or the roadmap's boundary has no two places to drive between.
+pub fn missions(
     world: &WorldConfig,
     roadmap: &Roadmap,
     team: &TeamConfig,

@@ -103,6 +103,15 @@ pub enum Policy {
     /// The reservation walk: no rover enters before its whole way is reserved. See
     /// [`reservation`](super::reservation).
     Complete,
+    /// A baseline that knows everything and never fails: revised prioritised planning, in the order of
+    /// the queues ([`crate::planning::reference`]).
+    Reference,
+    /// A baseline that knows everything and fails often: prioritised planning in space and time
+    /// ([`crate::planning::prioritised`]). A rover without a way never enters.
+    Prioritised,
+    /// A baseline that knows everything: the best plan of all, by a search over all rovers at once
+    /// ([`crate::planning::coupled`]). For small teams.
+    Coupled,
 }
 
 /// Who wins a vertex that several rovers' paths enter in the same cycle. The paper: "a priority has
@@ -193,6 +202,8 @@ pub struct NetworkConfig {
     pub routes: u32,
     /// `complete`: how many cycles before its planned time a vertex may be granted.
     pub grants_ahead: u32,
+    /// `coupled`: the most nodes that the search may expand.
+    pub max_expansions: u64,
     /// Passive deadlock: no move and no entry for so many cycles.
     pub passive_window: u32,
     /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
@@ -229,6 +240,7 @@ impl Default for NetworkConfig {
             acceleration_chains: false,
             routes: 8,
             grants_ahead: 2,
+            max_expansions: 1_000_000,
             passive_window: 20,
             active_window: 300,
             cycle_limit: 5000,

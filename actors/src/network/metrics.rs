@@ -70,6 +70,8 @@ pub struct NetworkMetrics {
     pub bytes_per_rover_cycle: f64,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
+    /// Nodes that the `coupled` policy's search expanded before the start.
+    pub plan_expansions: u64,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands.
     pub standstill: Option<String>,

@@ -208,10 +208,10 @@ impl Score {
         }
         let config = &site.config;
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
-        let reason = if still(self.last_move, config.passive_window) {
+        let reason = if still(self.last_move, config.passive_window + site.patience) {
             self.deadlock = Deadlock::Passive;
             "passive deadlock"
-        } else if still(self.nearest.1, config.active_window) {
+        } else if still(self.nearest.1, config.active_window + site.patience) {
             self.deadlock = Deadlock::Active;
             "active deadlock"
         } else if self.cycle >= config.cycle_limit {
@@ -227,9 +227,12 @@ impl Score {
 
     /// Who is still out, in a sentence.
     fn remaining(&self, site: &Site) -> String {
-        let out = |t: &Track| t.arrived.is_none() || t.vertex.is_some();
+        let out = |t: &Track| match site.stays {
+            true => t.remaining > 0,
+            false => t.arrived.is_none() || t.vertex.is_some(),
+        };
         let left = self.tracks.iter().filter(|t| out(t)).count();
-        let on_the_way = |t: &Track| t.vertex.is_some();
+        let on_the_way = |t: &Track| out(t) && t.vertex.is_some();
         let first = self.tracks.iter().position(on_the_way);
         let first = first.or_else(|| self.tracks.iter().position(out));
         let Some(first) = first else {
@@ -259,6 +262,7 @@ impl Score {
             interventions: self.interventions,
             cycles: self.cycle + 1,
             standstill: self.standstill.clone(),
+            plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);

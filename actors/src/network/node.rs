@@ -156,7 +156,7 @@ impl Actor for Node {
             let goal = self.site.missions[rover.0 as usize].1;
             ledger.stand(vertex, rover, goal);
         }
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             self.open_registry(ctx);
         }
         // The first cycle begins at once; after a restart, the next.

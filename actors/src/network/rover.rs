@@ -136,7 +136,7 @@ impl Actor for Rover {
             self.drive(ctx);
         }
         self.record(ctx);
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             self.proceed(ctx);
         }
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
@@ -168,7 +168,7 @@ impl Handler<PaceAllows> for Rover {
 
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             if !ctx.durable::<RoverMemory>().keep(&grant) {
                 self.beacon(ctx, grant.node);
             }
@@ -227,7 +227,7 @@ impl Handler<EdgeEnds> for Rover {
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);
-            if self.site.config.policy == Policy::Complete {
+            if self.site.config.policy != Policy::Paper {
                 self.proceed(ctx);
             }
         }

@@ -19,7 +19,7 @@ impl Node {
     pub(super) fn listen(&mut self, ctx: &mut Context<'_, Self>) {
         let timing = &self.site.timing;
         self.cycle = self.site.cycle_at(ctx.now());
-        if config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             let phase = Phase::Listen;
             ctx.timer(self.site.until_next_cycle(ctx.now()), PhaseBegins { phase });
             self.repeat(ctx);
