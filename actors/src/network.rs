@@ -67,17 +67,22 @@ mod node;
 #[cfg(test)]
 mod open_tests;
 mod payoff;
+mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
+mod schedule;
 #[cfg(test)]
 pub(crate) mod testing;
+mod timing;
 
-pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing};
+pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{
     ConfigError, Motion, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig,
 };
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
+pub use processor::Processor;
 pub use rover::Rover;
+pub use timing::Timing;

@@ -166,7 +166,7 @@ mod motion {
             motion: Motion::Continuous,
             speed: 2.0,
             acceleration_limit: 1.0,
-            cycle: SimDuration::from_secs(8),
+            cycle: Some(SimDuration::from_secs(8)),
             ..NetworkConfig::default()
         }
     }
@@ -219,14 +219,20 @@ mod motion {
     #[test]
     fn an_edge_that_takes_too_long_is_named() {
         let mut network = continuous(Policy::Paper);
-        network.cycle = SimDuration::from_secs(7);
+        network.cycle = Some(SimDuration::from_secs(7));
         let error = Case::new(network).run().err().unwrap();
         assert!(matches!(error, NetworkError::SlowEdge { .. }));
         let text = error.to_string();
         assert!(text.contains("is 10.0 m long and takes 7s"), "{text}");
         assert!(text.contains("leaves after its phases is 6.3s"), "{text}");
+        // Where nothing is said, the cycle is long enough.
+        let network = NetworkConfig {
+            cycle: None,
+            ..continuous(Policy::Paper)
+        };
+        Case::new(network).run().unwrap();
         let mut network = continuous(Policy::Complete);
-        (network.cycle, network.passive_window) = (SimDuration::from_secs(1), 7);
+        (network.cycle, network.passive_window) = (Some(SimDuration::from_secs(1)), 7);
         let text = Case::new(network).run().err().unwrap().to_string();
         assert!(text.contains("network.passive_window is 7s"), "{text}");
     }

@@ -143,7 +143,7 @@ impl Actor for Rover {
             self.drive(ctx);
         }
         self.record(ctx);
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             self.proceed(ctx);
         }
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
@@ -160,7 +160,7 @@ impl Handler<CycleStarts> for Rover {
         let memory = ctx.durable::<RoverMemory>();
         let has_left = memory.vertex.is_none() && memory.step > 0;
         if !has_left {
-            ctx.timer(self.site.config.cycle, CycleStarts);
+            ctx.timer(self.site.timing.cycle, CycleStarts);
         }
         Ok(())
     }
@@ -175,7 +175,7 @@ impl Handler<PaceAllows> for Rover {
 
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             if !ctx.durable::<RoverMemory>().keep(&grant) {
                 self.beacon(ctx, grant.node);
             }
@@ -196,7 +196,7 @@ impl Rover {
         let goes_on = self.site.config.motion == Motion::Continuous && memory.previous.is_some();
         let pace = match goes_on {
             true => SimDuration::ZERO,
-            false => self.site.config.cycle,
+            false => self.site.timing.cycle,
         };
         let Some(grant) = memory.next_granted().cloned() else {
             return;
@@ -238,7 +238,7 @@ impl Handler<EdgeEnds> for Rover {
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);
-            if self.site.config.policy == Policy::Complete {
+            if self.site.config.policy != Policy::Paper {
                 self.proceed(ctx);
             }
         }

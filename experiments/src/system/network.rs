@@ -249,6 +249,8 @@ const KEYS: [&str; 14] = [
     "network.collision_penalty_factor",
     "network.noise",
     "network.convergence",
+    "network.damping",
+    "network.processor",
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",

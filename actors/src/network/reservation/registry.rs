@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use farside_worlds::{NodeId, VertexId};
+use farside_worlds::{NodeId, Roadmap, VertexId};
 
 use super::book::{Book, Clash, Visit};
-use super::messages::{Item, Probe, Reserve, Settle, Verdict, Walk};
+use super::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Yield};
 use super::relay::Line;
 use super::routes::routes;
 use crate::network::assemble::Site;
@@ -20,12 +20,22 @@ const MAX_FRONTIER: usize = 24;
 #[derive(Debug)]
 struct Applicant {
     origin: Origin,
+    aim: Aim,
     /// The walk under way, and when its attempt began.
     walk: Option<(Walk, u64)>,
     /// The next attempt, and when it begins.
     again: Option<(Walk, u64)>,
     /// Attempts that found no way at all.
     in_vain: u32,
+}
+
+/// Where a way is to lead.
+#[derive(Debug)]
+enum Aim {
+    /// To the rover's goal.
+    Goal,
+    /// Off this path, out of another's way.
+    Aside(Vec<VertexId>),
 }
 
 /// Where a way begins.
@@ -56,6 +66,7 @@ struct Offers {
     heard: u32,
     probes: u32,
     first_step: u32,
+    wishful: bool,
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -101,8 +112,12 @@ impl Registry {
                     last_entry: 0,
                 });
             }
+            self.preload(desk);
             let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
             for (rover, vertex) in standing {
+                if desk.site.schedule.is_some() {
+                    continue;
+                }
                 self.book.stand(vertex, rover, 1);
                 if desk.site.missions[rover.0 as usize].1 != vertex {
                     self.seek(Origin::Stand {
@@ -119,6 +134,34 @@ impl Registry {
         }
     }
 
+    /// Enters what was planned before the start.
+    fn preload(&mut self, desk: &Desk<'_>) {
+        let schedule = desk.site.schedule.iter().flat_map(|s| &s.visits);
+        for (rover, way) in (0..).map(RoverId).zip(schedule) {
+            let walk = Walk {
+                rover,
+                attempt: 0,
+                since: 0,
+            };
+            for (i, timed) in way.iter().enumerate() {
+                if desk.site.sensors.owner(timed.vertex) != desk.node {
+                    continue;
+                }
+                let visit = Visit {
+                    walk,
+                    step: i as u32 + 1,
+                    from: i.checked_sub(1).map(|before| way[before].vertex),
+                    start: timed.start,
+                    end: timed.end,
+                    confirmed: true,
+                    // Who stands on the map has its first vertex already.
+                    granted: i == 0 && desk.site.stays,
+                };
+                self.book.enter(timed.vertex, visit);
+            }
+        }
+    }
+
     /// The time that it takes to learn that a vertex is free and to grant it [ns].
     fn gap(&self) -> u64 {
         let measured = self.lines.values().filter(|line| line.is_measured());
@@ -130,6 +173,7 @@ impl Registry {
     fn seek(&mut self, origin: Origin) {
         self.applicants.push(Applicant {
             origin,
+            aim: Aim::Goal,
             walk: None,
             again: None,
             in_vain: 0,
@@ -165,22 +209,31 @@ impl Registry {
         let applicant = &mut self.applicants[at];
         applicant.walk = Some((walk, desk.now));
         applicant.again = None;
-        let goal = desk.site.missions[walk.rover.0 as usize].1;
+        let in_vain = applicant.in_vain;
+        let mut goal = desk.site.missions[walk.rover.0 as usize].1;
         let soon = desk.now + self.walk_time;
         let (labels, entry, first_step) = match applicant.origin {
             Origin::Queue {
                 entry, last_entry, ..
             } => {
-                let dwell = desk.site.config.cycle.as_nanos();
+                let dwell = desk.site.timing.cycle.as_nanos();
                 let earliest = soon.max(last_entry + 1);
                 let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
                 (labels, entry, 1)
             }
             Origin::Stand { vertex, step, .. } => {
+                if let Aim::Aside(path) = &applicant.aim {
+                    goal = aside(&desk.site.roadmap, vertex, path, in_vain);
+                }
+                let cycle = desk.site.timing.cycle.as_nanos();
+                let came = self
+                    .book
+                    .standing(vertex)
+                    .map_or(0, |visit| visit.start + cycle);
                 let label = Label {
                     vertex,
-                    start: soon,
-                    ready: soon,
+                    start: soon.max(came),
+                    ready: soon.max(came),
                     until: FOREVER,
                     parent: None,
                 };
@@ -189,6 +242,9 @@ impl Registry {
             Origin::Done => return,
         };
         let site = desk.site;
+        // Every second time that there is no way it asks what the way would be without those who
+        // stand still.
+        let wishful = site.stays && in_vain % 2 == 1;
         let routes = routes(
             &site.roadmap,
             &site.sensors,
@@ -205,6 +261,7 @@ impl Registry {
                 at: 0,
                 goal,
                 first_step,
+                wishful,
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
@@ -213,11 +270,20 @@ impl Registry {
     }
 
     fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&Ground<'_>) -> T) -> T {
+        self.search_in(desk, &|v| self.book.busy(v), with)
+    }
+
+    fn search_in<T>(
+        &self,
+        desk: &Desk<'_>,
+        busy: &dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
+        with: impl FnOnce(&Ground<'_>) -> T,
+    ) -> T {
         let ground = Ground {
             roadmap: &desk.site.roadmap,
             gap: self.gap(),
             travel: &|u, v| desk.site.planned_step(u, v).as_nanos(),
-            busy: &|v| self.book.busy(v),
+            busy,
         };
         with(&ground)
     }
@@ -227,6 +293,7 @@ impl Registry {
             Item::Probe(probe) => self.probe(desk, probe),
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
+            Item::Yield(request) => self.make_way(desk, request),
         }
     }
 
@@ -239,7 +306,12 @@ impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
-        self.search(desk, |ground| ground.expand(&mut labels, open));
+        if probe.wishful {
+            let busy = |v| self.book.busy_for_now(v);
+            self.search_in(desk, &busy, |ground| ground.expand(&mut labels, open));
+        } else {
+            self.search(desk, |ground| ground.expand(&mut labels, open));
+        }
         let Some(&next) = probe.route.get(probe.at as usize + 1) else {
             self.offer(desk, &probe, &labels);
             return;
@@ -270,6 +342,7 @@ impl Registry {
                 heard: 0,
                 probes: probe.probes,
                 first_step: probe.first_step,
+                wishful: probe.wishful,
                 route: probe.route.clone(),
                 best: None,
                 decided: false,
@@ -323,6 +396,16 @@ impl Registry {
         offers.decided = true;
         let (walk, first_step) = (offers.walk, offers.first_step);
         match offers.best.take() {
+            Some((_, way)) if offers.wishful => {
+                let route = owners(desk, &way);
+                let request = Yield {
+                    walk,
+                    path: way.iter().map(|visit| visit.vertex).collect(),
+                    at: route.len() as u32 - 1,
+                    route,
+                };
+                self.make_way(desk, request);
+            }
             Some((_, way)) => {
                 let at = way.len() as u32 - 1;
                 let reserve = Reserve {
@@ -397,6 +480,7 @@ impl Registry {
             self.book.leave_by(vertex, end);
         }
         self.served(desk, &reserve);
+        self.return_later(desk, &reserve.walk);
         let settle = Settle {
             walk: reserve.walk,
             verdict: Verdict::Confirmed,
@@ -461,7 +545,7 @@ impl Registry {
         // Nothing leads there as things stand: other rovers have to go first.
         let applicant = &mut self.applicants[at];
         applicant.walk = None;
-        let pause = desk.site.config.cycle.as_nanos() << applicant.in_vain.min(3);
+        let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(3);
         applicant.in_vain += 1;
         applicant.again = Some((next, desk.now + pause));
     }
@@ -469,7 +553,10 @@ impl Registry {
     fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
         match settle.verdict {
             Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
-            Verdict::Confirmed => self.book.confirm(&settle.walk),
+            Verdict::Confirmed => {
+                self.book.confirm(&settle.walk);
+                self.return_later(desk, &settle.walk);
+            }
             Verdict::Released => self.book.strike(&settle.walk),
         }
         self.forward(settle);
@@ -511,6 +598,84 @@ impl Registry {
         self.apply(desk);
     }
 
+    /// Asks those of this node's rovers that stand on a path to step aside, and passes that on.
+    fn make_way(&mut self, desk: &Desk<'_>, request: Yield) {
+        for &vertex in &request.path {
+            let Some(visit) = self.book.standing(vertex) else {
+                continue;
+            };
+            let (rover, step) = (visit.walk.rover, visit.step);
+            if rover == request.walk.rover {
+                continue;
+            }
+            let seeks = |a: &&mut Applicant| matches!(a.origin, Origin::Stand { rover: r, .. } if r == rover);
+            // One that is itself on its way out of the way, or about to be, is left alone.
+            if let Some(applicant) = self.applicants.iter_mut().find(seeks) {
+                if applicant.walk.is_none() && matches!(applicant.aim, Aim::Goal) {
+                    applicant.aim = Aim::Aside(request.path.clone());
+                }
+                continue;
+            }
+            self.seek(Origin::Stand {
+                rover,
+                vertex,
+                step,
+            });
+            if let Some(applicant) = self.applicants.last_mut() {
+                applicant.aim = Aim::Aside(request.path.clone());
+            }
+        }
+        let (walk, route) = (request.walk, request.route.clone());
+        match request.at.checked_sub(1) {
+            Some(at) => {
+                let to = route[at as usize];
+                self.post(to, Item::Yield(Yield { at, ..request }));
+            }
+            None => self.fail(
+                desk,
+                Settle {
+                    walk,
+                    verdict: Verdict::NoWay,
+                    route,
+                    at: 0,
+                },
+            ),
+        }
+    }
+
+    /// A rover that has stepped aside goes on to its goal, once the other one has had the time to
+    /// pass.
+    fn return_later(&mut self, desk: &Desk<'_>, walk: &Walk) {
+        if !desk.site.stays {
+            return;
+        }
+        let goal = desk.site.missions[walk.rover.0 as usize].1;
+        for &vertex in desk.site.sensors.owned(desk.node) {
+            let Some(visit) = self.book.standing(vertex) else {
+                continue;
+            };
+            if visit.walk != *walk || vertex == goal {
+                continue;
+            }
+            let (rover, step) = (walk.rover, visit.step);
+            let due = visit.start + RETURN_AFTER * desk.site.timing.cycle.as_nanos();
+            self.seek(Origin::Stand {
+                rover,
+                vertex,
+                step,
+            });
+            let first = Walk {
+                rover,
+                attempt: walk.attempt + 1,
+                since: due,
+            };
+            if let Some(applicant) = self.applicants.last_mut() {
+                applicant.again = Some((first, due));
+            }
+            return;
+        }
+    }
+
     /// When something is to be done without being told.
     pub(super) fn next_due(&self) -> Option<u64> {
         let lines = self.lines.values().filter_map(Line::next_due);
@@ -521,6 +686,19 @@ impl Registry {
         lines.chain(open.map(|o| o.deadline)).min()
     }
 }
+
+/// Where to step aside to from `from`: the nearest vertex off `path`, or after failures the next
+/// nearest.
+fn aside(roadmap: &Roadmap, from: VertexId, path: &[VertexId], failures: u32) -> VertexId {
+    let off = |v: &VertexId| *v != from && !path.contains(v);
+    let mut places: Vec<VertexId> = roadmap.vertices().filter(off).collect();
+    places.sort_by_key(|&v| (roadmap.distance(from, v), v));
+    let at = failures as usize % places.len().clamp(1, 64);
+    places.get(at).copied().unwrap_or(from)
+}
+
+/// How many cycles after it has come there a rover that has stepped aside goes on.
+const RETURN_AFTER: u64 = 20;
 
 /// The gap before anything was measured [ns].
 const FIRST_GAP: u64 = 10_000_000;
