@@ -10,7 +10,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside_worlds::{Roadmap, SensorNetwork, VertexId};
 
 use super::messages::{Beacon, RoverState};
-use super::testing::{grid, v};
+use super::testing::grid;
 use super::*;
 
 /// A link of 5 ms that loses some.
