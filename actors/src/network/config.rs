@@ -204,6 +204,20 @@ pub struct NetworkConfig {
     /// gravity of 1.6 m/s2.
     #[serde(with = "units::acceleration_m_per_s2")]
     pub acceleration_limit: f64,
+    /// How wrong a rover's estimate of its own position is, as the standard deviation along its way
+    /// \[m\], in [0, 100]; 0 is the paper's. A rover says that it has left a vertex only when it is off it
+    /// by `location_clearance`, though its estimate were three times this wrong; and that it has come
+    /// to one only when a fix of its position was good enough, for which it stops.
+    #[serde(rename = "location_sigma", with = "units::length_m")]
+    pub location_sigma_m: f64,
+    /// How far from a vertex a rover is off it \[m\], in [0.1, 100]; and how wrong a fix may be for it to
+    /// know that it is there. By default 2 m, the length of a rover: with half of that on either
+    /// side two of them do not touch.
+    #[serde(rename = "location_clearance", with = "units::length_m")]
+    pub location_clearance_m: f64,
+    /// How long a fix takes, where locations are uncertain. One that is not good enough is repeated.
+    #[serde(with = "units::duration")]
+    pub location_fix: SimDuration,
     /// C, the estimate of the longest path, in diameters of the roadmap.
     pub longest_path_factor: f64,
     /// What a path loses that leads back to the vertex just left.
@@ -260,6 +274,9 @@ impl Default for NetworkConfig {
             motion: Motion::default(),
             speed: 4.0,
             acceleration_limit: 1.0,
+            location_sigma_m: 0.0,
+            location_clearance_m: 2.0,
+            location_fix: SimDuration::from_millis(100),
             longest_path_factor: 20.0,
             backtrack_penalty: 40.0,
             leaf_wait_penalty: 45.0,
@@ -332,6 +349,7 @@ impl NetworkConfig {
             ("exchange", self.exchange),
             ("iteration_timeout", self.iteration_timeout),
             ("traverse", Some(self.traverse)),
+            ("location_fix", Some(self.location_fix)),
         ] {
             let actual = duration.map_or_else(|| "auto".to_owned(), |d| d.to_string());
             let lasts = duration.is_none_or(|d| !d.is_zero());
@@ -362,6 +380,22 @@ impl NetworkConfig {
         ] {
             check(key, window > 0, window.to_string(), "at least 1")?;
         }
+        let sigma_m = self.location_sigma_m;
+        let fits = (0.0..=100.0).contains(&sigma_m);
+        check(
+            "location_sigma",
+            fits,
+            format!("{sigma_m} m"),
+            "in [0, 100] m",
+        )?;
+        let clear_m = self.location_clearance_m;
+        let fits = (0.1..=100.0).contains(&clear_m);
+        check(
+            "location_clearance",
+            fits,
+            format!("{clear_m} m"),
+            "in [0.1, 100] m",
+        )?;
         for (key, limit) in [
             ("speed", self.speed),
             ("acceleration_limit", self.acceleration_limit),

@@ -180,9 +180,13 @@ impl Ways<'_> {
         }
     }
 
-    /// How long the edge takes from rest to rest: what plans reckon with.
+    /// How long the edge takes from rest to rest, and a fix of the position: what plans reckon with.
     pub(super) fn planned(&self, u: VertexId, v: VertexId) -> SimDuration {
-        self.drive((u, v), None, 0.0).time
+        let time = self.drive((u, v), None, 0.0).time;
+        match self.config.location_sigma_m > 0.0 {
+            true => time + self.config.location_fix,
+            false => time,
+        }
     }
 
     /// The edge that takes longest, and how long.

@@ -237,3 +237,66 @@ mod motion {
         assert!(text.contains("network.passive_window is 7s"), "{text}");
     }
 }
+
+mod location {
+    use super::*;
+
+    fn uncertain(policy: Policy, sigma_m: f64) -> NetworkConfig {
+        NetworkConfig {
+            policy,
+            location_sigma_m: sigma_m,
+            ..NetworkConfig::default()
+        }
+    }
+
+    /// Nobody says LEAVING before it is off the vertex by the clearance, nor that it has come before it
+    /// has; and all arrive all the same.
+    #[test]
+    fn what_is_said_is_certain() {
+        for (policy, sigma_m, loss) in [
+            (Policy::Paper, 0.5, 0.0),
+            (Policy::Complete, 0.5, 0.0),
+            (Policy::Complete, 1.5, 0.3),
+        ] {
+            let mut case = Case::new(uncertain(policy, sigma_m));
+            (case.loss, case.rovers) = (loss, 4);
+            let (_, seen) = case.arrives();
+            // 200 ms for 10 m.
+            let clear_ns = 200_000_000 / 10 * 2;
+            let mut leavings = 0;
+            for (sent, beacon) in &seen.beacons {
+                let said = beacon.whereabouts;
+                let is = |state: &RoverState| {
+                    let true_ = state.whereabouts;
+                    (true_.rover, true_.step) == (said.rover, said.step)
+                };
+                let began = seen.changes.iter().find(|(_, state)| {
+                    is(state) && (said.moving_to.is_none() || state.whereabouts == said)
+                });
+                let (began, _) = began.expect("it said what was never so");
+                assert!(began <= sent);
+                if said.moving_to.is_some() {
+                    leavings += 1;
+                    assert!(sent.as_nanos() - began.as_nanos() >= clear_ns);
+                }
+            }
+            assert!(leavings > 0);
+        }
+    }
+
+    /// Each fix that is no good costs another one's time.
+    #[test]
+    fn the_less_is_known_the_longer_it_takes() {
+        let time = |sigma_m| {
+            let (_, seen) = Case::new(uncertain(Policy::Complete, sigma_m)).arrives();
+            let all = moves(&seen);
+            let sum: u64 = all.iter().map(|m| m.3.as_nanos() - m.2.as_nanos()).sum();
+            sum / all.len() as u64
+        };
+        assert_eq!(time(0.0), 200_000_000);
+        assert_eq!(time(0.01), 300_000_000, "one fix is enough");
+        // A fix of 2 m is good with a chance of 0.68: 1.46 of them in the mean.
+        let mean = time(2.0);
+        assert!((325_000_000..370_000_000).contains(&mean), "{mean}");
+    }
+}

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::assemble::Site;
 use super::config::{Motion, Policy, Sabotage};
-use super::messages::{Beacon, Grant, RoverId, RoverState};
+use super::messages::{Beacon, Grant, RoverId, RoverState, Whereabouts};
 use super::node::Node;
 use super::safety::{Answer, RoverMemory};
 use crate::radio::RadioChange;
@@ -30,12 +30,23 @@ pub struct Rover {
     /// How fast it is at the end of the edge under way, or at the vertex that it rolls through \[m/s\];
     /// a crash stops it.
     speed: f64,
+    /// It may say that it is leaving: it is off the vertex for certain.
+    off: bool,
+    /// Fixes of its position taken at the end of the edge under way.
+    fixes: u32,
 }
 
 /// Timer: a planning cycle begins.
 #[derive(Serialize, Deserialize)]
 #[doc(hidden)]
 pub struct CycleStarts;
+
+/// Timer: it is off the vertex that it came to with this step, for certain.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct OffVertex {
+    step: u32,
+}
 
 /// Timer: the end of the edge is reached.
 #[derive(Serialize, Deserialize)]
@@ -58,6 +69,8 @@ impl Rover {
             nodes: Vec::new(),
             radios: Vec::new(),
             speed: 0.0,
+            off: true,
+            fixes: 0,
         }
     }
 
@@ -78,10 +91,21 @@ impl Rover {
         let (Some(here), Some(next)) = (memory.vertex, memory.moving_to) else {
             return;
         };
-        let beyond = memory.granted_beyond();
+        let step = memory.step;
+        let sigma_m = self.site.config.location_sigma_m;
+        let is_certain = sigma_m == 0.0;
+        let beyond = memory.granted_beyond().filter(|_| is_certain);
         let drive = self.site.ways().drive((here, next), beyond, self.speed);
         self.speed = drive.end;
         ctx.timer(drive.time, EdgeEnds);
+        self.fixes = 0;
+        self.off = is_certain;
+        if !is_certain {
+            let said_m = self.leaves_at_m(ctx, step);
+            if let Some(after) = drive.passes(said_m) {
+                ctx.timer(after, OffVertex { step });
+            }
+        }
         let end = ctx.now() + drive.time;
         for radio in &self.radios {
             let moves = RadioChange::Moves {
@@ -94,10 +118,40 @@ impl Rover {
         }
     }
 
+    /// How far from the vertex it is when it says that it has left: as soon as its estimate is that it is
+    /// off it by the clearance and three standard deviations. Errors beyond that it notices.
+    fn leaves_at_m(&self, ctx: &Context<'_, Self>, step: u32) -> f64 {
+        let config = &self.site.config;
+        let most_m = 3.0 * config.location_sigma_m;
+        let mut draws = ctx.random_at("odometry", u64::from(step)).stream();
+        let error_m = draws.normal(0.0, config.location_sigma_m);
+        config.location_clearance_m + most_m - error_m.clamp(-most_m, most_m)
+    }
+
+    /// At the end of an edge: whether it has yet to find out that it is there.
+    fn is_lost(&mut self, ctx: &mut Context<'_, Self>) -> bool {
+        let config = &self.site.config;
+        if config.location_sigma_m == 0.0 {
+            return false;
+        }
+        let step = ctx.durable::<RoverMemory>().step;
+        let key = u64::from(step) << 32 | u64::from(self.fixes);
+        let mut draws = ctx.random_at("location_fix", key).stream();
+        let error_m = draws.normal(0.0, config.location_sigma_m).abs();
+        // The first time there is no fix yet.
+        let is_lost = self.fixes == 0 || error_m > config.location_clearance_m;
+        self.fixes += 1;
+        is_lost
+    }
+
     fn beacon(&self, ctx: &mut Context<'_, Self>, to: NodeId) {
         let memory = ctx.durable::<RoverMemory>();
+        let whereabouts = memory.whereabouts(self.id);
         let beacon = Beacon {
-            whereabouts: memory.whereabouts(self.id),
+            whereabouts: Whereabouts {
+                moving_to: whereabouts.moving_to.filter(|_| self.off),
+                ..whereabouts
+            },
             previous: memory.previous,
             goal: self.goal,
         };
@@ -126,7 +180,7 @@ impl Rover {
 }
 
 impl Actor for Rover {
-    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows);
+    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows, OffVertex);
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         for name in &self.site.node_names {
@@ -223,8 +277,10 @@ impl Rover {
                 self.drive(ctx);
                 self.record(ctx);
                 // LEAVING goes to the owner of the vertex left, which is not the one that granted
-                // the next one.
-                self.beacon_here(ctx);
+                // the next one. Said later, if the rover cannot be certain yet.
+                if self.off {
+                    self.beacon_here(ctx);
+                }
                 return;
             }
             Answer::Entered | Answer::Left => self.record(ctx),
@@ -233,8 +289,23 @@ impl Rover {
     }
 }
 
+impl Handler<OffVertex> for Rover {
+    fn handle(&mut self, timer: OffVertex, ctx: &mut Context<'_, Self>) -> Outcome {
+        let memory = ctx.durable::<RoverMemory>();
+        if memory.step == timer.step && memory.moving_to.is_some() {
+            self.off = true;
+            self.beacon_here(ctx);
+        }
+        Ok(())
+    }
+}
+
 impl Handler<EdgeEnds> for Rover {
     fn handle(&mut self, _timer: EdgeEnds, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.is_lost(ctx) {
+            ctx.timer(self.site.config.location_fix, EdgeEnds);
+            return Ok(());
+        }
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);

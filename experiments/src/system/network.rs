@@ -237,12 +237,15 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 19] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
     "network.traverse",
     "network.speed",
+    "network.location_sigma",
+    "network.location_clearance",
+    "network.location_fix",
     "network.acceleration_limit",
     "network.longest_path_factor",
     "network.backtrack_penalty",
