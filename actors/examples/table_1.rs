@@ -8,7 +8,7 @@
 //! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
 //! `2M/s`), `damping`, `anytime`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
-//! `speed`, `acceleration_limit`, `sigma` (of locations), and the payoffs' `factor`, `backtrack`, `leaf_wait`, `noise`.
+//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`, `leaf_wait`, `noise`.
 
 use std::sync::Arc;
 
@@ -105,6 +105,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             }
             "speed" => network.speed = value.parse()?,
             "acceleration_limit" => network.acceleration_limit = value.parse()?,
+            "roadmap_from" => network.roadmap_from = Some(value.to_owned()),
             "sigma" => network.location_sigma_m = value.parse()?,
             "passive" => network.passive_window = value.parse()?,
             "first_seed" => options.first_seed = value.parse()?,

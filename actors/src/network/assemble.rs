@@ -78,6 +78,16 @@ pub enum NetworkError {
         /// How long that is.
         limit: SimDuration,
     },
+    /// No node has the name that `network.roadmap_from` gives.
+    #[error("network.roadmap_from is {name}, but there are {first} to {last}")]
+    UnknownSource {
+        /// The name.
+        name: String,
+        /// The first node.
+        first: String,
+        /// The last.
+        last: String,
+    },
     /// No actor has this name.
     #[error("no node or rover is called {name}; there are {first} to {last}")]
     UnknownActor {
@@ -101,6 +111,8 @@ pub(crate) struct Site {
     /// Cycles that may pass without progress because messages take so long: a way is reserved in
     /// some tens of messages one after the other.
     pub(crate) patience: u32,
+    /// Who gives the roadmap to all others.
+    pub(crate) roadmap_from: Option<NodeId>,
     pub(crate) payoffs: Payoffs,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
@@ -258,6 +270,7 @@ fn assemble_missions(
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: network.patience(sim.slowest_link(), &timing),
         timing,
+        roadmap_from: source(network, &node_names)?,
         node_names,
         rover_names,
         config: network.clone(),
@@ -278,6 +291,20 @@ fn assemble_missions(
         rovers,
         score,
     })
+}
+
+/// The node that `network.roadmap_from` names.
+fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, NetworkError> {
+    let Some(name) = &config.roadmap_from else {
+        return Ok(None);
+    };
+    let at = names.iter().position(|known| known == name);
+    let at = at.ok_or_else(|| NetworkError::UnknownSource {
+        name: name.clone(),
+        first: names.first().cloned().unwrap_or_default(),
+        last: names.last().cloned().unwrap_or_default(),
+    })?;
+    Ok(Some(NodeId(at as u32)))
 }
 
 /// The parts of a cycle. The paper's policy moves rovers within its cycles: where nothing is said, they

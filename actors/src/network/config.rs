@@ -218,6 +218,10 @@ pub struct NetworkConfig {
     /// How long a fix takes, where locations are uncertain. One that is not good enough is repeated.
     #[serde(with = "units::duration")]
     pub location_fix: SimDuration,
+    /// The node, such as `node_01`, that alone knows the roadmap at the start and gives it to the others over
+    /// the network, in parts. Nodes plan and admit only once they know all of it. Absent, all do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roadmap_from: Option<String>,
     /// C, the estimate of the longest path, in diameters of the roadmap.
     pub longest_path_factor: f64,
     /// What a path loses that leads back to the vertex just left.
@@ -275,6 +279,7 @@ impl Default for NetworkConfig {
             speed: 4.0,
             acceleration_limit: 1.0,
             location_sigma_m: 0.0,
+            roadmap_from: None,
             location_clearance_m: 2.0,
             location_fix: SimDuration::from_millis(100),
             longest_path_factor: 20.0,

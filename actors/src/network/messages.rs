@@ -193,6 +193,13 @@ pub struct RoverState {
     pub transmit_energy_j: f64,
 }
 
+/// What a node records when it was given the last part of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoadmapKnown {
+    /// The node.
+    pub node: NodeId,
+}
+
 /// What a node records of itself once in each cycle, when vertices are granted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NodeState {

@@ -72,6 +72,10 @@ pub struct NetworkMetrics {
     pub max_plus_iterations: f64,
     /// Nodes that the `coupled` policy's search expanded before the start.
     pub plan_expansions: u64,
+    /// When the last node knew the roadmap, where nodes are given it over the network \[s\]; none if
+    /// some never did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roadmap_known_s: Option<f64>,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands.
     pub standstill: Option<String>,

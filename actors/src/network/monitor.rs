@@ -49,6 +49,8 @@ pub(crate) struct Score {
     last_intervention: Option<u32>,
     iterations: u64,
     planned_cycles: u64,
+    /// When nodes that were given the roadmap knew all of it.
+    informed: Vec<SimTime>,
     messages: u64,
     bytes: u64,
     last_move: u32,
@@ -127,6 +129,8 @@ impl Observer for Monitor {
                 return Ok(score.follow(&self.site, rover, &state, record.time()));
             } else if kind.name() == "NodeState" {
                 score.count(&kind.schema().decode(record.body).map_err(failed)?);
+            } else if kind.name() == "RoadmapKnown" {
+                score.informed.push(record.time());
             }
         }
         Ok(Flow::Continue)
@@ -265,6 +269,11 @@ impl Score {
             plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
+        // One has always known it.
+        if site.roadmap_from.is_some() && self.informed.len() + 1 >= site.sensors.len() {
+            let last = self.informed.iter().max().copied().unwrap_or(SimTime::ZERO);
+            metrics.roadmap_known_s = Some(last.as_secs_f64());
+        }
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);

@@ -19,8 +19,8 @@ use super::lng::LocalGraph;
 use super::messages::{
     Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
 };
-use super::reservation::RegistryDue;
 use super::reservation::messages::Relay;
+use super::reservation::{Registry, RegistryDue};
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
@@ -115,6 +115,12 @@ impl Node {
         self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
     }
 
+    /// Whether it may take part: where nodes are given the roadmap over the network, only with all of it.
+    pub(super) fn knows_roadmap(&self, ctx: &mut Context<'_, Self>) -> bool {
+        let source = self.site.roadmap_from;
+        source.is_none() || ctx.durable::<Registry>().knows_roadmap(source)
+    }
+
     fn owns(&self, v: VertexId) -> bool {
         self.site.sensors.owner(v) == self.id
     }
@@ -156,7 +162,7 @@ impl Actor for Node {
             let goal = self.site.missions[rover.0 as usize].1;
             ledger.stand(vertex, rover, goal);
         }
-        if self.site.config.policy != Policy::Paper {
+        if self.site.config.policy != Policy::Paper || self.site.roadmap_from.is_some() {
             self.open_registry(ctx);
         }
         // The first cycle begins at once; after a restart, the next.

@@ -1,13 +1,13 @@
 //! The paper's open questions (section 5), on small teams: continuous motion, uncertain locations,
 //! roadmaps that nodes are given over the network, balanced loads.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside_worlds::{Roadmap, SensorNetwork, VertexId};
+use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 
 use super::messages::{Beacon, RoverState};
 use super::testing::grid;
@@ -40,6 +40,8 @@ struct Seen {
     changes: Vec<(SimTime, RoverState)>,
     /// When each beacon was sent.
     beacons: Vec<(SimTime, Beacon)>,
+    /// How many messages that carry items from node to node arrived.
+    relays: u32,
 }
 
 struct Witness(Arc<Mutex<Seen>>);
@@ -63,6 +65,7 @@ impl Observer for Witness {
             let state = kind.schema().decode(record.body).map_err(failed)?;
             seen.changes.push((record.time(), state));
         }
+        seen.relays += u32::from(record.class == RecordClass::Delivered && kind.name() == "Relay");
         if record.class == RecordClass::Delivered && kind.name() == "Beacon" {
             let beacon = kind.schema().decode(record.body).map_err(failed)?;
             seen.beacons.push((record.sent, beacon));
@@ -75,6 +78,8 @@ struct Case {
     map: Roadmap,
     rovers: u32,
     loss: f64,
+    /// Nodes hear rovers, but not each other.
+    are_nodes_deaf: bool,
     seed: u64,
     network: NetworkConfig,
 }
@@ -85,6 +90,7 @@ impl Case {
             map: grid(5, 4, &[(6, 7), (12, 13)]),
             rovers: 6,
             loss: 0.0,
+            are_nodes_deaf: false,
             seed: 1,
             network,
         }
@@ -105,10 +111,16 @@ impl Case {
         let mut sim = Simulation::new(self.seed);
         let seen = Arc::new(Mutex::new(Seen::default()));
         sim.observe(Witness(seen.clone()));
-        let loss = self.loss;
+        let loss = |from: &str, to: &str| {
+            let are_nodes = from.starts_with("node") && to.starts_with("node");
+            match self.are_nodes_deaf && are_nodes {
+                true => 1.0,
+                false => self.loss,
+            }
+        };
         let mut connect =
             |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-                sim.link(a, b, &format!("{from}-{to}"), Lossy(loss));
+                sim.link(a, b, &format!("{from}-{to}"), Lossy(loss(from, to)));
             };
         let network = assemble(
             &mut sim,
@@ -298,5 +310,72 @@ mod location {
         // A fix of 2 m is good with a chance of 0.68: 1.46 of them in the mean.
         let mean = time(2.0);
         assert!((325_000_000..370_000_000).contains(&mean), "{mean}");
+    }
+}
+
+mod roadmap {
+    use super::*;
+
+    #[test]
+    fn who_is_given_the_roadmap_waits_for_it_and_all_arrive() {
+        for (policy, loss) in [
+            (Policy::Paper, 0.0),
+            (Policy::Paper, 0.3),
+            (Policy::Complete, 0.0),
+            (Policy::Complete, 0.3),
+        ] {
+            let mut case = Case::new(NetworkConfig {
+                policy,
+                roadmap_from: Some("node_02".to_owned()),
+                ..NetworkConfig::default()
+            });
+            (case.loss, case.rovers) = (loss, 3);
+            let (metrics, seen) = case.arrives();
+            let known_s = metrics.roadmap_known_s.unwrap();
+            assert!(known_s > 0.0 && (loss > 0.0 || known_s < 0.1), "{known_s}");
+            case.network.roadmap_from = None;
+            let (before, none) = case.arrives();
+            assert_eq!(before.roadmap_known_s, None);
+            if policy == Policy::Paper {
+                assert_eq!(none.relays, 0);
+            }
+            // Three nodes were given two parts each, by messages like others.
+            assert!(seen.relays >= 6);
+        }
+    }
+
+    /// Nobody comes to a node that does not know the roadmap, if nodes do not hear each other.
+    #[test]
+    fn who_does_not_know_the_roadmap_admits_nobody() {
+        for policy in [Policy::Paper, Policy::Complete] {
+            let mut case = Case::new(NetworkConfig {
+                policy,
+                roadmap_from: Some("node_02".to_owned()),
+                ..NetworkConfig::default()
+            });
+            (case.are_nodes_deaf, case.rovers) = (true, 12);
+            let (metrics, _, seen) = case.run().unwrap();
+            assert_eq!(metrics.roadmap_known_s, None);
+            let (_, sensors) = case.world();
+            let places = seen
+                .changes
+                .iter()
+                .filter_map(|(_, s)| s.whereabouts.vertex);
+            let owners: BTreeSet<NodeId> = places.map(|v| sensors.owner(v)).collect();
+            assert!(owners.iter().all(|&owner| owner == NodeId(1)), "{owners:?}");
+        }
+    }
+
+    #[test]
+    fn a_source_that_is_none_is_refused() {
+        let network = NetworkConfig {
+            roadmap_from: Some("node_5".to_owned()),
+            ..NetworkConfig::default()
+        };
+        let text = Case::new(network).run().err().unwrap().to_string();
+        assert_eq!(
+            text,
+            "network.roadmap_from is node_5, but there are node_01 to node_04"
+        );
     }
 }

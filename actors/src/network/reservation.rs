@@ -39,6 +39,7 @@
 //! Both need links that lose less than all, and nodes and rovers that come back: what they keep is
 //! durable.
 
+mod atlas;
 mod book;
 pub mod messages;
 mod registry;
@@ -46,4 +47,5 @@ mod relay;
 mod routes;
 mod steps;
 
+pub(crate) use registry::Registry;
 pub(crate) use steps::RegistryDue;

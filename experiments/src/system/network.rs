@@ -228,6 +228,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::Endpoints { .. } => "world.endpoints",
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
         NetworkError::SlowEdge { .. } => "network.speed",
+        NetworkError::UnknownSource { .. } => "network.roadmap_from",
         NetworkError::Config(ConfigError::Range { key, .. }) => KEYS
             .iter()
             .find(|known| known.ends_with(&format!(".{key}")))

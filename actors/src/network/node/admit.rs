@@ -178,6 +178,9 @@ impl Handler<DepartedAck> for Node {
 
 impl Handler<Assignments> for Node {
     fn handle(&mut self, message: Assignments, ctx: &mut Context<'_, Self>) -> Outcome {
+        if !self.knows_roadmap(ctx) {
+            return Ok(());
+        }
         let decided = self.phase == Phase::Admit;
         for assignment in &message.rovers {
             if !self.is_rover(assignment.rover) {

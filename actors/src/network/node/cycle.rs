@@ -19,9 +19,13 @@ impl Node {
     pub(super) fn listen(&mut self, ctx: &mut Context<'_, Self>) {
         let timing = &self.site.timing;
         self.cycle = self.site.cycle_at(ctx.now());
-        if self.site.config.policy != Policy::Paper {
+        let knows_roadmap = self.knows_roadmap(ctx);
+        if self.site.config.policy != Policy::Paper || !knows_roadmap {
             let phase = Phase::Listen;
             ctx.timer(self.site.until_next_cycle(ctx.now()), PhaseBegins { phase });
+            if !knows_roadmap {
+                return;
+            }
             self.repeat(ctx);
             self.apply(ctx);
             return;

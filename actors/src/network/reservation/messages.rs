@@ -44,6 +44,34 @@ pub enum Item {
     Settle(Settle),
     /// Backward: who stands for ever on this path is asked to step aside for a while.
     Yield(Yield),
+    /// To all: a part of the roadmap, for nodes that are given it over the network.
+    Roadmap(RoadmapPart),
+}
+
+/// A part of the roadmap.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoadmapPart {
+    /// Its number, from 0.
+    pub part: u32,
+    /// How many parts there are.
+    pub parts: u32,
+    /// Some vertices, in order.
+    pub vertices: Vec<MapVertex>,
+    /// The edges whose lower end is one of them, as (lower, higher).
+    pub edges: Vec<(VertexId, VertexId)>,
+}
+
+/// A vertex of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapVertex {
+    /// The vertex.
+    pub vertex: VertexId,
+    /// Where it is, in the world's frame \[m\].
+    pub position_m: [f64; 3],
+    /// Rovers may enter or leave here.
+    pub is_boundary: bool,
+    /// The node that owns it.
+    pub owner: NodeId,
 }
 
 /// A rover that stays at its goal would have a way if nobody stood on it.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use farside_worlds::{NodeId, Roadmap, VertexId};
 
+use super::atlas::Atlas;
 use super::book::{Book, Clash, Visit};
 use super::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Yield};
 use super::relay::Line;
@@ -79,6 +80,8 @@ struct Offers {
 pub(crate) struct Registry {
     pub(super) book: Book,
     pub(super) lines: BTreeMap<NodeId, Line>,
+    /// What the node was given of the roadmap.
+    pub(super) atlas: Atlas,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
     /// Ways that wait for younger walks to be settled.
@@ -113,6 +116,7 @@ impl Registry {
                 });
             }
             self.preload(desk);
+            self.publish_roadmap(desk);
             let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
             for (rover, vertex) in standing {
                 if desk.site.schedule.is_some() {
@@ -294,10 +298,12 @@ impl Registry {
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Yield(request) => self.make_way(desk, request),
+            // Taken before: see `receive`.
+            Item::Roadmap(_) => {}
         }
     }
 
-    fn post(&mut self, to: NodeId, item: Item) {
+    pub(super) fn post(&mut self, to: NodeId, item: Item) {
         if let Some(line) = self.lines.get_mut(&to) {
             line.post(item);
         }

@@ -67,8 +67,13 @@ impl Line {
     pub(super) fn due(&mut self, now: u64) -> Option<(Receipt, Vec<Numbered>)> {
         let patience = (2 * self.round_trip()).max(LEAST_PATIENCE);
         let mut items = Vec::new();
+        let mut has_part = false;
         for (&number, pending) in &mut self.pending {
             if pending.due > now {
+                continue;
+            }
+            // Parts of the roadmap are long: one in a message, the others in the next.
+            if matches!(pending.item, Item::Roadmap(_)) && std::mem::replace(&mut has_part, true) {
                 continue;
             }
             // Each time it waits longer, up to four times as long.

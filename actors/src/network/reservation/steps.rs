@@ -9,6 +9,7 @@ use super::messages::Relay;
 use super::registry::{Desk, Registry};
 use super::relay::Receipt;
 use crate::network::config::Policy;
+use crate::network::messages::RoadmapKnown;
 use crate::network::node::Node;
 use crate::network::safety::Ledger;
 
@@ -59,7 +60,11 @@ impl Node {
         };
         work(&mut registry, &desk);
         registry.decide_overdue(&desk);
-        let next_grant = self.grant_heads(ctx, &mut registry, now);
+        let knows_roadmap = registry.knows_roadmap(site.roadmap_from);
+        let next_grant = match knows_roadmap {
+            true => self.grant_heads(ctx, &mut registry, now),
+            false => None,
+        };
         for (&to, line) in &mut registry.lines {
             let Some((
                 Receipt {
@@ -150,6 +155,7 @@ impl Handler<Relay> for Node {
             echo,
             items,
         } = relay;
+        let knew = self.knows_roadmap(ctx);
         self.with_registry(ctx, |registry, desk| {
             let Some(line) = registry.lines.get_mut(&node) else {
                 return;
@@ -167,9 +173,15 @@ impl Handler<Relay> for Node {
                 .filter_map(|item| line.take(sent, item))
                 .collect();
             for item in new {
-                registry.take(desk, item);
+                registry.receive(desk, node, item);
             }
         });
-        Ok(())
+        if !knew && self.knows_roadmap(ctx) {
+            ctx.sample(&RoadmapKnown { node: self.id });
+        }
+        match ctx.durable::<Registry>().wrong_roadmap() {
+            Some(wrong) => Err(HandlerError::new(wrong)),
+            None => Ok(()),
+        }
     }
 }
