@@ -191,7 +191,7 @@ mod tests {
                         // Every fourth fate is a loss, another one a repetition, at least at first.
                         let (delay, fate) = fates[sent % fates.len()];
                         sent += 1;
-                        let lost = fate == 0 && sent < 400;
+                        let lost = fate == 0 && sent < 16;
                         let copies = usize::from(!lost) + usize::from(fate == 1);
                         for copy in 0..copies as u64 {
                             let at = now + (delay + 7 * copy) * MS;
