@@ -15,7 +15,7 @@ use std::sync::Arc;
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Priority, TeamConfig, WorldConfig, assemble,
+    Deadlock, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig, assemble,
 };
 use farside_actors::units::parse_duration;
 use farside_worlds::{Endpoints, Roadmap};
@@ -87,6 +87,15 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
         let network = &mut options.network;
         match key {
             "first_seed" => options.first_seed = value.parse()?,
+            "policy" => {
+                network.policy = match value {
+                    "complete" => Policy::Complete,
+                    _ => Policy::Paper,
+                }
+            }
+            "routes" => network.routes = value.parse()?,
+            "ahead" => network.grants_ahead = value.parse()?,
+            "passive" => network.passive_window = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
             "rovers" => options.rovers = numbers(value)?,
@@ -160,6 +169,9 @@ fn run(
     let report = sim.run(Executor::Inline)?;
     if let Some(fault) = report.fault() {
         return Err(fault.to_string().into());
+    }
+    if let Some(s) = &network.metrics().standstill {
+        eprintln!("seed {seed}: {s} {} cycles", network.metrics().cycles);
     }
     Ok((network.metrics(), report))
 }

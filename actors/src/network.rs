@@ -65,6 +65,7 @@ mod monitor;
 mod node;
 mod payoff;
 mod processor;
+pub mod reservation;
 mod rover;
 mod safety;
 #[cfg(test)]
