@@ -9,9 +9,9 @@ use crate::units::parse_duration;
 
 /// How long the parts of a planning cycle last, the same for all nodes.
 ///
-/// What [`NetworkConfig`] leaves open follows from the slowest link's latency L, so that what is
+/// What [`NetworkConfig`] leaves open follows, for the paper's policy, from the slowest link's latency L, so that what is
 /// sent in a part is there when the next begins. The paper's messages take no time; up to 10 ms these
-/// are its values, and ours:
+/// are its values, and ours, and those of the other policy always:
 ///
 /// | part | lasts | because |
 /// |---|---|---|
@@ -68,6 +68,9 @@ impl NetworkConfig {
     /// # Errors
     /// When the phases of a cycle are longer than `network.cycle`.
     pub fn timing(&self, latency: SimDuration) -> Result<Timing, ConfigError> {
+        // The reservation walk has no phases that messages must fit into.
+        let phased = self.policy == Policy::Paper;
+        let latency = if phased { latency } else { SimDuration::ZERO };
         let at_least = |ms, needed: SimDuration| needed.max(SimDuration::from_millis(ms));
         let half = SimDuration::from_nanos(latency.as_nanos() / 2);
         let exchange = latency + half + SimDuration::from_millis(20);
