@@ -36,6 +36,7 @@ mod load;
 mod metrics;
 mod plan;
 mod pool;
+mod published;
 mod reproduce;
 pub mod results;
 mod runner;

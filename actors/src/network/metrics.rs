@@ -54,6 +54,9 @@ pub struct NetworkMetrics {
     pub time_ratio: f64,
     /// Cycles from entry to goal.
     pub mean_steps: f64,
+    /// The steps of all rovers that arrived, together (the paper's total solution length, Figure
+    /// 5). Rovers that did not arrive have none: a run that came to a standstill has fewer.
+    pub total_steps: u32,
     /// Cycles between entry and goal in which the rover did not set out.
     pub mean_stops: f64,
     /// Moves back to the vertex just left.

@@ -269,6 +269,7 @@ impl Score {
             metrics.path_ratio += f64::from(steps) / shortest;
             metrics.time_ratio += f64::from(arrived + 1) / shortest;
             metrics.mean_steps += f64::from(steps);
+            metrics.total_steps = metrics.total_steps.saturating_add(steps);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
             metrics.mean_backtracks += f64::from(track.backtracks);
         }

@@ -82,6 +82,8 @@ pub(super) enum Found {
     Same,
     /// Results of the same study with fewer seeds.
     FewerSeeds,
+    /// Results of the same study, set beside other figures.
+    OtherPublished,
 }
 
 /// A results folder that runs are written to. One process at a time has it, or the shard of it.
@@ -112,9 +114,17 @@ impl Store {
         if there == *manifest {
             return Ok(Found::Same);
         }
+        // What others published decides nothing about the runs, and is often written after them.
+        let beside = Manifest {
+            published: manifest.published.clone(),
+            ..there.clone()
+        };
+        if beside == *manifest {
+            return Ok(Found::OtherPublished);
+        }
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
-            ..there.clone()
+            ..beside
         };
         if extended == *manifest && manifest.seeds.starts_with(&there.seeds) {
             return Ok(Found::FewerSeeds);
