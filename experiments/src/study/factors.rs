@@ -235,7 +235,7 @@ fn variants(
     }
     // Names of which only some can be read as quantities are words.
     if check_values(&levels, file.scale).is_err() {
-        levels = levels.into_iter().map(Level::as_word).collect();
+        levels = levels.into_iter().map(Level::into_word).collect();
     }
     match check_values(&levels, file.scale) {
         Ok(dimension) => Ok((keys, (Levels::Values(levels), dimension))),

@@ -95,7 +95,7 @@ impl Level {
     }
 
     /// The same as a word, even if it could be read as a quantity.
-    pub(super) fn as_word(self) -> Self {
+    pub(super) fn into_word(self) -> Self {
         Level {
             value: Value::from(self.text.as_str()),
             dimension: Dimension::Text,

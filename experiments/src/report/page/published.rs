@@ -197,7 +197,11 @@ fn as_lines(study: &Study<'_>, lines: &[&LineSummary]) -> Markup {
             .next()
             .map_or(name.to_owned(), |factor| factor.label.clone())
     };
+    let mut quotes: Vec<&str> = lines.iter().map(|line| line.quote.as_str()).collect();
+    quotes.retain(|quote| !quote.is_empty());
+    quotes.dedup();
     html! {
+        @for quote in quotes { p class="note" { "“" (quote) "”" } }
         div class="scroll" tabindex="0" {
             table {
                 caption { "Published to be linear: the line through our figures, by least squares." }
@@ -216,7 +220,6 @@ fn as_lines(study: &Study<'_>, lines: &[&LineSummary]) -> Markup {
                         tr {
                             th scope="row" {
                                 @if line.of.is_empty() { "all" } @else { (line.of) }
-                                @if !line.quote.is_empty() { small class="quote" { " “" (line.quote) "”" } }
                             }
                             td { (label(&line.factor)) }
                             td { (line.cells.len()) }
