@@ -14,7 +14,7 @@ use std::sync::Arc;
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Priority, TeamConfig, WorldConfig, assemble,
+    Deadlock, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig, assemble,
 };
 use farside_worlds::{Endpoints, Roadmap};
 
@@ -82,6 +82,15 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
         };
         let network = &mut options.network;
         match key {
+            "policy" => {
+                network.policy = match value {
+                    "complete" => Policy::Complete,
+                    _ => Policy::Paper,
+                }
+            }
+            "routes" => network.routes = value.parse()?,
+            "ahead" => network.grants_ahead = value.parse()?,
+            "passive" => network.passive_window = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
             "rovers" => options.rovers = numbers(value)?,
@@ -149,6 +158,9 @@ fn run(
     let report = sim.run(Executor::Inline)?;
     if let Some(fault) = report.fault() {
         return Err(fault.to_string().into());
+    }
+    if let Some(s) = &network.metrics().standstill {
+        eprintln!("seed {seed}: {s} {} cycles", network.metrics().cycles);
     }
     Ok((network.metrics(), report))
 }

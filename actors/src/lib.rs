@@ -2,6 +2,7 @@
 
 pub mod link;
 pub mod network;
+pub mod planning;
 pub mod radio;
 pub mod traffic;
 pub mod units;

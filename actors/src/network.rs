@@ -64,6 +64,7 @@ mod metrics;
 mod monitor;
 mod node;
 mod payoff;
+pub mod reservation;
 mod rover;
 mod safety;
 #[cfg(test)]

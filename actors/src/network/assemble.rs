@@ -70,6 +70,12 @@ impl Site {
         u32::try_from(now.as_nanos() / self.config.cycle.as_nanos()).unwrap_or(u32::MAX)
     }
 
+    /// Who waits at `entry`, in order.
+    pub(crate) fn queue(&self, entry: VertexId) -> &[RoverId] {
+        let at = self.queues.binary_search_by_key(&entry, |queue| queue.0);
+        at.map_or(&[], |at| &self.queues[at].1)
+    }
+
     /// Where a vertex is, on the ground, in the world's frame [m].
     pub(crate) fn place_m(&self, vertex: VertexId) -> Point3<f64> {
         let at = self.roadmap.position_m(vertex);

@@ -87,6 +87,9 @@ pub enum Policy {
     /// The paper's: candidate paths, payoffs, max-plus.
     #[default]
     Paper,
+    /// The reservation walk: no rover enters before its whole way is reserved. See
+    /// [`reservation`](super::reservation).
+    Complete,
 }
 
 /// Who wins a vertex that several rovers' paths enter in the same cycle. The paper: "a priority has
@@ -158,6 +161,10 @@ pub struct NetworkConfig {
     pub acceleration: bool,
     /// Whether it may follow one that itself follows. The paper's implementation ignores this.
     pub acceleration_chains: bool,
+    /// `complete`: along how many routes a walk looks for a way; at least 1.
+    pub routes: u32,
+    /// `complete`: how many cycles before its planned time a vertex may be granted.
+    pub grants_ahead: u32,
     /// Passive deadlock: no move and no entry for so many cycles.
     pub passive_window: u32,
     /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
@@ -189,6 +196,8 @@ impl Default for NetworkConfig {
             priority: Priority::default(),
             acceleration: true,
             acceleration_chains: false,
+            routes: 8,
+            grants_ahead: 2,
             passive_window: 20,
             active_window: 300,
             cycle_limit: 5000,
@@ -267,6 +276,7 @@ impl NetworkConfig {
             check(key, fits, weight.to_string(), "in [0, 1e9]")?;
         }
         for (key, window) in [
+            ("routes", self.routes),
             ("passive_window", self.passive_window),
             ("active_window", self.active_window),
             ("cycle_limit", self.cycle_limit),

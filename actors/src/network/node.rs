@@ -14,10 +14,13 @@ use serde::{Deserialize, Serialize};
 
 use super::assemble::Site;
 use super::assignment::Request;
+use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
     Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
 };
+use super::reservation::RegistryDue;
+use super::reservation::messages::Relay;
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
@@ -27,12 +30,12 @@ use optimise::Optimiser;
 ///
 /// Its record of who holds its vertices is durable; what it plans is not.
 pub struct Node {
-    site: Arc<Site>,
-    id: NodeId,
+    pub(super) site: Arc<Site>,
+    pub(super) id: NodeId,
     graph: Arc<LocalGraph>,
-    neighbors: Vec<Neighbor>,
+    pub(super) neighbors: Vec<Neighbor>,
     rovers: Vec<Address<Rover>>,
-    cycle: u32,
+    pub(super) cycle: u32,
     phase: Phase,
     optimiser: Optimiser,
     /// Requests for this node's vertices in this cycle.
@@ -40,12 +43,14 @@ pub struct Node {
     /// Own rovers that leave their vertex in this cycle without accelerating.
     leaving: Vec<VertexId>,
     forced_stops: u32,
+    /// When the timer of the `complete` policy fires \[ns\].
+    pub(super) alarm: Option<(u64, TimerId)>,
 }
 
 /// What a node knows of a neighbour.
-struct Neighbor {
+pub(super) struct Neighbor {
     id: NodeId,
-    address: Address<Node>,
+    pub(super) address: Address<Node>,
     /// The latest cycle in which it told its locations, and what it told.
     located: Option<u32>,
     holdings: Vec<Holding>,
@@ -95,10 +100,11 @@ impl Node {
             requests: Vec::new(),
             leaving: Vec::new(),
             forced_stops: 0,
+            alarm: None,
         }
     }
 
-    fn neighbor(&self, id: NodeId) -> Option<usize> {
+    pub(super) fn neighbor(&self, id: NodeId) -> Option<usize> {
         self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
     }
 
@@ -118,6 +124,8 @@ impl Actor for Node {
         Assignments,
         PhaseBegins,
         IterationOverdue,
+        Relay,
+        RegistryDue,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -134,6 +142,9 @@ impl Actor for Node {
         }
         let owned = self.site.sensors.owned(self.id);
         ctx.durable::<Ledger>().open(owned, self.rovers.len());
+        if self.site.config.policy == Policy::Complete {
+            self.open_registry(ctx);
+        }
         // The first cycle begins at once; after a restart, the next.
         let delay = if ctx.now() == SimTime::ZERO {
             SimDuration::ZERO

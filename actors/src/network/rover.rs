@@ -9,7 +9,7 @@ use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
 use super::assemble::Site;
-use super::config::Sabotage;
+use super::config::{Policy, Sabotage};
 use super::messages::{Beacon, Grant, RoverId, RoverState};
 use super::node::Node;
 use super::safety::{Answer, RoverMemory};
@@ -38,6 +38,11 @@ pub struct CycleStarts;
 #[derive(Serialize, Deserialize)]
 #[doc(hidden)]
 pub struct EdgeEnds;
+
+/// Timer: the next move may begin.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct PaceAllows;
 
 impl Rover {
     pub(crate) fn new(site: Arc<Site>, id: RoverId) -> Self {
@@ -114,7 +119,7 @@ impl Rover {
 }
 
 impl Actor for Rover {
-    type Accepts = (Grant, CycleStarts, EdgeEnds);
+    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows);
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         for name in &self.site.node_names {
@@ -126,6 +131,9 @@ impl Actor for Rover {
             self.drive(ctx);
         }
         self.record(ctx);
+        if self.site.config.policy == Policy::Complete {
+            self.proceed(ctx);
+        }
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
         Ok(())
     }
@@ -146,14 +154,54 @@ impl Handler<CycleStarts> for Rover {
     }
 }
 
+impl Handler<PaceAllows> for Rover {
+    fn handle(&mut self, _timer: PaceAllows, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.proceed(ctx);
+        Ok(())
+    }
+}
+
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.site.config.policy == Policy::Complete {
+            if !ctx.durable::<RoverMemory>().keep(&grant) {
+                self.beacon(ctx, grant.node);
+            }
+            self.proceed(ctx);
+            return Ok(());
+        }
+        self.obey(&grant, ctx);
+        Ok(())
+    }
+}
+
+impl Rover {
+    /// Takes the next step if it was granted ahead, and no sooner than a cycle after the last move
+    /// began.
+    fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
+        let now = ctx.now();
+        let pace = self.site.config.cycle;
+        let memory = ctx.durable::<RoverMemory>();
+        let Some(grant) = memory.next_granted().cloned() else {
+            return;
+        };
+        let begins = memory.last_move.map_or(now, |last| last + pace);
+        if grant.to.is_some() && begins > now {
+            let wait = begins.as_nanos() - now.as_nanos();
+            ctx.timer(SimDuration::from_nanos(wait), PaceAllows);
+            return;
+        }
+        memory.last_move = Some(now);
+        self.obey(&grant, ctx);
+    }
+
+    fn obey(&mut self, grant: &Grant, ctx: &mut Context<'_, Self>) {
         let roadmap = &self.site.roadmap;
         let adjacent = |u, v| roadmap.are_adjacent(u, v);
         let memory = ctx.durable::<RoverMemory>();
-        let answer = memory.obey(&grant, self.entry, self.goal, adjacent);
+        let answer = memory.obey(grant, self.entry, self.goal, adjacent);
         match answer {
-            Answer::Hold => return Ok(()),
+            Answer::Hold => return,
             Answer::Report => {}
             Answer::SetOut => {
                 self.drive(ctx);
@@ -161,12 +209,11 @@ impl Handler<Grant> for Rover {
                 // LEAVING goes to the owner of the vertex left, which is not the one that granted
                 // the next one.
                 self.beacon_here(ctx);
-                return Ok(());
+                return;
             }
             Answer::Entered | Answer::Left => self.record(ctx),
         }
         self.beacon(ctx, grant.node);
-        Ok(())
     }
 }
 
@@ -175,6 +222,9 @@ impl Handler<EdgeEnds> for Rover {
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);
+            if self.site.config.policy == Policy::Complete {
+                self.proceed(ctx);
+            }
         }
         Ok(())
     }

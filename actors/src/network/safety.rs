@@ -14,6 +14,7 @@
 //! would need each of two rovers to hold the vertex on which the other one still stands. All proofs
 //! are facts that stay true ([`Whereabouts`]), so late, repeated and reordered messages do no harm.
 
+use farside::SimTime;
 use farside_worlds::VertexId;
 
 use super::messages::{Grant, Holding, RoverId, Whereabouts};
@@ -55,6 +56,9 @@ pub(crate) struct Duty {
 pub(crate) struct News {
     /// Vertices that are free now.
     pub(crate) freed: Vec<VertexId>,
+    /// Where rovers came from that have left again without ever being heard here: the owners of
+    /// those vertices cannot know.
+    pub(crate) unheard: Vec<VertexId>,
     /// The rover was heard for the first time at the vertex it was granted.
     pub(crate) arrived: bool,
 }
@@ -191,6 +195,10 @@ impl Ledger {
                 || held.step == fact.step && (!here || fact.moving_to.is_some())
                 || held.step == fact.step + 1 && elsewhere;
             if free {
+                let unheard = held
+                    .previous
+                    .filter(|_| !held.arrived && held.step < fact.step);
+                news.unheard.extend(unheard);
                 slot.occupant = None;
                 news.freed.push(slot.vertex);
             } else if held.step == fact.step {
@@ -240,6 +248,10 @@ pub(crate) struct RoverMemory {
     pub(crate) vertex: Option<VertexId>,
     pub(crate) previous: Option<VertexId>,
     pub(crate) moving_to: Option<VertexId>,
+    /// Grants for steps to come, of the `complete` policy.
+    ahead: Vec<Grant>,
+    /// When the last move began.
+    pub(crate) last_move: Option<SimTime>,
 }
 
 /// What a rover does about a grant.
@@ -258,6 +270,28 @@ pub(crate) enum Answer {
 }
 
 impl RoverMemory {
+    /// Keeps a grant for a step to come. False if that step is done, or being done.
+    pub(crate) fn keep(&mut self, grant: &Grant) -> bool {
+        let next = self.step + 1 + u32::from(self.moving_to.is_some());
+        if grant.step < next {
+            return false;
+        }
+        if self.ahead.iter().all(|kept| kept.step != grant.step) {
+            self.ahead.push(grant.clone());
+        }
+        true
+    }
+
+    /// The grant kept for the next step, if the rover stands still.
+    pub(crate) fn next_granted(&mut self) -> Option<&Grant> {
+        let step = self.step;
+        self.ahead.retain(|kept| kept.step > step);
+        let stands = self.moving_to.is_none();
+        self.ahead
+            .iter()
+            .find(|kept| stands && kept.step == step + 1)
+    }
+
     /// Obeys a grant, if it is for the next step and leads from here: into the roadmap at `entry`,
     /// along an edge, or out of it at `goal`.
     pub(crate) fn obey(

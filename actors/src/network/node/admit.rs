@@ -6,7 +6,7 @@ use farside_worlds::VertexId;
 
 use super::{Node, Phase};
 use crate::network::assignment::{Request, winner};
-use crate::network::config::Sabotage;
+use crate::network::config::{Policy, Sabotage};
 use crate::network::messages::{
     Assignments, Beacon, Departed, DepartedAck, NodeState, RoverId, Whereabouts,
 };
@@ -69,6 +69,15 @@ impl Node {
 
     fn hear(&mut self, ctx: &mut Context<'_, Self>, fact: &Whereabouts, goal: Option<VertexId>) {
         let news = ctx.durable::<Ledger>().hear(fact, goal, self.cycle);
+        if self.site.config.policy == Policy::Complete {
+            for &previous in &news.unheard {
+                self.report_departure(ctx, *fact, Some(previous));
+            }
+            if !news.freed.is_empty() {
+                self.departed(ctx, &news.freed);
+            }
+            return;
+        }
         for vertex in news.freed {
             self.freed(ctx, vertex);
         }

@@ -8,6 +8,7 @@ use farside_worlds::VertexId;
 use super::{Node, Phase, PhaseBegins};
 use crate::network::assignment::Request;
 use crate::network::candidates::{CandidatePath, FirstStep, candidates};
+use crate::network::config::Policy;
 use crate::network::messages::{
     Assignment, Assignments, CandidatePaths, Departed, Grant, Locations, RoverId, RoverPaths,
 };
@@ -18,6 +19,13 @@ impl Node {
     pub(super) fn listen(&mut self, ctx: &mut Context<'_, Self>) {
         let config = &self.site.config;
         self.cycle = self.site.cycle_at(ctx.now());
+        if config.policy == Policy::Complete {
+            let phase = Phase::Listen;
+            ctx.timer(self.site.until_next_cycle(ctx.now()), PhaseBegins { phase });
+            self.repeat(ctx);
+            self.apply(ctx);
+            return;
+        }
         for (phase, delay) in [
             (Phase::Locate, config.exchange),
             (Phase::Propose, config.exchange * 2),
@@ -60,7 +68,7 @@ impl Node {
         }
     }
 
-    pub(super) fn send_grant(
+    pub(in crate::network) fn send_grant(
         &self,
         ctx: &mut Context<'_, Self>,
         rover: RoverId,

@@ -1,0 +1,123 @@
+//! What nodes say to each other on a reservation walk. Plain serde types: the log describes them
+//! field by field.
+
+use farside_worlds::{NodeId, VertexId};
+use serde::{Deserialize, Serialize};
+
+use crate::network::messages::RoverId;
+use crate::planning::safe_intervals::{Label, TimedVisit};
+
+/// Node to neighbour: items, each to be taken once, and a receipt for those that came the other way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Relay {
+    /// The node.
+    pub node: NodeId,
+    /// All items below this number were taken.
+    pub taken: u64,
+    /// Items taken beyond that.
+    pub beyond: Vec<u64>,
+    /// When this was sent \[ns\].
+    pub sent: u64,
+    /// When the message was sent that this answers, by its sender's clock \[ns\].
+    pub echo: Option<u64>,
+    /// New and repeated items.
+    pub items: Vec<Numbered>,
+}
+
+/// An item with its number on the way from one node to another, from 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Numbered {
+    /// The number.
+    pub number: u64,
+    /// The item.
+    pub item: Item,
+}
+
+/// One step of a walk.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Item {
+    /// Forward: where and when the rover could be.
+    Probe(Probe),
+    /// Backward: the way chosen, to be entered in the books.
+    Reserve(Reserve),
+    /// Forward or backward: what became of it.
+    Settle(Settle),
+}
+
+/// One attempt to reserve a way for a rover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Walk {
+    /// The rover.
+    pub rover: RoverId,
+    /// The attempt, from 1.
+    pub attempt: u32,
+    /// When its first attempt began \[ns\]: of two walks that want the same, the older one wins.
+    pub since: u64,
+}
+
+impl Walk {
+    /// Whether this walk goes before `other`.
+    pub fn is_older_than(&self, other: &Walk) -> bool {
+        (self.since, self.rover) < (other.since, other.rover)
+    }
+}
+
+/// The forward half of a walk along one of several routes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Probe {
+    /// The walk.
+    pub walk: Walk,
+    /// How many probes of this attempt there are, one for each route.
+    pub probes: u32,
+    /// When the attempt began \[ns\].
+    pub started: u64,
+    /// The nodes to pass, from the rover's to its goal's.
+    pub route: Vec<NodeId>,
+    /// The place in `route` of the node that this is for.
+    pub at: u32,
+    /// Where the rover wants to go.
+    pub goal: VertexId,
+    /// The step with which the way begins.
+    pub first_step: u32,
+    /// Where the rover can be, and when.
+    pub labels: Vec<Label>,
+    /// Those of them, by place, from which the next node goes on.
+    pub frontier: Vec<u32>,
+}
+
+/// The backward half: the way is entered in the books of all that own a part of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reserve {
+    /// The walk.
+    pub walk: Walk,
+    /// The step of the first visit; each further one is one step on.
+    pub first_step: u32,
+    /// All visits, from the rover's place to its goal.
+    pub way: Vec<TimedVisit>,
+    /// The last visit that is not entered yet.
+    pub at: u32,
+}
+
+/// What became of a walk, passed on along its route.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settle {
+    /// The walk.
+    pub walk: Walk,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// The nodes along its way.
+    pub route: Vec<NodeId>,
+    /// The place in `route` of the node that this is for.
+    pub at: u32,
+}
+
+/// What became of a walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Verdict {
+    /// All of the way is reserved: it is irrevocable. Goes forward.
+    Confirmed,
+    /// A part could not be had: what was entered is struck out. Goes forward.
+    Released,
+    /// The same, for the node that began: it tries again. Goes backward.
+    Failed,
+}

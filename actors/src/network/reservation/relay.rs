@@ -1,0 +1,128 @@
+//! Items that reach a neighbouring node exactly once, over links that are late, lose and repeat: each
+//! is numbered, repeated until it is acknowledged, and taken once. Order is not kept; nothing here
+//! needs it. All of it is durable, so that a crash is no more than a delay.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::messages::{Item, Numbered};
+
+/// The first guess of a round trip \[ns\].
+const FIRST_ROUND_TRIP: u64 = 200_000_000;
+/// An item is never repeated sooner than this after the last time \[ns\].
+const LEAST_PATIENCE: u64 = 40_000_000;
+
+#[derive(Debug)]
+struct Pending {
+    item: Item,
+    /// When it is to be sent, again or for the first time [ns].
+    due: u64,
+    sent: u32,
+}
+
+/// One direction to, and one from, a neighbour.
+#[derive(Debug, Default)]
+pub(super) struct Line {
+    next: u64,
+    pending: BTreeMap<u64, Pending>,
+    /// All below were taken.
+    taken: u64,
+    /// Taken beyond that.
+    beyond: BTreeSet<u64>,
+    /// The neighbour is owed a receipt, for a message that it sent then [ns].
+    owes: Option<u64>,
+    /// Smoothed round trip \[ns\].
+    round_trip: Option<u64>,
+}
+
+/// What acknowledges: all below `taken`, and these.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Receipt {
+    pub(super) taken: u64,
+    pub(super) beyond: Vec<u64>,
+    /// When the message was sent that this answers, by the clock of its sender [ns].
+    pub(super) echo: Option<u64>,
+}
+
+impl Line {
+    pub(super) fn post(&mut self, item: Item) {
+        let pending = Pending {
+            item,
+            due: 0,
+            sent: 0,
+        };
+        self.pending.insert(self.next, pending);
+        self.next += 1;
+    }
+
+    /// The measured round trip; a guess before the first answer \[ns\].
+    pub(super) fn round_trip(&self) -> u64 {
+        self.round_trip.unwrap_or(FIRST_ROUND_TRIP)
+    }
+
+    pub(super) fn is_measured(&self) -> bool {
+        self.round_trip.is_some()
+    }
+
+    /// What is to be sent now: items that are new or overdue, and a receipt. None if nothing is due.
+    pub(super) fn due(&mut self, now: u64) -> Option<(Receipt, Vec<Numbered>)> {
+        let patience = (2 * self.round_trip()).max(LEAST_PATIENCE);
+        let mut items = Vec::new();
+        for (&number, pending) in &mut self.pending {
+            if pending.due > now {
+                continue;
+            }
+            // Each time it waits longer, up to four times as long.
+            pending.due = now + (patience << pending.sent.min(2));
+            pending.sent += 1;
+            let item = pending.item.clone();
+            items.push(Numbered { number, item });
+        }
+        let echo = self.owes.take();
+        if items.is_empty() && echo.is_none() {
+            return None;
+        }
+        let receipt = Receipt {
+            taken: self.taken,
+            beyond: self.beyond.iter().copied().collect(),
+            echo,
+        };
+        Some((receipt, items))
+    }
+
+    /// When an item is to be repeated, if any is on its way.
+    pub(super) fn next_due(&self) -> Option<u64> {
+        self.pending.values().map(|p| p.due).min()
+    }
+
+    /// After a crash nobody knows what was on its way: all is repeated.
+    pub(super) fn restart(&mut self) {
+        for pending in self.pending.values_mut() {
+            pending.due = 0;
+        }
+    }
+
+    /// A receipt has come. What it echoes says how long a round trip takes, however often things were
+    /// repeated.
+    pub(super) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {
+        if let Some(sent) = receipt.echo {
+            let sample = now.saturating_sub(sent);
+            let smoothed = self.round_trip.map_or(sample, |old| (7 * old + sample) / 8);
+            self.round_trip = Some(smoothed);
+        }
+        let done = |number: u64| number < receipt.taken || receipt.beyond.contains(&number);
+        self.pending.retain(|&number, _| !done(number));
+    }
+
+    /// Takes an item of a message sent at `sent`, unless it was taken before.
+    pub(super) fn take(&mut self, sent: u64, numbered: Numbered) -> Option<Item> {
+        self.owes = Some(sent);
+        let Numbered { number, item } = numbered;
+        if number < self.taken || !self.beyond.insert(number) {
+            return None;
+        }
+        while self.beyond.remove(&self.taken) {
+            self.taken += 1;
+        }
+        Some(item)
+    }
+}

@@ -1,0 +1,3 @@
+//! Planning on roadmaps in space and time, without messages.
+
+pub mod safe_intervals;

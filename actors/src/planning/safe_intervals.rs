@@ -1,0 +1,199 @@
+//! Safe-interval path planning (Phillips and Likhachev, 2011) in continuous time, over any part of
+//! a roadmap, so that a search can be handed from one part to the next.
+//!
+//! A rover's way is a list of visits. A **visit** of a vertex begins when the rover sets out towards
+//! it, and ends when it sets out towards the next: from then on the vertex is free. Between two
+//! visits of one vertex by different rovers there is a gap, the time that it takes to learn of the
+//! one and to permit the other. A **safe interval** of a vertex is a time in which a visit may lie.
+//!
+//! Of two ways into the same safe interval the one that is there first is as good as the other in all
+//! that follows, since it may wait. So a search keeps one [`Label`] for each vertex and interval.
+//! Swapping along an edge needs no rule of its own: each of the two rovers would have to begin its
+//! visit after the other one has ended.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use farside_worlds::{Roadmap, VertexId};
+use serde::{Deserialize, Serialize};
+
+/// A time later than all others \[ns\].
+pub const FOREVER: u64 = u64::MAX;
+
+/// A way to be at a vertex within one of its safe intervals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Label {
+    /// Where.
+    pub vertex: VertexId,
+    /// The earliest begin of the visit \[ns\].
+    pub start: u64,
+    /// When the rover then stands there \[ns\].
+    pub ready: u64,
+    /// When the visit must have ended \[ns\]: the safe interval's end.
+    pub until: u64,
+    /// The label it comes from, by its place in the same list; none where the way begins.
+    pub parent: Option<u32>,
+}
+
+/// One visit of a planned way: the rover claims `vertex` from `start` until `end`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TimedVisit {
+    /// Where.
+    pub vertex: VertexId,
+    /// When the rover sets out towards it \[ns\].
+    pub start: u64,
+    /// When it sets out from it, or leaves the roadmap; [`FOREVER`] if it stays \[ns\].
+    pub end: u64,
+}
+
+/// The part of a roadmap that a search may enter, and who is there when.
+pub struct Ground<'a> {
+    /// The roadmap.
+    pub roadmap: &'a Roadmap,
+    /// The least time between one rover's leaving and the next one's coming \[ns\].
+    pub gap: u64,
+    /// How long a rover takes from setting out to being ready to set out again \[ns\]; at least 1.
+    pub travel: &'a dyn Fn(VertexId, VertexId) -> u64,
+    /// The visits planned at a vertex, as (start, end), disjoint and in order; none for a vertex
+    /// that the search may not enter.
+    pub busy: &'a dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
+}
+
+/// The safe intervals left by visits `busy`, as (first begin, last end).
+///
+/// ```
+/// use farside_actors::planning::safe_intervals::{FOREVER, safe_intervals};
+/// let safe: Vec<_> = safe_intervals(&[(10, 20), (22, 30)], 2).collect();
+/// assert_eq!(safe, [(0, 8), (32, FOREVER)]);
+/// ```
+pub fn safe_intervals(busy: &[(u64, u64)], gap: u64) -> impl Iterator<Item = (u64, u64)> + '_ {
+    (0..=busy.len()).filter_map(move |i| {
+        let from = if i == 0 {
+            0
+        } else {
+            busy[i - 1].1.saturating_add(gap)
+        };
+        let to = match busy.get(i) {
+            Some((start, _)) => start.saturating_sub(gap),
+            None => FOREVER,
+        };
+        (from < to).then_some((from, to))
+    })
+}
+
+impl Ground<'_> {
+    /// Labels for a rover that comes to `vertex` from outside the roadmap, at `earliest` or later,
+    /// and needs `dwell` \[ns\] to come in.
+    pub fn enter(&self, vertex: VertexId, earliest: u64, dwell: u64) -> Vec<Label> {
+        let busy = (self.busy)(vertex).unwrap_or_default();
+        let label = |(from, until): (u64, u64)| {
+            let start = from.max(earliest);
+            let ready = start.checked_add(dwell)?;
+            (ready <= until).then_some(Label {
+                vertex,
+                start,
+                ready,
+                until,
+                parent: None,
+            })
+        };
+        safe_intervals(&busy, self.gap).filter_map(label).collect()
+    }
+
+    /// Expands the labels at `open` (places in `labels`) and all that come of them, earliest first;
+    /// appends what is found to `labels`. Labels lead on from any vertex, but only to vertices that
+    /// [`Ground::busy`] knows.
+    pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
+        let mut queue = BinaryHeap::new();
+        let mut best = BTreeMap::<(VertexId, u64), u64>::new();
+        for &at in open {
+            let label = labels[at as usize];
+            best.insert((label.vertex, label.until), label.ready);
+            queue.push(Reverse((label.ready, at)));
+        }
+        while let Some(Reverse((ready, at))) = queue.pop() {
+            let from = labels[at as usize];
+            if best.get(&(from.vertex, from.until)) != Some(&ready) {
+                continue;
+            }
+            for &to in self.roadmap.neighbors(from.vertex) {
+                let Some(busy) = (self.busy)(to) else {
+                    continue;
+                };
+                let travel = (self.travel)(from.vertex, to);
+                for (safe_from, until) in safe_intervals(&busy, self.gap) {
+                    let start = safe_from.max(ready);
+                    if start > from.until {
+                        break;
+                    }
+                    let Some(there) = start.checked_add(travel).filter(|&t| t <= until) else {
+                        continue;
+                    };
+                    let known = best.entry((to, until)).or_insert(FOREVER);
+                    if there >= *known {
+                        continue;
+                    }
+                    *known = there;
+                    queue.push(Reverse((there, labels.len() as u32)));
+                    labels.push(Label {
+                        vertex: to,
+                        start,
+                        ready: there,
+                        until,
+                        parent: Some(at),
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The way that ends with the label at `last`: each visit begins as early as can be, but the first
+/// one as late as the second allows, so that a rover that comes from outside waits there and not in
+/// the way of others. The last visit ends at `end`.
+pub fn way_to(labels: &[Label], last: u32, end: u64) -> Vec<TimedVisit> {
+    let mut way = Vec::new();
+    let (mut next, mut end) = (Some(last), end);
+    while let Some(at) = next {
+        let label = labels[at as usize];
+        next = label.parent;
+        let start = match next {
+            // Where the way begins and ends at once there is nothing to wait for.
+            None if !way.is_empty() => end - (label.ready - label.start),
+            _ => label.start,
+        };
+        way.push(TimedVisit {
+            vertex: label.vertex,
+            start,
+            end,
+        });
+        end = start;
+    }
+    way.reverse();
+    way
+}
+
+/// Keeps only the labels at `wanted` and those they come from; their order stays. Returns where the
+/// wanted ones are now.
+pub fn prune(labels: &mut Vec<Label>, wanted: &[u32]) -> Vec<u32> {
+    let mut place = vec![None; labels.len()];
+    for &at in wanted {
+        let mut next = Some(at);
+        while let Some(at) = next.filter(|&at| place[at as usize].is_none()) {
+            place[at as usize] = Some(0);
+            next = labels[at as usize].parent;
+        }
+    }
+    let mut kept = Vec::new();
+    for (at, slot) in place.iter_mut().enumerate() {
+        if slot.is_some() {
+            *slot = Some(kept.len() as u32);
+            kept.push(labels[at]);
+        }
+    }
+    for label in &mut kept {
+        label.parent = label.parent.and_then(|p| place[p as usize]);
+    }
+    *labels = kept;
+    wanted.iter().filter_map(|&at| place[at as usize]).collect()
+}
