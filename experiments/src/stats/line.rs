@@ -110,6 +110,11 @@ mod tests {
             };
             let least = error(line.slope, line.intercept);
             prop_assert!(least <= error(line.slope + slope, line.intercept + shift) * (1.0 + 1e-9));
+            // Nor one that is a little steeper or higher: what is left has no slope and no mean.
+            let left = |(x, y): &(f64, f64)| y - line.at(*x);
+            let sum: f64 = points.iter().map(left).sum();
+            let turn: f64 = points.iter().map(|point| left(point) * point.0).sum();
+            prop_assert!(sum.abs() < 1e-6 && turn.abs() < 1e-4, "{sum} {turn}");
             prop_assert!(line.r_squared < 1.0 + 1e-9 && line.r_squared > -1e-9);
         }
     }
