@@ -68,9 +68,6 @@ impl NetworkConfig {
     /// # Errors
     /// When the phases of a cycle are longer than `network.cycle`.
     pub fn timing(&self, latency: SimDuration) -> Result<Timing, ConfigError> {
-        // The reservation walk has no phases that messages must fit into.
-        let phased = self.policy == Policy::Paper;
-        let latency = if phased { latency } else { SimDuration::ZERO };
         let at_least = |ms, needed: SimDuration| needed.max(SimDuration::from_millis(ms));
         let half = SimDuration::from_nanos(latency.as_nanos() / 2);
         let exchange = latency + half + SimDuration::from_millis(20);
