@@ -156,7 +156,7 @@ fn nodes_and_rovers_that_crash_and_come_back() {
         loss: 0.1,
     };
     let (mut sim, network) = queued(&world, 50, 2, radio, &config(Policy::Complete));
-    let at = |tenths| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
+    let at = |tenths: u64| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
     for (i, name) in (0..).zip(network.node_names()) {
         network.crash_at(&mut sim, at(1 + 9 * i), name).unwrap();
         network.restart_at(&mut sim, at(60 + 9 * i), name).unwrap();

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use farside_worlds::{NodeId, VertexId};
+use farside_worlds::VertexId;
 
 use super::{Applicant, Desk, Offers, Registry, owners};
 use crate::network::messages::RoverId;
@@ -89,7 +89,7 @@ impl Registry {
     }
 
     /// Decides what has waited for long enough.
-    pub(super) fn decide_overdue(&mut self, desk: &Desk<'_>) {
+    pub(in crate::network::reservation) fn decide_overdue(&mut self, desk: &Desk<'_>) {
         let overdue = |o: &Offers| !o.decided && o.deadline <= desk.now && o.best.is_some();
         let rovers = self
             .offers
