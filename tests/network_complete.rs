@@ -201,11 +201,11 @@ fn the_references_plan_is_driven() {
     // Following takes some milliseconds, so a rover may come a cycle early (grants are given ahead)
     // or late.
     let ratio = metrics.time_ratio / planned.time_ratio;
-    assert!((0.95..1.1).contains(&ratio), "{ratio}");
+    assert!((0.9..1.1).contains(&ratio), "{ratio}");
     let (sim, network) = queued(&world, 60, 4, PERFECT, &config(Policy::Complete));
     sim.run(Executor::Inline).unwrap();
     let ratio = network.metrics().time_ratio / metrics.time_ratio;
-    assert!((1.0..1.3).contains(&ratio), "{ratio}");
+    assert!((0.85..1.15).contains(&ratio), "{ratio}");
 }
 
 #[test]

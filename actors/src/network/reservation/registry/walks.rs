@@ -44,11 +44,13 @@ impl Registry {
     /// A probe has come to the owner of its goal.
     pub(super) fn offer(&mut self, desk: &Desk<'_>, probe: &Probe, labels: &[Label]) {
         let rover = probe.walk.rover;
-        let known = self.offers.get(&rover).map_or(0, |o| o.walk.attempt);
-        if known > probe.walk.attempt {
+        // Of a rover's walks, and of their attempts, only the last counts.
+        let age = |walk: &Walk| Some((walk.since, walk.attempt));
+        let known = self.offers.get(&rover).and_then(|o| age(&o.walk));
+        if known > age(&probe.walk) {
             return;
         }
-        if known < probe.walk.attempt {
+        if known < age(&probe.walk) {
             let offers = Offers {
                 walk: probe.walk,
                 heard: 0,
