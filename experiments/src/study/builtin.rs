@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 9] = [
+const BUILTIN: [(&str, &str); 11] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),
@@ -29,6 +29,14 @@ const BUILTIN: [(&str, &str); 9] = [
     (
         "network/figure-5",
         include_str!("../../studies/network/figure-5.toml"),
+    ),
+    (
+        "network/growth",
+        include_str!("../../studies/network/growth.toml"),
+    ),
+    (
+        "network/robust",
+        include_str!("../../studies/network/robust.toml"),
     ),
     (
         "network/table-1",
