@@ -229,11 +229,11 @@ impl Registry {
                 if let Aim::Aside(path) = &applicant.aim {
                     goal = making_way::aside(&desk.site.roadmap, vertex, path, in_vain);
                 }
-                let cycle = desk.site.timing.cycle.as_nanos();
+                let step_time = desk.site.longest_step.as_nanos();
                 let came = self
                     .book
                     .standing(vertex)
-                    .map_or(0, |visit| visit.start + cycle);
+                    .map_or(0, |visit| visit.start + step_time);
                 let label = Label {
                     vertex,
                     start: soon.max(came),
