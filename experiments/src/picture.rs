@@ -13,8 +13,6 @@ mod spacetime;
 pub(crate) mod tracks;
 mod waits;
 
-
-
 use farside::SimDuration;
 use farside_logs::LogError;
 use farside_worlds::VertexId;
@@ -66,7 +64,10 @@ impl Drawn {
         let to_ns = self.time_ns(to)?;
         let from_ns = from.map_or(Ok(0), |from| self.time_ns(Some(from)))?;
         if from_ns >= to_ns {
-            let (from, to) = (SimDuration::from_nanos(from_ns), SimDuration::from_nanos(to_ns));
+            let (from, to) = (
+                SimDuration::from_nanos(from_ns),
+                SimDuration::from_nanos(to_ns),
+            );
             return Err(PictureError::Window { from, to });
         }
         spacetime::figure(self, line, from_ns, to_ns)
@@ -129,7 +130,9 @@ pub(crate) enum PictureError {
     #[error("the shortest ways through these vertices go through vertex {vertex} twice")]
     Twice { vertex: u32 },
     /// A map without corridors.
-    #[error("{roadmap} has no corridor, and no rovers wait in a circle: name vertices to go through")]
+    #[error(
+        "{roadmap} has no corridor, and no rovers wait in a circle: name vertices to go through"
+    )]
     NoCorridor { roadmap: String },
 }
 

@@ -55,7 +55,10 @@ fn line(text: &str) -> Result<Line, String> {
         let number = part.trim().parse::<u32>().map(VertexId);
         number.map_err(|_| format!("{part:?}: expected auto, or vertices as in 12,40"))
     };
-    text.split(',').map(vertex).collect::<Result<_, _>>().map(Line::Through)
+    text.split(',')
+        .map(vertex)
+        .collect::<Result<_, _>>()
+        .map(Line::Through)
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
@@ -66,7 +69,10 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     };
     let figure: Figure = figure.map_err(|error| picture_error(args, error))?;
     let out = args.out.clone().unwrap_or_else(|| {
-        let stem = args.log.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let stem = args
+            .log
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned());
         let name = format!("{}-{}", stem.unwrap_or_default(), figure.file);
         args.log.with_file_name(name)
     });

@@ -47,7 +47,10 @@ pub(crate) fn colours(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<usize> 
         colours[node.0 as usize] = Some(colour);
         used[colour] += 1;
     }
-    colours.into_iter().map(|colour| colour.unwrap_or(0)).collect()
+    colours
+        .into_iter()
+        .map(|colour| colour.unwrap_or(0))
+        .collect()
 }
 
 #[cfg(test)]

@@ -110,7 +110,9 @@ pub(crate) fn busiest(
         let stood_ns: u64 = line.iter().map(|v| stood_ns[v.0 as usize]).sum();
         (if met > 1 { met } else { 0 }, stood_ns)
     };
-    let scored = corridors(roadmap).into_iter().map(|line| (score(&line), line));
+    let scored = corridors(roadmap)
+        .into_iter()
+        .map(|line| (score(&line), line));
     // Of equals the first: `max_by` would take the last.
     let best = scored.rev().max_by(|a, b| a.0.cmp(&b.0));
     match (best, waits.circles.first()) {
@@ -172,9 +174,9 @@ pub(crate) fn closed_ns(tracks: &Tracks, rovers: &[Seen], circle: &[u32], until_
         let last = marks.iter().rfind(|mark| mark.time_ns <= until_ns)?;
         Some(last.time_ns)
     };
-    let members = rovers.iter().filter(|seen| {
-        circle.contains(&seen.rover) && matches!(seen.place, Place::At(_))
-    });
+    let members = rovers
+        .iter()
+        .filter(|seen| circle.contains(&seen.rover) && matches!(seen.place, Place::At(_)));
     members.filter_map(since).max().unwrap_or(until_ns)
 }
 
@@ -200,7 +202,12 @@ mod tests {
                 edges.push((v, v + width));
             }
         }
-        let mut edges: Vec<_> = edges.into_iter().zip(kept).filter(|e| *e.1).map(|e| e.0).collect();
+        let mut edges: Vec<_> = edges
+            .into_iter()
+            .zip(kept)
+            .filter(|e| *e.1)
+            .map(|e| e.0)
+            .collect();
         let mut part = BTreeSet::from([edges.first()?.0]);
         for _ in 0..edges.len() {
             for (a, b) in &edges {
@@ -210,7 +217,8 @@ mod tests {
             }
         }
         edges.retain(|(a, _)| part.contains(a));
-        let number: BTreeMap<u32, VertexId> = part.iter().copied().zip((0..).map(VertexId)).collect();
+        let number: BTreeMap<u32, VertexId> =
+            part.iter().copied().zip((0..).map(VertexId)).collect();
         let place = |v: &u32| Point2::new(f64::from(v % width), f64::from(v / width));
         let places = part.iter().map(place).collect();
         let edges = edges.iter().map(|(a, b)| (number[a], number[b])).collect();
@@ -219,7 +227,10 @@ mod tests {
 
     /// The chains' inner vertices, by joining neighbours until nothing changes.
     fn chains(map: &Roadmap) -> BTreeSet<Vec<VertexId>> {
-        let inner: Vec<VertexId> = map.vertices().filter(|v| map.neighbors(*v).len() == 2).collect();
+        let inner: Vec<VertexId> = map
+            .vertices()
+            .filter(|v| map.neighbors(*v).len() == 2)
+            .collect();
         let mut label: BTreeMap<VertexId, VertexId> = inner.iter().map(|v| (*v, *v)).collect();
         for _ in 0..inner.len() {
             for &(u, v) in map.edges() {
@@ -229,7 +240,13 @@ mod tests {
                 }
             }
         }
-        let of = |root: &VertexId| inner.iter().copied().filter(|v| label[v] == *root).collect();
+        let of = |root: &VertexId| {
+            inner
+                .iter()
+                .copied()
+                .filter(|v| label[v] == *root)
+                .collect()
+        };
         label.values().map(of).collect()
     }
 

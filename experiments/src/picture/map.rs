@@ -51,7 +51,8 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
     let circled: usize = waits.circles.iter().map(Vec::len).sum();
     let title = format!("{}, seed {}, at {at}", run.scenario, run.seed);
     let cycle = at_ns / run.site.cycle.as_nanos();
-    let mut says = format!("Cycle {cycle}. {on_map} rovers on the map, {queued} in queues, {gone} gone.");
+    let mut says =
+        format!("Cycle {cycle}. {on_map} rovers on the map, {queued} in queues, {gone} gone.");
     if circled > 0 {
         let behind = waits.behind.len();
         says.push_str(&format!(
@@ -100,7 +101,11 @@ impl<'a> Sheet<'a> {
         lengths_m.sort_by(f64::total_cmp);
         let middle_m = lengths_m.get(lengths_m.len() / 2).copied().unwrap_or(1.0);
         let vertices = roadmap.vertices().map(|v| roadmap.position_m(v));
-        let posts = run.site.sensors.nodes().map(|n| run.site.sensors.position_m(n));
+        let posts = run
+            .site
+            .sensors
+            .nodes()
+            .map(|n| run.site.sensors.position_m(n));
         let mut all: Vec<[f64; 2]> = vertices.chain(posts).map(|p| [p.x, p.y]).collect();
         if let Ground::Walls { middles_m, .. } = &run.site.ground {
             all.extend(middles_m);
@@ -108,7 +113,10 @@ impl<'a> Sheet<'a> {
         let range = |axis: usize| {
             let values = all.iter().map(|p| p[axis]);
             let low = values.clone().fold(f64::INFINITY, f64::min);
-            (low - middle_m, values.fold(f64::NEG_INFINITY, f64::max) + middle_m)
+            (
+                low - middle_m,
+                values.fold(f64::NEG_INFINITY, f64::max) + middle_m,
+            )
         };
         let ((west, east), (south, north)) = (range(0), range(1));
         let longest_m = (east - west).max(north - south);
@@ -279,7 +287,10 @@ impl<'a> Sheet<'a> {
 
     /// Lines between the rovers of the coordination graph (section 3.2).
     fn coordination(&self, rovers: &[Seen]) -> String {
-        let places: Vec<_> = rovers.iter().filter_map(|r| Some((r, self.place(r)?))).collect();
+        let places: Vec<_> = rovers
+            .iter()
+            .filter_map(|r| Some((r, self.place(r)?)))
+            .collect();
         let mut data = String::new();
         for (at, (a, from)) in places.iter().enumerate() {
             for (b, to) in &places[at + 1..] {
@@ -403,7 +414,8 @@ fn arrow(from: (f64, f64), to: (f64, f64), r: f64, class: &str) -> Markup {
         return html! {};
     };
     let aside = 0.55 * r;
-    let shift = |(x, y): (f64, f64), along: f64| (x + dx * along - dy * aside, y + dy * along + dx * aside);
+    let shift =
+        |(x, y): (f64, f64), along: f64| (x + dx * along - dy * aside, y + dy * along + dx * aside);
     let (start, tip) = (shift(from, 0.7 * r), shift(to, -0.9 * r));
     let back = |side: f64| (tip.0 - dx * 8.0 - dy * side, tip.1 - dy * 8.0 + dx * side);
     html! {
@@ -419,10 +431,7 @@ fn direction(from: (f64, f64), to: (f64, f64)) -> Option<(f64, f64)> {
 }
 
 /// The parts of a line that are inside.
-fn parts(
-    line: impl Iterator<Item = (f64, f64)>,
-    inside: impl Fn(&(f64, f64)) -> bool,
-) -> String {
+fn parts(line: impl Iterator<Item = (f64, f64)>, inside: impl Fn(&(f64, f64)) -> bool) -> String {
     let (mut data, mut part) = (String::new(), Vec::new());
     for point in line {
         if inside(&point) {
@@ -442,7 +451,10 @@ fn step(rough: f64) -> f64 {
     }
     let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
     let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
-    steps.into_iter().find(|step| *step >= rough).unwrap_or(10.0 * power)
+    steps
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(10.0 * power)
 }
 
 fn entry_mark((x, y): (f64, f64)) -> String {

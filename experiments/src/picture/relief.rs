@@ -21,14 +21,22 @@ pub(super) fn contours(terrain: &HeightField, height_m: f64, stride: usize) -> V
         let share = (level_m - a) / (b - a);
         let from = terrain.sample_position_m(c * stride, r * stride);
         let to = terrain.sample_position_m(c2 * stride, r2 * stride);
-        [from.x + (to.x - from.x) * share, from.y + (to.y - from.y) * share]
+        [
+            from.x + (to.x - from.x) * share,
+            from.y + (to.y - from.y) * share,
+        ]
     };
     let mut joined = BTreeMap::<Crossing, Vec<Crossing>>::new();
     for r in 0..rows.saturating_sub(1) {
         for c in 0..columns.saturating_sub(1) {
             let corners = [(c, r), (c + 1, r), (c + 1, r + 1), (c, r + 1)];
             let high = corners.map(|(c, r)| at(c, r) > level_m);
-            let sides = [(c, r, false), (c + 1, r, true), (c, r + 1, false), (c, r, true)];
+            let sides = [
+                (c, r, false),
+                (c + 1, r, true),
+                (c, r + 1, false),
+                (c, r, true),
+            ];
             let met: Vec<Crossing> = (0..4)
                 .filter(|side| high[*side] != high[(*side + 1) % 4])
                 .map(|side| sides[side])
@@ -103,7 +111,10 @@ mod tests {
             let line = &found[0];
             assert_eq!(line.first(), line.last());
             for [x, y] in line {
-                assert!(((x * x + y * y).sqrt() - radius_m).abs() < 0.2, "{radius_m}: {x}, {y}");
+                assert!(
+                    ((x * x + y * y).sqrt() - radius_m).abs() < 0.2,
+                    "{radius_m}: {x}, {y}"
+                );
             }
             let length_m: f64 = line
                 .windows(2)
@@ -113,7 +124,10 @@ mod tests {
                 })
                 .sum();
             let circle_m = 2.0 * std::f64::consts::PI * radius_m;
-            assert!((length_m / circle_m - 1.0).abs() < 0.02, "{radius_m}: {length_m}");
+            assert!(
+                (length_m / circle_m - 1.0).abs() < 0.02,
+                "{radius_m}: {length_m}"
+            );
         }
         // What leaves the field is open: four arcs in its corners.
         let arcs = contours(&cone, 22.0, 1);

@@ -90,7 +90,9 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
             };
             match (here, mark.moving_to, there) {
                 (Some(here), None, _) => {
-                    visit.pieces.push(piece(here, here, wanted(run, mark, &place, here)));
+                    visit
+                        .pieces
+                        .push(piece(here, here, wanted(run, mark, &place, here)));
                 }
                 (Some(here), Some(_), Some(to)) if here.abs_diff(to) == 1 => {
                     visit.pieces.push(piece(here, to, Way::between(here, to)));
@@ -195,10 +197,16 @@ fn locked(run: &Drawn, line: &[VertexId], waits: &Waits, to_ns: u64) -> Option<u
     let rovers = run.tracks.at(to_ns);
     let on_line = |rover: &u32| {
         let seen = rovers.iter().find(|seen| seen.rover == *rover);
-        seen.and_then(|seen| seen.holds()).is_some_and(|v| line.contains(&v))
+        seen.and_then(|seen| seen.holds())
+            .is_some_and(|v| line.contains(&v))
     };
-    let circles = waits.circles.iter().filter(|circle| circle.iter().filter(|r| on_line(r)).count() > 1);
-    circles.map(|circle| corridor::closed_ns(&run.tracks, &rovers, circle, to_ns)).min()
+    let circles = waits
+        .circles
+        .iter()
+        .filter(|circle| circle.iter().filter(|r| on_line(r)).count() > 1);
+    circles
+        .map(|circle| corridor::closed_ns(&run.tracks, &rovers, circle, to_ns))
+        .min()
 }
 
 impl Diagram<'_> {
@@ -212,7 +220,9 @@ impl Diagram<'_> {
         let mut rovers: Vec<u32> = visits.iter().map(|visit| visit.rover).collect();
         rovers.sort_unstable();
         rovers.dedup();
-        let (from, to) = [self.from_ns, self.to_ns].map(SimDuration::from_nanos).into();
+        let (from, to) = [self.from_ns, self.to_ns]
+            .map(SimDuration::from_nanos)
+            .into();
         let mut says = format!("{} rovers on it between {from} and {to}.", rovers.len());
         if let Some(ns) = locked {
             let cycle = libm::floor(ns as f64 / self.cycle_ns);
@@ -315,7 +325,10 @@ impl Diagram<'_> {
             let cycles = (piece.to_ns - piece.from_ns) as f64 / self.cycle_ns;
             piece.from == piece.to && cycles > WAIT
         };
-        let shown = visit.pieces.iter().filter(|piece| piece.to_ns > self.from_ns);
+        let shown = visit
+            .pieces
+            .iter()
+            .filter(|piece| piece.to_ns > self.from_ns);
         let pieces: Vec<&Piece> = shown.collect();
         let mut drives: Vec<(Way, Vec<(f64, f64)>)> = Vec::new();
         let mut last = None;
@@ -363,7 +376,12 @@ impl Diagram<'_> {
                 continue;
             };
             if last.to_ns == self.to_ns {
-                names.push((self.area.x(1.0) + 8.0, self.y(last.to) + 4.0, visit.rover, true));
+                names.push((
+                    self.area.x(1.0) + 8.0,
+                    self.y(last.to) + 4.0,
+                    visit.rover,
+                    true,
+                ));
             }
             let text = (visit.rover + 1).to_string();
             let (width, x) = (text_width(&text, 10.5), self.x(first.from_ns));
@@ -372,7 +390,8 @@ impl Diagram<'_> {
             let box_at = |y: f64| [x, y - 9.0, x + width + 2.0, y + 1.0];
             let free = |y: &&f64| {
                 let [left, top, right, bottom] = box_at(**y);
-                let apart = |b: &[f64; 4]| right < b[0] || b[2] < left || bottom < b[1] || b[3] < top;
+                let apart =
+                    |b: &[f64; 4]| right < b[0] || b[2] < left || bottom < b[1] || b[3] < top;
                 taken.iter().all(apart)
             };
             if let Some(y) = [up, down].iter().find(free).copied() {

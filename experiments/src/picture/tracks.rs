@@ -65,8 +65,8 @@ impl Seen {
 impl Tracks {
     /// Reads them from a log.
     pub(crate) fn read(log: &Log) -> Result<Tracks, PictureError> {
-        let schema = Schema::of::<RoverState>()
-            .map_err(|error| PictureError::States(error.to_string()))?;
+        let schema =
+            Schema::of::<RoverState>().map_err(|error| PictureError::States(error.to_string()))?;
         let mut tracks = Tracks::default();
         let mut records = log.records()?;
         while let Some((record, _)) = records.next_ref()? {
@@ -113,13 +113,20 @@ impl Tracks {
 
     /// The rovers by number, each with its states.
     pub(crate) fn rovers(&self) -> impl Iterator<Item = (u32, &[Mark])> {
-        self.rovers.iter().map(|(rover, marks)| (*rover, &marks[..]))
+        self.rovers
+            .iter()
+            .map(|(rover, marks)| (*rover, &marks[..]))
     }
 
     /// The highest vertex number in it.
     pub(crate) fn highest_vertex(&self) -> u32 {
         let of = |mark: &Mark| {
-            let places = [mark.vertex, mark.moving_to, Some(mark.entry), Some(mark.goal)];
+            let places = [
+                mark.vertex,
+                mark.moving_to,
+                Some(mark.entry),
+                Some(mark.goal),
+            ];
             places.into_iter().flatten().map(|v| v.0).max()
         };
         let all = self.rovers.values().flatten();

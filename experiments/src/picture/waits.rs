@@ -171,7 +171,12 @@ mod tests {
     #[test]
     fn two_that_meet_wait_in_a_circle_and_others_behind_them() {
         let map = line(6);
-        let team = [standing(0, 1, 5), standing(1, 2, 5), standing(2, 3, 0), standing(3, 5, 5)];
+        let team = [
+            standing(0, 1, 5),
+            standing(1, 2, 5),
+            standing(2, 3, 0),
+            standing(3, 5, 5),
+        ];
         let waits = Waits::of(&map, &team);
         assert_eq!(waits.circles, [vec![1, 2]]);
         assert_eq!(waits.behind, BTreeSet::from([0]));

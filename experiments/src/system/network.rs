@@ -98,7 +98,12 @@ impl Settings for NetworkScenario {
             }
         }
         let cycle = settings.cycle;
-        setup.scene = Some(Box::new(NetworkScene::new(map, posts, cycle, system.clone())));
+        setup.scene = Some(Box::new(NetworkScene::new(
+            map,
+            posts,
+            cycle,
+            system.clone(),
+        )));
         let watched = system.clone();
         setup.goal = Some(Goal {
             what: "rovers arrived",

@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
-use farside::{RunInfo, SimDuration};
 use farside::record::{Record, RecordClass};
+use farside::{RunInfo, SimDuration};
 use farside_actors::network::Network;
 use farside_actors::network::messages::RoverState;
 use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
@@ -131,11 +131,15 @@ impl NetworkScene {
     /// The vertices of each node, for viewers that draw no entities: a topic each, because they
     /// colour by topic.
     fn territories(&self) -> impl Iterator<Item = Drawing> {
-        self.system.node_names().iter().zip(self.sensors.nodes()).map(|(name, node)| {
-            let owned = self.sensors.owned(node).iter();
-            let places = owned.map(|v| Pose::at(self.place(*v))).collect();
-            poses(&format!("roadmap/{name}"), places)
-        })
+        self.system
+            .node_names()
+            .iter()
+            .zip(self.sensors.nodes())
+            .map(|(name, node)| {
+                let owned = self.sensors.owned(node).iter();
+                let places = owned.map(|v| Pose::at(self.place(*v))).collect();
+                poses(&format!("roadmap/{name}"), places)
+            })
     }
 
     /// The coordination graph (section 3.2) of the cycle that begins, if it is another than before:
@@ -186,7 +190,11 @@ impl NetworkScene {
 
     fn node(&self, node: NodeId, name: &str, [x, y, z]: [f64; 3]) -> Drawing {
         let diameter_m = 0.4 * self.scale_m;
-        let ball = shape(Form::Sphere { diameter_m }, [x, y, z], self.colours[node.0 as usize]);
+        let ball = shape(
+            Form::Sphere { diameter_m },
+            [x, y, z],
+            self.colours[node.0 as usize],
+        );
         Drawing::Entity {
             id: name.to_owned(),
             frame: MAP.to_owned(),

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 use farside_worlds::VertexId;
+use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
 use super::{Files, NetworkScenario, SetupError, crater, grid, ground, in_crater, is_grid, place};
 use crate::picture::{Ground, Site};
@@ -67,10 +67,17 @@ mod tests {
         let world = GridWorld::new("m.map", &map, 10.0, tasks.tasks()).unwrap();
         let mut walls = walls(&map, &world, 10.0);
         let vertices = world.roadmap().vertices();
-        walls.extend(vertices.map(|v| world.roadmap().position_m(v)).map(|p| [p.x, p.y]));
+        walls.extend(
+            vertices
+                .map(|v| world.roadmap().position_m(v))
+                .map(|p| [p.x, p.y]),
+        );
         walls.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
         let columns = [5.0, 15.0, 25.0];
-        let cells: Vec<[f64; 2]> = columns.iter().flat_map(|x| [[*x, 5.0], [*x, 15.0]]).collect();
+        let cells: Vec<[f64; 2]> = columns
+            .iter()
+            .flat_map(|x| [[*x, 5.0], [*x, 15.0]])
+            .collect();
         assert_eq!(walls, cells);
     }
 }
