@@ -274,7 +274,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 14] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -284,6 +284,8 @@ const KEYS: [&str; 12] = [
     "network.collision_penalty_factor",
     "network.noise",
     "network.convergence",
+    "network.damping",
+    "network.processor",
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",

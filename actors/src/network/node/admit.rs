@@ -69,7 +69,7 @@ impl Node {
 
     fn hear(&mut self, ctx: &mut Context<'_, Self>, fact: &Whereabouts, goal: Option<VertexId>) {
         let news = ctx.durable::<Ledger>().hear(fact, goal, self.cycle);
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             for &previous in &news.unheard {
                 self.report_departure(ctx, *fact, Some(previous));
             }

@@ -1,31 +1,41 @@
-//! What a node keeps for the `complete` policy, all of it durable, and how walks proceed: what is done
-//! with each item that comes in. Pure but for the books: items go to `lines`, grants to the caller.
+//! What a node keeps for the `complete` policy, all of it durable, and who seeks a way from where.
+//! Pure: items go to `lines`, grants to the caller. What is done with items is in [`walks`].
+
+mod making_way;
+mod walks;
 
 use std::collections::BTreeMap;
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::book::{Book, Clash, Visit};
-use super::messages::{Item, Probe, Reserve, Settle, Verdict, Walk};
+use super::book::{Book, Visit};
+use super::messages::{Item, Probe, Reserve, Walk};
 use super::relay::Line;
 use super::routes::routes;
 use crate::network::assemble::Site;
 use crate::network::messages::RoverId;
-use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit, prune, way_to};
-
-/// The most labels that a probe hands on from one node to the next, so that messages stay small.
-const MAX_FRONTIER: usize = 24;
+use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
 
 /// A rover, or a queue of rovers, for which a way is sought.
 #[derive(Debug)]
 struct Applicant {
     origin: Origin,
+    aim: Aim,
     /// The walk under way, and when its attempt began.
     walk: Option<(Walk, u64)>,
     /// The next attempt, and when it begins.
     again: Option<(Walk, u64)>,
     /// Attempts that found no way at all.
     in_vain: u32,
+}
+
+/// Where a way is to lead.
+#[derive(Debug)]
+enum Aim {
+    /// To the rover's goal.
+    Goal,
+    /// Off this path, out of another's way.
+    Aside(Vec<VertexId>),
 }
 
 /// Where a way begins.
@@ -56,6 +66,7 @@ struct Offers {
     heard: u32,
     probes: u32,
     first_step: u32,
+    wishful: bool,
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -101,8 +112,12 @@ impl Registry {
                     last_entry: 0,
                 });
             }
+            self.preload(desk);
             let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
             for (rover, vertex) in standing {
+                if desk.site.schedule.is_some() {
+                    continue;
+                }
                 self.book.stand(vertex, rover, 1);
                 if desk.site.missions[rover.0 as usize].1 != vertex {
                     self.seek(Origin::Stand {
@@ -119,6 +134,34 @@ impl Registry {
         }
     }
 
+    /// Enters what was planned before the start.
+    fn preload(&mut self, desk: &Desk<'_>) {
+        let schedule = desk.site.schedule.iter().flat_map(|s| &s.visits);
+        for (rover, way) in (0..).map(RoverId).zip(schedule) {
+            let walk = Walk {
+                rover,
+                attempt: 0,
+                since: 0,
+            };
+            for (i, timed) in way.iter().enumerate() {
+                if desk.site.sensors.owner(timed.vertex) != desk.node {
+                    continue;
+                }
+                let visit = Visit {
+                    walk,
+                    step: i as u32 + 1,
+                    from: i.checked_sub(1).map(|before| way[before].vertex),
+                    start: timed.start,
+                    end: timed.end,
+                    confirmed: true,
+                    // Who stands on the map has its first vertex already.
+                    granted: i == 0 && desk.site.stays,
+                };
+                self.book.enter(timed.vertex, visit);
+            }
+        }
+    }
+
     /// The time that it takes to learn that a vertex is free and to grant it [ns].
     fn gap(&self) -> u64 {
         let measured = self.lines.values().filter(|line| line.is_measured());
@@ -130,6 +173,7 @@ impl Registry {
     fn seek(&mut self, origin: Origin) {
         self.applicants.push(Applicant {
             origin,
+            aim: Aim::Goal,
             walk: None,
             again: None,
             in_vain: 0,
@@ -165,22 +209,31 @@ impl Registry {
         let applicant = &mut self.applicants[at];
         applicant.walk = Some((walk, desk.now));
         applicant.again = None;
-        let goal = desk.site.missions[walk.rover.0 as usize].1;
+        let in_vain = applicant.in_vain;
+        let mut goal = desk.site.missions[walk.rover.0 as usize].1;
         let soon = desk.now + self.walk_time;
         let (labels, entry, first_step) = match applicant.origin {
             Origin::Queue {
                 entry, last_entry, ..
             } => {
-                let dwell = desk.site.config.cycle.as_nanos();
+                let dwell = desk.site.timing.cycle.as_nanos();
                 let earliest = soon.max(last_entry + 1);
                 let labels = self.search(desk, |ground| ground.enter(entry, earliest, dwell));
                 (labels, entry, 1)
             }
             Origin::Stand { vertex, step, .. } => {
+                if let Aim::Aside(path) = &applicant.aim {
+                    goal = making_way::aside(&desk.site.roadmap, vertex, path, in_vain);
+                }
+                let cycle = desk.site.timing.cycle.as_nanos();
+                let came = self
+                    .book
+                    .standing(vertex)
+                    .map_or(0, |visit| visit.start + cycle);
                 let label = Label {
                     vertex,
-                    start: soon,
-                    ready: soon,
+                    start: soon.max(came),
+                    ready: soon.max(came),
                     until: FOREVER,
                     parent: None,
                 };
@@ -189,6 +242,9 @@ impl Registry {
             Origin::Done => return,
         };
         let site = desk.site;
+        // Every second time that there is no way it asks what the way would be without those who
+        // stand still.
+        let wishful = site.stays && in_vain % 2 == 1;
         let routes = routes(
             &site.roadmap,
             &site.sensors,
@@ -205,6 +261,7 @@ impl Registry {
                 at: 0,
                 goal,
                 first_step,
+                wishful,
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
@@ -213,11 +270,20 @@ impl Registry {
     }
 
     fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&Ground<'_>) -> T) -> T {
+        self.search_in(desk, &|v| self.book.busy(v), with)
+    }
+
+    fn search_in<T>(
+        &self,
+        desk: &Desk<'_>,
+        busy: &dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
+        with: impl FnOnce(&Ground<'_>) -> T,
+    ) -> T {
         let ground = Ground {
             roadmap: &desk.site.roadmap,
             gap: self.gap(),
-            travel: &|_, _| desk.site.config.cycle.as_nanos(),
-            busy: &|v| self.book.busy(v),
+            travel: &|_, _| desk.site.timing.cycle.as_nanos(),
+            busy,
         };
         with(&ground)
     }
@@ -227,259 +293,13 @@ impl Registry {
             Item::Probe(probe) => self.probe(desk, probe),
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
+            Item::Yield(request) => self.make_way(desk, request),
         }
     }
 
     fn post(&mut self, to: NodeId, item: Item) {
         if let Some(line) = self.lines.get_mut(&to) {
             line.post(item);
-        }
-    }
-
-    /// Works out where the rover could be in this node's part, and hands that on.
-    fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe) {
-        let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
-        self.search(desk, |ground| ground.expand(&mut labels, open));
-        let Some(&next) = probe.route.get(probe.at as usize + 1) else {
-            self.offer(desk, &probe, &labels);
-            return;
-        };
-        let site = desk.site;
-        let borders = |label: &Label| {
-            let onward = site.roadmap.neighbors(label.vertex);
-            site.sensors.owner(label.vertex) == desk.node
-                && onward.iter().any(|&v| site.sensors.owner(v) == next)
-        };
-        let frontier = frontier(&labels, borders);
-        probe.frontier = prune(&mut labels, &frontier);
-        probe.labels = labels;
-        probe.at += 1;
-        self.post(next, Item::Probe(probe));
-    }
-
-    /// A probe has come to the owner of its goal.
-    fn offer(&mut self, desk: &Desk<'_>, probe: &Probe, labels: &[Label]) {
-        let rover = probe.walk.rover;
-        let known = self.offers.get(&rover).map_or(0, |o| o.walk.attempt);
-        if known > probe.walk.attempt {
-            return;
-        }
-        if known < probe.walk.attempt {
-            let offers = Offers {
-                walk: probe.walk,
-                heard: 0,
-                probes: probe.probes,
-                first_step: probe.first_step,
-                route: probe.route.clone(),
-                best: None,
-                decided: false,
-                // Other routes may be much slower, or lead past a node that is down.
-                deadline: desk.now + 2 * (desk.now - probe.started) + self.gap(),
-            };
-            self.offers.insert(rover, offers);
-        }
-        let gap = self.gap();
-        let Some(offers) = self.offers.get_mut(&rover) else {
-            return;
-        };
-        offers.heard += 1;
-        // Who stays needs the goal for ever.
-        let stays = desk.site.stays;
-        let arrivals = (0..)
-            .zip(labels)
-            .filter(|(_, label)| label.vertex == probe.goal && (!stays || label.until == FOREVER));
-        if let Some((at, label)) = arrivals.min_by_key(|(_, label)| label.ready)
-            && offers
-                .best
-                .as_ref()
-                .is_none_or(|(ready, _)| label.ready < *ready)
-        {
-            let leaves = label.ready.saturating_add(gap).min(label.until);
-            let end = if stays { FOREVER } else { leaves };
-            offers.best = Some((label.ready, way_to(labels, at, end)));
-        }
-        if offers.heard >= offers.probes {
-            self.decide(desk, rover);
-        }
-    }
-
-    /// Decides what has waited for long enough.
-    pub(super) fn decide_overdue(&mut self, desk: &Desk<'_>) {
-        let overdue = |o: &Offers| !o.decided && o.deadline <= desk.now && o.best.is_some();
-        let rovers = self
-            .offers
-            .iter()
-            .filter(|(_, o)| overdue(o))
-            .map(|(&r, _)| r);
-        for rover in rovers.collect::<Vec<_>>() {
-            self.decide(desk, rover);
-        }
-    }
-
-    fn decide(&mut self, desk: &Desk<'_>, rover: RoverId) {
-        let Some(offers) = self.offers.get_mut(&rover).filter(|o| !o.decided) else {
-            return;
-        };
-        offers.decided = true;
-        let (walk, first_step) = (offers.walk, offers.first_step);
-        match offers.best.take() {
-            Some((_, way)) => {
-                let at = way.len() as u32 - 1;
-                let reserve = Reserve {
-                    walk,
-                    first_step,
-                    way,
-                    at,
-                };
-                self.reserve(desk, reserve);
-            }
-            None => {
-                let route = offers.route.clone();
-                let settle = Settle {
-                    walk,
-                    verdict: Verdict::NoWay,
-                    at: route.len() as u32 - 1,
-                    route,
-                };
-                self.fail(desk, settle);
-            }
-        }
-    }
-
-    /// Enters this node's part of a way, from the back.
-    fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
-        self.book.strike_earlier(&reserve.walk);
-        let hi = reserve.at as usize;
-        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.node;
-        let part = reserve.way[..=hi]
-            .iter()
-            .rev()
-            .take_while(|visit| mine(visit))
-            .count();
-        let lo = hi + 1 - part;
-        // A rover that stands on the map has its first vertex already.
-        let stands = lo == 0 && desk.site.stays;
-        let first = lo + usize::from(stands);
-        match self.book.check(&reserve.walk, &reserve.way[first..=hi]) {
-            Ok(()) => {}
-            Err(Clash::Younger) => {
-                self.parked.push(reserve);
-                return;
-            }
-            Err(Clash::Firm) => {
-                self.refuse(desk, &reserve, lo);
-                return;
-            }
-        }
-        for i in first..=hi {
-            let TimedVisit { vertex, start, end } = reserve.way[i];
-            let visit = Visit {
-                walk: reserve.walk,
-                step: reserve.first_step + i as u32,
-                from: i.checked_sub(1).map(|before| reserve.way[before].vertex),
-                start,
-                end,
-                confirmed: lo == 0,
-                granted: false,
-            };
-            self.book.enter(vertex, visit);
-        }
-        if lo > 0 {
-            reserve.at = lo as u32 - 1;
-            let to = desk.site.sensors.owner(reserve.way[lo - 1].vertex);
-            self.post(to, Item::Reserve(reserve));
-            return;
-        }
-        // The whole way is entered: from here on it holds.
-        self.book.confirm(&reserve.walk);
-        if stands {
-            let TimedVisit { vertex, end, .. } = reserve.way[0];
-            self.book.leave_by(vertex, end);
-        }
-        self.served(desk, &reserve);
-        let settle = Settle {
-            walk: reserve.walk,
-            verdict: Verdict::Confirmed,
-            route: owners(desk, &reserve.way),
-            at: 0,
-        };
-        self.forward(settle);
-        self.unpark(desk);
-    }
-
-    /// The first part of the way, from visit `lo` on, cannot be entered.
-    fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
-        let route = owners(desk, &reserve.way);
-        let at = owners(desk, &reserve.way[..=lo]).len() as u32 - 1;
-        let walk = reserve.walk;
-        let released = Settle {
-            walk,
-            verdict: Verdict::Released,
-            route: route.clone(),
-            at,
-        };
-        self.forward(released);
-        // A route may pass this node twice.
-        self.book.strike(&walk);
-        self.unpark(desk);
-        self.fail(
-            desk,
-            Settle {
-                walk,
-                verdict: Verdict::Failed,
-                route,
-                at,
-            },
-        );
-    }
-
-    fn forward(&mut self, settle: Settle) {
-        let at = settle.at + 1;
-        if let Some(&to) = settle.route.get(at as usize) {
-            self.post(to, Item::Settle(Settle { at, ..settle }));
-        }
-    }
-
-    /// Tells the node that began; if that is this one, it begins again.
-    fn fail(&mut self, desk: &Desk<'_>, settle: Settle) {
-        if let Some(at) = settle.at.checked_sub(1) {
-            let to = settle.route[at as usize];
-            self.post(to, Item::Settle(Settle { at, ..settle }));
-            return;
-        }
-        let walk = settle.walk;
-        let current = |a: &Applicant| a.walk.is_some_and(|(mine, _)| mine == walk);
-        let Some(at) = self.applicants.iter().position(current) else {
-            return;
-        };
-        let attempt = walk.attempt + 1;
-        let next = Walk { attempt, ..walk };
-        if settle.verdict == Verdict::Failed {
-            self.begin(desk, at, next);
-            return;
-        }
-        // Nothing leads there as things stand: other rovers have to go first.
-        let applicant = &mut self.applicants[at];
-        applicant.walk = None;
-        let pause = desk.site.config.cycle.as_nanos() << applicant.in_vain.min(3);
-        applicant.in_vain += 1;
-        applicant.again = Some((next, desk.now + pause));
-    }
-
-    fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
-        match settle.verdict {
-            Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
-            Verdict::Confirmed => self.book.confirm(&settle.walk),
-            Verdict::Released => self.book.strike(&settle.walk),
-        }
-        self.forward(settle);
-        self.unpark(desk);
-    }
-
-    /// Something was settled: who waited for it may go on.
-    fn unpark(&mut self, desk: &Desk<'_>) {
-        for reserve in std::mem::take(&mut self.parked) {
-            self.reserve(desk, reserve);
         }
     }
 
@@ -533,26 +353,4 @@ fn owners(desk: &Desk<'_>, way: &[TimedVisit]) -> Vec<NodeId> {
         .collect();
     owners.dedup();
     owners
-}
-
-/// The labels from which to go on: the earliest of each vertex and interval, not too many, and always
-/// one of those that can be kept up for ever.
-fn frontier(labels: &[Label], borders: impl Fn(&Label) -> bool) -> Vec<u32> {
-    let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
-    for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
-        let found = best
-            .entry((label.vertex, label.until))
-            .or_insert((label.ready, at));
-        *found = (*found).min((label.ready, at));
-    }
-    let mut all: Vec<(u64, u32)> = best.into_values().collect();
-    all.sort_unstable();
-    let last = all
-        .iter()
-        .position(|&(_, at)| labels[at as usize].until == FOREVER);
-    if let Some(last) = last.filter(|&last| last >= MAX_FRONTIER) {
-        all.swap(MAX_FRONTIER - 1, last);
-    }
-    all.truncate(MAX_FRONTIER);
-    all.into_iter().map(|(_, at)| at).collect()
 }
