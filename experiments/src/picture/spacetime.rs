@@ -156,7 +156,7 @@ pub(super) fn figure(
     let row = (520.0 / line.len() as f64).clamp(16.0, 34.0);
     let area = Area {
         left: 86.0,
-        top: 104.0,
+        top: 124.0,
         width: (13.0 * (last - first)).clamp(640.0, 1400.0),
         height: row * line.len().saturating_sub(1).max(1) as f64,
     };

@@ -97,7 +97,7 @@ impl Settings for NetworkScenario {
                 setup.links.terrain(Arc::new(crater()?.terrain().clone()));
             }
         }
-        let cycle = settings.cycle;
+        let cycle = system.cycle();
         setup.scene = Some(Box::new(NetworkScene::new(
             map,
             posts,

@@ -414,7 +414,7 @@ mod tests {
         );
         let system = Arc::new(system.unwrap());
         let drawings = Arc::new(Mutex::new(Vec::new()));
-        let scene = NetworkScene::new(roadmap, sensors, network.cycle, system.clone());
+        let scene = NetworkScene::new(roadmap, sensors, system.cycle(), system.clone());
         sim.observe(Show(scene, None, drawings.clone()));
         sim.stop_at(SimTime::ZERO + SimDuration::from_secs(120), "enough");
         sim.run(Executor::Inline).unwrap();

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use farside::SimDuration;
 use farside_worlds::VertexId;
 use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
@@ -34,7 +35,9 @@ pub(super) fn site(
         roadmap: Arc::new(roadmap),
         sensors: Arc::new(sensors),
         ground: drawn,
-        cycle: scenario.network.cycle,
+        // Left to the links it is a second, or longer over slow ones, which are not looked at here:
+        // then the diagram counts seconds.
+        cycle: scenario.network.cycle.unwrap_or(SimDuration::from_secs(1)),
     })
 }
 
