@@ -160,14 +160,4 @@ impl Tracks {
         };
         self.rovers().filter_map(seen).collect()
     }
-
-    /// Tracks from marks, for tests.
-    #[cfg(test)]
-    pub(crate) fn of(rovers: BTreeMap<u32, Vec<Mark>>, end_ns: u64) -> Tracks {
-        Tracks {
-            rovers,
-            end_ns,
-            end: String::new(),
-        }
-    }
 }
