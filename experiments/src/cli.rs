@@ -8,7 +8,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, builtin, check, diff, info, recover, report, reproduce, run, study, verify,
+    CommandError, builtin, check, diff, draw, info, recover, report, reproduce, run, study, verify,
 };
 use crate::system::Registry;
 
@@ -57,6 +57,8 @@ enum Command {
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
     Diff(diff::Args),
+    /// Draw a run from its log: a map at an instant, or who was where along a corridor
+    Draw(draw::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
     Study(study::Args),
     /// List the studies that are built in
@@ -122,6 +124,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),
+        Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args),
         Command::Reproduce(args) => reproduce::run(&args, registry),

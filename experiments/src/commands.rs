@@ -3,6 +3,7 @@
 pub(crate) mod builtin;
 pub(crate) mod check;
 pub(crate) mod diff;
+pub(crate) mod draw;
 pub(crate) mod info;
 mod interrupt;
 mod progress;
@@ -47,6 +48,9 @@ pub(crate) enum CommandError {
     /// A log whose run cannot be executed again.
     #[error("{}: cannot be run again: {reason}", .path.display())]
     NotRepeatable { path: PathBuf, reason: String },
+    /// A log of whose run there is no picture.
+    #[error("{}: cannot be drawn: {reason}", .path.display())]
+    NotDrawn { path: PathBuf, reason: String },
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
@@ -79,6 +83,7 @@ impl CommandError {
             | CommandError::Scenario(_)
             | CommandError::Log(_)
             | CommandError::NotRepeatable { .. }
+            | CommandError::NotDrawn { .. }
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

@@ -19,6 +19,7 @@
 
 pub mod cli;
 mod commands;
+pub mod picture;
 pub mod report;
 pub mod scenario;
 pub mod stats;

@@ -10,8 +10,8 @@ mod measure;
 mod numbers;
 mod page;
 mod plots;
-mod scale;
-mod svg;
+pub(crate) mod scale;
+pub(crate) mod svg;
 
 #[cfg(test)]
 mod tests;

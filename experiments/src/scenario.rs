@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::picture::Site;
 use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
 use contacts::{ContactsConfig, LinkContacts};
@@ -377,6 +378,16 @@ impl Scenario {
             notes,
             remarks,
         })
+    }
+
+    /// Where a run with this seed takes place, if on a roadmap: what pictures are drawn on.
+    ///
+    /// # Errors
+    /// When the settings cannot be.
+    pub fn site(&self, seed: u64) -> Result<Option<Site>, ScenarioError> {
+        let mut files = self.files.clone();
+        let site = self.settings.site(seed, &mut files);
+        site.map_err(|error| ScenarioError::from_setup(&self.source, error))
     }
 
     /// Whether a run ended because its time was over.

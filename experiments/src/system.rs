@@ -19,6 +19,7 @@ use farside_logs::Scene;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
+use crate::picture::Site;
 use crate::scenario::nearest;
 pub use files::Files;
 
@@ -51,6 +52,14 @@ pub trait Settings: Send + Sync {
     /// # Errors
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError>;
+
+    /// Where a run with this seed takes place, if on a roadmap of which pictures can be drawn.
+    ///
+    /// # Errors
+    /// Those of [`Settings::assemble`].
+    fn site(&self, _seed: u64, _files: &mut Files) -> Result<Option<Site>, SetupError> {
+        Ok(None)
+    }
 }
 
 /// What a system builds from.

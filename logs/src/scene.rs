@@ -133,10 +133,14 @@ pub struct Shape {
 /// What a shape is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// Lines between the first and the second point, the third and the fourth, and so on.
+    /// Lines between the first and the second point, the third and the fourth, and so on; or with
+    /// indices, between the points that the first and the second index say, and so on.
     Lines {
         /// The ends, relative to the shape's place \[m\].
         points_m: Vec<[f64; 3]>,
+        /// Numbers of points, from 0: where many lines meet in few points, less to write. Empty: the
+        /// points in their order.
+        indices: Vec<u32>,
         /// How thick \[m\].
         thickness_m: f64,
     },

@@ -488,6 +488,11 @@ impl Network {
         self.site.timing
     }
 
+    /// The length of a planning cycle, stretched if links are slow.
+    pub fn cycle(&self) -> SimDuration {
+        self.site.timing.cycle
+    }
+
     /// How many rovers have arrived so far.
     pub fn arrived(&self) -> u32 {
         let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);

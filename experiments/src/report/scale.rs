@@ -11,7 +11,7 @@ pub(super) enum Spacing {
 
 /// An axis: values from `low` to `high` at 0 to 1.
 #[derive(Clone, Debug)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     low: f64,
     high: f64,
     spacing: Spacing,
@@ -19,9 +19,9 @@ pub(super) struct Scale {
 
 /// A place along an axis, from 0 to 1, and what is written there.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tick {
-    pub(super) at: f64,
-    pub(super) text: String,
+pub(crate) struct Tick {
+    pub(crate) at: f64,
+    pub(crate) text: String,
 }
 
 impl Scale {
@@ -58,7 +58,7 @@ impl Scale {
     }
 
     /// From exactly `low` to `high`.
-    pub(super) fn between(low: f64, high: f64) -> Self {
+    pub(crate) fn between(low: f64, high: f64) -> Self {
         Scale {
             low,
             high,
@@ -72,7 +72,7 @@ impl Scale {
     }
 
     /// Where a value goes, 0 to 1, if it is on the axis.
-    pub(super) fn place(&self, value: f64) -> f64 {
+    pub(crate) fn place(&self, value: f64) -> f64 {
         let place = match self.spacing {
             Spacing::Linear => (value - self.low) / (self.high - self.low),
             Spacing::Log => libm::log(value / self.low) / libm::log(self.high / self.low),
@@ -85,7 +85,7 @@ impl Scale {
     }
 
     /// Round numbers along a linear axis, about `count` of them.
-    pub(super) fn ticks(&self, count: f64) -> Vec<Tick> {
+    pub(crate) fn ticks(&self, count: f64) -> Vec<Tick> {
         let step = self.step(count);
         let decimals = (0..12).find(|decimals| {
             let scaled = step * libm::pow(10.0, f64::from(*decimals));
@@ -121,7 +121,7 @@ impl Scale {
 }
 
 /// The width of a text of this size, roughly: nobody measures fonts here.
-pub(super) fn text_width(text: &str, size: f64) -> f64 {
+pub(crate) fn text_width(text: &str, size: f64) -> f64 {
     let width = |letter: char| match letter {
         'i' | 'j' | 'l' | '.' | ',' | ' ' | '\'' | '|' | ':' => 0.32,
         'm' | 'w' | 'M' | 'W' | '%' => 0.88,
@@ -133,7 +133,7 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 }
 
 /// Leaves out what would run into what is written already, the ends first of all kept.
-pub(super) fn thinned(ticks: &[Tick], length: f64, size: f64) -> Vec<Tick> {
+pub(crate) fn thinned(ticks: &[Tick], length: f64, size: f64) -> Vec<Tick> {
     let span = |tick: &Tick| {
         let half = text_width(&tick.text, size) / 2.0 + 4.0;
         (tick.at * length - half, tick.at * length + half)

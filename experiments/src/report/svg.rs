@@ -20,9 +20,9 @@ pub struct Figure {
     pub title: String,
     /// The same in a sentence or two, for who cannot see it.
     pub description: String,
-    pub(super) width: f64,
-    pub(super) height: f64,
-    pub(super) body: Markup,
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) body: Markup,
 }
 
 impl Figure {
@@ -67,7 +67,7 @@ impl Figure {
 
 /// A coordinate, to a tenth of a pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Px(pub(super) f64);
+pub(crate) struct Px(pub(crate) f64);
 
 impl Render for Px {
     fn render_to(&self, out: &mut String) {
@@ -79,7 +79,7 @@ impl Render for Px {
 }
 
 /// Points as the path's data: `M` to the first, `L` to the others.
-pub(super) fn path(points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(crate) fn path(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut data = String::new();
     for (x, y) in points {
         data.push(if data.is_empty() { 'M' } else { 'L' });
@@ -92,21 +92,21 @@ pub(super) fn path(points: impl IntoIterator<Item = (f64, f64)>) -> String {
 
 /// Where a plot's marks go: a rectangle, y upwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Area {
-    pub(super) left: f64,
-    pub(super) top: f64,
-    pub(super) width: f64,
-    pub(super) height: f64,
+pub(crate) struct Area {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) width: f64,
+    pub(crate) height: f64,
 }
 
 impl Area {
     /// The x of a place from 0 to 1.
-    pub(super) fn x(&self, place: f64) -> f64 {
+    pub(crate) fn x(&self, place: f64) -> f64 {
         self.left + place * self.width
     }
 
     /// The y of a place from 0 to 1.
-    pub(super) fn y(&self, place: f64) -> f64 {
+    pub(crate) fn y(&self, place: f64) -> f64 {
         self.top + (1.0 - place) * self.height
     }
 }

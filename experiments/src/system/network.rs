@@ -1,16 +1,19 @@
 //! The network-guided system, as scenarios see it: `[world]`, `[team]`, `[network]`.
 
 mod scene;
+mod site;
 
 use std::sync::Arc;
 
 use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
 use farside_worlds::movingai::{self, Builtin, GridMap, GridWorld, TaskList};
-use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, WorldError};
+use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, SensorNetwork, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use scene::NetworkScene;
+
+use crate::picture::Site;
 
 use super::{Conclude, Files, Goal, Results, Settings, Setup, SetupError, System};
 
@@ -60,16 +63,7 @@ impl Settings for NetworkScenario {
         }
         let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
         let roadmap = Arc::new(roadmap);
-        let sensors = self.world.place(&roadmap, setup.seed).map_err(|error| {
-            let key = match error {
-                SensorError::NodeCount { .. } => "world.nodes",
-                SensorError::Radius { .. } => "world.radius",
-                // Which of the two to change is the user's choice; the message suggests a radius.
-                _ if self.world.radius_m.is_some() => "world.radius",
-                _ => "world.nodes",
-            };
-            SetupError::value(key, error)
-        })?;
+        let sensors = place(&self.world, &roadmap, setup.seed)?;
         let (world, team, settings) = (&self.world, &self.team, &self.network);
         let (map, posts) = (roadmap.clone(), Arc::new(sensors));
         let links = &mut *setup.links;
@@ -99,14 +93,17 @@ impl Settings for NetworkScenario {
             for (name, place_m) in system.places_m() {
                 setup.links.place(name, place_m);
             }
-            // The built-in roadmaps lie in the default crater; of others the ground is not known.
-            if !self.world.roadmap.ends_with(".toml") && grid.is_none() {
-                let crater = Crater::generate(&CraterSettings::default())
-                    .map_err(|error| SetupError::value("world.roadmap", error))?;
-                setup.links.terrain(Arc::new(crater.terrain().clone()));
+            if in_crater(&self.world) {
+                setup.links.terrain(Arc::new(crater()?.terrain().clone()));
             }
         }
-        setup.scene = Some(Box::new(NetworkScene::new(map, posts, system.clone())));
+        let cycle = system.cycle();
+        setup.scene = Some(Box::new(NetworkScene::new(
+            map,
+            posts,
+            cycle,
+            system.clone(),
+        )));
         let watched = system.clone();
         setup.goal = Some(Goal {
             what: "rovers arrived",
@@ -127,6 +124,41 @@ impl Settings for NetworkScenario {
             results
         }))
     }
+
+    fn site(&self, seed: u64, files: &mut Files) -> Result<Option<Site>, SetupError> {
+        site::site(self, seed, files).map(Some)
+    }
+}
+
+/// The nodes.
+fn place(world: &WorldConfig, roadmap: &Roadmap, seed: u64) -> Result<SensorNetwork, SetupError> {
+    world.place(roadmap, seed).map_err(|error| {
+        let key = match error {
+            SensorError::NodeCount { .. } => "world.nodes",
+            SensorError::Radius { .. } => "world.radius",
+            // Which of the two to change is the user's choice; the message suggests a radius.
+            _ if world.radius_m.is_some() => "world.radius",
+            _ => "world.nodes",
+        };
+        SetupError::value(key, error)
+    })
+}
+
+/// Whether the roadmap lies in the default crater, as the built-in ones do; of others the ground is
+/// not known.
+fn in_crater(world: &WorldConfig) -> bool {
+    let name = &world.roadmap;
+    !name.ends_with(".toml") && !is_grid(name)
+}
+
+fn crater() -> Result<Crater, SetupError> {
+    let crater = Crater::generate(&CraterSettings::default());
+    crater.map_err(|error| SetupError::value("world.roadmap", error))
+}
+
+/// Whether the roadmap is a map of cells.
+fn is_grid(name: &str) -> bool {
+    name.ends_with(".map") || Builtin::find(name).is_some()
 }
 
 /// Where rovers drive, and what a map of cells adds.
@@ -139,8 +171,8 @@ struct Ground {
 fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground, SetupError> {
     let name = &world.roadmap;
     let wrong = |message: String| SetupError::value("world.roadmap", message);
-    if name.ends_with(".map") || Builtin::find(name).is_some() {
-        let grid = grid(world, rovers, files)?;
+    if is_grid(name) {
+        let (_, grid) = grid(world, rovers, files)?;
         let roadmap = grid.roadmap().clone();
         return Ok(Ground {
             roadmap,
@@ -176,8 +208,12 @@ fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground,
     Ok(plain(roadmap))
 }
 
-/// A MovingAI map with its tasks.
-fn grid(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<GridWorld, SetupError> {
+/// A MovingAI map, and the world that it makes with its tasks.
+fn grid(
+    world: &WorldConfig,
+    rovers: u32,
+    files: &mut Files,
+) -> Result<(GridMap, GridWorld), SetupError> {
     let name = &world.roadmap;
     let of_map = |message: String| SetupError::value("world.roadmap", message);
     let of_tasks = |message: String| SetupError::value("world.tasks", message);
@@ -200,10 +236,12 @@ fn grid(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<GridWorld
     let in_tasks = |error| of_tasks(format!("{tasks_name}: {error}"));
     let tasks = TaskList::from_movingai(&bytes).map_err(in_tasks)?;
     let first = tasks.first(rovers as usize).map_err(in_tasks)?;
-    GridWorld::new(map_name, &map, world.cell_m, first).map_err(|error| match error.line() {
+    let made = GridWorld::new(map_name, &map, world.cell_m, first);
+    let made = made.map_err(|error| match error.line() {
         Some(_) => in_tasks(error),
         None => in_map(error),
-    })
+    })?;
+    Ok((map, made))
 }
 
 /// Says whether rovers that stay at their goals are sure to arrive: only on well-formed instances.

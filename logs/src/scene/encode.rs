@@ -192,6 +192,7 @@ fn put_shapes(out: &mut Vec<u8>, shapes: &[Shape]) {
             }),
             Form::Lines {
                 points_m,
+                indices,
                 thickness_m,
             } => put_message(out, 11, |out| {
                 // Type 2: a list of separate lines.
@@ -202,6 +203,10 @@ fn put_shapes(out: &mut Vec<u8>, shapes: &[Shape]) {
                     put_doubles(out, 5, point);
                 }
                 put_doubles(out, 6, &shape.colour);
+                if !indices.is_empty() {
+                    let packed: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+                    put_bytes(out, 8, &packed);
+                }
             }),
             Form::Label { text, height_m } => put_message(out, 13, |out| {
                 place(out, 1);

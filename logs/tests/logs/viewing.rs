@@ -31,6 +31,7 @@ impl Scene for Masts {
             shapes: vec![
                 shape(Form::Lines {
                     points_m,
+                    indices: Vec::new(),
                     thickness_m: 0.1,
                 }),
                 shape(Form::Sphere { diameter_m: 0.5 }),

@@ -1,24 +1,30 @@
-//! The network-guided system as viewers draw it: the roadmap, the nodes, and rovers that drive.
+//! The network-guided system as viewers draw it: the roadmap in the colours of its nodes, the nodes,
+//! rovers that drive, and which of them are coordinated.
 //!
 //! All of it is told by committed samples: a rover's frame is placed when it sets out and when it
-//! arrives, and viewers move it in between.
+//! arrives, and viewers move it in between. The coordination graph is told as it is when a planning
+//! cycle begins, if it is another than in the cycle before.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
-use farside::RunInfo;
 use farside::record::{Record, RecordClass};
+use farside::{RunInfo, SimDuration};
 use farside_actors::network::Network;
 use farside_actors::network::messages::RoverState;
 use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
-use farside_worlds::{Roadmap, SensorNetwork, VertexId};
+use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+
+use crate::picture::colouring;
+use crate::picture::coordinated;
 
 /// The frame that everything is placed in.
 const MAP: &str = "map";
 
-const ROADS: [f64; 4] = [0.55, 0.5, 0.45, 1.0];
-const NODES: [f64; 4] = [0.25, 0.6, 0.95, 0.9];
+/// The entity of the coordination graph.
+const COORDINATION: &str = "coordination";
+const COORDINATED: [f64; 4] = [0.9, 0.9, 0.9, 0.25];
 const ROVERS: [f64; 4] = [0.95, 0.55, 0.1, 1.0];
 const NAMES: [f64; 4] = [1.0, 1.0, 1.0, 1.0];
 
@@ -31,12 +37,21 @@ pub(super) struct NetworkScene {
     /// By the number of the actor in the run; none for those that are no rovers.
     rovers: Vec<Option<Seen>>,
     collisions: u32,
+    /// Of each node.
+    colours: Vec<[f64; 4]>,
+    cycle_ns: u64,
+    /// The planning cycle.
+    cycle: u64,
+    /// The vertices that were last told of as held.
+    told: Vec<VertexId>,
 }
 
 /// A rover as it was last drawn.
 #[derive(Clone, Copy)]
 struct Seen {
     on_the_map: bool,
+    /// The vertex that it stands on, or drives to.
+    holds: Option<VertexId>,
     heading: [f64; 2],
 }
 
@@ -50,6 +65,7 @@ impl NetworkScene {
     pub(super) fn new(
         roadmap: Arc<Roadmap>,
         sensors: Arc<SensorNetwork>,
+        cycle: SimDuration,
         system: Arc<Network>,
     ) -> Self {
         let length = |&(u, v): &(VertexId, VertexId)| {
@@ -57,8 +73,17 @@ impl NetworkScene {
             (step.x * step.x + step.y * step.y).sqrt()
         };
         let shortest = roadmap.edges().iter().map(length).reduce(f64::min);
+        let colours = colouring::colours(&roadmap, &sensors).into_iter();
+        let colours = colours.map(|colour| {
+            let [red, green, blue] = colouring::RGB[colour];
+            [red, green, blue, 1.0]
+        });
         NetworkScene {
             scale_m: shortest.unwrap_or(1.0),
+            colours: colours.collect(),
+            cycle_ns: cycle.as_nanos().max(1),
+            cycle: 0,
+            told: Vec::new(),
             roadmap,
             sensors,
             system,
@@ -72,18 +97,82 @@ impl NetworkScene {
         [position.x, position.y, self.roadmap.height_m(vertex)]
     }
 
+    /// The edges in the colours of their ends' owners; what joins two territories is parted in its
+    /// middle.
     fn roads(&self) -> Drawing {
-        let ends = |&(u, v): &(VertexId, VertexId)| [self.place(u), self.place(v)];
-        let points_m = self.roadmap.edges().iter().flat_map(ends).collect();
-        let lines = Form::Lines {
-            points_m,
-            thickness_m: 0.06 * self.scale_m,
+        let mut of_nodes = vec![Vec::new(); self.sensors.len()];
+        for &(u, v) in self.roadmap.edges() {
+            let (from, to) = (self.place(u), self.place(v));
+            let (a, b) = (self.sensors.owner(u), self.sensors.owner(v));
+            if a == b {
+                of_nodes[a.0 as usize].extend([from, to]);
+            } else {
+                let middle = [0, 1, 2].map(|axis| 0.5 * (from[axis] + to[axis]));
+                of_nodes[a.0 as usize].extend([from, middle]);
+                of_nodes[b.0 as usize].extend([middle, to]);
+            }
+        }
+        let parts = of_nodes.into_iter().zip(&self.colours);
+        let part = |(points_m, colour): (Vec<[f64; 3]>, &[f64; 4])| {
+            let lines = Form::Lines {
+                points_m,
+                indices: Vec::new(),
+                thickness_m: 0.06 * self.scale_m,
+            };
+            shape(lines, [0.0; 3], *colour)
         };
         Drawing::Entity {
             id: "roadmap".to_owned(),
             frame: MAP.to_owned(),
-            shapes: vec![shape(lines, [0.0; 3], ROADS)],
+            shapes: parts.map(part).collect(),
         }
+    }
+
+    /// The vertices of each node, for viewers that draw no entities: a topic each, because they
+    /// colour by topic.
+    fn territories(&self) -> impl Iterator<Item = Drawing> {
+        self.system
+            .node_names()
+            .iter()
+            .zip(self.sensors.nodes())
+            .map(|(name, node)| {
+                let owned = self.sensors.owned(node).iter();
+                let places = owned.map(|v| Pose::at(self.place(*v))).collect();
+                poses(&format!("roadmap/{name}"), places)
+            })
+    }
+
+    /// The coordination graph (section 3.2) of the cycle that begins, if it is another than before:
+    /// lines between all pairs of rovers whose owners are the same node or neighbours.
+    fn coordinate(&mut self, out: &mut Vec<Drawing>) {
+        let holds = self.rovers.iter().flatten().filter_map(|seen| seen.holds);
+        let mut held: Vec<VertexId> = holds.collect();
+        held.sort_unstable();
+        if held == self.told {
+            return;
+        }
+        let mut indices = Vec::new();
+        for (i, u) in (0..).zip(&held) {
+            let others = (0..).zip(&held).skip(i as usize + 1);
+            let joined = others.filter(|(_, v)| coordinated(&self.sensors, *u, **v));
+            indices.extend(joined.flat_map(|(j, _)| [i, j]));
+        }
+        let id = COORDINATION.to_owned();
+        out.push(if indices.is_empty() {
+            Drawing::Remove { id }
+        } else {
+            let lines = Form::Lines {
+                points_m: held.iter().map(|v| self.place(*v)).collect(),
+                indices,
+                thickness_m: 0.02 * self.scale_m,
+            };
+            Drawing::Entity {
+                id,
+                frame: MAP.to_owned(),
+                shapes: vec![shape(lines, [0.0; 3], COORDINATED)],
+            }
+        });
+        self.told = held;
     }
 
     /// The nodes' places: as high as the nearest vertex, because heights are known at vertices.
@@ -99,9 +188,13 @@ impl NetworkScene {
         self.sensors.nodes().map(post).collect()
     }
 
-    fn node(&self, name: &str, [x, y, z]: [f64; 3]) -> Drawing {
+    fn node(&self, node: NodeId, name: &str, [x, y, z]: [f64; 3]) -> Drawing {
         let diameter_m = 0.4 * self.scale_m;
-        let ball = shape(Form::Sphere { diameter_m }, [x, y, z], NODES);
+        let ball = shape(
+            Form::Sphere { diameter_m },
+            [x, y, z],
+            self.colours[node.0 as usize],
+        );
         Drawing::Entity {
             id: name.to_owned(),
             frame: MAP.to_owned(),
@@ -134,6 +227,7 @@ impl NetworkScene {
     /// A rover's sample: where it is now, and which way it faces.
     fn follow(&self, name: &str, seen: &mut Seen, state: &RoverState, out: &mut Vec<Drawing>) {
         let whereabouts = &state.whereabouts;
+        seen.holds = whereabouts.moving_to.or(whereabouts.vertex);
         let Some(vertex) = whereabouts.vertex else {
             if seen.on_the_map {
                 seen.on_the_map = false;
@@ -183,18 +277,26 @@ impl Scene for NetworkScene {
         let seen = |entity: &farside::Entity| {
             names.contains(&entity.name).then_some(Seen {
                 on_the_map: false,
+                holds: None,
                 heading: [1.0, 0.0],
             })
         };
         self.rovers = run.entities.iter().map(seen).collect();
         out.push(self.roads());
         let posts = self.posts();
+        out.extend(self.territories());
         let nodes = self.system.node_names().iter().zip(&posts);
-        out.extend(nodes.map(|(name, post)| self.node(name, *post)));
+        let nodes = self.sensors.nodes().zip(nodes);
+        out.extend(nodes.map(|(node, (name, post))| self.node(node, name, *post)));
         out.push(poses("nodes", posts.into_iter().map(Pose::at).collect()));
     }
 
     fn record(&mut self, record: &Record<'_>, run: &RunInfo, out: &mut Vec<Drawing>) {
+        let cycle = record.time().as_nanos() / self.cycle_ns;
+        if cycle > self.cycle {
+            self.cycle = cycle;
+            self.coordinate(out);
+        }
         let name = run.name(record.receiver);
         match record.class {
             RecordClass::Crash => out.push(text(Level::Warning, name, "crashed")),
@@ -312,7 +414,7 @@ mod tests {
         );
         let system = Arc::new(system.unwrap());
         let drawings = Arc::new(Mutex::new(Vec::new()));
-        let scene = NetworkScene::new(roadmap, sensors, system.clone());
+        let scene = NetworkScene::new(roadmap, sensors, system.cycle(), system.clone());
         sim.observe(Show(scene, None, drawings.clone()));
         sim.stop_at(SimTime::ZERO + SimDuration::from_secs(120), "enough");
         sim.run(Executor::Inline).unwrap();

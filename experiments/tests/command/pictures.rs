@@ -1,0 +1,127 @@
+//! `farside draw`: what it draws, and what it refuses.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use farside::encoding::Schema;
+use farside_actors::network::messages::RoverState;
+use farside_logs::Log;
+
+use crate::common::{farside, text};
+
+const CROWD: [&str; 9] = [
+    "run",
+    "--set",
+    "team.rovers=60",
+    "--set",
+    "network.max_iterations=1",
+    "--until",
+    "25s",
+    "--out",
+    "run.mcap",
+];
+
+/// Draws, and gives back the picture.
+fn drawn(folder: &Path, more: &[&str]) -> String {
+    let output = farside(
+        folder,
+        &[&["draw", "run.mcap", "--out", "p.svg"], more].concat(),
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    std::fs::read_to_string(folder.join("p.svg")).unwrap()
+}
+
+/// Checks that every tag is closed, in order.
+fn assert_well_formed(svg: &str) {
+    let mut open = Vec::new();
+    for part in svg.split('<').skip(1) {
+        let (tag, after) = part.split_once('>').expect("a tag ends");
+        assert!(!after.contains('>'), "{after}");
+        match tag {
+            tag if tag.starts_with('?') || tag.ends_with('/') => {}
+            tag if tag.starts_with('/') => assert_eq!(open.pop(), Some(&tag[1..])),
+            tag => open.push(tag.split([' ', '\n']).next().unwrap()),
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+/// How many rovers are on the map at a time, by the log.
+fn on_the_map(log: &Path, at_ns: u64) -> usize {
+    let schema = Schema::of::<RoverState>().unwrap();
+    let mut last = BTreeMap::new();
+    for record in Log::open(log).unwrap().records().unwrap() {
+        let record = record.unwrap();
+        if record.topic.ends_with("/rover_state") && record.key.time_ns <= at_ns {
+            let state: RoverState = schema.decode(&record.body).unwrap();
+            last.insert(record.sender, state.whereabouts.vertex.is_some());
+        }
+    }
+    last.values().filter(|on| **on).count()
+}
+
+#[test]
+fn the_map_has_the_rovers_of_its_instant() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = farside(folder.path(), &CROWD);
+    assert!(
+        run.status.code().is_some_and(|code| code < 2),
+        "{}",
+        text(&run.stderr)
+    );
+    for (at, at_ns) in [("0s", 0), ("6.7s", 6_700_000_000), ("20s", 20_000_000_000)] {
+        let map = drawn(folder.path(), &["--at", at]);
+        assert_well_formed(&map);
+        let discs = map.matches("<circle class=\"rover disc").count();
+        assert_eq!(
+            discs,
+            on_the_map(&folder.path().join("run.mcap"), at_ns),
+            "{at}"
+        );
+    }
+    let corridor = drawn(folder.path(), &["--corridor", "auto"]);
+    assert_well_formed(&corridor);
+    assert!(corridor.contains("class=\"stand"));
+    assert_eq!(drawn(folder.path(), &["--corridor", "auto"]), corridor);
+    let refused = |more: &[&str], says: &str| {
+        let output = farside(folder.path(), &[&["draw", "run.mcap"], more].concat());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(
+            text(&output.stderr).contains(says),
+            "{}",
+            text(&output.stderr)
+        );
+    };
+    refused(&["--at", "1h"], "the run ended at 25");
+    refused(
+        &["--corridor", "99999"],
+        "has no vertex 99999: expected 0 to",
+    );
+    refused(&["--corridor", "a,b"], "expected auto, or vertices");
+    refused(&["--corridor", "1,2,1"], "through vertex");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("no.mcap"), "no log").unwrap();
+    let output = farside(folder.path(), &["draw", "no.mcap"]);
+    assert_eq!(output.status.code(), Some(2));
+    let run = [
+        "run",
+        "traffic/open-loop",
+        "--until",
+        "2s",
+        "--out",
+        "t.mcap",
+    ];
+    farside(folder.path(), &run);
+    let output = farside(folder.path(), &["draw", "t.mcap"]);
+    assert_eq!(output.status.code(), Some(2));
+    let says = "its system is \"traffic\", which has no roadmap";
+    assert!(
+        text(&output.stderr).contains(says),
+        "{}",
+        text(&output.stderr)
+    );
+}
