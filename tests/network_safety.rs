@@ -121,6 +121,11 @@ fn scenario() -> impl Strategy<Value = Scenario> {
             crashes,
             network: NetworkConfig {
                 acceleration_chains,
+                policy: if std::env::var("PC").is_ok() {
+                    farside_actors::network::Policy::Complete
+                } else {
+                    Default::default()
+                },
                 cycle_limit: 120,
                 ..NetworkConfig::default()
             },

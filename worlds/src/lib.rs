@@ -30,7 +30,7 @@ pub mod terrain;
 pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, ContactWindow};
 pub use crater::{Crater, CraterSettings, Hazard};
 pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
-pub use roadmap::{Endpoints, Roadmap, VertexId};
+pub use roadmap::{Endpoints, Roadmap, RoadmapTable, VertexId};
 pub use rocks::{Rock, RockAbundance};
 pub use sensors::{NodeId, SensorNetwork};
 pub use terrain::HeightField;

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::RoadmapError;
 pub(crate) use check::segments_meet;
 pub use endpoints::Endpoints;
+pub use file::RoadmapTable;
 
 /// The index of a vertex of a [`Roadmap`], from 0.
 ///

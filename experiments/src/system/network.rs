@@ -4,7 +4,9 @@ mod scene;
 
 use std::sync::Arc;
 
-use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
+use farside_actors::network::{
+    self, NetworkConfig, NetworkMetrics, RoadmapSource, TeamConfig, WorldConfig,
+};
 use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -90,7 +92,8 @@ impl Settings for NetworkScenario {
                 setup.links.place(name, place_m);
             }
             // The built-in roadmaps lie in the default crater; of others the ground is not known.
-            if !self.world.roadmap.ends_with(".toml") {
+            let named = Roadmap::builtin_names().contains(&self.world.roadmap.name());
+            if named {
                 let crater = Crater::generate(&CraterSettings::default())
                     .map_err(|error| SetupError::value("world.roadmap", error))?;
                 setup.links.terrain(Arc::new(crater.terrain().clone()));
@@ -107,9 +110,13 @@ impl Settings for NetworkScenario {
     }
 }
 
-/// The built-in roadmap, or the one in a file.
-fn roadmap(name: &str, files: &mut Files) -> Result<Roadmap, SetupError> {
+/// The built-in roadmap, the one in a file, or the one that the scenario has itself.
+fn roadmap(source: &RoadmapSource, files: &mut Files) -> Result<Roadmap, SetupError> {
     let wrong = |message: String| SetupError::value("world.roadmap", message);
+    if let Some(inline) = source.table() {
+        return inline.map_err(|error| wrong(error.to_string()));
+    }
+    let name = source.name();
     if !name.ends_with(".toml") {
         return Roadmap::builtin(name).map_err(|error| match error {
             WorldError::UnknownRoadmap { .. } => {
@@ -144,7 +151,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -157,6 +164,7 @@ const KEYS: [&str; 12] = [
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",
+    "network.sabotage",
 ];
 
 fn results(metrics: &NetworkMetrics) -> Results {
