@@ -9,6 +9,7 @@ mod endpoints;
 mod file;
 
 use std::collections::VecDeque;
+use std::fmt;
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,12 @@ pub use file::RoadmapTable;
 )]
 #[serde(transparent)]
 pub struct VertexId(pub u32);
+
+impl fmt::Display for VertexId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 /// The most vertices a roadmap may have (its distance table then takes 8 MB).
 pub const MAX_VERTICES: usize = 2048;

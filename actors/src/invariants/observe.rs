@@ -428,3 +428,71 @@ impl<V: Copy + Ord> Watch<V> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(place: Place<u32>, waits: Waits<u32>) -> Seen<u32> {
+        Seen {
+            place,
+            waits,
+            done: false,
+        }
+    }
+
+    fn at(second: u64) -> SimTime {
+        SimTime::from_nanos(second * 1_000_000_000)
+    }
+
+    const WINDOW: SimDuration = SimDuration::from_secs(5);
+
+    #[test]
+    fn a_circle_is_found_while_others_drive_and_told_once() {
+        let mut watch = Watch::default();
+        let [a, b, c] = ["a", "b", "c"].map(|name| watch.add(name, at(0)));
+        watch.update(at(1), a, seen(Place::At(1), Waits::ForVertex(2)));
+        watch.update(
+            at(2),
+            b,
+            seen(Place::At(2), Waits::ForAgents(vec!["a".to_owned()])),
+        );
+        for second in 2..12 {
+            watch.update(
+                at(second),
+                c,
+                seen(Place::At(second as u32 + 10), Waits::ForNobody),
+            );
+            let found = watch.standstill(at(second), WINDOW);
+            assert_eq!(found.is_some(), second == 7, "at {second} s");
+            if let Some(found) = found {
+                let text = "standstill since 2s: a at 1 waits for b at 2, which waits for a";
+                assert_eq!(found.to_string(), text);
+                assert_eq!((found.noticed, found.left), (at(7), 3));
+            }
+        }
+        // It breaks up and forms anew: that is another one.
+        watch.update(at(12), b, seen(Place::At(2), Waits::ForNobody));
+        assert_eq!(watch.standstill(at(12), WINDOW), None);
+        watch.update(at(13), b, seen(Place::At(2), Waits::ForVertex(1)));
+        watch.update(at(17), c, seen(Place::At(9), Waits::ForNobody));
+        assert_eq!(watch.standstill(at(17), WINDOW), None);
+        assert_eq!(watch.standstill(at(18), WINDOW).unwrap().since, at(13));
+    }
+
+    #[test]
+    fn a_team_that_rests_without_a_circle_is_found_and_those_who_are_done_are_not() {
+        let mut watch = Watch::default();
+        let (a, b) = (watch.add("a", at(0)), watch.add("b", at(0)));
+        watch.update(at(1), a, seen(Place::At(1), Waits::ForVertex(2)));
+        let done = Seen {
+            done: true,
+            ..seen(Place::At(2), Waits::ForVertex(1))
+        };
+        watch.update(at(3), b, done);
+        assert_eq!(watch.standstill(at(7), WINDOW), None);
+        let found = watch.standstill(at(8), WINDOW).unwrap();
+        assert_eq!((found.since, found.left, found.cycles.len()), (at(3), 1, 0));
+        assert_eq!(watch.standstill(at(20), WINDOW), None, "told once");
+    }
+}

@@ -105,26 +105,33 @@ fn cut_grids(vertices: usize) -> impl Strategy<Value = Roadmap> {
     let most = vertices.max(4) as u32;
     let size =
         (2..=6.min(most / 2)).prop_flat_map(move |columns| (Just(columns), 2..=most / columns));
-    (size, any::<u64>()).prop_map(|((columns, rows), cuts)| {
-        let count = columns * rows;
-        let cells: Vec<(i32, i32)> = (0..count)
-            .map(|i| ((i % columns) as i32, (i / columns) as i32))
-            .collect();
-        let right = (0..count)
-            .filter(|i| (i + 1) % columns != 0)
-            .map(|i| (i, i + 1));
-        let up = (0..count - columns).map(|i| (i, i + columns));
-        let mut edges: Vec<(u32, u32)> = right.chain(up).collect();
-        for (bit, edge) in edges.clone().into_iter().enumerate() {
-            if cuts >> (bit % 64) & 1 == 1 {
-                let fewer: Vec<_> = edges.iter().copied().filter(|&e| e != edge).collect();
-                if on_lattice("grid", &cells, &fewer).is_some() {
-                    edges = fewer;
-                }
+    (size, any::<u64>()).prop_map(|((columns, rows), cuts)| cut_grid(columns, rows, cuts))
+}
+
+/// A grid of at least 2 x 1 vertices, row by row, without those of its edges that `cuts` has a bit
+/// for, as far as it hangs together without them: trees, loops, corridors.
+///
+/// # Panics
+/// When there are fewer vertices, or more than a roadmap may have.
+pub fn cut_grid(columns: u32, rows: u32, cuts: u64) -> Roadmap {
+    let count = columns * rows;
+    let cells: Vec<(i32, i32)> = (0..count)
+        .map(|i| ((i % columns) as i32, (i / columns) as i32))
+        .collect();
+    let right = (0..count)
+        .filter(|i| (i + 1) % columns != 0)
+        .map(|i| (i, i + 1));
+    let up = (0..count - columns).map(|i| (i, i + columns));
+    let mut edges: Vec<(u32, u32)> = right.chain(up).collect();
+    for (bit, edge) in edges.clone().into_iter().enumerate() {
+        if cuts >> (bit % 64) & 1 == 1 {
+            let fewer: Vec<_> = edges.iter().copied().filter(|&e| e != edge).collect();
+            if on_lattice("grid", &cells, &fewer).is_some() {
+                edges = fewer;
             }
         }
-        on_lattice("grid", &cells, &edges).expect("the whole grid hangs together")
-    })
+    }
+    on_lattice("grid", &cells, &edges).expect("the whole grid hangs together")
 }
 
 /// The roadmap of these cells; none if it falls apart. A cell next to a free one is on the boundary.

@@ -150,6 +150,9 @@ fn key_of(error: &network::NetworkError) -> &'static str {
     }
 }
 
+/// The most collisions that are named where a run is called wrong.
+const NAMED_IN_A_LINE: usize = 3;
+
 /// The keys of `[network]` that have ranges.
 const KEYS: [&str; 13] = [
     "network.cycle",
@@ -166,6 +169,18 @@ const KEYS: [&str; 13] = [
     "network.cycle_limit",
     "network.sabotage",
 ];
+
+/// How many collisions there were, and the first of them by name.
+fn violation(metrics: &NetworkMetrics) -> String {
+    let count = metrics.collisions as usize;
+    let named = metrics.collided.iter().take(NAMED_IN_A_LINE);
+    let first: Vec<String> = named.map(ToString::to_string).collect();
+    let rest = match count - first.len().min(count) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    };
+    format!("{count} collisions: {}{rest}", first.join("; "))
+}
 
 fn results(metrics: &NetworkMetrics) -> Results {
     let mut results = Results::default();
@@ -184,6 +199,12 @@ fn results(metrics: &NetworkMetrics) -> Results {
     let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
     let deadlock = deadlock.unwrap_or("unknown").to_owned();
     line("deadlock", deadlock);
+    if let Some(shortest) = metrics.wait_cycles.first() {
+        line("circles of rovers", metrics.wait_cycles.len().to_string());
+        line("the shortest", shortest.to_string());
+    } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
+        line("standstill", why.to_owned());
+    }
     line("planning cycles", metrics.cycles.to_string());
     if metrics.arrived > 0 {
         line("time ratio", format!("{:.2}", metrics.time_ratio));
@@ -191,8 +212,7 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("stops per rover", format!("{:.1}", metrics.mean_stops));
     }
     if metrics.collisions > 0 {
-        let count = metrics.collisions;
-        results.violations.push(format!("{count} collisions"));
+        results.violations.push(violation(metrics));
     }
     results
 }
