@@ -10,12 +10,11 @@ use farside::prelude::*;
 use farside_actors::invariants::strategies::{Bounds, cases, cut_grid};
 use farside_actors::invariants::{Case, Downtime};
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Policy, RoadmapSource, Sabotage, TeamConfig,
-    WorldConfig,
+    Deadlock, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
 };
 use farside_experiments::scenario::Scenario;
 use farside_experiments::system::{Files, Registry, Results};
-use farside_worlds::{RoadmapTable, VertexId};
+use farside_worlds::VertexId;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
@@ -195,7 +194,7 @@ fn plain(seed: u64) -> Case {
     Case {
         seed,
         world: WorldConfig {
-            roadmap: RoadmapSource::Inline(Box::new(RoadmapTable::from(&map))),
+            roadmap: (&map).into(),
             nodes: 4,
             radius_m: Some(100.0),
             ..WorldConfig::default()

@@ -18,13 +18,13 @@
 //! ```
 
 use farside::SimDuration;
-use farside_worlds::{Endpoints, Roadmap, RoadmapTable, SensorNetwork, VertexId};
+use farside_worlds::{Endpoints, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point2;
 use proptest::prelude::*;
 
 use super::case::{Case, Downtime};
 use crate::link::{Degrade, LinkOverrides, LinkParams};
-use crate::network::{RoadmapSource, TeamConfig, WorldConfig};
+use crate::network::{TeamConfig, WorldConfig};
 
 /// How large and how bad cases may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,7 +165,7 @@ pub fn worlds(
         |(map, nodes, radius_m, endpoints, seed)| {
             let (nodes, radius_m) = feasible(&map, nodes as usize, radius_m, seed);
             WorldConfig {
-                roadmap: RoadmapSource::Inline(Box::new(RoadmapTable::from(&map))),
+                roadmap: (&map).into(),
                 nodes: nodes as u32,
                 radius_m: Some(f64::from(radius_m)),
                 endpoints,

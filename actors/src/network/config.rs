@@ -44,7 +44,7 @@ pub struct WorldConfig {
 impl Default for WorldConfig {
     fn default() -> Self {
         WorldConfig {
-            roadmap: RoadmapSource::Named("crater-dense".to_owned()),
+            roadmap: "crater-dense".into(),
             nodes: 28,
             radius_m: None,
             endpoints: Endpoints::default(),
@@ -88,6 +88,18 @@ impl RoadmapSource {
             RoadmapSource::Named(_) => None,
             RoadmapSource::Inline(table) => Some(table.build(self.name())),
         }
+    }
+}
+
+impl From<&str> for RoadmapSource {
+    fn from(name: &str) -> Self {
+        RoadmapSource::Named(name.to_owned())
+    }
+}
+
+impl From<&Roadmap> for RoadmapSource {
+    fn from(map: &Roadmap) -> Self {
+        RoadmapSource::Inline(Box::new(RoadmapTable::from(map)))
     }
 }
 
