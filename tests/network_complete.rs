@@ -56,7 +56,7 @@ fn queued(
     radio: Radio,
     config: &NetworkConfig,
 ) -> (Simulation, Network) {
-    let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+    let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
     let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
     let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
@@ -121,7 +121,7 @@ fn all_endpoints_on_both_roadmaps() {
             Endpoints::WestToEast,
         ] {
             let world = WorldConfig {
-                roadmap: map.to_owned(),
+                roadmap: map.into(),
                 endpoints,
                 nodes: 21,
                 ..WorldConfig::default()
@@ -192,7 +192,7 @@ fn the_references_plan_is_driven() {
     sim.run(Executor::Inline).unwrap();
     let metrics = network.metrics();
     all_arrive(&metrics);
-    let roadmap = Roadmap::builtin(&world.roadmap).unwrap();
+    let roadmap = Roadmap::builtin(world.roadmap.name()).unwrap();
     let all = missions(&world, &roadmap, &TeamConfig { rovers: 60 }, 4).unwrap();
     let all = all.into_iter().map(|(a, b)| Mission::new(a, b)).collect();
     let problem = Problem::new(&roadmap, all, Rules::Queues).unwrap();

@@ -76,7 +76,7 @@ struct Run {
 /// `rovers` on the dense roadmap over links of `latency` that lose nothing.
 fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run, NetworkError> {
     let (world, seed) = (WorldConfig::default(), 3);
-    let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+    let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
     let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
     let wire = FixedDelay::new(latency);

@@ -1,306 +1,261 @@
-//! No collision, whatever the links and the faults: random roadmaps, teams and seeds, loss from
-//! 0 to 100 %, latency of several cycles, duplicates, reordering, degradations, crashes and restarts.
-//! And that the test can fail: with a rule of the safety protocol broken, the monitor turns red
-//! (the last two tests; setting `network.sabotage` in `scenario` shows a shrunk case).
+//! No collision, whatever the links and the faults, with either policy: random roadmaps, teams and
+//! seeds, loss from 0 to 100 %, latency of several cycles, duplicates, reordering, degradations,
+//! crashes and restarts. With the `complete` policy all arrive, as long as something gets through.
+//! And that the tests can fail: with a rule of the safety protocol broken they do, and say so in a
+//! scenario of a few lines.
 
-use std::sync::Arc;
+use std::cell::Cell;
 
-use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
+use farside_actors::invariants::strategies::{Bounds, cases, cut_grid};
+use farside_actors::invariants::{Case, Downtime};
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Sabotage, TeamConfig, WorldConfig, assemble,
+    Deadlock, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
 };
-use farside_worlds::{Endpoints, Roadmap, VertexId};
-use nalgebra::Point2;
+use farside_experiments::scenario::Scenario;
+use farside_experiments::system::{Files, Registry, Results};
+use farside_worlds::VertexId;
 use proptest::prelude::*;
+use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
-/// A link that delays, reorders, loses and repeats; worse in the middle of the run.
-#[derive(Clone, Debug)]
-struct Bad {
-    latency_ms: u64,
-    jitter_ms: u64,
-    loss: f64,
-    duplicates: f64,
-    /// Between these seconds everything is lost.
-    outage_s: (u64, u64),
-}
-
-impl Bad {
-    fn good() -> Bad {
-        Bad {
-            latency_ms: 5,
-            jitter_ms: 0,
-            loss: 0.0,
-            duplicates: 0.0,
-            outage_s: (0, 0),
-        }
+/// What every property here is tried on.
+fn config(cases: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases,
+        failure_persistence: None,
+        max_shrink_iters: 4000,
+        ..ProptestConfig::default()
     }
 }
 
-impl Carrier for Bad {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        SimDuration::from_millis(self.latency_ms)
-    }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        let second = parcel.now().as_nanos() / 1_000_000_000;
-        if (self.outage_s.0..self.outage_s.1).contains(&second) {
-            return verdicts.lose("outage");
-        }
-        if parcel.random(0, 0, 0).uniform() < self.loss {
-            return verdicts.lose("loss");
-        }
-        let delay = |copy| {
-            let share = parcel.random(1, 0, copy).uniform();
-            SimDuration::from_secs_f64(
-                (self.latency_ms as f64 + share * self.jitter_ms as f64) / 1e3,
-            )
-        };
-        verdicts.deliver(delay(0));
-        if parcel.random(2, 0, 0).uniform() < self.duplicates {
-            verdicts.deliver(delay(1));
-        }
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
-}
-
-/// A small world and what goes wrong in it. All small numbers, so that it shrinks well.
-#[derive(Clone, Debug)]
-struct Scenario {
-    seed: u64,
-    columns: u32,
-    rows: u32,
-    /// Edges of the grid are left out by these bits, as long as it stays connected.
-    cuts: u64,
-    nodes: u32,
-    rovers: u32,
-    endpoints: Endpoints,
-    link: Bad,
-    /// (second, tenths until the restart, who).
-    crashes: Vec<(u64, u64, u32)>,
-    network: NetworkConfig,
-}
-
-fn scenario() -> impl Strategy<Value = Scenario> {
-    let world = (1..1000u64, 2..6u32, 2..5u32, any::<u64>(), 1..6u32, 1..9u32);
-    let endpoints = prop_oneof![
-        Just(Endpoints::Alternating),
-        Just(Endpoints::AnyToAny),
-        Just(Endpoints::WestToEast)
-    ];
-    let loss = prop_oneof![Just(0.0), 0.0..0.5, 0.5..=1.0];
-    let latency = prop_oneof![Just(5u64), 1..100u64, 100..3000u64];
-    let link = (
-        latency,
-        prop_oneof![Just(0u64), 0..2000u64],
-        loss,
-        0.0..0.5,
-        0..40u64,
-        0..10u64,
-    );
-    let crashes = prop::collection::vec((1..40u64, 1..80u64, 0..12u32), 0..6);
-    (world, endpoints, link, crashes, any::<bool>()).prop_map(
-        |(world, endpoints, link, crashes, acceleration_chains)| Scenario {
-            seed: world.0,
-            columns: world.1,
-            rows: world.2,
-            cuts: world.3,
-            nodes: world.4,
-            rovers: world.5,
-            endpoints,
-            link: Bad {
-                latency_ms: link.0,
-                jitter_ms: link.1,
-                loss: link.2,
-                duplicates: link.3,
-                outage_s: (link.4, link.4 + link.5),
-            },
-            crashes,
-            network: NetworkConfig {
-                acceleration_chains,
-                cycle_limit: 120,
-                ..rigid()
-            },
-        },
-    )
-}
-
-/// Phases that do not stretch with latency, so that messages come cycles late.
-fn rigid() -> NetworkConfig {
-    NetworkConfig {
-        cycle: Some(SimDuration::from_secs(1)),
-        exchange: Some(SimDuration::from_millis(50)),
-        optimisation: Some(SimDuration::from_millis(500)),
-        iteration_timeout: Some(SimDuration::from_millis(20)),
-        ..NetworkConfig::default()
-    }
-}
-
-/// A connected grid with some edges cut out: trees, loops, corridors.
-fn roadmap(columns: u32, rows: u32, cuts: u64) -> Roadmap {
-    let count = columns * rows;
-    let at = |i: u32| Point2::new(f64::from(i % columns) * 10.0, f64::from(i / columns) * 10.0);
-    let rim = |i: &u32| {
-        let (x, y) = (i % columns, i / columns);
-        x == 0 || y == 0 || x + 1 == columns || y + 1 == rows
+/// A case as it comes, but with this policy, and with an end.
+fn with_policy(mut case: Case, policy: Policy) -> Case {
+    case.network.policy = policy;
+    (case.network.passive_window, case.network.cycle_limit) = match policy {
+        Policy::Paper => (20, 120),
+        // A walk over links that are seconds late takes its time before the first rover enters.
+        _ => (60, 200),
     };
-    let build = |edges: &[(u32, u32)]| {
-        Roadmap::new(
-            "cut grid",
-            (0..count).map(at).collect(),
-            edges
-                .iter()
-                .map(|&(a, b)| (VertexId(a), VertexId(b)))
-                .collect(),
-            (0..count).filter(rim).map(VertexId).collect(),
-        )
-    };
-    let right = (0..count)
-        .filter(|i| (i + 1) % columns != 0)
-        .map(|i| (i, i + 1));
-    let up = (0..count - columns).map(|i| (i, i + columns));
-    let mut edges: Vec<_> = right.chain(up).collect();
-    for (bit, edge) in edges.clone().into_iter().enumerate() {
-        if cuts >> (bit % 64) & 1 == 1 {
-            let fewer: Vec<_> = edges.iter().copied().filter(|&e| e != edge).collect();
-            if build(&fewer).is_ok() {
-                edges = fewer;
-            }
-        }
-    }
-    build(&edges).expect("the whole grid is connected")
+    // Phases that do not stretch with latency, so that messages come cycles late.
+    case.network.cycle = Some(SimDuration::from_secs(1));
+    case.network.exchange = Some(SimDuration::from_millis(50));
+    case.network.optimisation = Some(SimDuration::from_millis(500));
+    case.network.iteration_timeout = Some(SimDuration::from_millis(20));
+    case
 }
 
-fn run(scenario: &Scenario) -> (NetworkMetrics, Report) {
-    run_on(scenario, Executor::Inline)
+fn any_policy() -> impl Strategy<Value = Case> {
+    let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
+    (cases(Bounds::default()), policy, any::<bool>()).prop_map(|(case, policy, chains)| {
+        let mut case = with_policy(case, policy);
+        case.network.acceleration_chains = chains;
+        case
+    })
 }
 
-fn run_on(scenario: &Scenario, executor: Executor) -> (NetworkMetrics, Report) {
-    let map = Arc::new(roadmap(scenario.columns, scenario.rows, scenario.cuts));
-    let world = WorldConfig {
-        nodes: scenario.nodes.min(map.len() as u32),
-        radius_m: Some(100.0),
-        endpoints: scenario.endpoints,
-        ..WorldConfig::default()
-    };
-    let sensors = Arc::new(world.place(&map, scenario.seed).expect("everyone in range"));
-    let team = TeamConfig {
-        rovers: scenario.rovers,
-    };
-    let mut sim = Simulation::new(scenario.seed);
-    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-        sim.link(a, b, &format!("{from}-{to}"), scenario.link.clone());
-    };
-    let (settings, seed) = (&scenario.network, scenario.seed);
-    let network = assemble(
-        &mut sim,
-        &world,
-        map,
-        sensors,
-        &team,
-        settings,
-        seed,
-        &mut connect,
-    )
-    .unwrap();
-    let names: Vec<_> = network
-        .node_names()
-        .iter()
-        .chain(network.rover_names())
-        .collect();
-    for &(second, tenths, who) in &scenario.crashes {
-        let name = names[who as usize % names.len()];
-        // Off the cycle's own instants, so that crashes fall between any two events.
-        let down = SimTime::ZERO + SimDuration::from_millis(second * 1000 + tenths * 97 % 1000);
-        network.crash_at(&mut sim, down, name).unwrap();
-        network
-            .restart_at(
-                &mut sim,
-                down + SimDuration::from_millis(tenths * 100),
-                name,
-            )
-            .unwrap();
-    }
-    let report = sim.run(executor).unwrap();
+fn run(case: &Case) -> (NetworkMetrics, Report) {
+    let (metrics, report) = case.run(Executor::Inline).expect("the case makes sense");
     assert_eq!(report.end.name(), "stopped", "{}", report.end.detail());
-    (network.metrics(), report)
+    (metrics, report)
 }
 
-fn plain(seed: u64) -> Scenario {
-    Scenario {
-        seed,
-        columns: 5,
-        rows: 4,
-        cuts: 0x2d5a_96b4_c3a5_1e78,
-        nodes: 4,
-        rovers: 6,
-        endpoints: Endpoints::Alternating,
-        link: Bad::good(),
-        crashes: Vec::new(),
-        network: rigid(),
+/// With how many seeds each case is tried.
+const SEEDS: u64 = 8;
+
+/// The case with the first of its seeds with which rovers collide.
+fn collides(case: &Case) -> Option<Case> {
+    let mut seeded = case.seeds(SEEDS);
+    seeded.find(|case| run(case).0.collisions > 0)
+}
+
+/// The property: nobody collides.
+fn no_collision(case: &Case) -> Result<(), TestCaseError> {
+    match collides(case) {
+        None => Ok(()),
+        Some(case) => Err(TestCaseError::fail(format!("a collision in\n\n{case}"))),
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(256))]
 
     #[test]
-    fn rovers_never_collide(scenario in scenario()) {
-        let (metrics, report) = run(&scenario);
-        prop_assert_eq!(metrics.collisions, 0, "{}", report.end.detail());
+    fn rovers_never_collide(case in any_policy()) {
+        no_collision(&case)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(config(64))]
+
+    /// Liveness: half of the messages lost, latencies of more than a cycle, outages, nodes and rovers
+    /// that crash and come back.
+    #[test]
+    fn with_the_complete_policy_all_arrive(case in cases(Bounds {
+        loss_percent: 50,
+        latency: SimDuration::from_millis(1500),
+        ..Bounds::default()
+    })) {
+        let mut case = case;
+        case.network = NetworkConfig {
+            policy: Policy::Complete,
+            passive_window: 2000,
+            active_window: 4000,
+            cycle_limit: 20_000,
+            ..NetworkConfig::default()
+        };
+        let (metrics, report) = run(&case);
+        prop_assert!(metrics.completed, "{}", report.end.detail());
+        prop_assert_eq!(metrics.collisions, 0);
+    }
+}
+
+/// Reads a printed case as the command line does, and runs it.
+fn run_as_scenario(text: &str, sets: &[String]) -> (Results, Report) {
+    let files = Files::on_disk(std::path::PathBuf::new());
+    let scenario = Scenario::parse(
+        "printed.toml",
+        text.to_owned(),
+        sets,
+        &Registry::builtin(),
+        files,
+    );
+    let scenario = scenario.unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let assembled = scenario.assemble().expect("it makes sense");
+    let report = assembled.sim.run(Executor::Inline).expect("it starts");
+    ((assembled.conclude)(&report), report)
+}
+
+proptest! {
+    #![proptest_config(config(48))]
+
+    #[test]
+    fn what_a_case_prints_is_a_scenario_that_does_the_same(case in any_policy()) {
+        let mut case = case;
+        case.network.cycle_limit = 25;
+        let (metrics, report) = run(&case);
+        let (results, again) = run_as_scenario(&case.to_string(), &[]);
+        prop_assert_eq!(report, again);
+        let metrics = serde_json::to_value(metrics).expect("plain numbers");
+        prop_assert_eq!(metrics, serde_json::Value::Object(results.metrics));
+    }
+}
+
+/// The property above with a rule broken: "a vertex counts as occupied until its occupant is heard to
+/// have left". The cases are the first of a fixed sequence, so that this does not depend on luck.
+#[test]
+fn freeing_a_vertex_before_it_is_heard_free_is_found_and_shrinks() {
+    for policy in [Policy::Paper, Policy::Complete] {
+        let broken = any_policy().prop_map(move |case| {
+            let mut case = with_policy(case, policy);
+            case.network.sabotage = Sabotage::FreeOnGrant;
+            case
+        });
+        let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+        let mut runner = TestRunner::new_with_rng(config(256), rng);
+        let (tried, found_after) = (Cell::new(0), Cell::new(None));
+        let found = runner.run(&broken, |case| {
+            tried.set(tried.get() + 1);
+            let result = no_collision(&case);
+            if result.is_err() && found_after.get().is_none() {
+                found_after.set(Some(tried.get()));
+            }
+            result
+        });
+        let Err(TestError::Fail(_, case)) = found else {
+            panic!("{policy:?}: no collision in 256 cases, though the rule is broken");
+        };
+        let case = collides(&case).expect("it did a moment ago");
+        let found_after = found_after.get().unwrap_or_default();
+        println!("{policy:?}, found with case {found_after}, shrunk:\n\n{case}");
+        assert!(case.team.rovers <= 3, "{case}");
+        assert!(case.to_string().lines().count() <= 25, "{case}");
+        let (results, _) = run_as_scenario(&case.to_string(), &[]);
+        assert_eq!(results.violations.len(), 1, "{case}");
+        let sound = ["network.sabotage=none".to_owned()];
+        let (results, _) = run_as_scenario(&case.to_string(), &sound);
+        assert!(results.violations.is_empty(), "{case}");
+    }
+}
+
+/// The scenario in the documentation of `farside_actors::invariants`.
+#[test]
+fn the_scenario_in_the_docs_collides_because_of_the_broken_rule() {
+    let text = include_str!("../actors/src/invariants/freed-on-grant.toml");
+    let (results, _) = run_as_scenario(text, &[]);
+    let violation = results.violations.join("\n");
+    assert_eq!(
+        violation,
+        "1 collisions: rover_02 met rover_01 at vertex 0 at 1.704587464s"
+    );
+    let (results, _) = run_as_scenario(text, &["network.sabotage=none".to_owned()]);
+    assert!(results.violations.is_empty());
+    assert_eq!(results.metrics["collisions"], 0);
+}
+
+/// A grid with loops and dead ends, four nodes, six rovers, links without faults.
+fn plain(seed: u64) -> Case {
+    let map = cut_grid(5, 4, 0x2d5a_96b4_c3a5_1e78);
+    Case {
+        seed,
+        world: WorldConfig {
+            roadmap: (&map).into(),
+            nodes: 4,
+            radius_m: Some(100.0),
+            ..WorldConfig::default()
+        },
+        team: TeamConfig { rovers: 6 },
+        ..Case::default()
+    }
+}
+
+fn down(actor: &str, at_ms: u64, for_ms: Option<u64>) -> Downtime {
+    Downtime {
+        actor: actor.to_owned(),
+        at: SimDuration::from_millis(at_ms),
+        restart_after: for_ms.map(SimDuration::from_millis),
     }
 }
 
 #[test]
 fn with_everything_lost_nobody_moves_and_the_run_ends() {
-    let mut scenario = plain(3);
-    scenario.link.loss = 1.0;
-    let (metrics, report) = run(&scenario);
+    let mut case = plain(3);
+    case.link.loss = 1.0;
+    let (metrics, report) = run(&case);
     assert_eq!((metrics.arrived, metrics.collisions), (0, 0));
     assert_eq!(metrics.deadlock, Deadlock::Passive);
+    assert!(metrics.wait_cycles.is_empty(), "all are in their queues");
+    let detail = report.end.detail();
     assert!(
-        report
-            .end
-            .detail()
-            .contains("passive deadlock: 6 rovers left")
+        detail.contains("passive deadlock: 6 rovers left"),
+        "{detail}"
     );
 }
 
 #[test]
 fn with_a_third_lost_all_arrive() {
     for seed in 1..=5 {
-        let mut scenario = plain(seed);
-        scenario.rovers = 3;
-        scenario.link.loss = 0.3;
-        let (metrics, report) = run(&scenario);
-        assert_eq!(
-            (metrics.arrived, metrics.collisions),
-            (3, 0),
-            "{}",
-            report.end.detail()
-        );
+        let mut case = plain(seed);
+        case.team.rovers = 3;
+        case.link.loss = 0.3;
+        let (metrics, report) = run(&case);
+        let found = (metrics.arrived, metrics.collisions);
+        assert_eq!(found, (3, 0), "{}", report.end.detail());
     }
 }
 
 #[test]
 fn a_latency_of_several_cycles_slows_down_and_does_not_stop() {
-    let mut scenario = plain(1);
-    scenario.rovers = 2;
-    scenario.link.latency_ms = 2300;
-    scenario.link.jitter_ms = 900;
-    scenario.network.passive_window = 40;
-    let (slow, report) = run(&scenario);
-    assert_eq!(
-        (slow.arrived, slow.collisions),
-        (2, 0),
-        "{}",
-        report.end.detail()
-    );
-    scenario.link = Bad::good();
-    let (fast, _) = run(&scenario);
+    let mut case = plain(1);
+    case.team.rovers = 2;
+    case.link.latency = SimDuration::from_millis(2700);
+    case.link.jitter = SimDuration::from_millis(450);
+    case.network.passive_window = 40;
+    let (slow, report) = run(&case);
+    let found = (slow.arrived, slow.collisions);
+    assert_eq!(found, (2, 0), "{}", report.end.detail());
+    case.link = plain(1).link;
+    let (fast, _) = run(&case);
     assert!(
         slow.cycles > 3 * fast.cycles,
         "{} and {}",
@@ -311,34 +266,30 @@ fn a_latency_of_several_cycles_slows_down_and_does_not_stop() {
 
 #[test]
 fn a_rover_that_is_gone_for_good_is_named() {
-    let mut scenario = plain(2);
-    scenario.rovers = 1;
-    // Nothing restarts it within the run.
-    scenario.crashes = vec![(3, 1_000_000, scenario.nodes)];
-    let (metrics, report) = run(&scenario);
+    let mut case = plain(2);
+    case.team.rovers = 1;
+    case.crash = vec![down("rover_01", 3000, None)];
+    let (metrics, report) = run(&case);
     assert_eq!(metrics.deadlock, Deadlock::Passive);
-    assert!(
-        report.end.detail().contains("rover_01 at vertex"),
-        "{}",
-        report.end.detail()
-    );
+    assert!(metrics.wait_cycles.is_empty(), "it waits for nobody");
+    let detail = report.end.detail();
+    assert!(detail.contains("rover_01 at vertex"), "{detail}");
 }
 
 #[test]
 fn threads_change_nothing() {
-    let mut scenario = plain(7);
-    scenario.rovers = 12;
-    scenario.link = Bad {
-        jitter_ms: 30,
-        loss: 0.1,
-        duplicates: 0.1,
-        ..Bad::good()
-    };
-    scenario.crashes = vec![(2, 30, 1), (4, 15, 6)];
-    let (metrics, report) = run(&scenario);
-    assert_eq!(run(&scenario), (metrics.clone(), report.clone()));
+    let mut case = plain(7);
+    case.team.rovers = 12;
+    case.link.jitter = SimDuration::from_millis(4);
+    (case.link.loss, case.link.duplicate) = (0.1, 0.1);
+    case.crash = vec![
+        down("node_02", 2000, Some(3000)),
+        down("rover_03", 4000, Some(1500)),
+    ];
+    let alone = run(&case);
+    assert_eq!(run(&case), alone);
     let threads = Executor::Kameo { threads: 2 };
-    assert_eq!(run_on(&scenario, threads), (metrics, report));
+    assert_eq!(case.run(threads).expect("it starts"), alone);
 }
 
 /// The monitor notices if a rule is broken: owners that grant an occupied vertex now and then.
@@ -356,10 +307,78 @@ fn moving_without_a_grant_is_noticed() {
 /// Whether one of a hundred small runs with this fault shows a collision.
 fn collides_with(sabotage: Sabotage) -> bool {
     let collides = |seed| {
-        let mut scenario = plain(seed);
-        scenario.rovers = 12;
-        scenario.network.sabotage = sabotage;
-        run(&scenario).0.collisions > 0
+        let mut case = plain(seed);
+        case.team.rovers = 12;
+        case.network.sabotage = sabotage;
+        run(&case).0.collisions > 0
     };
     (1..=100).any(collides)
+}
+
+/// The circles that the report names are circles: each rover stands where it is said to stand, and
+/// the next one stands on the next vertex of its shortest way to its goal.
+#[test]
+fn rovers_that_wait_in_a_circle_are_named() {
+    let mut circles = 0;
+    for seed in 1..=40 {
+        let mut case = plain(seed);
+        case.team.rovers = 14;
+        case.network.active_window = 60;
+        let mut sim = Simulation::new(seed);
+        let system = case.assemble(&mut sim).expect("the case makes sense");
+        let report = sim.run(Executor::Inline).expect("it starts");
+        let metrics = system.metrics();
+        let standstill = metrics.standstill.unwrap_or_default();
+        if metrics.deadlock == Deadlock::None {
+            assert!(metrics.wait_cycles.is_empty());
+            continue;
+        }
+        assert!(standstill.starts_with(report.end.detail().trim_start_matches("@control: ")));
+        let map = case.roadmap().expect("a roadmap");
+        for cycle in &metrics.wait_cycles {
+            let waiters = &cycle.0;
+            for (i, waiter) in waiters.iter().enumerate() {
+                let next = &waiters[(i + 1) % waiters.len()];
+                let number: usize = waiter.agent["rover_".len()..].parse().expect("a number");
+                let goal = system.missions()[number - 1].1;
+                let way = map.shortest_path(waiter.at.expect("on the map"), goal);
+                assert_eq!(Some(way[1]), next.at, "{standstill}");
+            }
+            circles += 1;
+        }
+        match metrics.wait_cycles.first() {
+            Some(shortest) => assert!(standstill.ends_with(&format!("; {shortest}"))),
+            None if metrics.deadlock == Deadlock::Active => {
+                assert!(standstill.ends_with("rovers moved without coming nearer to their goals"));
+            }
+            None => {}
+        }
+    }
+    assert!(
+        circles >= 3,
+        "only {circles} circles in 40 runs of a crowded map"
+    );
+}
+
+#[test]
+fn a_roadmap_that_is_none_is_named_with_its_place() {
+    let text = "system = 'network'\n[world]\nnodes = 1\nroadmap = { boundary = [0], \
+                positions_m = [[0, 0]], edges = [[0, 1]] }";
+    let parse = |text: &str| {
+        let files = Files::on_disk(std::path::PathBuf::new());
+        Scenario::parse("x.toml", text.to_owned(), &[], &Registry::builtin(), files)
+    };
+    let error = parse(text).expect("it has the right form").assemble().err();
+    let error = error.expect("there is no vertex 1").to_string();
+    assert!(error.starts_with("x.toml:4:"), "{error}");
+    assert!(
+        error.contains("vertex") && error.contains(&VertexId(1).to_string()),
+        "{error}"
+    );
+    let error = parse(&text.replace("edges", "edge"))
+        .err()
+        .expect("an unknown key")
+        .to_string();
+    assert!(error.contains("edge"), "{error}");
+    assert!(error.starts_with("x.toml:4:"), "{error}");
 }

@@ -32,7 +32,7 @@ impl Carrier for Lossy {
 
 fn team(seed: u64, rovers: u32) -> Result<(Simulation, Network), NetworkError> {
     let world = WorldConfig::default();
-    let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+    let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
     let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
     let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {

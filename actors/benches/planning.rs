@@ -34,7 +34,7 @@ fn run(nodes: u32, processor: Processor, seed: u64) -> (f64, u32) {
         cycle_limit: CYCLES,
         ..NetworkConfig::default()
     };
-    let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).expect("a built-in roadmap"));
+    let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).expect("a built-in roadmap"));
     let sensors = Arc::new(world.place(&roadmap, seed).expect("a placement"));
     let mut sim = Simulation::new(seed);
     sim.without_digest();

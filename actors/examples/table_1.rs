@@ -154,7 +154,7 @@ fn run(
     seed: u64,
 ) -> Result<(NetworkMetrics, Report), Box<dyn std::error::Error>> {
     let world = WorldConfig {
-        roadmap: map.to_owned(),
+        roadmap: map.into(),
         nodes,
         endpoints: options.endpoints,
         ..WorldConfig::default()

@@ -1,5 +1,6 @@
-//! Links, rovers, sensor nodes, planners and plain traffic for Farside.
+//! Links, rovers, sensor nodes, planners, plain traffic, and what watches over them, for Farside.
 
+pub mod invariants;
 pub mod link;
 pub mod network;
 pub mod planning;

@@ -15,7 +15,7 @@
 //! use farside_worlds::Roadmap;
 //!
 //! let (world, seed) = (WorldConfig::default(), 1);
-//! let roadmap = Arc::new(Roadmap::builtin(&world.roadmap)?);
+//! let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name())?);
 //! let sensors = Arc::new(world.place(&roadmap, seed)?);
 //! let (team, network) = (TeamConfig { rovers: 3 }, NetworkConfig::default());
 //! let mut sim = Simulation::new(seed);
@@ -90,7 +90,8 @@ mod timing;
 pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{
-    ConfigError, Motion, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig,
+    ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
+    WorldConfig,
 };
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;

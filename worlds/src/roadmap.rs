@@ -10,6 +10,7 @@ mod file;
 mod well_formed;
 
 use std::collections::VecDeque;
+use std::fmt;
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::RoadmapError;
 pub(crate) use check::segments_meet;
 pub use endpoints::Endpoints;
+pub use file::RoadmapTable;
 pub use well_formed::{Blocked, well_formed};
 
 /// The index of a vertex of a [`Roadmap`], from 0.
@@ -30,6 +32,12 @@ pub use well_formed::{Blocked, well_formed};
 )]
 #[serde(transparent)]
 pub struct VertexId(pub u32);
+
+impl fmt::Display for VertexId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
 
 /// The most vertices a roadmap may have: a full grid of 64 by 64. Its distance table, two bytes for
 /// each pair, then takes 32 MiB.

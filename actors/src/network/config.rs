@@ -3,8 +3,12 @@
 //! is a key here.
 
 use farside::SimDuration;
-use farside_worlds::{Endpoints, Roadmap, SensorError, SensorNetwork};
-use serde::{Deserialize, Serialize};
+use std::fmt;
+
+use farside_worlds::{Endpoints, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::processor::Processor;
 use super::timing;
@@ -15,14 +19,14 @@ use crate::units;
 /// ```
 /// use farside_actors::network::WorldConfig;
 /// let world = WorldConfig::default();
-/// assert_eq!((world.roadmap.as_str(), world.nodes), ("crater-dense", 28));
+/// assert_eq!((world.roadmap.name(), world.nodes), ("crater-dense", 28));
 /// ```
 #[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields, default, rename_all = "snake_case")]
 pub struct WorldConfig {
-    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), or the path of a
-    /// TOML file or of a MovingAI `.map`.
-    pub roadmap: String,
+    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), the path of a TOML
+    /// file or of a MovingAI `.map`, or the roadmap itself.
+    pub roadmap: RoadmapSource,
     /// How long the side of a cell of a MovingAI map is, in metres.
     #[serde(rename = "cell", with = "units::length_m")]
     pub cell_m: f64,
@@ -49,7 +53,7 @@ pub struct WorldConfig {
 impl Default for WorldConfig {
     fn default() -> Self {
         WorldConfig {
-            roadmap: "crater-dense".to_owned(),
+            roadmap: "crater-dense".into(),
             cell_m: 10.0,
             tasks: None,
             nodes: 28,
@@ -57,6 +61,85 @@ impl Default for WorldConfig {
             endpoints: Endpoints::default(),
             placement_seed: None,
         }
+    }
+}
+
+/// Where a roadmap comes from.
+///
+/// ```
+/// use farside_actors::network::WorldConfig;
+/// let world: WorldConfig = toml::from_str(
+///     "roadmap = { boundary = [0, 1], positions_m = [[0, 0], [9, 0]], edges = [[0, 1]] }",
+/// )?;
+/// assert_eq!(world.roadmap.name(), "inline");
+/// assert_eq!(world.roadmap.table().unwrap()?.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Serialize, Clone, Debug, PartialEq)]
+#[serde(untagged)]
+pub enum RoadmapSource {
+    /// A built-in roadmap's name, or the path of a file.
+    Named(String),
+    /// The roadmap, written out.
+    Inline(Box<RoadmapTable>),
+}
+
+impl RoadmapSource {
+    /// The name or path; `inline` for one that is written out.
+    pub fn name(&self) -> &str {
+        match self {
+            RoadmapSource::Named(name) => name,
+            RoadmapSource::Inline(_) => "inline",
+        }
+    }
+
+    /// The roadmap, if it is written out.
+    pub fn table(&self) -> Option<Result<Roadmap, RoadmapError>> {
+        match self {
+            RoadmapSource::Named(_) => None,
+            RoadmapSource::Inline(table) => Some(table.build(self.name())),
+        }
+    }
+}
+
+impl From<&str> for RoadmapSource {
+    fn from(name: &str) -> Self {
+        RoadmapSource::Named(name.to_owned())
+    }
+}
+
+impl From<&Roadmap> for RoadmapSource {
+    fn from(map: &Roadmap) -> Self {
+        RoadmapSource::Inline(Box::new(RoadmapTable::from(map)))
+    }
+}
+
+// By hand: serde's `untagged` would lose the places of mistakes.
+impl<'de> Deserialize<'de> for RoadmapSource {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct NameOrTable;
+
+        impl<'de> Visitor<'de> for NameOrTable {
+            type Value = RoadmapSource;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(
+                    "a built-in roadmap's name, a TOML file, or a table of `boundary`, \
+                     `positions_m` and `edges`",
+                )
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<RoadmapSource, E> {
+                Ok(RoadmapSource::Named(name.to_owned()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RoadmapSource, A::Error> {
+                let table = RoadmapTable::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(RoadmapSource::Inline(Box::new(table)))
+            }
+        }
+
+        from.deserialize_any(NameOrTable)
     }
 }
 
@@ -257,8 +340,7 @@ pub struct NetworkConfig {
     /// The run ends after so many cycles, arrived or not.
     pub cycle_limit: u32,
     /// Breaks the safety protocol, to show that the monitor notices.
-    #[doc(hidden)]
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Sabotage::is_none")]
     pub sabotage: Sabotage,
 }
 
@@ -302,17 +384,42 @@ impl Default for NetworkConfig {
     }
 }
 
-/// A deliberate fault in the safety protocol.
-#[doc(hidden)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// A deliberate fault in the safety protocol, for tests of what watches over it.
+///
+/// ```
+/// use farside_actors::network::{NetworkConfig, Sabotage};
+/// let network: NetworkConfig = toml::from_str("sabotage = 'free_on_grant'")?;
+/// assert_eq!(network.sabotage, Sabotage::FreeOnGrant);
+/// let network: NetworkConfig = toml::from_str("sabotage = { grant_occupied = 0.05 }")?;
+/// assert_eq!(network.sabotage, Sabotage::GrantOccupied(0.05));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, Default, PartialEq)]
+#[serde(rename_all = "snake_case")]
 pub enum Sabotage {
     /// None: the protocol as it is.
     #[default]
     None,
-    /// Owners grant an occupied vertex with this probability.
+    /// Owners grant an occupied vertex with this probability (the `paper` policy only).
     GrantOccupied(f64),
     /// Rovers move on without a grant, at each cycle with this probability.
     MoveUnbidden(f64),
+    /// A vertex is free as soon as its occupant was sent the grant for the next one, where it
+    /// should count as occupied until its occupant is heard to leave.
+    FreeOnGrant,
+}
+
+impl Sabotage {
+    fn is_none(&self) -> bool {
+        *self == Sabotage::None
+    }
+
+    fn is_possible(&self) -> bool {
+        match self {
+            Sabotage::None | Sabotage::FreeOnGrant => true,
+            Sabotage::GrantOccupied(p) | Sabotage::MoveUnbidden(p) => (0.0..=1.0).contains(p),
+        }
+    }
 }
 
 /// A setting that makes no sense.
@@ -385,6 +492,13 @@ impl NetworkConfig {
         ] {
             check(key, window > 0, window.to_string(), "at least 1")?;
         }
+        let sabotage = format!("{:?}", self.sabotage);
+        check(
+            "sabotage",
+            self.sabotage.is_possible(),
+            sabotage,
+            "a probability in [0, 1]",
+        )?;
         let sigma_m = self.location_sigma_m;
         let fits = (0.0..=100.0).contains(&sigma_m);
         check(

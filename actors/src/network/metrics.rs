@@ -1,7 +1,10 @@
 //! What a run of the network-guided system amounts to, in numbers: the paper's metrics (section 4)
 //! and what they leave out.
 
+use farside_worlds::VertexId;
 use serde::Serialize;
+
+use crate::invariants::{Collision, WaitCycle};
 
 /// How a team came to a standstill.
 #[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +44,8 @@ pub struct NetworkMetrics {
     pub transmit_energy_j: f64,
     /// Times a rover claimed a vertex that another one had, or took an edge against another.
     pub collisions: u32,
+    /// The first of them: when, who, where.
+    pub collided: Vec<Collision<VertexId>>,
     /// How the team came to a standstill, if it did.
     pub deadlock: Deadlock,
     /// Cycles in which at least one rover was kept from a vertex that its path entered.
@@ -77,6 +82,10 @@ pub struct NetworkMetrics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadmap_known_s: Option<f64>,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
-    /// first of them stands.
+    /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
+    /// move in vain.
     pub standstill: Option<String>,
+    /// The circles of rovers that wait for each other when a team of the `paper` policy came to a
+    /// standstill: each for the one on the next vertex of its shortest way. The shortest first.
+    pub wait_cycles: Vec<WaitCycle<VertexId>>,
 }

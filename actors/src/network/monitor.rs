@@ -1,10 +1,12 @@
 //! The monitor: watches rovers' true positions from outside, ends the run, and keeps the score. It
 //! knows nothing of grants, owners or plans: only what rovers recorded of themselves.
 //!
-//! **Collision.** A rover that stands at a vertex claims it. From the instant at which it sets out
-//! along an edge it claims the vertex at the other end and the edge, and no longer the one it leaves:
-//! a vertex is one rover wide, an edge much longer. Two rovers with a claim on one vertex, or on one
-//! edge in opposite directions, collide. In entry queues and beyond goals nothing is claimed.
+//! **Collision.** As [`Collisions`] has it; in entry queues and beyond goals nothing is claimed.
+//!
+//! **Who waits for whom**, at a standstill of the `paper` policy: a rover for the one that claims the
+//! next vertex of its shortest way ([`Roadmap::shortest_path`](farside_worlds::Roadmap)) to its goal;
+//! one in a queue for the one at its entry. Nobody waits for two, so that the circles are all there
+//! are. With `complete`, rovers go their reserved ways and not the shortest: there is no such graph.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,14 +15,14 @@ use farside::{RunInfo, SimTime};
 use farside_worlds::VertexId;
 
 use super::assemble::Site;
+use super::config::Policy;
 use super::messages::{NodeState, RoverId, RoverState};
 use super::metrics::{Deadlock, NetworkMetrics};
+use crate::invariants::{Collisions, Place, WaitCycle, WaitGraph};
 
-/// What the monitor keeps of a rover.
+/// What the monitor keeps of a rover, beside where it is.
 #[derive(Clone, Debug, Default)]
 struct Track {
-    vertex: Option<VertexId>,
-    moving_to: Option<VertexId>,
     previous: Option<VertexId>,
     entered: Option<u32>,
     arrived: Option<u32>,
@@ -29,22 +31,19 @@ struct Track {
     /// Moves begun.
     moves: u32,
     backtracks: u32,
+    /// The cycle of its last move.
+    moved: Option<u32>,
     /// Edges between where it is, or will be, and its goal.
     remaining: u32,
-}
-
-impl Track {
-    /// The vertex that it claims.
-    fn claim(&self) -> Option<VertexId> {
-        self.moving_to.or(self.vertex)
-    }
+    /// The same when the team was nearest to its goals.
+    remaining_then: u32,
 }
 
 #[derive(Debug, Default)]
 pub(crate) struct Score {
     tracks: Vec<Track>,
+    collisions: Collisions<VertexId>,
     cycle: u32,
-    collisions: u32,
     interventions: u32,
     last_intervention: Option<u32>,
     iterations: u64,
@@ -58,6 +57,7 @@ pub(crate) struct Score {
     nearest: (u32, u32),
     deadlock: Deadlock,
     standstill: Option<String>,
+    wait_cycles: Vec<WaitCycle<VertexId>>,
     ended: bool,
 }
 
@@ -71,14 +71,23 @@ pub(crate) struct Monitor {
 impl Monitor {
     /// A monitor, and what it will write the score to.
     pub(crate) fn new(site: Arc<Site>) -> (Monitor, Arc<Mutex<Score>>) {
-        let start = |&(entry, goal): &(VertexId, VertexId)| Track {
-            remaining: site.roadmap.distance(entry, goal),
-            ..Track::default()
+        let start = |&(entry, goal): &(VertexId, VertexId)| {
+            let remaining = site.roadmap.distance(entry, goal);
+            Track {
+                remaining,
+                remaining_then: remaining,
+                ..Track::default()
+            }
         };
         let tracks: Vec<Track> = site.missions.iter().map(start).collect();
         let sum = tracks.iter().map(|t| t.remaining).sum();
+        let mut collisions = Collisions::new();
+        for name in &site.rover_names {
+            collisions.add(name);
+        }
         let score = Arc::new(Mutex::new(Score {
             tracks,
+            collisions,
             nearest: (sum, 0),
             ..Score::default()
         }));
@@ -154,19 +163,24 @@ impl Score {
     fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
         self.tracks[at].transmit_energy_j = state.transmit_energy_j;
-        let (vertex, moving_to) = (state.whereabouts.vertex, state.whereabouts.moving_to);
-        let old = self.tracks[at].clone();
-        if (old.vertex, old.moving_to) == (vertex, moving_to) {
+        let old = self.collisions.place(at);
+        let place = match (state.whereabouts.vertex, state.whereabouts.moving_to) {
+            (None, _) => Place::Away,
+            (Some(here), None) => Place::At(here),
+            (Some(here), Some(next)) => Place::Between(here, next),
+        };
+        if place == old {
             return Flow::Continue;
         }
+        self.collisions.update(now, at, place);
         let cycle = self.cycle;
         let track = &mut self.tracks[at];
-        (track.vertex, track.moving_to) = (vertex, moving_to);
-        if let Some(to) = moving_to {
+        let vertex = place.vertex();
+        if let Place::Between(_, to) = place {
             track.moves += 1;
             track.backtracks += u32::from(track.previous == Some(to));
-        } else if vertex != old.vertex {
-            track.previous = old.vertex;
+        } else if vertex != old.vertex() {
+            track.previous = old.vertex();
         }
         if vertex.is_some() && track.entered.is_none() {
             track.entered = Some(cycle);
@@ -175,26 +189,13 @@ impl Score {
             track.arrived = Some(cycle);
             track.arrived_at = Some(now);
         }
-        if let Some(claim) = track.claim() {
+        if let Some(claim) = place.claim() {
             track.remaining = site.roadmap.distance(claim, state.goal);
         }
-        let claim = track.claim();
+        track.moved = Some(cycle);
         self.last_move = cycle;
-        let edge = vertex.zip(moving_to);
-        if claim != old.claim() || edge.is_some() {
-            let clashes = |other: &Track| {
-                claim.is_some() && other.claim() == claim
-                    || edge.is_some() && other.moving_to.zip(other.vertex) == edge
-            };
-            let others = self.tracks.iter().enumerate().filter(|&(i, _)| i != at);
-            self.collisions += others.filter(|(_, other)| clashes(other)).count() as u32;
-        }
-        let stays = site.stays;
-        let all_gone = |t: &Track| {
-            let there = stays && t.remaining == 0 && t.moving_to.is_none();
-            t.arrived.is_some() && (t.vertex.is_none() || there)
-        };
-        if !self.ended && self.tracks.iter().all(all_gone) {
+        let gone = |rover: usize| !self.is_out(site, rover);
+        if !self.ended && (0..self.tracks.len()).all(gone) {
             self.ended = true;
             return Flow::Stop("all rovers have arrived".to_owned());
         }
@@ -206,6 +207,9 @@ impl Score {
         let sum: u32 = self.tracks.iter().map(|t| t.remaining).sum();
         if sum < self.nearest.0 {
             self.nearest = (sum, self.cycle);
+            for track in &mut self.tracks {
+                track.remaining_then = track.remaining;
+            }
         }
         if self.ended {
             return None;
@@ -224,33 +228,79 @@ impl Score {
             return None;
         };
         self.ended = true;
+        // Why the run stopped is part of its digest, and stays as short as it was.
         let reason = format!("{reason}: {}", self.remaining(site));
-        self.standstill = Some(reason.clone());
+        if self.deadlock != Deadlock::None && config.policy == Policy::Paper {
+            self.wait_cycles = self.circles(site);
+        }
+        self.standstill = Some(format!("{reason}{}", self.why()));
         Some(reason)
+    }
+
+    /// Whether the rover has still to leave the roadmap, or to come to where it stays.
+    fn is_out(&self, site: &Site, rover: usize) -> bool {
+        let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
+        match place {
+            Place::At(_) if site.stays => track.remaining > 0,
+            _ => track.arrived.is_none() || place != Place::Away,
+        }
     }
 
     /// Who is still out, in a sentence.
     fn remaining(&self, site: &Site) -> String {
-        let out = |t: &Track| match site.stays {
-            true => t.remaining > 0,
-            false => t.arrived.is_none() || t.vertex.is_some(),
-        };
-        let left = self.tracks.iter().filter(|t| out(t)).count();
-        let on_the_way = |t: &Track| out(t) && t.vertex.is_some();
-        let first = self.tracks.iter().position(on_the_way);
-        let first = first.or_else(|| self.tracks.iter().position(out));
-        let Some(first) = first else {
+        let out: Vec<usize> = (0..self.tracks.len())
+            .filter(|&r| self.is_out(site, r))
+            .collect();
+        let left = out.len();
+        let place = |rover: usize| self.collisions.place(rover).vertex();
+        let on_the_way = out.iter().copied().find(|&rover| place(rover).is_some());
+        let Some(first) = on_the_way.or(out.first().copied()) else {
             return format!("{left} rovers left");
         };
         let name = &site.rover_names[first];
-        match self.tracks[first].vertex {
+        match place(first) {
             Some(v) => format!("{left} rovers left, {name} at vertex {}", v.0),
             None => format!("{left} rovers left, {name} in its queue"),
         }
     }
 
+    /// The circles of rovers that wait for each other.
+    fn circles(&self, site: &Site) -> Vec<WaitCycle<VertexId>> {
+        let mut waits = WaitGraph::new(self.tracks.len());
+        for (rover, &(entry, goal)) in site.missions.iter().enumerate() {
+            let next = match self.collisions.place(rover) {
+                Place::At(here) if here != goal => site.roadmap.shortest_path(here, goal)[1],
+                Place::Away if self.tracks[rover].entered.is_none() => entry,
+                _ => continue,
+            };
+            for &holder in self.collisions.holders(next) {
+                waits.add(rover, holder);
+            }
+        }
+        waits.named_cycles(|rover| {
+            let at = self.collisions.place(rover).vertex();
+            (site.rover_names[rover].clone(), at)
+        })
+    }
+
+    /// What holds the team up, as far as can be seen from outside; the end of a sentence.
+    fn why(&self) -> String {
+        if let Some(shortest) = self.wait_cycles.first() {
+            return format!("; {shortest}");
+        }
+        if self.deadlock != Deadlock::Active {
+            return String::new();
+        }
+        let since = self.nearest.1;
+        let moved = |track: &&Track| track.moved.is_some_and(|cycle| cycle > since);
+        let no_nearer = |track: &&Track| track.remaining >= track.remaining_then;
+        let tracks = self.tracks.iter().filter(moved).filter(no_nearer);
+        let (vain, cycles) = (tracks.count(), self.cycle - since);
+        format!("; in {cycles} cycles {vain} rovers moved without coming nearer to their goals")
+    }
+
     pub(crate) fn collisions(&self) -> u32 {
-        self.collisions
+        u32::try_from(self.collisions.count()).unwrap_or(u32::MAX)
     }
 
     pub(crate) fn arrived(&self) -> u32 {
@@ -261,7 +311,9 @@ impl Score {
     pub(crate) fn metrics(&self, site: &Site) -> NetworkMetrics {
         let mut metrics = NetworkMetrics {
             rovers: self.tracks.len() as u32,
-            collisions: self.collisions,
+            collisions: self.collisions(),
+            collided: self.collisions.named().to_vec(),
+            wait_cycles: self.wait_cycles.clone(),
             deadlock: self.deadlock,
             interventions: self.interventions,
             cycles: self.cycle + 1,

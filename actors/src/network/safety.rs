@@ -13,6 +13,8 @@
 //! By 1, 2 and 4 at most one rover may be at, or on its way to, a vertex. Swapping along an edge
 //! would need each of two rovers to hold the vertex on which the other one still stands. All proofs
 //! are facts that stay true ([`Whereabouts`]), so late, repeated and reordered messages do no harm.
+//!
+//! What happens without rule 4 is in [`crate::invariants`], as a scenario of a few lines.
 
 use farside::SimTime;
 use farside_worlds::VertexId;

@@ -147,8 +147,7 @@ fn place(world: &WorldConfig, roadmap: &Roadmap, seed: u64) -> Result<SensorNetw
 /// Whether the roadmap lies in the default crater, as the built-in ones do; of others the ground is
 /// not known.
 fn in_crater(world: &WorldConfig) -> bool {
-    let name = &world.roadmap;
-    !name.ends_with(".toml") && !is_grid(name)
+    Roadmap::builtin_names().contains(&world.roadmap.name())
 }
 
 fn crater() -> Result<Crater, SetupError> {
@@ -167,9 +166,9 @@ struct Ground {
     grid: Option<GridWorld>,
 }
 
-/// The built-in roadmap, or the one in a file.
+/// The built-in roadmap, the one in a file, or the one that the scenario has itself.
 fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground, SetupError> {
-    let name = &world.roadmap;
+    let name = world.roadmap.name();
     let wrong = |message: String| SetupError::value("world.roadmap", message);
     if is_grid(name) {
         let (_, grid) = grid(world, rovers, files)?;
@@ -187,6 +186,9 @@ fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground,
         roadmap,
         grid: None,
     };
+    if let Some(inline) = world.roadmap.table() {
+        return inline.map(plain).map_err(|error| wrong(error.to_string()));
+    }
     if !name.ends_with(".toml") {
         return Roadmap::builtin(name)
             .map(plain)
@@ -214,20 +216,20 @@ fn grid(
     rovers: u32,
     files: &mut Files,
 ) -> Result<(GridMap, GridWorld), SetupError> {
-    let name = &world.roadmap;
+    let name = world.roadmap.name();
     let of_map = |message: String| SetupError::value("world.roadmap", message);
     let of_tasks = |message: String| SetupError::value("world.tasks", message);
     let limit = movingai::MAX_FILE_BYTES as u64;
     let builtin = Builtin::find(name);
     let (map_name, bytes) = match builtin {
         Some(file) => (file.map_name, file.map.to_vec()),
-        None => (name.as_str(), files.read(name, limit).map_err(of_map)?),
+        None => (name, files.read(name, limit).map_err(of_map)?),
     };
     let in_map = |error| of_map(format!("{name}: {error}"));
     let map = GridMap::from_movingai(&bytes).map_err(in_map)?;
     let (tasks_name, bytes) = match (&world.tasks, builtin) {
         (Some(tasks), _) => (tasks.as_str(), files.read(tasks, limit).map_err(of_tasks)?),
-        (None, Some(file)) => (name.as_str(), file.tasks.to_vec()),
+        (None, Some(file)) => (name, file.tasks.to_vec()),
         (None, None) => {
             let message = "missing: expected a .scen file with the starts and goals on the map";
             return Err(of_tasks(message.to_owned()));
@@ -275,8 +277,11 @@ fn key_of(error: &network::NetworkError) -> &'static str {
     }
 }
 
+/// The most collisions that are named where a run is called wrong.
+const NAMED_IN_A_LINE: usize = 3;
+
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 20] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -296,7 +301,20 @@ const KEYS: [&str; 19] = [
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",
+    "network.sabotage",
 ];
+
+/// How many collisions there were, and the first of them by name.
+fn violation(metrics: &NetworkMetrics) -> String {
+    let count = metrics.collisions as usize;
+    let named = metrics.collided.iter().take(NAMED_IN_A_LINE);
+    let first: Vec<String> = named.map(ToString::to_string).collect();
+    let rest = match count - first.len().min(count) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    };
+    format!("{count} collisions: {}{rest}", first.join("; "))
+}
 
 fn results(metrics: &NetworkMetrics) -> Results {
     let mut results = Results::default();
@@ -315,6 +333,12 @@ fn results(metrics: &NetworkMetrics) -> Results {
     let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
     let deadlock = deadlock.unwrap_or("unknown").to_owned();
     line("deadlock", deadlock);
+    if let Some(shortest) = metrics.wait_cycles.first() {
+        line("circles of rovers", metrics.wait_cycles.len().to_string());
+        line("the shortest", shortest.to_string());
+    } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
+        line("standstill", why.to_owned());
+    }
     line("planning cycles", metrics.cycles.to_string());
     if metrics.arrived > 0 {
         line("time ratio", format!("{:.2}", metrics.time_ratio));
@@ -322,8 +346,7 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("stops per rover", format!("{:.1}", metrics.mean_stops));
     }
     if metrics.collisions > 0 {
-        let count = metrics.collisions;
-        results.violations.push(format!("{count} collisions"));
+        results.violations.push(violation(metrics));
     }
     results
 }

@@ -12,10 +12,10 @@
 use std::fmt::Write;
 
 use nalgebra::Point2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Roadmap, VertexId};
-use crate::error::WorldError;
+use crate::error::{RoadmapError, WorldError};
 
 /// The most bytes of a roadmap file that are read.
 const MAX_FILE_BYTES: usize = 1 << 20;
@@ -36,6 +36,61 @@ struct RoadmapFile {
     positions_m: Vec<[f64; 2]>,
     heights_m: Option<Vec<f64>>,
     edges: Vec<(VertexId, VertexId)>,
+}
+
+/// A roadmap written out, as a scenario has it in `world.roadmap`: the keys of a roadmap file but
+/// the name.
+///
+/// ```
+/// use farside_worlds::roadmap::RoadmapTable;
+/// let text = "boundary = [0, 2]\npositions_m = [[0, 0], [9, 0], [9, 9]]\nedges = [[0, 1], [1, 2]]";
+/// let table: RoadmapTable = toml::from_str(text)?;
+/// let map = table.build("bend")?;
+/// assert_eq!((map.name(), map.len(), map.edge_count()), ("bend", 3, 2));
+/// assert_eq!(RoadmapTable::from(&map), table);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoadmapTable {
+    /// Where rovers enter and leave.
+    pub boundary: Vec<VertexId>,
+    /// The place of each vertex, x to the east and y to the north \[m\].
+    pub positions_m: Vec<[f64; 2]>,
+    /// The terrain's height at each vertex \[m\]; without, 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights_m: Option<Vec<f64>>,
+    /// Pairs of vertices.
+    pub edges: Vec<(VertexId, VertexId)>,
+}
+
+impl RoadmapTable {
+    /// The roadmap, under a name.
+    ///
+    /// # Errors
+    /// Those of [`Roadmap::new`] and [`Roadmap::with_heights_m`].
+    pub fn build(&self, name: &str) -> Result<Roadmap, RoadmapError> {
+        let places = self.positions_m.iter().map(|&[x, y]| Point2::new(x, y));
+        let (edges, boundary) = (self.edges.clone(), self.boundary.clone());
+        let roadmap = Roadmap::new(name, places.collect(), edges, boundary)?;
+        match &self.heights_m {
+            Some(heights_m) => roadmap.with_heights_m(heights_m.clone()),
+            None => Ok(roadmap),
+        }
+    }
+}
+
+impl From<&Roadmap> for RoadmapTable {
+    fn from(map: &Roadmap) -> Self {
+        let place = |v| [map.position_m(v).x, map.position_m(v).y];
+        let heights_m: Vec<f64> = map.vertices().map(|v| map.height_m(v)).collect();
+        RoadmapTable {
+            boundary: map.boundary().to_vec(),
+            positions_m: map.vertices().map(place).collect(),
+            heights_m: heights_m.iter().any(|h| *h != 0.0).then_some(heights_m),
+            edges: map.edges().to_vec(),
+        }
+    }
 }
 
 impl Roadmap {
@@ -100,16 +155,13 @@ impl Roadmap {
         let file: RoadmapFile = toml::from_str(text).map_err(|error| WorldError::Toml {
             message: error.to_string(),
         })?;
-        let positions_m = file
-            .positions_m
-            .iter()
-            .map(|&[x, y]| Point2::new(x, y))
-            .collect();
-        let roadmap = Roadmap::new(&file.name, positions_m, file.edges, file.boundary)?;
-        Ok(match file.heights_m {
-            Some(heights_m) => roadmap.with_heights_m(heights_m)?,
-            None => roadmap,
-        })
+        let table = RoadmapTable {
+            boundary: file.boundary,
+            positions_m: file.positions_m,
+            heights_m: file.heights_m,
+            edges: file.edges,
+        };
+        Ok(table.build(&file.name)?)
     }
 
     /// The roadmap as a file, which [`Roadmap::from_toml`] reads back to an equal one.

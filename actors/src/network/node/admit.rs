@@ -2,7 +2,7 @@
 //! departures, following closely (*network-guided*, section 3.5).
 
 use farside::prelude::*;
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 
 use super::{Node, Phase};
 use crate::network::assignment::{Request, winner};
@@ -51,6 +51,7 @@ impl Node {
             let (rover, step) = (best.rover, best.step);
             if ledger.grant(vertex, rover, step, Some(best.from), self.cycle) {
                 self.send_grant(ctx, rover, step, Some(vertex));
+                self.presume_left(ctx, (rover, step), best.from, vertex);
                 return true;
             }
         }
@@ -102,6 +103,37 @@ impl Node {
         }
     }
 
+    /// Takes the grant of a step for proof that it is being taken: what [`Sabotage::FreeOnGrant`] is
+    /// for. Returns the vertex left if it is one of this node's, and free now.
+    pub(in crate::network) fn presume_left(
+        &mut self,
+        ctx: &mut Context<'_, Self>,
+        (rover, step): (RoverId, u32),
+        from: VertexId,
+        to: VertexId,
+    ) -> Option<VertexId> {
+        if self.site.config.sabotage != Sabotage::FreeOnGrant {
+            return None;
+        }
+        let presumed = Whereabouts {
+            rover,
+            step: step - 1,
+            vertex: Some(from),
+            moving_to: Some(to),
+        };
+        if !self.owns(from) {
+            self.tell_departure(ctx, self.site.sensors.owner(from), presumed);
+            return None;
+        }
+        let news = ctx.durable::<Ledger>().hear(&presumed, None, self.cycle);
+        if self.site.config.policy == Policy::Paper {
+            for &vertex in &news.freed {
+                self.freed(ctx, vertex);
+            }
+        }
+        news.freed.first().copied()
+    }
+
     /// A rover came over from a neighbour's vertex: the neighbour has to know.
     fn report_departure(
         &mut self,
@@ -118,6 +150,10 @@ impl Node {
             moving_to: None,
             ..fact
         };
+        self.tell_departure(ctx, to, whereabouts);
+    }
+
+    fn tell_departure(&self, ctx: &mut Context<'_, Self>, to: NodeId, whereabouts: Whereabouts) {
         ctx.durable::<Ledger>().take_on(Duty { to, whereabouts });
         if let Some(at) = self.neighbor(to) {
             let node = self.id;
@@ -206,6 +242,7 @@ impl Handler<Assignments> for Node {
             let ledger = ctx.durable::<Ledger>();
             if ledger.grant(vertex, rover, step, Some(from), self.cycle) {
                 self.send_grant(ctx, rover, step, Some(vertex));
+                self.presume_left(ctx, (rover, step), from, vertex);
             }
         }
         Ok(())

@@ -97,7 +97,7 @@ impl Node {
 
     /// Grants the vertices whose first visit is due. Returns when the next one is.
     fn grant_heads(
-        &self,
+        &mut self,
         ctx: &mut Context<'_, Self>,
         registry: &mut Registry,
         now: u64,
@@ -105,6 +105,7 @@ impl Node {
         let config = &self.site.config;
         let ahead = self.site.longest_step.as_nanos() * u64::from(config.grants_ahead);
         let mut next = None::<u64>;
+        let mut left = Vec::new();
         for (vertex, visit) in registry.book.heads() {
             let due = visit.start.saturating_sub(ahead);
             if ctx.durable::<Ledger>().occupant(vertex).is_some() {
@@ -119,6 +120,11 @@ impl Node {
             ctx.durable::<Ledger>()
                 .force(vertex, rover, step, visit.from, self.cycle);
             self.send_grant(ctx, rover, step, Some(vertex));
+            let from = visit.from;
+            left.extend(from.and_then(|v| self.presume_left(ctx, (rover, step), v, vertex)));
+        }
+        for vertex in left {
+            registry.book.departed(vertex);
         }
         next
     }

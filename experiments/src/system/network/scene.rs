@@ -390,7 +390,7 @@ mod tests {
     /// What is drawn of a small team, and how many collisions there were.
     fn drawn(rovers: u32, sabotage: Sabotage) -> (Vec<Drawing>, u32) {
         let world = WorldConfig::default();
-        let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+        let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
         let sensors = Arc::new(world.place(&roadmap, 1).unwrap());
         let network = NetworkConfig {
             sabotage,

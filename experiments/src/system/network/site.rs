@@ -16,7 +16,7 @@ pub(super) fn site(
     files: &mut Files,
 ) -> Result<Site, SetupError> {
     let (world, rovers) = (&scenario.world, scenario.team.rovers);
-    let (roadmap, drawn) = if is_grid(&world.roadmap) {
+    let (roadmap, drawn) = if is_grid(world.roadmap.name()) {
         let (map, made) = grid(world, rovers, files)?;
         let middles_m = walls(&map, &made, world.cell_m);
         let cell_m = world.cell_m;

@@ -1,0 +1,107 @@
+//! What must never happen, as parts that watch any scenario: collisions, and standstills with the
+//! circle of those who wait for each other. They know no rover, no node and no protocol: only what
+//! actors record of themselves, so that they can find fault with all of these.
+//!
+//! Two parts are pure, and used where a state is at hand: [`Collisions`] keeps claims on the vertices
+//! and edges of a graph, [`WaitGraph`] keeps who waits for whom and finds the circles. Two are
+//! observers of a simulation made of them: [`CollisionMonitor`] and [`DeadlockMonitor`] read the state
+//! samples of a user's own actors with a closure.
+//!
+//! # A run of one's own, watched
+//!
+//! Two carts on one track, each of which wants to go where the other one stands:
+//!
+//! ```
+//! use farside::prelude::*;
+//! use farside_actors::invariants::{CollisionMonitor, DeadlockMonitor, Place, Seen, Waits};
+//! use serde::{Deserialize, Serialize};
+//!
+//! /// What a cart records of itself.
+//! #[derive(Serialize, Deserialize)]
+//! struct CartState {
+//!     at: u32,
+//!     wants: u32,
+//! }
+//!
+//! struct Cart(CartState);
+//!
+//! impl Actor for Cart {
+//!     type Accepts = (Look,);
+//!
+//!     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+//!         ctx.sample(&self.0);
+//!         ctx.timer(SimDuration::from_secs(1), Look);
+//!         Ok(())
+//!     }
+//! }
+//!
+//! /// It looks again and again, and nothing changes.
+//! #[derive(Serialize, Deserialize)]
+//! struct Look;
+//!
+//! impl Handler<Look> for Cart {
+//!     fn handle(&mut self, _look: Look, ctx: &mut Context<'_, Self>) -> Outcome {
+//!         ctx.timer(SimDuration::from_secs(1), Look);
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let mut sim = Simulation::new(1);
+//! for (name, at, wants) in [("cart_a", 3, 4), ("cart_b", 4, 3)] {
+//!     let host = sim.host(name);
+//!     sim.actor(host, name, move |_| Cart(CartState { at, wants }));
+//! }
+//! let (monitor, collisions) = CollisionMonitor::new(|_, cart: &CartState| Place::At(cart.at));
+//! sim.observe(monitor);
+//! let window = SimDuration::from_secs(20);
+//! let (monitor, standstills) = DeadlockMonitor::new(window, |_, cart: &CartState| Seen {
+//!     place: Place::At(cart.at),
+//!     waits: Waits::ForVertex(cart.wants),
+//!     done: false,
+//! });
+//! sim.observe(monitor.that_stops());
+//! let report = sim.run(Executor::Inline).unwrap();
+//!
+//! assert_eq!(collisions.get().count(), 0);
+//! let circle = "cart_a at 3 waits for cart_b at 4, which waits for cart_a";
+//! assert_eq!(standstills.get()[0].cycles[0].to_string(), circle);
+//! assert_eq!(report.end.detail(), format!("@control: standstill since 0s: {circle}"));
+//! ```
+//!
+//! `actors/examples/own_monitor.rs` is a longer one, with a collision in it.
+//!
+//! # Cases
+//!
+//! A [`Case`] is a run of the network-guided system with all that goes wrong in it. It prints as a
+//! scenario of a few lines that `farside run` reads. With the feature `proptest`,
+//! `invariants::strategies` makes random ones that shrink: to few rovers, few vertices, good links.
+//!
+//! # A rule broken, and what is left of the case that shows it
+//!
+//! In the network-guided system a vertex counts as occupied until its occupant is heard to have left
+//! it. [`Sabotage::FreeOnGrant`](crate::network::Sabotage) breaks that: the vertex is free as soon as
+//! the grant of the next one is sent. `tests/network_safety.rs` tries its property, that nobody
+//! collides, on random cases with this fault, and finds a collision within a few. `proptest` shrinks
+//! it to two rovers, one node, three vertices and a jitter of a millisecond, and prints:
+//!
+//! ```toml
+#![doc = include_str!("invariants/freed-on-grant.toml")]
+//! ```
+//!
+//! `farside run` ends this with "1 collisions: rover_02 met rover_01 at vertex 0 at 1.704587464s".
+//! At 1.7 s the node sends one rover on and lets the other one follow in the same instant; the
+//! follower's grant overtakes the first one's by a fraction of the jitter, and it sets out for a
+//! vertex on which the first rover still stands. Without the fault nobody collides. The test
+//! `the_scenario_in_the_docs_collides_because_of_the_broken_rule` runs it both ways.
+
+mod case;
+mod collisions;
+mod observe;
+#[cfg(any(feature = "proptest", test))]
+pub mod strategies;
+mod waits;
+
+pub use case::{Case, CaseError, Downtime};
+pub use collisions::{Collision, Collisions, Contested, NAMED_COLLISIONS, Place};
+pub use observe::{CollisionMonitor, DeadlockMonitor, Handle, Seen, Standstill, Waits};
+pub use waits::{WaitCycle, WaitGraph, Waiter};
