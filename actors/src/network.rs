@@ -51,7 +51,7 @@
 //!
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`,
 //! `payoff`, `max_plus`, `assignment`. The protocol: [`messages`], `safety` (what owners and rovers
-//! keep, and why no two rovers meet), `node` and `rover` (the actors). Outside both: `monitor`.
+//! keep, and why no two rovers meet), `takeover` (who answers for a node that fell silent), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
 mod assignment;
@@ -69,6 +69,7 @@ pub mod reservation;
 mod rover;
 mod safety;
 mod schedule;
+mod takeover;
 #[cfg(test)]
 pub(crate) mod testing;
 mod timing;

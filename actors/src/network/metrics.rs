@@ -72,6 +72,10 @@ pub struct NetworkMetrics {
     pub max_plus_iterations: f64,
     /// Nodes that the `coupled` policy's search expanded before the start.
     pub plan_expansions: u64,
+    /// Times a neighbour took over the vertices of a node that had fallen silent.
+    pub takeovers: u32,
+    /// Which node was replaced by which, and in which cycle, in order.
+    pub taken_over: Vec<String>,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands.
     pub standstill: Option<String>,

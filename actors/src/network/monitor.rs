@@ -10,10 +10,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{RunInfo, SimTime};
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 
 use super::assemble::Site;
-use super::messages::{NodeState, RoverId, RoverState};
+use super::messages::{NodeState, RoverId, RoverState, TakenOver};
 use super::metrics::{Deadlock, NetworkMetrics};
 
 /// What the monitor keeps of a rover.
@@ -56,6 +56,7 @@ pub(crate) struct Score {
     nearest: (u32, u32),
     deadlock: Deadlock,
     standstill: Option<String>,
+    taken_over: Vec<TakenOver>,
     ended: bool,
 }
 
@@ -127,6 +128,9 @@ impl Observer for Monitor {
                 return Ok(score.follow(&self.site, rover, &state, record.time()));
             } else if kind.name() == "NodeState" {
                 score.count(&kind.schema().decode(record.body).map_err(failed)?);
+            } else if kind.name() == "TakenOver" {
+                let taken = kind.schema().decode(record.body).map_err(failed)?;
+                score.taken_over.push(taken);
             }
         }
         Ok(Flow::Continue)
@@ -265,6 +269,13 @@ impl Score {
             plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
+        let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
+        let sentence = |t: &TakenOver| {
+            let (home, deputy) = (name(t.home), name(t.deputy));
+            format!("{home} by {deputy} in cycle {}", t.cycle)
+        };
+        metrics.takeovers = self.taken_over.len() as u32;
+        metrics.taken_over = self.taken_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
