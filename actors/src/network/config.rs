@@ -265,6 +265,10 @@ pub enum Sabotage {
     GrantOccupied(f64),
     /// Rovers move on without a grant, at each cycle with this probability.
     MoveUnbidden(f64),
+    /// Rovers obey nodes that are replaced.
+    IgnoreFences,
+    /// Deputies take the vertices that they take over as free.
+    ForgetAccounts,
 }
 
 /// A setting that makes no sense.

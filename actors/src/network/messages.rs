@@ -117,12 +117,14 @@ pub struct Replacement {
     pub rank: u32,
 }
 
-/// Node to node by way of a common neighbour: a deputy and those beside the vertices that it took over
+/// Node to node by way of others: a deputy and those beside the vertices that it took over
 /// need not be radio neighbours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Passed {
     /// Whom it is for.
     pub to: NodeId,
+    /// How often it may still be passed on.
+    pub hops: u32,
     /// What it says.
     pub content: Content,
 }

@@ -202,6 +202,7 @@ impl Handler<Grant> for Rover {
         }
         if let Some(to) = grant.to
             && self.acting(ctx, to) != grant.node
+            && self.site.config.sabotage != Sabotage::IgnoreFences
         {
             // It does not know that it was replaced.
             self.account(ctx, grant.node, self.site.sensors.owner(to));

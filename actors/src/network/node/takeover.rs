@@ -11,6 +11,7 @@ use farside::prelude::*;
 use farside_worlds::NodeId;
 
 use super::{Neighbor, Node};
+use crate::network::config::Sabotage;
 use crate::network::lng::LocalGraph;
 use crate::network::messages::{
     Account, Content, Departed, DepartedAck, Holding, Inquiry, Locations, Passed, Replaced,
@@ -19,8 +20,11 @@ use crate::network::messages::{
 use crate::network::safety::Ledger;
 use crate::network::takeover::{Charter, Inquest, holder, released};
 
-/// By way of how many common neighbours a message is passed on: one of them may be lost.
+/// By how many ways a message to a node out of radio range sets out: one of them may be lost.
 const WAYS: usize = 2;
+
+/// How often it may be passed on: as far as two ends of a ring around a node and its neighbours.
+const HOPS: u32 = 5;
 
 /// What a node knows of takeovers between two crashes; what must outlive one is in its [`Charter`].
 pub(super) struct Wards {
@@ -218,7 +222,10 @@ impl Node {
     /// All rovers have answered: from now on this node answers for the vertices of `home`.
     fn take_over(&mut self, ctx: &mut Context<'_, Self>, home: NodeId, rank: u32) {
         let site = self.site.clone();
-        let accounts = ctx.durable::<Charter>().take_on(home, rank);
+        let mut accounts = ctx.durable::<Charter>().take_on(home, rank);
+        if site.config.sabotage == Sabotage::ForgetAccounts {
+            accounts.retain(|account| account.whereabouts.step == 0);
+        }
         let ledger = ctx.durable::<Ledger>();
         for &vertex in site.sensors.owned(home) {
             let entered = released(&accounts, site.queue(vertex));
@@ -275,14 +282,37 @@ impl Node {
                 Content::DepartedAck(message) => ctx.send(address, message),
             };
         }
-        if self.wards.is_none() {
+        let passed = Passed {
+            to,
+            hops: HOPS,
+            content,
+        };
+        self.pass_on(ctx, passed, WAYS);
+    }
+
+    /// Hands a message to the neighbours nearest to whom it is for, round those that are replaced.
+    fn pass_on(&self, ctx: &mut Context<'_, Self>, passed: Passed, ways: usize) {
+        if self.wards.is_none() || passed.to.0 as usize >= self.site.sensors.len() {
             return;
         }
-        let between =
-            |n: &&Neighbor| self.site.sensors.are_neighbors(n.id, to) && !self.is_silent(n.id);
-        for neighbor in self.neighbors.iter().filter(between).take(WAYS) {
-            let content = content.clone();
-            ctx.send(neighbor.address, Passed { to, content });
+        let mut hops = vec![u32::MAX; self.site.sensors.len()];
+        hops[passed.to.0 as usize] = 0;
+        let mut queue = std::collections::VecDeque::from([passed.to]);
+        while let Some(at) = queue.pop_front() {
+            for &next in self.site.sensors.neighbors(at) {
+                let known = hops[next.0 as usize] != u32::MAX;
+                if !known && self.acting(next) == next && next != self.id {
+                    hops[next.0 as usize] = hops[at.0 as usize] + 1;
+                    queue.push_back(next);
+                }
+            }
+        }
+        let distance = |n: &&Neighbor| hops[n.id.0 as usize];
+        let mut ahead: Vec<&Neighbor> = self.neighbors.iter().collect();
+        ahead.retain(|n| distance(n) != u32::MAX && (n.id == passed.to || !self.is_silent(n.id)));
+        ahead.sort_by_key(distance);
+        for neighbor in ahead.into_iter().take(ways) {
+            ctx.send(neighbor.address, passed.clone());
         }
     }
 
@@ -396,8 +426,8 @@ impl Handler<Replaced> for Node {
 impl Handler<Passed> for Node {
     fn handle(&mut self, message: Passed, ctx: &mut Context<'_, Self>) -> Outcome {
         if message.to != self.id {
-            if let Some(at) = self.neighbor(message.to) {
-                ctx.send(self.neighbors[at].address, message);
+            if let Some(hops) = message.hops.checked_sub(1) {
+                self.pass_on(ctx, Passed { hops, ..message }, 1);
             }
             return Ok(());
         }

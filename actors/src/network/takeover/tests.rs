@@ -11,8 +11,10 @@ use proptest::prelude::*;
 
 use super::lines;
 use crate::network::messages::RoverState;
-use crate::network::testing::{grid, v};
-use crate::network::{NetworkConfig, NetworkMetrics, Policy, TeamConfig, WorldConfig, assemble};
+use crate::network::testing::grid;
+use crate::network::{
+    NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig, assemble,
+};
 
 /// A link that loses, delays, repeats, and is down between two seconds.
 #[derive(Clone, Debug)]
@@ -73,6 +75,7 @@ struct Trial {
     crashes: Vec<(u32, u64, Option<u64>)>,
     after: Option<u32>,
     cycle_limit: u32,
+    sabotage: Sabotage,
 }
 
 fn crater(seed: u64) -> Trial {
@@ -86,6 +89,7 @@ fn crater(seed: u64) -> Trial {
         crashes: Vec::new(),
         after: Some(3),
         cycle_limit: 400,
+        sabotage: Sabotage::None,
     }
 }
 
@@ -155,6 +159,7 @@ fn run_on(
     let settings = NetworkConfig {
         takeover_after: trial.after,
         cycle_limit: trial.cycle_limit,
+        sabotage: trial.sabotage,
         ..NetworkConfig::default()
     };
     let team = TeamConfig {
@@ -217,7 +222,8 @@ fn all_arrive(trial: &Trial, takeovers: u32) {
     assert_eq!(
         (metrics.arrived, metrics.collisions),
         (trial.rovers, 0),
-        "{detail}"
+        "{detail} {:?}",
+        metrics.taken_over
     );
     assert_eq!(metrics.takeovers, takeovers, "{:?}", metrics.taken_over);
     assert_eq!(metrics.taken_over.len(), takeovers as usize);
@@ -345,11 +351,8 @@ fn a_line_is_a_clique_and_its_first_reaches_the_most() {
             for m in sensors.nodes() {
                 let hears = |n: &&NodeId| sensors.are_neighbors(m, **n);
                 let heard = line.iter().filter(hears).count();
-                assert_eq!(
-                    heard == line.len() - 1,
-                    line.contains(&m),
-                    "{m:?} in {line:?}"
-                );
+                let all = heard == line.len() - 1;
+                assert!(all || !line.contains(&m), "{m:?} in {line:?}");
                 assert!(heard < line.len(), "it could go on with {m:?}");
             }
             let reach = |m: NodeId| {
@@ -369,7 +372,6 @@ fn a_line_is_a_clique_and_its_first_reaches_the_most() {
             }
         }
     }
-    assert_eq!(grid(2, 1, &[]).neighbors(v(0)), [v(1)]);
 }
 
 fn trial() -> impl Strategy<Value = Trial> {
@@ -399,6 +401,7 @@ fn trial() -> impl Strategy<Value = Trial> {
             crashes,
             after: Some(after),
             cycle_limit: 100,
+            sabotage: Sabotage::None,
         }
     })
 }
@@ -413,4 +416,38 @@ proptest! {
         let (metrics, report) = run(&trial);
         prop_assert_eq!(metrics.collisions, 0, "{} {:?}", report.end.detail(), metrics.taken_over);
     }
+}
+
+/// Whether one of many small runs with this fault shows a collision: a node that others do not hear,
+/// and rovers do.
+fn collides_with(sabotage: Sabotage) -> bool {
+    (1..=200).any(|seed| {
+        let trial = Trial {
+            rovers: 10,
+            nodes: 3,
+            grid: Some((5, 4)),
+            unheard: vec![((seed % 3) as u32, (4, 60))],
+            cycle_limit: 100,
+            sabotage,
+            ..crater(seed)
+        };
+        run(&trial).0.collisions > 0
+    })
+}
+
+#[test]
+fn the_same_runs_without_a_fault_show_none() {
+    assert!(!collides_with(Sabotage::None));
+}
+
+/// The monitor notices if rovers obey a node that is replaced.
+#[test]
+fn ignoring_fences_is_noticed() {
+    assert!(collides_with(Sabotage::IgnoreFences));
+}
+
+/// And if a deputy opens vertices without asking who is there.
+#[test]
+fn forgetting_accounts_is_noticed() {
+    assert!(collides_with(Sabotage::ForgetAccounts));
 }
