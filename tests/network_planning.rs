@@ -107,7 +107,7 @@ fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run
 const LATENCY: SimDuration = SimDuration::from_millis(5);
 
 /// When a node's first vectors leave, by the rules of the processor's documentation and the times of
-/// the phases alone: 10 us for each pair of paths.
+/// the phases alone: 40 us for each pair of paths.
 fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration {
     let pairs = |a: &[u64], b: &[u64]| a.iter().sum::<u64>() * b.iter().sum::<u64>();
     let own = &heard.paths[&node];
@@ -117,7 +117,7 @@ fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration
     let neighbors = sensors.neighbors(node).iter();
     let others = neighbors.filter_map(|other| heard.paths.get(other));
     let across: u64 = others.map(|theirs| pairs(own, theirs)).sum();
-    let takes = |pairs: u64| SimDuration::from_micros(10 * pairs);
+    let takes = |pairs: u64| SimDuration::from_micros(40 * pairs);
     let ms = SimDuration::from_millis;
     let proposed = ms(100) + takes(within / 2);
     let payoffs = proposed.max(ms(100) + LATENCY) + takes(across);
@@ -127,7 +127,7 @@ fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration
 #[test]
 fn the_first_vectors_leave_when_they_are_computed() {
     let network = NetworkConfig {
-        processor: Processor::PairsPerS(100_000),
+        processor: Processor::PairsPerS(25_000),
         cycle_limit: 30,
         ..NetworkConfig::default()
     };
@@ -136,7 +136,7 @@ fn the_first_vectors_leave_when_they_are_computed() {
     let (mut in_time, mut too_late) = (0, 0);
     for (cycle, heard) in &book.cycles {
         let start = SimTime::from_secs(u64::from(*cycle));
-        for (node, _) in &heard.paths {
+        for node in heard.paths.keys() {
             let others = sensors.neighbors(*node).iter();
             if others.clone().all(|n| !heard.paths.contains_key(n)) {
                 continue;
@@ -185,7 +185,7 @@ fn a_small_team_arrives_over_links_of_a_second() {
     let fast = run(6, LATENCY, &NetworkConfig::default()).unwrap();
     assert_eq!(metrics.cycles, fast.metrics.cycles);
 
-    // With the phases of fast links nobody learns in time who is where.
+    // With the phases of fast links what is said in one is heard cycles later.
     let rigid = NetworkConfig {
         cycle: Some(SimDuration::from_secs(1)),
         exchange: Some(SimDuration::from_millis(50)),
@@ -193,8 +193,8 @@ fn a_small_team_arrives_over_links_of_a_second() {
         iteration_timeout: Some(SimDuration::from_millis(20)),
         ..NetworkConfig::default()
     };
-    let stuck = run(6, latency, &rigid).unwrap();
-    assert!(stuck.metrics.arrived < 6);
+    let slow = run(6, latency, &rigid).unwrap();
+    assert!(slow.metrics.time_ratio > 2.0 * metrics.time_ratio);
 
     // A cycle that is set is not stretched.
     let short = NetworkConfig {

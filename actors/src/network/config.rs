@@ -228,7 +228,7 @@ impl Default for NetworkConfig {
             exchange: None,
             optimisation: None,
             max_iterations: 100,
-            processor: Processor::Unlimited,
+            processor: Processor::PAPER,
             damping: 0.0,
             anytime: false,
             iteration_timeout: None,

@@ -9,9 +9,9 @@ use crate::units::parse_duration;
 
 /// How long the parts of a planning cycle last, the same for all nodes.
 ///
-/// What [`NetworkConfig`] leaves open follows from the slowest link's latency L, so that what is
+/// What [`NetworkConfig`] leaves open follows, for the paper's policy, from the slowest link's latency L, so that what is
 /// sent in a part is there when the next begins. The paper's messages take no time; up to 10 ms these
-/// are its values, and ours:
+/// are its values, and ours, and those of the other policy always:
 ///
 /// | part | lasts | because |
 /// |---|---|---|

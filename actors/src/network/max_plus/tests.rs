@@ -1,3 +1,5 @@
+//! Max-plus against brute force and against its definition.
+
 use super::*;
 use crate::network::candidates::Destination;
 use crate::network::payoff::collision;
