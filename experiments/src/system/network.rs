@@ -227,16 +227,17 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::NoRovers => "team.rovers",
         NetworkError::Endpoints { .. } => "world.endpoints",
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
-        NetworkError::Config(ConfigError::Range { key, .. }) => KEYS
-            .iter()
-            .find(|known| known.ends_with(&format!(".{key}")))
-            .unwrap_or(&"network"),
+        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::PaperOnly { key }) => {
+            KEYS.iter()
+                .find(|known| known.ends_with(&format!(".{key}")))
+                .unwrap_or(&"network")
+        }
         _ => "network",
     }
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -248,6 +249,7 @@ const KEYS: [&str; 14] = [
     "network.convergence",
     "network.damping",
     "network.processor",
+    "network.takeover_after",
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",
@@ -270,6 +272,9 @@ fn results(metrics: &NetworkMetrics) -> Results {
     let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
     let deadlock = deadlock.unwrap_or("unknown").to_owned();
     line("deadlock", deadlock);
+    for replaced in &metrics.taken_over {
+        line("taken over", replaced.clone());
+    }
     line("planning cycles", metrics.cycles.to_string());
     if metrics.arrived > 0 {
         line("time ratio", format!("{:.2}", metrics.time_ratio));
