@@ -62,7 +62,8 @@
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
 //! `max_plus`, `assignment`; how long it takes: `processor`, `timing`; how long an edge takes: `motion`.
 //! The protocol: [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet),
-//! `node` and `rover` (the actors). Outside both: `monitor`.
+//! `takeover` (who answers for a node that has fallen silent), `node` and `rover` (the actors).
+//! Outside both: `monitor`.
 
 mod assemble;
 mod assignment;
@@ -83,6 +84,7 @@ pub mod reservation;
 mod rover;
 mod safety;
 mod schedule;
+mod takeover;
 #[cfg(test)]
 pub(crate) mod testing;
 mod timing;

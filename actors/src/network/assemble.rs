@@ -18,6 +18,7 @@ use super::node::Node;
 use super::payoff::Payoffs;
 use super::rover::Rover;
 use super::schedule::Schedule;
+use super::takeover;
 use super::timing::Timing;
 
 /// Why a system could not be assembled, or has no such actor.
@@ -120,6 +121,8 @@ pub(crate) struct Site {
     pub(crate) missions: Vec<(VertexId, VertexId)>,
     /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
     pub(crate) stays: bool,
+    /// Each node's line of succession, with `network.takeover_after`; else empty.
+    pub(crate) lines: Vec<Vec<NodeId>>,
     /// The plan of a policy that plans ahead.
     pub(crate) schedule: Option<Schedule>,
     /// Who waits at each entry, in order.
@@ -265,7 +268,12 @@ fn assemble_missions(
     let timing = timing(&roadmap, network, sim.slowest_link())?;
     let longest_step = longest_step(&roadmap, network, &timing)?;
     let schedule = Schedule::of(network, &timing, &roadmap, &missions, stays);
+    let lines = match network.takeover_after {
+        Some(_) => takeover::lines(&roadmap, &sensors),
+        None => Vec::new(),
+    };
     let site = Arc::new(Site {
+        lines,
         payoffs: Payoffs::new(network, &roadmap),
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: network.patience(sim.slowest_link(), &timing),

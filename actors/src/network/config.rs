@@ -333,6 +333,10 @@ pub struct NetworkConfig {
     pub grants_ahead: u32,
     /// `coupled`: the most nodes that the search may expand.
     pub max_expansions: u64,
+    /// `paper`: a node that was not heard for so many cycles, at least 1, is replaced by a neighbour,
+    /// for the rest of the run. Without it (the default) its vertices stay closed until it is back.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub takeover_after: Option<u32>,
     /// Passive deadlock: no move and no entry for so many cycles.
     pub passive_window: u32,
     /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
@@ -376,6 +380,7 @@ impl Default for NetworkConfig {
             routes: 8,
             grants_ahead: 2,
             max_expansions: 1_000_000,
+            takeover_after: None,
             passive_window: 20,
             active_window: 300,
             cycle_limit: 5000,
@@ -407,6 +412,10 @@ pub enum Sabotage {
     /// A vertex is free as soon as its occupant was sent the grant for the next one, where it
     /// should count as occupied until its occupant is heard to leave.
     FreeOnGrant,
+    /// Rovers obey nodes that are replaced.
+    IgnoreFences,
+    /// Deputies take the vertices that they take over as free.
+    ForgetAccounts,
 }
 
 impl Sabotage {
@@ -416,8 +425,8 @@ impl Sabotage {
 
     fn is_possible(&self) -> bool {
         match self {
-            Sabotage::None | Sabotage::FreeOnGrant => true,
             Sabotage::GrantOccupied(p) | Sabotage::MoveUnbidden(p) => (0.0..=1.0).contains(p),
+            _ => true,
         }
     }
 }
@@ -434,6 +443,12 @@ pub enum ConfigError {
         actual: String,
         /// What it may be.
         expected: &'static str,
+    },
+    /// A key that only the policy `paper` knows.
+    #[error("network.{key} is for the policy paper; leave it out")]
+    PaperOnly {
+        /// The key.
+        key: &'static str,
     },
     /// The phases do not fit into a cycle.
     #[error(
@@ -484,6 +499,13 @@ impl NetworkConfig {
         let computes = self.processor != Processor::PairsPerS(0);
         let actual = self.processor.to_string();
         check("processor", computes, actual, "more than 0/s")?;
+        if let Some(cycles) = self.takeover_after {
+            let key = "takeover_after";
+            check(key, cycles > 0, cycles.to_string(), "at least 1")?;
+            if self.policy != Policy::Paper {
+                return Err(ConfigError::PaperOnly { key });
+            }
+        }
         for (key, window) in [
             ("routes", self.routes),
             ("passive_window", self.passive_window),

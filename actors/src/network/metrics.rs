@@ -81,6 +81,10 @@ pub struct NetworkMetrics {
     /// some never did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadmap_known_s: Option<f64>,
+    /// Times a neighbour took over the vertices of a node that had fallen silent.
+    pub takeovers: u32,
+    /// Which node was replaced by which, and in which cycle, in order.
+    pub taken_over: Vec<String>,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
     /// move in vain.

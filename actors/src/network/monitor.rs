@@ -12,11 +12,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{RunInfo, SimTime};
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 
 use super::assemble::Site;
 use super::config::Policy;
-use super::messages::{NodeState, RoverId, RoverState};
+use super::messages::{NodeState, RoverId, RoverState, TakenOver};
 use super::metrics::{Deadlock, NetworkMetrics};
 use crate::invariants::{Collisions, Place, WaitCycle, WaitGraph};
 
@@ -58,6 +58,7 @@ pub(crate) struct Score {
     deadlock: Deadlock,
     standstill: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
+    taken_over: Vec<TakenOver>,
     ended: bool,
 }
 
@@ -140,6 +141,9 @@ impl Observer for Monitor {
                 score.count(&kind.schema().decode(record.body).map_err(failed)?);
             } else if kind.name() == "RoadmapKnown" {
                 score.informed.push(record.time());
+            } else if kind.name() == "TakenOver" {
+                let taken = kind.schema().decode(record.body).map_err(failed)?;
+                score.taken_over.push(taken);
             }
         }
         Ok(Flow::Continue)
@@ -326,6 +330,13 @@ impl Score {
             let last = self.informed.iter().max().copied().unwrap_or(SimTime::ZERO);
             metrics.roadmap_known_s = Some(last.as_secs_f64());
         }
+        let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
+        let sentence = |t: &TakenOver| {
+            let (home, deputy) = (name(t.home), name(t.deputy));
+            format!("{home} by {deputy} in cycle {}", t.cycle)
+        };
+        metrics.takeovers = self.taken_over.len() as u32;
+        metrics.taken_over = self.taken_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);

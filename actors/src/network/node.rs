@@ -5,6 +5,7 @@
 mod admit;
 mod cycle;
 mod optimise;
+mod takeover;
 
 use std::sync::Arc;
 
@@ -17,13 +18,15 @@ use super::assignment::Request;
 use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
-    Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
+    Account, Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations,
+    MaxPlus, Passed, Replaced,
 };
 use super::reservation::messages::Relay;
 use super::reservation::{Registry, RegistryDue};
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
+use takeover::Wards;
 
 /// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
 /// cycle, and owns vertices by the safety protocol.
@@ -43,6 +46,8 @@ pub struct Node {
     /// Own rovers that leave their vertex in this cycle without accelerating.
     leaving: Vec<VertexId>,
     forced_stops: u32,
+    /// Who answers for which node's vertices, with `network.takeover_after`.
+    wards: Option<Wards>,
     /// When the timer of the `complete` policy fires \[ns\].
     pub(super) alarm: Option<(u64, TimerId)>,
 }
@@ -107,6 +112,7 @@ impl Node {
             requests: Vec::new(),
             leaving: Vec::new(),
             forced_stops: 0,
+            wards: None,
             alarm: None,
         }
     }
@@ -121,8 +127,9 @@ impl Node {
         source.is_none() || ctx.durable::<Registry>().knows_roadmap(source)
     }
 
+    /// Whether it answers for `v`: its own vertex, or one that it took over.
     fn owns(&self, v: VertexId) -> bool {
-        self.site.sensors.owner(v) == self.id
+        self.answers_for(self.site.sensors.owner(v))
     }
 }
 
@@ -140,6 +147,9 @@ impl Actor for Node {
         Relay,
         RegistryDue,
         ProcessorDone,
+        Account,
+        Replaced,
+        Passed,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -154,7 +164,12 @@ impl Actor for Node {
         for name in &self.site.rover_names {
             self.rovers.push(ctx.lookup::<Rover>(name)?);
         }
-        let owned = self.site.sensors.owned(self.id);
+        self.open_wards(ctx);
+        // A node that was replaced has no vertices of its own any more.
+        let owned: &[VertexId] = match self.answers_for(self.id) {
+            true => self.site.sensors.owned(self.id),
+            false => &[],
+        };
         let ledger = ctx.durable::<Ledger>();
         let is_new = ledger.is_new();
         ledger.open(owned, self.rovers.len());
@@ -193,13 +208,18 @@ impl Handler<PhaseBegins> for Node {
 }
 
 impl Handler<Locations> for Node {
-    fn handle(&mut self, message: Locations, _ctx: &mut Context<'_, Self>) -> Outcome {
+    fn handle(&mut self, message: Locations, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.wards.is_some() {
+            self.correct(ctx, &message);
+        }
         if let Some(at) = self.neighbor(message.node) {
             let neighbor = &mut self.neighbors[at];
             if neighbor.located.is_none_or(|cycle| cycle < message.cycle) {
                 neighbor.located = Some(message.cycle);
                 neighbor.holdings = message.holdings;
             }
+        } else {
+            self.located_afar(message);
         }
         Ok(())
     }

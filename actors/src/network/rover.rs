@@ -10,9 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::assemble::Site;
 use super::config::{Motion, Policy, Sabotage};
-use super::messages::{Beacon, Grant, RoverId, RoverState, Whereabouts};
+use super::messages::{Account, Beacon, Grant, Inquiry, RoverId, RoverState, Whereabouts};
 use super::node::Node;
 use super::safety::{Answer, RoverMemory};
+use super::takeover::Fences;
 use crate::radio::RadioChange;
 
 /// A rover of the network-guided system.
@@ -161,8 +162,32 @@ impl Rover {
     /// Tells the owner of the vertex that it stands on, or is leaving.
     fn beacon_here(&self, ctx: &mut Context<'_, Self>) {
         if let Some(here) = ctx.durable::<RoverMemory>().vertex {
-            self.beacon(ctx, self.site.sensors.owner(here));
+            let to = self.acting(ctx, here);
+            self.beacon(ctx, to);
         }
+    }
+
+    /// The node that answers for a vertex: its owner, or who has replaced it.
+    fn acting(&self, ctx: &mut Context<'_, Self>, vertex: VertexId) -> NodeId {
+        let home = self.site.sensors.owner(vertex);
+        match self.site.lines.get(home.0 as usize) {
+            Some(line) => line[ctx.durable::<Fences>().rank(home) as usize],
+            None => home,
+        }
+    }
+
+    /// Tells `to` where it is, and whom it obeys about the vertices of `home`.
+    fn account(&self, ctx: &mut Context<'_, Self>, to: NodeId, home: NodeId) {
+        let rank = ctx.durable::<Fences>().rank(home);
+        let memory = ctx.durable::<RoverMemory>();
+        let account = Account {
+            home,
+            rank,
+            whereabouts: memory.whereabouts(self.id),
+            previous: memory.previous,
+            goal: self.goal,
+        };
+        ctx.send(self.nodes[to.0 as usize], account);
     }
 
     /// Moves on without being told to: what [`Sabotage::MoveUnbidden`] is for.
@@ -180,7 +205,7 @@ impl Rover {
 }
 
 impl Actor for Rover {
-    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows, OffVertex);
+    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows, OffVertex, Inquiry);
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         for name in &self.site.node_names {
@@ -236,7 +261,27 @@ impl Handler<Grant> for Rover {
             self.proceed(ctx);
             return Ok(());
         }
+        if let Some(to) = grant.to
+            && self.acting(ctx, to) != grant.node
+            && self.site.config.sabotage != Sabotage::IgnoreFences
+        {
+            // It does not know that it was replaced.
+            self.account(ctx, grant.node, self.site.sensors.owner(to));
+            return Ok(());
+        }
         self.obey(&grant, ctx);
+        Ok(())
+    }
+}
+
+impl Handler<Inquiry> for Rover {
+    fn handle(&mut self, inquiry: Inquiry, ctx: &mut Context<'_, Self>) -> Outcome {
+        let line = self.site.lines.get(inquiry.home.0 as usize);
+        let entitled = line.and_then(|line| line.get(inquiry.rank as usize));
+        if entitled == Some(&inquiry.node) {
+            ctx.durable::<Fences>().raise(inquiry.home, inquiry.rank);
+            self.account(ctx, inquiry.node, inquiry.home);
+        }
         Ok(())
     }
 }

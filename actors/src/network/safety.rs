@@ -89,6 +89,25 @@ impl Ledger {
         }
     }
 
+    /// Takes on a vertex of another node, with who holds it and how many entered there.
+    pub(crate) fn adopt(&mut self, vertex: VertexId, occupant: Option<Occupant>, released: u32) {
+        let slot = Slot {
+            vertex,
+            occupant,
+            released,
+        };
+        match self.slots.binary_search_by_key(&vertex, |s| s.vertex) {
+            Ok(at) => self.slots[at] = slot,
+            Err(at) => self.slots.insert(at, slot),
+        }
+    }
+
+    /// Has nothing to say of these vertices any more.
+    pub(crate) fn abandon(&mut self, vertices: &[VertexId]) {
+        self.slots
+            .retain(|slot| vertices.binary_search(&slot.vertex).is_err());
+    }
+
     /// A rover that has stood at `vertex` from the start, with step 1.
     pub(crate) fn stand(&mut self, vertex: VertexId, rover: RoverId, goal: VertexId) {
         self.force(vertex, rover, 1, None, 0);

@@ -269,10 +269,11 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
         NetworkError::SlowEdge { .. } => "network.speed",
         NetworkError::UnknownSource { .. } => "network.roadmap_from",
-        NetworkError::Config(ConfigError::Range { key, .. }) => KEYS
-            .iter()
-            .find(|known| known.ends_with(&format!(".{key}")))
-            .unwrap_or(&"network"),
+        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::PaperOnly { key }) => {
+            KEYS.iter()
+                .find(|known| known.ends_with(&format!(".{key}")))
+                .unwrap_or(&"network")
+        }
         _ => "network",
     }
 }
@@ -281,7 +282,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 const NAMED_IN_A_LINE: usize = 3;
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 20] = [
+const KEYS: [&str; 21] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -298,6 +299,7 @@ const KEYS: [&str; 20] = [
     "network.convergence",
     "network.damping",
     "network.processor",
+    "network.takeover_after",
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",
@@ -338,6 +340,9 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("the shortest", shortest.to_string());
     } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
         line("standstill", why.to_owned());
+    }
+    for replaced in &metrics.taken_over {
+        line("taken over", replaced.clone());
     }
     line("planning cycles", metrics.cycles.to_string());
     if metrics.arrived > 0 {

@@ -8,9 +8,10 @@ use super::{Node, Phase};
 use crate::network::assignment::{Request, winner};
 use crate::network::config::{Policy, Sabotage};
 use crate::network::messages::{
-    Assignments, Beacon, Departed, DepartedAck, NodeState, RoverId, Whereabouts,
+    Assignments, Beacon, Content, Departed, DepartedAck, NodeState, RoverId, Whereabouts,
 };
 use crate::network::safety::{Duty, Ledger};
+use crate::network::takeover::Charter;
 
 impl Node {
     /// Grants each free vertex to one of those whose paths enter it now.
@@ -68,7 +69,15 @@ impl Node {
         self.admit_one(ctx, vertex, followed);
     }
 
-    fn hear(&mut self, ctx: &mut Context<'_, Self>, fact: &Whereabouts, goal: Option<VertexId>) {
+    pub(super) fn hear(
+        &mut self,
+        ctx: &mut Context<'_, Self>,
+        fact: &Whereabouts,
+        goal: Option<VertexId>,
+    ) {
+        if self.wards.is_some() {
+            ctx.durable::<Charter>().note(fact);
+        }
         let news = ctx.durable::<Ledger>().hear(fact, goal, self.cycle);
         if self.site.config.policy != Policy::Paper {
             for &previous in &news.unheard {
@@ -142,7 +151,7 @@ impl Node {
         previous: Option<VertexId>,
     ) {
         let from = previous.map(|v| self.site.sensors.owner(v));
-        let Some(to) = from.filter(|&owner| owner != self.id) else {
+        let Some(to) = from.filter(|&owner| !self.answers_for(owner)) else {
             return;
         };
         // What is to be told is that it came here; where it goes next is another story.
@@ -153,12 +162,14 @@ impl Node {
         self.tell_departure(ctx, to, whereabouts);
     }
 
-    fn tell_departure(&self, ctx: &mut Context<'_, Self>, to: NodeId, whereabouts: Whereabouts) {
+    fn tell_departure(
+        &mut self,
+        ctx: &mut Context<'_, Self>,
+        to: NodeId,
+        whereabouts: Whereabouts,
+    ) {
         ctx.durable::<Ledger>().take_on(Duty { to, whereabouts });
-        if let Some(at) = self.neighbor(to) {
-            let node = self.id;
-            ctx.send(self.neighbors[at].address, Departed { node, whereabouts });
-        }
+        self.send_departed(ctx, to, whereabouts);
     }
 
     fn is_rover(&self, rover: RoverId) -> bool {
@@ -192,22 +203,19 @@ impl Handler<Departed> for Node {
     fn handle(&mut self, message: Departed, ctx: &mut Context<'_, Self>) -> Outcome {
         let fact = message.whereabouts;
         self.hear(ctx, &fact, None);
-        if let Some(at) = self.neighbor(message.node) {
-            let ack = DepartedAck {
-                node: self.id,
-                rover: fact.rover,
-                step: fact.step,
-            };
-            ctx.send(self.neighbors[at].address, ack);
-        }
+        let ack = DepartedAck {
+            node: self.id,
+            rover: fact.rover,
+            step: fact.step,
+        };
+        self.tell(ctx, message.node, Content::DepartedAck(ack));
         Ok(())
     }
 }
 
 impl Handler<DepartedAck> for Node {
     fn handle(&mut self, ack: DepartedAck, ctx: &mut Context<'_, Self>) -> Outcome {
-        let ledger = ctx.durable::<Ledger>();
-        ledger.acknowledged(ack.node, ack.rover, ack.step);
+        self.acknowledged(ctx, &ack);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use crate::network::assignment::Request;
 use crate::network::candidates::{CandidatePath, FirstStep, candidates};
 use crate::network::config::Policy;
 use crate::network::messages::{
-    Assignment, Assignments, CandidatePaths, Departed, Grant, Locations, RoverId, RoverPaths,
+    Assignment, Assignments, CandidatePaths, Content, Grant, Locations, RoverId, RoverPaths,
 };
 use crate::network::safety::{Ledger, Occupant};
 
@@ -43,6 +43,7 @@ impl Node {
         self.requests.clear();
         self.leaving.clear();
         self.optimiser.reset();
+        self.watch(ctx);
         self.repeat(ctx);
         let site = self.site.clone();
         for (entry, queue) in site.queues.iter().filter(|(entry, _)| self.owns(*entry)) {
@@ -67,10 +68,7 @@ impl Node {
             self.send_grant(ctx, held.rover, held.step + 1, None);
         }
         for duty in ctx.durable::<Ledger>().duties().to_vec() {
-            if let Some(at) = self.neighbor(duty.to) {
-                let (node, whereabouts) = (self.id, duty.whereabouts);
-                ctx.send(self.neighbors[at].address, Departed { node, whereabouts });
-            }
+            self.send_departed(ctx, duty.to, duty.whereabouts);
         }
     }
 
@@ -87,6 +85,9 @@ impl Node {
 
     /// Step 1.
     pub(super) fn locate(&mut self, ctx: &mut Context<'_, Self>) {
+        if !self.spread(ctx) {
+            return;
+        }
         let message = Locations {
             node: self.id,
             cycle: self.cycle,
@@ -99,10 +100,12 @@ impl Node {
                 message.clone(),
             );
         }
+        self.tell_partners(ctx, &Content::Locations(message));
     }
 
     /// Steps 2 and 3.
     pub(super) fn propose(&mut self, ctx: &mut Context<'_, Self>) {
+        self.survey();
         let rovers: Vec<_> = self
             .movable(ctx)
             .into_iter()
@@ -140,7 +143,7 @@ impl Node {
             };
             let is_next = |rover, step| rover == held.rover && step > held.step;
             let granted_here = ledger.occupied().any(|(_, o)| is_next(o.rover, o.step));
-            let mut theirs = self.neighbors.iter().flat_map(|n| &n.holdings);
+            let mut theirs = self.reports();
             if !granted_here && !theirs.any(|h| is_next(h.rover, h.step)) {
                 movable.push((here, held, goal));
             }
@@ -161,10 +164,9 @@ impl Node {
             if self.owns(v) {
                 return ledger.occupant(v).is_some();
             }
-            let mut theirs = self.neighbors.iter().flat_map(|n| &n.holdings);
-            theirs.any(|holding| holding.vertex == v)
+            self.reports().any(|holding| holding.vertex == v)
         };
-        let mut paths = candidates(&self.graph, here, goal, occupied);
+        let mut paths = candidates(self.surveyed(), here, goal, occupied);
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
@@ -217,6 +219,7 @@ impl Node {
                 message.clone(),
             );
         }
+        self.tell_partners(ctx, &Content::Assignments(message));
     }
 
     /// Keeps what an assignment asks of this node.
