@@ -170,6 +170,7 @@ pub fn worlds(
                 radius_m: Some(f64::from(radius_m)),
                 endpoints,
                 placement_seed: Some(seed),
+                ..WorldConfig::default()
             }
         },
     )

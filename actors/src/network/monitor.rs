@@ -48,6 +48,8 @@ pub(crate) struct Score {
     last_intervention: Option<u32>,
     iterations: u64,
     planned_cycles: u64,
+    messages: u64,
+    bytes: u64,
     last_move: u32,
     /// The least sum of remaining distances so far, and when it was reached.
     nearest: (u32, u32),
@@ -120,6 +122,11 @@ impl Observer for Monitor {
                 return Ok(Flow::Stop(reason));
             }
         }
+        if record.class.is_fate() && record.link.is_some() && record.copy == 0 {
+            score.messages += 1;
+            // The digest had it encoded: looking costs nothing.
+            score.bytes += record.body.len() as u64;
+        }
         if record.class == RecordClass::Sample
             && let Some(kind) = record.kind
         {
@@ -183,7 +190,7 @@ impl Score {
         }
         track.moved = Some(cycle);
         self.last_move = cycle;
-        let gone = |rover: usize| !self.is_out(rover);
+        let gone = |rover: usize| !self.is_out(site, rover);
         if !self.ended && (0..self.tracks.len()).all(gone) {
             self.ended = true;
             return Flow::Stop("all rovers have arrived".to_owned());
@@ -205,10 +212,10 @@ impl Score {
         }
         let config = &site.config;
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
-        let reason = if still(self.last_move, config.passive_window) {
+        let reason = if still(self.last_move, config.passive_window + site.patience) {
             self.deadlock = Deadlock::Passive;
             "passive deadlock"
-        } else if still(self.nearest.1, config.active_window) {
+        } else if still(self.nearest.1, config.active_window + site.patience) {
             self.deadlock = Deadlock::Active;
             "active deadlock"
         } else if self.cycle >= config.cycle_limit {
@@ -226,18 +233,23 @@ impl Score {
         Some(reason)
     }
 
-    /// Whether the rover has still to leave the roadmap.
-    fn is_out(&self, rover: usize) -> bool {
-        self.tracks[rover].arrived.is_none() || self.collisions.place(rover) != Place::Away
+    /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
+    fn is_out(&self, site: &Site, rover: usize) -> bool {
+        let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
+        match site.stays {
+            true => track.remaining > 0 || !matches!(place, Place::At(_)),
+            false => track.arrived.is_none() || place != Place::Away,
+        }
     }
 
     /// Who is still out, in a sentence.
     fn remaining(&self, site: &Site) -> String {
-        let out: Vec<usize> = (0..self.tracks.len()).filter(|&r| self.is_out(r)).collect();
+        let out = |rover: &usize| self.is_out(site, *rover);
+        let out: Vec<usize> = (0..self.tracks.len()).filter(out).collect();
         let left = out.len();
         let place = |rover: usize| self.collisions.place(rover).vertex();
-        let on_the_way = (0..self.tracks.len()).find(|&rover| place(rover).is_some());
-        let Some(first) = on_the_way.or(out.first().copied()) else {
+        let on_the_way = out.iter().find(|&&rover| place(rover).is_some());
+        let Some(&first) = on_the_way.or(out.first()) else {
             return format!("{left} rovers left");
         };
         let name = &site.rover_names[first];
@@ -301,6 +313,7 @@ impl Score {
             interventions: self.interventions,
             cycles: self.cycle + 1,
             standstill: self.standstill.clone(),
+            plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
@@ -311,6 +324,9 @@ impl Score {
         metrics.transmit_energy_j = energies_j.sum();
         metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
         metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
+        let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
+        metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
+        metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
             let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
                 continue;
@@ -322,6 +338,7 @@ impl Score {
             metrics.path_ratio += f64::from(steps) / shortest;
             metrics.time_ratio += f64::from(arrived + 1) / shortest;
             metrics.mean_steps += f64::from(steps);
+            metrics.total_steps += u64::from(steps);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
             metrics.mean_backtracks += f64::from(track.backtracks);
         }
