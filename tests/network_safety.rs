@@ -32,25 +32,40 @@ fn config(cases: u32) -> ProptestConfig {
 fn with_policy(mut case: Case, policy: Policy) -> Case {
     case.network.policy = policy;
     (case.network.passive_window, case.network.cycle_limit) = match policy {
-        Policy::Paper => (20, 120),
         // A walk over links that are seconds late takes its time before the first rover enters.
-        _ => (60, 200),
+        Policy::Complete => (60, 200),
+        _ => (20, 120),
     };
-    // Phases that do not stretch with latency, so that messages come cycles late.
-    case.network.cycle = Some(SimDuration::from_secs(1));
-    case.network.exchange = Some(SimDuration::from_millis(50));
-    case.network.optimisation = Some(SimDuration::from_millis(500));
-    case.network.iteration_timeout = Some(SimDuration::from_millis(20));
     case
 }
 
 fn any_policy() -> impl Strategy<Value = Case> {
     let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
-    (cases(Bounds::default()), policy, any::<bool>()).prop_map(|(case, policy, chains)| {
-        let mut case = with_policy(case, policy);
+    let all = (
+        cases(Bounds::default()),
+        policy,
+        any::<bool>(),
+        any::<bool>(),
+    );
+    all.prop_map(|(mut case, policy, chains, is_rigid)| {
+        case.network = match is_rigid {
+            true => rigid(),
+            false => NetworkConfig::default(),
+        };
         case.network.acceleration_chains = chains;
-        case
+        with_policy(case, policy)
     })
+}
+
+/// Phases that do not stretch with latency, so that messages come cycles late.
+fn rigid() -> NetworkConfig {
+    NetworkConfig {
+        cycle: Some(SimDuration::from_secs(1)),
+        exchange: Some(SimDuration::from_millis(50)),
+        optimisation: Some(SimDuration::from_millis(500)),
+        iteration_timeout: Some(SimDuration::from_millis(20)),
+        ..NetworkConfig::default()
+    }
 }
 
 fn run(case: &Case) -> (NetworkMetrics, Report) {
@@ -205,6 +220,7 @@ fn plain(seed: u64) -> Case {
             ..WorldConfig::default()
         },
         team: TeamConfig { rovers: 6 },
+        network: rigid(),
         ..Case::default()
     }
 }

@@ -241,24 +241,23 @@ impl Score {
         Some(reason)
     }
 
-    /// Whether the rover has still to leave the roadmap, or to come to where it stays.
+    /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
     fn is_out(&self, site: &Site, rover: usize) -> bool {
         let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
-        match place {
-            Place::At(_) if site.stays => track.remaining > 0,
-            _ => track.arrived.is_none() || place != Place::Away,
+        match site.stays {
+            true => track.remaining > 0 || !matches!(place, Place::At(_)),
+            false => track.arrived.is_none() || place != Place::Away,
         }
     }
 
     /// Who is still out, in a sentence.
     fn remaining(&self, site: &Site) -> String {
-        let out: Vec<usize> = (0..self.tracks.len())
-            .filter(|&r| self.is_out(site, r))
-            .collect();
+        let out = |rover: &usize| self.is_out(site, *rover);
+        let out: Vec<usize> = (0..self.tracks.len()).filter(out).collect();
         let left = out.len();
         let place = |rover: usize| self.collisions.place(rover).vertex();
-        let on_the_way = out.iter().copied().find(|&rover| place(rover).is_some());
-        let Some(first) = on_the_way.or(out.first().copied()) else {
+        let on_the_way = out.iter().find(|&&rover| place(rover).is_some());
+        let Some(&first) = on_the_way.or(out.first()) else {
             return format!("{left} rovers left");
         };
         let name = &site.rover_names[first];

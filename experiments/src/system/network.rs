@@ -178,10 +178,7 @@ fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground,
             grid: Some(grid),
         });
     }
-    if let Some(tasks) = &world.tasks {
-        let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
-        return Err(SetupError::value("world.tasks", message));
-    }
+    check_no_tasks(world)?;
     let plain = |roadmap| Ground {
         roadmap,
         grid: None,
