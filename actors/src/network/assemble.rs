@@ -9,6 +9,7 @@ use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
 use super::config::{ConfigError, NetworkConfig, TeamConfig, WorldConfig};
+use super::corridors::Corridors;
 use super::lng::LocalGraph;
 use super::messages::RoverId;
 use super::metrics::NetworkMetrics;
@@ -56,6 +57,8 @@ pub(crate) struct Site {
     pub(crate) sensors: Arc<SensorNetwork>,
     pub(crate) config: NetworkConfig,
     pub(crate) payoffs: Payoffs,
+    /// Where rovers cannot pass each other; none unless `corridor_tokens` asks for them.
+    pub(crate) corridors: Corridors,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
     /// Each rover's entry and goal.
@@ -130,6 +133,10 @@ pub fn assemble(
     }
     let site = Arc::new(Site {
         payoffs: Payoffs::new(network, &roadmap),
+        corridors: match network.corridor_tokens {
+            true => Corridors::new(&roadmap),
+            false => Corridors::default(),
+        },
         node_names: names("node", sensors.len()),
         rover_names: names("rover", missions.len()),
         config: network.clone(),

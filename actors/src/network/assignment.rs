@@ -6,7 +6,7 @@
 
 use farside_worlds::VertexId;
 
-use super::candidates::FirstStep;
+use super::candidates::{Destination, FirstStep};
 use super::config::Priority;
 use super::messages::{Assignment, RoverId};
 
@@ -20,6 +20,10 @@ pub(crate) struct Request {
     pub(crate) from: VertexId,
     /// For how many cycles it has stood there.
     pub(crate) waited: u32,
+    /// The vertex that the path enters after that.
+    pub(crate) then: Option<VertexId>,
+    /// The path's end, if the rover leaves the roadmap there.
+    pub(crate) leaves_at: Option<VertexId>,
     /// The path begins with a wait because the vertex is occupied: it may accelerate.
     pub(crate) follows: bool,
 }
@@ -32,7 +36,13 @@ impl Request {
             FirstStep::Move(vertex) => (vertex, false),
             FirstStep::Follow(vertex) => (vertex, true),
         };
+        let path = &assignment.path;
+        let then = path.vertices.get(2 + usize::from(follows)).copied();
+        let leaves = path.destination == Destination::Goal;
+        let leaves_at = path.vertices.last().copied().filter(|_| leaves);
         Some(Request {
+            then,
+            leaves_at,
             vertex,
             rover: assignment.rover,
             step: assignment.step,
@@ -68,6 +78,8 @@ mod tests {
             rover: RoverId(rover),
             step: 1,
             from: v(2),
+            then: None,
+            leaves_at: None,
             waited,
             follows,
         }

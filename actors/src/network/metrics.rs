@@ -62,6 +62,10 @@ pub struct NetworkMetrics {
     pub cycles: u32,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
+    /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
+    pub confirmed_deadlocks: u32,
+    /// The last of them: each rover waits for the next, the last for the first.
+    pub last_confirmed: Vec<String>,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands.
     pub standstill: Option<String>,

@@ -54,6 +54,8 @@ pub(crate) struct Score {
     nearest: (u32, u32),
     deadlock: Deadlock,
     standstill: Option<String>,
+    confirmed_deadlocks: u32,
+    last_confirmed: Vec<RoverId>,
     ended: bool,
 }
 
@@ -132,6 +134,10 @@ impl Score {
         if state.forced_stops > 0 && self.last_intervention != Some(state.cycle) {
             self.last_intervention = Some(state.cycle);
             self.interventions += 1;
+        }
+        if state.confirmed_deadlocks > 0 {
+            self.confirmed_deadlocks += state.confirmed_deadlocks;
+            self.last_confirmed.clone_from(&state.deadlock);
         }
         if state.rovers > 0 {
             self.planned_cycles += 1;
@@ -247,11 +253,14 @@ impl Score {
             deadlock: self.deadlock,
             interventions: self.interventions,
             cycles: self.cycle + 1,
+            confirmed_deadlocks: self.confirmed_deadlocks,
             standstill: self.standstill.clone(),
             ..NetworkMetrics::default()
         };
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
+        let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
+        metrics.last_confirmed = self.last_confirmed.iter().filter_map(name).collect();
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
         metrics.deadlocked = self.deadlock != Deadlock::None;
         let energies_j = self.tracks.iter().map(|track| track.transmit_energy_j);

@@ -1,10 +1,17 @@
 //! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
 //! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
-//! [`optimise`], admission in [`admit`].
+//! [`optimise`], admission in [`admit`]. What helps the paper's policy out of standstills, each behind
+//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`].
 
 mod admit;
 mod cycle;
+mod gates;
 mod optimise;
+mod probes;
+mod resolution;
+#[cfg(test)]
+mod tests;
+mod tokens;
 
 use std::sync::Arc;
 
@@ -17,13 +24,17 @@ use super::assignment::Request;
 use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
-    Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations, MaxPlus,
+    Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck, Holding,
+    Locations, MaxPlus, Probe, Resolve,
 };
 use super::reservation::RegistryDue;
 use super::reservation::messages::Relay;
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
+use probes::Probes;
+use resolution::Resolution;
+use tokens::Watch;
 
 /// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
 /// cycle, and owns vertices by the safety protocol.
@@ -43,6 +54,10 @@ pub struct Node {
     /// Own rovers that leave their vertex in this cycle without accelerating.
     leaving: Vec<VertexId>,
     forced_stops: u32,
+    probes: Probes,
+    resolution: Resolution,
+    /// By corridor, once tokens are used.
+    watches: Vec<Watch>,
     /// When the timer of the `complete` policy fires \[ns\].
     pub(super) alarm: Option<(u64, TimerId)>,
 }
@@ -100,6 +115,9 @@ impl Node {
             requests: Vec::new(),
             leaving: Vec::new(),
             forced_stops: 0,
+            probes: Probes::default(),
+            resolution: Resolution::default(),
+            watches: Vec::new(),
             alarm: None,
         }
     }
@@ -126,6 +144,10 @@ impl Actor for Node {
         IterationOverdue,
         Relay,
         RegistryDue,
+        Probe,
+        Resolve,
+        Aside,
+        CorridorNews,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {

@@ -5,6 +5,7 @@ use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::VertexId;
 
+use super::tokens::Heading;
 use super::{Node, Phase, PhaseBegins};
 use crate::network::assignment::Request;
 use crate::network::candidates::{CandidatePath, FirstStep, candidates};
@@ -41,12 +42,24 @@ impl Node {
         self.optimiser.reset();
         self.repeat(ctx);
         let site = self.site.clone();
-        for (entry, queue) in site.queues.iter().filter(|(entry, _)| self.owns(*entry)) {
+        for (entry, queue) in &site.queues {
+            if !self.owns(*entry) || !self.lets_in(ctx, *entry, queue) {
+                continue;
+            }
             let released = ctx.durable::<Ledger>().release(*entry, queue, self.cycle);
             if let Some(rover) = released {
                 self.send_grant(ctx, rover, 1, Some(*entry));
             }
         }
+    }
+
+    /// Whether gates and tokens let the next rover of a queue in.
+    fn lets_in(&mut self, ctx: &mut Context<'_, Self>, entry: VertexId, queue: &[RoverId]) -> bool {
+        let Some(next) = ctx.durable::<Ledger>().next_in(entry, queue) else {
+            return false;
+        };
+        let (_, goal) = self.site.missions[next.0 as usize];
+        self.gate_is_open(ctx) && self.token_admits(ctx, entry, goal)
     }
 
     /// Repeats grants and departures that were not answered.
@@ -79,7 +92,7 @@ impl Node {
         ctx.send(self.rovers[rover.0 as usize], Grant { node, step, to });
     }
 
-    /// Step 1.
+    /// Step 1, and corridors' reports beside it.
     pub(super) fn locate(&mut self, ctx: &mut Context<'_, Self>) {
         let message = Locations {
             node: self.id,
@@ -93,10 +106,13 @@ impl Node {
                 message.clone(),
             );
         }
+        self.report_corridors(ctx);
     }
 
     /// Steps 2 and 3.
     pub(super) fn propose(&mut self, ctx: &mut Context<'_, Self>) {
+        self.decide_corridors(ctx);
+        self.probe(ctx);
         let rovers: Vec<_> = self
             .movable(ctx)
             .into_iter()
@@ -152,6 +168,14 @@ impl Node {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
+        let mut headings = Vec::new();
+        for next in self.graph.neighbors(here) {
+            headings.push((next, self.token_is_with(ctx, here, next)));
+        }
+        let heading = |v| {
+            let known = headings.iter().find(|(next, _)| *next == v);
+            known.map_or(Heading::Free, |(_, heading)| *heading)
+        };
         let ledger = ctx.durable::<Ledger>();
         let occupied = |v| {
             if self.owns(v) {
@@ -160,7 +184,15 @@ impl Node {
             let mut theirs = self.neighbors.iter().flat_map(|n| &n.holdings);
             theirs.any(|holding| holding.vertex == v)
         };
-        let mut paths = candidates(&self.graph, here, goal, occupied);
+        if let Some(paths) = self.path_aside(here, held, &occupied) {
+            return paths;
+        }
+        let closed = |v| occupied(v) || heading(v) != Heading::Free;
+        let mut paths = candidates(&self.graph, here, goal, closed);
+        paths.retain(|path| {
+            path.next_vertex()
+                .is_none_or(|v| heading(v) != Heading::Never)
+        });
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
