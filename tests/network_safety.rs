@@ -102,8 +102,8 @@ fn scenario() -> impl Strategy<Value = Scenario> {
         0..10u64,
     );
     let crashes = prop::collection::vec((1..40u64, 1..80u64, 0..12u32), 0..6);
-    (world, endpoints, link, crashes, any::<bool>()).prop_map(
-        |(world, endpoints, link, crashes, acceleration_chains)| Scenario {
+    (world, endpoints, link, crashes, any::<[bool; 4]>()).prop_map(
+        |(world, endpoints, link, crashes, aids)| Scenario {
             seed: world.0,
             columns: world.1,
             rows: world.2,
@@ -120,7 +120,11 @@ fn scenario() -> impl Strategy<Value = Scenario> {
             },
             crashes,
             network: NetworkConfig {
-                acceleration_chains,
+                acceleration_chains: aids[0],
+                entry_gates: aids[1],
+                corridor_tokens: aids[2],
+                junction_resolution: aids[3],
+                probe_after: 2,
                 cycle_limit: 120,
                 ..NetworkConfig::default()
             },

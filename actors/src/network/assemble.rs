@@ -134,7 +134,7 @@ pub fn assemble(
     let site = Arc::new(Site {
         payoffs: Payoffs::new(network, &roadmap),
         corridors: match network.corridor_tokens {
-            true => Corridors::new(&roadmap),
+            true => Corridors::new(&roadmap, 2),
             false => Corridors::default(),
         },
         node_names: names("node", sensors.len()),

@@ -20,8 +20,6 @@ pub(crate) struct Request {
     pub(crate) from: VertexId,
     /// For how many cycles it has stood there.
     pub(crate) waited: u32,
-    /// The vertex that the path enters after that.
-    pub(crate) then: Option<VertexId>,
     /// The path's end, if the rover leaves the roadmap there.
     pub(crate) leaves_at: Option<VertexId>,
     /// The path begins with a wait because the vertex is occupied: it may accelerate.
@@ -37,11 +35,9 @@ impl Request {
             FirstStep::Follow(vertex) => (vertex, true),
         };
         let path = &assignment.path;
-        let then = path.vertices.get(2 + usize::from(follows)).copied();
         let leaves = path.destination == Destination::Goal;
         let leaves_at = path.vertices.last().copied().filter(|_| leaves);
         Some(Request {
-            then,
             leaves_at,
             vertex,
             rover: assignment.rover,
@@ -78,7 +74,6 @@ mod tests {
             rover: RoverId(rover),
             step: 1,
             from: v(2),
-            then: None,
             leaves_at: None,
             waited,
             follows,

@@ -166,8 +166,8 @@ pub struct NetworkConfig {
     /// The share of the vertices of the owner's local neighbourhood graph up to which gates are
     /// open, from 0 to 1.
     pub entry_gate_occupancy: f64,
-    /// Corridor tokens: chains of vertices in which no two rovers can pass each other are driven in
-    /// one direction at a time. They take part in each cycle's exchanges: with links slower than
+    /// Corridor tokens: chains of at least two vertices in which no two rovers can pass each other
+    /// are entered in one direction at a time. They take part in each cycle's exchanges: with links slower than
     /// those, traffic in corridors waits for the news.
     pub corridor_tokens: bool,
     /// Wait-for probes, which confirm deadlocks and name the rovers in them.
@@ -215,7 +215,7 @@ impl Default for NetworkConfig {
             acceleration: true,
             acceleration_chains: false,
             entry_gates: false,
-            entry_gate_occupancy: 0.3,
+            entry_gate_occupancy: 0.15,
             corridor_tokens: false,
             deadlock_probes: false,
             probe_after: 6,

@@ -41,10 +41,8 @@ impl Direction {
 pub(crate) enum Passage {
     /// From an end into the chain of this corridor.
     Enters(usize, Direction),
-    /// From one vertex of the chain to the next.
-    Inside(usize, Direction),
-    /// Anything else; leaving a corridor, for one.
-    Outside,
+    /// Anything else.
+    Other,
 }
 
 impl Corridor {
@@ -74,16 +72,6 @@ impl Corridor {
     }
 }
 
-pub(crate) fn trial() -> u32 {
-    static T: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
-    *T.get_or_init(|| {
-        std::env::var("T")
-            .ok()
-            .and_then(|t| t.parse().ok())
-            .unwrap_or(0)
-    })
-}
-
 /// All corridors of a roadmap.
 #[derive(Debug, Default)]
 pub(crate) struct Corridors {
@@ -93,8 +81,9 @@ pub(crate) struct Corridors {
 }
 
 impl Corridors {
-    /// Ordered by the lowest vertex of their chains. A roadmap that is one ring has none.
-    pub(crate) fn new(roadmap: &Roadmap) -> Corridors {
+    /// Those whose chains have at least `shortest` vertices, ordered by the lowest of them. A
+    /// roadmap that is one ring has none.
+    pub(crate) fn new(roadmap: &Roadmap, shortest: usize) -> Corridors {
         let mut corridors = Corridors {
             all: Vec::new(),
             place: vec![None; roadmap.len()],
@@ -113,7 +102,7 @@ impl Corridors {
             way.reverse();
             way.push(lowest);
             way.extend(arm(roadmap, lowest, ahead).unwrap_or_default());
-            if trial() & 4 != 0 && way.len() < 4 {
+            if way.len() < shortest + 2 {
                 continue;
             }
             let index = corridors.all.len();
@@ -130,10 +119,23 @@ impl Corridors {
         &self.all
     }
 
+    /// The corridor in whose chain `at` is, and the direction of a move from there to its neighbour
+    /// `to`.
+    pub(crate) fn heading(&self, at: VertexId, to: VertexId) -> Option<(usize, Direction)> {
+        let (index, place) = self.place[at.0 as usize]?;
+        let ahead = self.all[index].way[place + 1] == to;
+        let direction = if ahead {
+            Direction::Forward
+        } else {
+            Direction::Backward
+        };
+        Some((index, direction))
+    }
+
     /// What a move from `from` to its neighbour `to` has to do with corridors.
     pub(crate) fn passage(&self, from: VertexId, to: VertexId) -> Passage {
         let Some((index, at)) = self.place[to.0 as usize] else {
-            return Passage::Outside;
+            return Passage::Other;
         };
         let way = &self.all[index].way;
         let direction = if way[at - 1] == from {
@@ -142,7 +144,7 @@ impl Corridors {
             Direction::Backward
         };
         match self.place[from.0 as usize] {
-            Some(_) => Passage::Inside(index, direction),
+            Some(_) => Passage::Other,
             None => Passage::Enters(index, direction),
         }
     }
@@ -233,17 +235,19 @@ mod tests {
     proptest! {
         #[test]
         fn corridors_are_the_chains_found_by_merging(
-            columns in 2..6u32, rows in 2..5u32, cuts in any::<u64>(),
+            columns in 2..6u32, rows in 2..5u32, cuts in any::<u64>(), shortest in 1..4usize,
         ) {
             let map = cut_grid(columns, rows, cuts);
-            let corridors = Corridors::new(&map);
+            let corridors = Corridors::new(&map, shortest);
             let sorted = |corridor: &Corridor| {
                 let mut chain = corridor.chain().to_vec();
                 chain.sort_unstable();
                 chain
             };
+            let mut chains = chains_by_merging(&map);
+            chains.retain(|chain| chain.len() >= shortest);
             let found: Vec<_> = corridors.all().iter().map(sorted).collect();
-            prop_assert_eq!(found, chains_by_merging(&map));
+            prop_assert_eq!(found, chains);
             for (index, corridor) in corridors.all().iter().enumerate() {
                 let way = &corridor.way;
                 for end in [way[0], way[way.len() - 1]] {
@@ -253,14 +257,12 @@ mod tests {
                     prop_assert!(map.are_adjacent(step[0], step[1]));
                     let ahead = match i {
                         0 => Passage::Enters(index, Direction::Forward),
-                        i if i + 2 == way.len() => Passage::Outside,
-                        _ => Passage::Inside(index, Direction::Forward),
+                        _ => Passage::Other,
                     };
                     prop_assert_eq!(corridors.passage(step[0], step[1]), ahead);
                     let back = match i {
-                        0 => Passage::Outside,
                         i if i + 2 == way.len() => Passage::Enters(index, Direction::Backward),
-                        _ => Passage::Inside(index, Direction::Backward),
+                        _ => Passage::Other,
                     };
                     prop_assert_eq!(corridors.passage(step[1], step[0]), back);
                 }
@@ -270,8 +272,8 @@ mod tests {
 
     #[test]
     fn a_ring_has_no_corridor_and_a_line_has_one() {
-        assert!(Corridors::new(&grid(2, 2, &[])).all().is_empty());
-        let line = Corridors::new(&grid(4, 1, &[]));
+        assert!(Corridors::new(&grid(2, 2, &[]), 1).all().is_empty());
+        let line = Corridors::new(&grid(4, 1, &[]), 1);
         assert_eq!(line.all()[0].way, [v(0), v(1), v(2), v(3)]);
         assert_eq!(line.all()[0].exit(Direction::Backward), v(0));
     }

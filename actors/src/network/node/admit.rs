@@ -138,7 +138,7 @@ impl Node {
         }
     }
 
-    fn is_rover(&self, rover: RoverId) -> bool {
+    pub(super) fn is_rover(&self, rover: RoverId) -> bool {
         (rover.0 as usize) < self.rovers.len()
     }
 }

@@ -5,7 +5,6 @@ use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::VertexId;
 
-use super::tokens::Heading;
 use super::{Node, Phase, PhaseBegins};
 use crate::network::assignment::Request;
 use crate::network::candidates::{CandidatePath, FirstStep, candidates};
@@ -168,14 +167,12 @@ impl Node {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
-        let mut headings = Vec::new();
+        let mut forbidden = Vec::new();
         for next in self.graph.neighbors(here) {
-            headings.push((next, self.token_is_with(ctx, here, next)));
+            if self.token_forbids(ctx, here, next) {
+                forbidden.push(next);
+            }
         }
-        let heading = |v| {
-            let known = headings.iter().find(|(next, _)| *next == v);
-            known.map_or(Heading::Free, |(_, heading)| *heading)
-        };
         let ledger = ctx.durable::<Ledger>();
         let occupied = |v| {
             if self.owns(v) {
@@ -187,18 +184,16 @@ impl Node {
         if let Some(paths) = self.path_aside(here, held, &occupied) {
             return paths;
         }
-        let closed = |v| occupied(v) || heading(v) != Heading::Free;
+        let closed = |v| occupied(v) || forbidden.contains(&v);
         let mut paths = candidates(&self.graph, here, goal, closed);
-        paths.retain(|path| {
-            path.next_vertex()
-                .is_none_or(|v| heading(v) != Heading::Never)
-        });
+        // Who was sent here goes back at no penalty.
+        let previous = held.previous.filter(|_| !self.was_sent(held.rover, here));
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
             let noise = draws.uniform_in(0.0, self.site.config.noise);
             let (roadmap, payoffs) = (&self.site.roadmap, &self.site.payoffs);
-            path.payoff = payoffs.unary(roadmap, path, goal, held.previous, noise);
+            path.payoff = payoffs.unary(roadmap, path, goal, previous, noise);
         }
         paths
     }

@@ -41,7 +41,8 @@ impl Resolution {
     }
 
     fn take(&mut self, order: Aside, cycle: u32) {
-        let stale = |old: &Aside| old.until < cycle || old.rover == order.rover;
+        // An order that is over still says why a rover is where it is.
+        let stale = |old: &Aside| old.until + 50 < cycle || old.rover == order.rover;
         self.orders.retain(|old| !stale(old));
         self.quiet_until = self.quiet_until.max(order.until);
         self.orders.push(order);
@@ -113,7 +114,7 @@ impl Node {
                 }
                 return;
             }
-            if self.cycle <= self.resolution.quiet_until && self.resolution.quiet_until > 0 {
+            if self.cycle < self.resolution.quiet_until {
                 return;
             }
             let held = ctx.durable::<Ledger>().occupant(member.vertex).copied();
@@ -177,14 +178,15 @@ impl Node {
             }
             self.resolution.take(order, cycle);
         }
-        let longer = ctx.random_at("back_off", u64::from(cycle)).stream();
-        let longer = longer.clone().uniform_in(0.0, f64::from(hold + 1));
+        let mut draws = ctx.random_at("back_off", u64::from(cycle)).stream();
+        let longer = draws.uniform_in(0.0, f64::from(hold + 1));
         self.resolution.quiet_until = until + longer as u32;
     }
 
-    /// Whether a rover is under orders to go aside.
-    pub(super) fn is_under_orders(&self, rover: RoverId) -> bool {
-        self.resolution.order(rover, self.cycle).is_some()
+    /// Whether the last order known for a rover led to `here`, over or not.
+    pub(super) fn was_sent(&self, rover: RoverId, here: VertexId) -> bool {
+        let led = |order: &Aside| order.rover == rover && order.path.contains(&here);
+        self.resolution.orders.iter().any(led)
     }
 
     /// The paths of a rover that was sent aside: on to its place, or, there, to wait; and the zero
@@ -223,7 +225,8 @@ impl Handler<Resolve> for Node {
 
 impl Handler<Aside> for Node {
     fn handle(&mut self, order: Aside, _ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.site.config.junction_resolution && order.until >= self.cycle {
+        let known = self.is_rover(order.rover);
+        if self.site.config.junction_resolution && known && order.until >= self.cycle {
             self.resolution.take(order, self.cycle);
         }
         Ok(())
