@@ -265,6 +265,22 @@ impl Simulation {
         self.links.iter().map(|link| link.name.as_str())
     }
 
+    /// The greatest [`Carrier::min_delay`] of all links declared so far, zero if there are none: what
+    /// a protocol has to reckon with, as far as links can tell before the start.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// sim.link(a, b, "a-b", FixedDelay::new(SimDuration::from_millis(5)));
+    /// sim.link(b, a, "b-a", FixedDelay::new(SimDuration::from_millis(700)));
+    /// assert_eq!(sim.slowest_link(), SimDuration::from_millis(700));
+    /// ```
+    pub fn slowest_link(&self) -> SimDuration {
+        let delays = self.links.iter().map(|link| link.carrier.min_delay());
+        delays.max().unwrap_or(SimDuration::ZERO)
+    }
+
     /// [`Simulation::crash_at`] for the actor of this name, as scenarios give it.
     ///
     /// # Errors

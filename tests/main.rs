@@ -6,6 +6,8 @@ mod determinism;
 mod golden;
 mod house;
 mod layering;
+mod network_complete;
+mod network_planning;
 mod network_safety;
 mod network_team;
 mod scenarios;

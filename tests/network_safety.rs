@@ -126,10 +126,21 @@ fn scenario() -> impl Strategy<Value = Scenario> {
                 junction_resolution: aids[3],
                 probe_after: 2,
                 cycle_limit: 120,
-                ..NetworkConfig::default()
+                ..rigid()
             },
         },
     )
+}
+
+/// Phases that do not stretch with latency, so that messages come cycles late.
+fn rigid() -> NetworkConfig {
+    NetworkConfig {
+        cycle: Some(SimDuration::from_secs(1)),
+        exchange: Some(SimDuration::from_millis(50)),
+        optimisation: Some(SimDuration::from_millis(500)),
+        iteration_timeout: Some(SimDuration::from_millis(20)),
+        ..NetworkConfig::default()
+    }
 }
 
 /// A connected grid with some edges cut out: trees, loops, corridors.
@@ -233,7 +244,7 @@ fn plain(seed: u64) -> Scenario {
         endpoints: Endpoints::Alternating,
         link: Bad::good(),
         crashes: Vec::new(),
-        network: NetworkConfig::default(),
+        network: rigid(),
     }
 }
 

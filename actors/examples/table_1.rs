@@ -4,8 +4,9 @@
 //!
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
-//! Keys: `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `digest` (true, false), `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
+//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
+//! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
+//! `2M/s`), `damping`, `anytime`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, and the payoffs'
 //! `factor`, `backtrack`, `leaf_wait`, `noise`. Aids: `gates`, `tokens`, `probes`, `resolution` (true,
 //! false), `gate` (occupancy), `probe_after`, `hold` (cycles).
@@ -17,6 +18,7 @@ use farside::prelude::*;
 use farside_actors::network::{
     Deadlock, NetworkConfig, NetworkMetrics, Policy, Priority, TeamConfig, WorldConfig, assemble,
 };
+use farside_actors::units::parse_duration;
 use farside_worlds::{Endpoints, Roadmap};
 
 /// A link with uniform jitter and independent loss.
@@ -46,6 +48,7 @@ impl Carrier for Radio {
 }
 
 struct Options {
+    first_seed: u64,
     seeds: u64,
     maps: Vec<String>,
     nodes: Vec<u32>,
@@ -58,6 +61,7 @@ struct Options {
 
 fn options() -> Result<Options, Box<dyn std::error::Error>> {
     let mut options = Options {
+        first_seed: 1,
         seeds: 16,
         maps: vec!["crater-dense".into(), "crater-sparse".into()],
         nodes: vec![14, 21, 28],
@@ -86,12 +90,15 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "policy" => {
                 network.policy = match value {
                     "complete" => Policy::Complete,
+                    "reference" => Policy::Reference,
+                    "prioritised" => Policy::Prioritised,
                     _ => Policy::Paper,
                 }
             }
             "routes" => network.routes = value.parse()?,
             "ahead" => network.grants_ahead = value.parse()?,
             "passive" => network.passive_window = value.parse()?,
+            "first_seed" => options.first_seed = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
             "rovers" => options.rovers = numbers(value)?,
@@ -99,6 +106,12 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "latency_ms" => options.radio.latency = SimDuration::from_millis(value.parse()?),
             "jitter_ms" => options.radio.jitter = SimDuration::from_millis(value.parse()?),
             "digest" => options.digest = value.parse()?,
+            "processor" => network.processor = value.parse()?,
+            "damping" => network.damping = value.parse()?,
+            "anytime" => network.anytime = value.parse()?,
+            "cycle" => network.cycle = Some(parse_duration(value)?),
+            "optimisation" => network.optimisation = Some(parse_duration(value)?),
+            "iteration_timeout" => network.iteration_timeout = Some(parse_duration(value)?),
             "iterations" => network.max_iterations = value.parse()?,
             "cycle_limit" => network.cycle_limit = value.parse()?,
             "active_window" => network.active_window = value.parse()?,
@@ -176,16 +189,19 @@ fn run(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
     println!(
-        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  coll  confirmed",
+        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  B/rover  total  coll  confirmed",
         "map"
     );
     for map in &options.maps {
         for &nodes in &options.nodes {
             for &rovers in &options.rovers {
-                let results =
-                    (1..=options.seeds).map(|seed| run(&options, map, nodes, rovers, seed));
+                let seeds = options.first_seed..options.first_seed + options.seeds;
+                let results = seeds.map(|seed| run(&options, map, nodes, rovers, seed));
                 let results = results.collect::<Result<Vec<_>, _>>()?;
                 print_cell(map, nodes, rovers, &results);
+                for (_, report) in results.iter().filter(|_| options.digest) {
+                    println!("    {}", report.digest);
+                }
             }
         }
     }
@@ -209,7 +225,7 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         results.iter().map(value).sum::<f64>() / n
     };
     println!(
-        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:4.0}  {:9.1}",
+        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}",
         percent(&|m| m.deadlock != Deadlock::None),
         percent(&|m| m.deadlock == Deadlock::Passive),
         percent(&|m| m.deadlock == Deadlock::Active),
@@ -224,6 +240,8 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         all(&|(m, _)| m.max_plus_iterations),
         mean(&|m| f64::from(m.cycles)),
         all(&|(m, r)| r.counts.sent as f64 / f64::from(m.cycles)),
+        all(&|(m, _)| m.bytes_per_rover_cycle),
+        mean(&|m| m.total_steps as f64),
         all(&|(m, _)| f64::from(m.collisions)),
         all(&|(m, _)| f64::from(m.confirmed_deadlocks)),
     );

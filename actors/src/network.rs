@@ -47,11 +47,22 @@
 //! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that comes
 //! too late to be weighed against others is granted if the vertex is free.
 //!
+//! # Starved processors
+//!
+//! The paper's Table 1 is about processors as much as about paths. With all the computing that it
+//! asks for (`network.processor = "unlimited"`, the default here), max-plus converges, and hardly a
+//! team comes to a standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after
+//! 500 ms of a core of 2006. With one constant for all cells, `network.processor = "paper"`
+//! ([`Processor::PAPER`]), its pattern appears: teams come to a standstill sooner with fewer nodes,
+//! which compare more and longer candidate paths. With fewer than three iterations in a cycle
+//! nearly all do.
+//!
 //! # Where what is
 //!
-//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`,
-//! `payoff`, `max_plus`, `assignment`. The protocol: [`messages`], `safety` (what owners and rovers
-//! keep, and why no two rovers meet), `node` and `rover` (the actors). Outside both: `monitor`.
+//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
+//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`. The protocol:
+//! [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet), `node` and
+//! `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
 mod assignment;
@@ -65,15 +76,20 @@ mod metrics;
 mod monitor;
 mod node;
 mod payoff;
+mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
+mod schedule;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
+mod timing;
 
-pub use assemble::{Connect, Network, NetworkError, assemble};
+pub use assemble::{Connect, Network, NetworkError, assemble, assemble_standing, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};
 pub use config::{ConfigError, NetworkConfig, Policy, Priority, Sabotage, TeamConfig, WorldConfig};
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
+pub use processor::Processor;
 pub use rover::Rover;
+pub use timing::Timing;

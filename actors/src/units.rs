@@ -160,6 +160,16 @@ const POWER: Quantity = Quantity {
     ],
 };
 
+const RATE: Quantity = Quantity {
+    expected: "a rate such as \"500k/s\" or \"2M/s\"",
+    units: &[
+        unit("/s", 1, 0),
+        unit("k/s", 1, 3),
+        unit("M/s", 1, 6),
+        unit("G/s", 1, 9),
+    ],
+};
+
 impl Quantity {
     /// The number's text and the unit. Whitespace between them is fine.
     fn split<'a>(&self, text: &'a str) -> Result<(&'a str, &'static Unit), UnitError> {
@@ -381,6 +391,27 @@ pub fn parse_power_w(text: &str) -> Result<f64, UnitError> {
 /// ```
 pub fn print_power_w(power_w: f64) -> String {
     format!("{power_w}W")
+}
+
+/// Reads how often something happens in a second: `"500k/s"`, `"2M/s"`, `"1.5G/s"`.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_rate("1.5k/s"), Ok(1500));
+/// ```
+///
+/// # Errors
+/// When it is none, has no unit or another quantity's, or is no whole number each second.
+pub fn parse_rate(text: &str) -> Result<u64, UnitError> {
+    RATE.whole(text, "a whole number each second")
+}
+
+/// Writes how often something happens in a second so that it parses back to the same rate.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_rate(2_000_000), "2M/s");
+/// ```
+pub fn print_rate(per_s: u64) -> String {
+    print_whole(per_s, &["/s", "k/s", "M/s", "G/s"])
 }
 
 /// The number in the largest of these units, each 1000 of the one before, that leaves it whole.

@@ -19,7 +19,7 @@ mod tests;
 pub use svg::Figure;
 
 use crate::study::results::Results;
-use crate::study::summary::summarise;
+use crate::study::summary::{Summary, summarise};
 use measure::Study;
 
 /// The style of figures, in light, dark and print.
@@ -37,6 +37,10 @@ pub struct Report {
     pub results_csv: String,
     /// One row for each cell and metric, see [`csv::summary_csv`].
     pub summary_csv: String,
+    /// One row for each published figure, see [`csv::published_csv`]; none if none is known.
+    pub published_csv: Option<String>,
+    /// What the study says, in figures.
+    pub summary: Summary,
 }
 
 /// Writes up a study. `folder` is the results folder as commands on the page name it.
@@ -47,7 +51,7 @@ pub struct Report {
 /// #     question: "Does it <b>escape</b>?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
 /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1],
-/// #     stop: None };
+/// #     stop: None, published: vec![] };
 /// # let results = Results { manifest, runs: vec![] };
 /// let report = farside_experiments::report::build(&results, "runs");
 /// assert!(report.page.contains("Does it &lt;b&gt;escape&lt;/b&gt;?"));
@@ -61,5 +65,7 @@ pub fn build(results: &Results, folder: &str) -> Report {
         figures,
         results_csv: csv::results_csv(results),
         summary_csv: csv::summary_csv(results, &summary),
+        published_csv: csv::published_csv(results, &summary),
+        summary,
     }
 }

@@ -12,9 +12,11 @@
 //! | what "no collision in 300 runs" is worth | [`rates`] |
 //! | when rovers arrive, if some never do | [`survival`] |
 //! | quantiles and their definition | [`distribution`] |
+//! | whether figures grow linearly | [`line`] |
 
 pub mod bootstrap;
 pub mod distribution;
+pub mod line;
 mod normal;
 pub mod rates;
 pub mod survival;

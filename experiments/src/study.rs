@@ -24,6 +24,45 @@
 //! together), `list` (`[[cell]]` tables give the values), `latin-hypercube` (`cells` points spread
 //! over ranges). With a `[stop]` table of `metric`, `width`, `min_seeds` and `max_seeds`, a cell runs
 //! until the 95 % interval of the metric is narrower than `width`.
+//!
+//! Instead of a key and values, a factor may have variants: names for what each sets, several keys
+//! or none. What one variant does not set is as the scenario has it.
+//!
+//! ```toml
+//! [[factor]]
+//! name = "policy"
+//! variants = [
+//!     { name = "paper", set = { network.policy = "paper" } },
+//!     { name = "chained", set = { network.policy = "paper", network.acceleration_chains = true } },
+//! ]
+//! ```
+//!
+//! # Published figures
+//!
+//! A `[[published]]` table has figures of others for one metric. The report sets them beside ours.
+//!
+//! ```toml
+//! [[published]]
+//! metric = "deadlocked"
+//! title = "Table 1: deadlocks, dense roadmap"
+//! source = "Luna, Oyama and Bekris, section 4, Table 1"
+//! unit = "%"          # of the published figures; none unless given
+//! scale = 100         # a published figure is ours times this; 1 unless given
+//! rows = "rovers"     # which factor makes the rows of the table; the first unless given
+//! values = [
+//!     { rovers = 100, nodes = 28, value = 58 },
+//!     { rovers = 25, about = 1.4, quote = "about 1.4 in the 25 vehicle case" },
+//!     { linear = "rovers" },
+//! ]
+//! note = "How to read them."
+//! why = "Why ours differ."
+//! ```
+//!
+//! Each of `values` names levels of factors, and is for every cell that has them all; a factor that
+//! it does not name may have any. Its claim is one of `value`, `about`, `below`, `above` (a number in
+//! `unit`), or `linear`, the name of a factor along which the metric should grow linearly. Two
+//! figures of a table for one cell are refused. Results are kept when these tables change: a note on
+//! why ours differ may be written when the runs are done.
 
 mod builtin;
 mod design;
@@ -36,6 +75,7 @@ mod load;
 mod metrics;
 mod plan;
 mod pool;
+mod published;
 mod reproduce;
 pub mod results;
 mod runner;

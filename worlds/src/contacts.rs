@@ -40,6 +40,7 @@ use farside::{SimDuration, SimTime};
 use serde::{Deserialize, Serialize};
 
 pub use builtin::Builtin;
+pub(crate) use error::shown;
 pub use error::{ContactError, ContactProblem, Position};
 pub use summary::{Gap, PairSummary, PlanSummary};
 pub use trace::CapacityTrace;

@@ -4,7 +4,7 @@
 //! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
 //! a [`SensorNetwork`] over it. Both lie in a generated [`Crater`], whose [`HeightField`] tells a
 //! radio link what the ground hides. [`contacts`] reads when which node hears which, as ION, HDTN
-//! and mahimahi write it down.
+//! and mahimahi write it down; [`movingai`] reads grid maps and tasks of path-finding benchmarks.
 //!
 //! ```
 //! use farside_worlds::{Roadmap, SensorNetwork};
@@ -22,6 +22,7 @@ pub mod contacts;
 pub mod crater;
 pub mod error;
 pub mod generate;
+pub mod movingai;
 pub mod roadmap;
 pub mod rocks;
 pub mod sensors;
@@ -30,7 +31,8 @@ pub mod terrain;
 pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, ContactWindow};
 pub use crater::{Crater, CraterSettings, Hazard};
 pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
-pub use roadmap::{Endpoints, Roadmap, VertexId};
+pub use movingai::{GridError, GridMap, GridTask, GridWorld, TaskList};
+pub use roadmap::{Blocked, Endpoints, Roadmap, VertexId, well_formed};
 pub use rocks::{Rock, RockAbundance};
 pub use sensors::{NodeId, SensorNetwork};
 pub use terrain::HeightField;

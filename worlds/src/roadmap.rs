@@ -7,6 +7,7 @@
 mod check;
 mod endpoints;
 mod file;
+mod well_formed;
 
 use std::collections::VecDeque;
 
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::RoadmapError;
 pub(crate) use check::segments_meet;
 pub use endpoints::Endpoints;
+pub use well_formed::{Blocked, well_formed};
 
 /// The index of a vertex of a [`Roadmap`], from 0.
 ///
@@ -29,8 +31,9 @@ pub use endpoints::Endpoints;
 #[serde(transparent)]
 pub struct VertexId(pub u32);
 
-/// The most vertices a roadmap may have (its distance table then takes 8 MB).
-pub const MAX_VERTICES: usize = 2048;
+/// The most vertices a roadmap may have: a full grid of 64 by 64. Its distance table, two bytes for
+/// each pair, then takes 32 MiB.
+pub const MAX_VERTICES: usize = 4096;
 
 /// The largest magnitude of a coordinate or height \[m\].
 pub const MAX_COORDINATE_M: f64 = 1.0e6;

@@ -17,6 +17,8 @@ use super::monitor::{Monitor, Score};
 use super::node::Node;
 use super::payoff::Payoffs;
 use super::rover::Rover;
+use super::schedule::Schedule;
+use super::timing::Timing;
 
 /// Why a system could not be assembled, or has no such actor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -39,6 +41,25 @@ pub enum NetworkError {
         /// Its exits.
         exits: usize,
     },
+    /// A policy that plans for the whole team ahead has no plan.
+    #[error("no plan for the whole team: {0}")]
+    NoPlan(String),
+    /// Two rovers cannot be in one place.
+    #[error("two rovers have the {what} {}", .vertex.0)]
+    Shared {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Where.
+        vertex: VertexId,
+    },
+    /// A vertex that the roadmap does not have.
+    #[error("a rover's {what} is vertex {}, which the roadmap does not have", .vertex.0)]
+    Outside {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Where.
+        vertex: VertexId,
+    },
     /// No actor has this name.
     #[error("no node or rover is called {name}; there are {first} to {last}")]
     UnknownActor {
@@ -56,13 +77,21 @@ pub(crate) struct Site {
     pub(crate) roadmap: Arc<Roadmap>,
     pub(crate) sensors: Arc<SensorNetwork>,
     pub(crate) config: NetworkConfig,
+    pub(crate) timing: Timing,
+    /// Cycles that may pass without progress because messages take so long: a way is reserved in
+    /// some tens of messages one after the other.
+    pub(crate) patience: u32,
     pub(crate) payoffs: Payoffs,
     /// Where rovers cannot pass each other; none unless `corridor_tokens` asks for them.
     pub(crate) corridors: Corridors,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
-    /// Each rover's entry and goal.
+    /// Each rover's entry, or where it stands at first, and its goal.
     pub(crate) missions: Vec<(VertexId, VertexId)>,
+    /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
+    pub(crate) stays: bool,
+    /// The plan of a policy that plans ahead.
+    pub(crate) schedule: Option<Schedule>,
     /// Who waits at each entry, in order.
     pub(crate) queues: Vec<(VertexId, Vec<RoverId>)>,
 }
@@ -70,7 +99,14 @@ pub(crate) struct Site {
 impl Site {
     /// The planning cycle at `now`, from 0. Nodes' clocks are synchronous.
     pub(crate) fn cycle_at(&self, now: SimTime) -> u32 {
-        u32::try_from(now.as_nanos() / self.config.cycle.as_nanos()).unwrap_or(u32::MAX)
+        u32::try_from(now.as_nanos() / self.timing.cycle.as_nanos()).unwrap_or(u32::MAX)
+    }
+
+    /// Who stands where at the start.
+    pub(crate) fn standing(&self) -> impl Iterator<Item = (RoverId, VertexId)> + '_ {
+        let all = (0..).map(RoverId).zip(&self.missions);
+        all.filter(|_| self.stays)
+            .map(|(id, (start, _))| (id, *start))
     }
 
     /// Who waits at `entry`, in order.
@@ -87,7 +123,7 @@ impl Site {
 
     /// From `now` to the start of the next cycle; never zero.
     pub(crate) fn until_next_cycle(&self, now: SimTime) -> SimDuration {
-        let cycle = self.config.cycle.as_nanos();
+        let cycle = self.timing.cycle.as_nanos();
         SimDuration::from_nanos(cycle - now.as_nanos() % cycle)
     }
 }
@@ -112,8 +148,8 @@ pub type Connect<'a> = dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)
 /// read here.
 ///
 /// # Errors
-/// When a setting makes no sense, the team is empty, or the roadmap's boundary has no two places to
-/// drive between.
+/// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, or the
+/// roadmap's boundary has no two places to drive between.
 #[allow(clippy::too_many_arguments, reason = "each is a part of a scenario")]
 pub fn assemble(
     sim: &mut Simulation,
@@ -125,29 +161,83 @@ pub fn assemble(
     seed: u64,
     connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
-    network.check()?;
     let missions = missions(world, &roadmap, team, seed)?;
-    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
-        queues.entry(*entry).or_default().push(id);
+    assemble_missions(sim, roadmap, sensors, missions, false, network, connect)
+}
+
+/// The same with the missions given, for rovers that stand on the map from the start and stay at
+/// their goals: each rover's start and goal, no two starts and no two goals alike.
+///
+/// # Errors
+/// When a setting makes no sense, the team is empty, or two rovers would share a vertex at the start
+/// or the end.
+pub fn assemble_standing(
+    sim: &mut Simulation,
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    missions: Vec<(VertexId, VertexId)>,
+    network: &NetworkConfig,
+    connect: &mut Connect<'_>,
+) -> Result<Network, NetworkError> {
+    for (what, of) in [("start", 0), ("goal", 1)] {
+        let place = |mission: &(VertexId, VertexId)| [mission.0, mission.1][of];
+        let mut places: Vec<_> = missions.iter().map(place).collect();
+        places.sort_unstable();
+        if let Some(pair) = places.windows(2).find(|pair| pair[0] == pair[1]) {
+            let vertex = pair[0];
+            return Err(NetworkError::Shared { what, vertex });
+        }
+        if let Some(&vertex) = places.last().filter(|v| v.0 as usize >= roadmap.len()) {
+            return Err(NetworkError::Outside { what, vertex });
+        }
     }
+    assemble_missions(sim, roadmap, sensors, missions, true, network, connect)
+}
+
+fn assemble_missions(
+    sim: &mut Simulation,
+    roadmap: Arc<Roadmap>,
+    sensors: Arc<SensorNetwork>,
+    missions: Vec<(VertexId, VertexId)>,
+    stays: bool,
+    network: &NetworkConfig,
+    connect: &mut Connect<'_>,
+) -> Result<Network, NetworkError> {
+    network.check()?;
+    if missions.is_empty() {
+        return Err(NetworkError::NoRovers);
+    }
+    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
+    if !stays {
+        for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
+            queues.entry(*entry).or_default().push(id);
+        }
+    }
+    let node_names = names("node", sensors.len());
+    let rover_names = names("rover", missions.len());
+    declare_links(sim, &sensors, (&node_names, &rover_names), connect);
+    let timing = network.timing(sim.slowest_link())?;
+    let schedule = Schedule::of(network, &timing, &roadmap, &missions, stays);
     let site = Arc::new(Site {
         payoffs: Payoffs::new(network, &roadmap),
         corridors: match network.corridor_tokens {
             true => Corridors::new(&roadmap, 2),
             false => Corridors::default(),
         },
-        node_names: names("node", sensors.len()),
-        rover_names: names("rover", missions.len()),
+        schedule: schedule.map_err(NetworkError::NoPlan)?,
+        patience: network.patience(sim.slowest_link(), &timing),
+        timing,
+        node_names,
+        rover_names,
         config: network.clone(),
         queues: queues.into_iter().collect(),
         roadmap,
         sensors,
         missions,
+        stays,
     });
     let nodes = declare_nodes(sim, &site);
     let rovers = declare_rovers(sim, &site);
-    declare_links(sim, &site, connect);
     let (monitor, score) = Monitor::new(site.clone());
     sim.observe(monitor);
     Ok(Network {
@@ -167,8 +257,21 @@ fn names(kind: &str, count: usize) -> Vec<String> {
         .collect()
 }
 
-/// An entry and a goal for each rover, at random.
-fn missions(
+/// An entry and a goal for each rover, at random: what [`assemble`] gives its rovers, for planners
+/// that are to be held against it. Of `world` only the endpoints are read.
+///
+/// ```
+/// use farside_actors::network::{TeamConfig, WorldConfig, missions};
+/// use farside_worlds::Roadmap;
+/// let map = Roadmap::builtin("crater-dense")?;
+/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
+/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the team is empty, or the roadmap's boundary has no two places to drive between.
+pub fn missions(
     world: &WorldConfig,
     roadmap: &Roadmap,
     team: &TeamConfig,
@@ -237,17 +340,22 @@ fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>>
         .collect()
 }
 
-fn declare_links(sim: &mut Simulation, site: &Site, connect: &mut Connect<'_>) {
+fn declare_links(
+    sim: &mut Simulation,
+    sensors: &SensorNetwork,
+    (node_names, rover_names): (&[String], &[String]),
+    connect: &mut Connect<'_>,
+) {
     let mut hosts =
         |names: &[String]| -> Vec<HostId> { names.iter().map(|name| sim.host(name)).collect() };
-    let (node_hosts, rover_hosts) = (hosts(&site.node_names), hosts(&site.rover_names));
-    for id in site.sensors.nodes() {
-        let node = (node_hosts[id.0 as usize], &*site.node_names[id.0 as usize]);
-        for other in site.sensors.neighbors(id) {
+    let (node_hosts, rover_hosts) = (hosts(node_names), hosts(rover_names));
+    for id in sensors.nodes() {
+        let node = (node_hosts[id.0 as usize], &*node_names[id.0 as usize]);
+        for other in sensors.neighbors(id) {
             let at = other.0 as usize;
-            connect(sim, node, (node_hosts[at], &site.node_names[at]));
+            connect(sim, node, (node_hosts[at], &node_names[at]));
         }
-        for (host, name) in rover_hosts.iter().zip(&site.rover_names) {
+        for (host, name) in rover_hosts.iter().zip(rover_names) {
             connect(sim, node, (*host, name));
             connect(sim, (*host, name), node);
         }
@@ -259,6 +367,11 @@ impl Network {
     pub fn metrics(&self) -> NetworkMetrics {
         let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
         score.metrics(&self.site)
+    }
+
+    /// How long the parts of a planning cycle last.
+    pub fn timing(&self) -> Timing {
+        self.site.timing
     }
 
     /// How many rovers have arrived so far.

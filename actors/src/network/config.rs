@@ -6,6 +6,8 @@ use farside::SimDuration;
 use farside_worlds::{Endpoints, Roadmap, SensorError, SensorNetwork};
 use serde::{Deserialize, Serialize};
 
+use super::processor::Processor;
+use super::timing;
 use crate::units;
 
 /// Where rovers drive: the roadmap and the sensor nodes over it.
@@ -18,8 +20,16 @@ use crate::units;
 #[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields, default, rename_all = "snake_case")]
 pub struct WorldConfig {
-    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`), or the path of a TOML file.
+    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), or the path of a
+    /// TOML file or of a MovingAI `.map`.
     pub roadmap: String,
+    /// How long the side of a cell of a MovingAI map is, in metres.
+    #[serde(rename = "cell", with = "units::length_m")]
+    pub cell_m: f64,
+    /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from the
+    /// start and stay at their goals. A built-in map of cells has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tasks: Option<String>,
     /// How many sensor nodes; at least 1.
     pub nodes: u32,
     /// The radio radius of each, in metres; by default one that nearly every placement can do with.
@@ -40,6 +50,8 @@ impl Default for WorldConfig {
     fn default() -> Self {
         WorldConfig {
             roadmap: "crater-dense".to_owned(),
+            cell_m: 10.0,
+            tasks: None,
             nodes: 28,
             radius_m: None,
             endpoints: Endpoints::default(),
@@ -70,7 +82,8 @@ impl WorldConfig {
 #[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
 #[serde(deny_unknown_fields, default, rename_all = "snake_case")]
 pub struct TeamConfig {
-    /// How many rovers, all waiting at their entries at the start; at least 1.
+    /// How many rovers, all waiting at their entries at the start; at least 1. Where the world has
+    /// tasks, they do the first ones.
     pub rovers: u32,
 }
 
@@ -90,6 +103,15 @@ pub enum Policy {
     /// The reservation walk: no rover enters before its whole way is reserved. See
     /// [`reservation`](super::reservation).
     Complete,
+    /// A baseline that knows everything and never fails: revised prioritised planning, in the order of
+    /// the queues ([`crate::planning::reference`]).
+    Reference,
+    /// A baseline that knows everything and fails often: prioritised planning in space and time
+    /// ([`crate::planning::prioritised`]). A rover without a way never enters.
+    Prioritised,
+    /// A baseline that knows everything: the best plan of all, by a search over all rovers at once
+    /// ([`crate::planning::coupled`]). For small teams.
+    Coupled,
 }
 
 /// Who wins a vertex that several rovers' paths enter in the same cycle. The paper: "a priority has
@@ -123,20 +145,35 @@ pub enum Priority {
 pub struct NetworkConfig {
     /// Who decides which rover asks for which vertex.
     pub policy: Policy,
-    /// The length of a planning cycle: at most one move of each rover.
-    #[serde(with = "units::duration")]
-    pub cycle: SimDuration,
+    /// The length of a planning cycle: at most one move of each rover. `None`, which is `"auto"` in
+    /// a scenario, is as long as its parts take over the slowest link, at least 1 s: see
+    /// [`super::Timing`]. The next three the same.
+    #[serde(with = "timing::auto")]
+    pub cycle: Option<SimDuration>,
     /// How long each exchange of step 1, 3 and 5 may take, and the rovers' beacons before them.
-    #[serde(with = "units::duration")]
-    pub exchange: SimDuration,
+    #[serde(with = "timing::auto")]
+    pub exchange: Option<SimDuration>,
     /// The cycle's time for max-plus (the paper: 500 ms).
-    #[serde(with = "units::duration")]
-    pub optimisation: SimDuration,
+    #[serde(with = "timing::auto")]
+    pub optimisation: Option<SimDuration>,
     /// The most iterations of max-plus in a cycle (the paper: 100).
     pub max_iterations: u32,
+    /// How fast each node computes: pairs of candidate paths a second, `"paper"` or `"unlimited"`.
+    /// The optimisation uses what is ready in its time.
+    pub processor: Processor,
+    /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as computed.
+    /// 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum on DCOPs
+    /// through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus oscillates.
+    pub damping: f64,
+    /// Anytime max-plus: a node whose optimisation has not converged when its time is over takes the
+    /// best of all iterations' assignments instead of the last. It judges by what it knows: its own
+    /// rovers' payoffs, alone, with each other, and with the paths that its neighbours announce
+    /// beside their vectors. After Vlassis, Elhorst and Kok (2004), who judge along a spanning
+    /// tree of the whole network.
+    pub anytime: bool,
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
-    #[serde(with = "units::duration")]
-    pub iteration_timeout: SimDuration,
+    #[serde(with = "timing::auto")]
+    pub iteration_timeout: Option<SimDuration>,
     /// How long a rover takes along an edge.
     #[serde(with = "units::duration")]
     pub traverse: SimDuration,
@@ -183,6 +220,8 @@ pub struct NetworkConfig {
     pub routes: u32,
     /// `complete`: how many cycles before its planned time a vertex may be granted.
     pub grants_ahead: u32,
+    /// `coupled`: the most nodes that the search may expand.
+    pub max_expansions: u64,
     /// Passive deadlock: no move and no entry for so many cycles.
     pub passive_window: u32,
     /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
@@ -199,11 +238,14 @@ impl Default for NetworkConfig {
     fn default() -> Self {
         NetworkConfig {
             policy: Policy::Paper,
-            cycle: SimDuration::from_secs(1),
-            exchange: SimDuration::from_millis(50),
-            optimisation: SimDuration::from_millis(500),
+            cycle: None,
+            exchange: None,
+            optimisation: None,
             max_iterations: 100,
-            iteration_timeout: SimDuration::from_millis(20),
+            processor: Processor::PAPER,
+            damping: 0.0,
+            anytime: false,
+            iteration_timeout: None,
             traverse: SimDuration::from_millis(200),
             longest_path_factor: 20.0,
             backtrack_penalty: 40.0,
@@ -223,6 +265,7 @@ impl Default for NetworkConfig {
             aside_hold: 8,
             routes: 8,
             grants_ahead: 2,
+            max_expansions: 1_000_000,
             passive_window: 20,
             active_window: 300,
             cycle_limit: 5000,
@@ -273,20 +316,20 @@ pub enum ConfigError {
 }
 
 impl NetworkConfig {
-    /// Checks ranges, and that the phases fit into a cycle.
+    /// Checks ranges. Whether the phases fit into a cycle is for [`NetworkConfig::timing`] to say.
     ///
     /// # Errors
-    /// When a duration or window is zero where it may not be, a weight is negative or no number, or
-    /// the phases of a cycle are longer than the cycle.
+    /// When a duration or window is zero where it may not be, or a weight is negative or no number.
     pub fn check(&self) -> Result<(), ConfigError> {
         for (key, duration) in [
             ("cycle", self.cycle),
             ("exchange", self.exchange),
             ("iteration_timeout", self.iteration_timeout),
-            ("traverse", self.traverse),
+            ("traverse", Some(self.traverse)),
         ] {
-            let actual = duration.to_string();
-            check(key, !duration.is_zero(), actual, "longer than zero")?;
+            let actual = duration.map_or_else(|| "auto".to_owned(), |d| d.to_string());
+            let lasts = duration.is_none_or(|d| !d.is_zero());
+            check(key, lasts, actual, "longer than zero")?;
         }
         for (key, weight) in [
             ("longest_path_factor", self.longest_path_factor),
@@ -303,6 +346,11 @@ impl NetworkConfig {
         let share = self.entry_gate_occupancy;
         let fits = (0.0..=1.0).contains(&share);
         check("entry_gate_occupancy", fits, share.to_string(), "in [0, 1]")?;
+        let damps = (0.0..1.0).contains(&self.damping);
+        check("damping", damps, self.damping.to_string(), "in [0, 1)")?;
+        let computes = self.processor != Processor::PairsPerS(0);
+        let actual = self.processor.to_string();
+        check("processor", computes, actual, "more than 0/s")?;
         for (key, window) in [
             ("probe_after", self.probe_after),
             ("routes", self.routes),
@@ -312,19 +360,7 @@ impl NetworkConfig {
         ] {
             check(key, window > 0, window.to_string(), "at least 1")?;
         }
-        if self.decided_after() >= self.cycle {
-            return Err(ConfigError::Schedule {
-                cycle: self.cycle,
-                exchange: self.exchange,
-                optimisation: self.optimisation,
-            });
-        }
         Ok(())
-    }
-
-    /// When in a cycle vertices are granted.
-    pub(crate) fn decided_after(&self) -> SimDuration {
-        self.exchange * 4 + self.optimisation
     }
 }
 
@@ -351,10 +387,12 @@ mod tests {
     #[test]
     fn phases_that_do_not_fit_are_refused() {
         let network = NetworkConfig {
-            optimisation: SimDuration::from_millis(800),
+            cycle: Some(SimDuration::from_secs(1)),
+            optimisation: Some(SimDuration::from_millis(800)),
             ..NetworkConfig::default()
         };
-        assert!(matches!(network.check(), Err(ConfigError::Schedule { .. })));
+        let timing = network.timing(SimDuration::from_millis(5));
+        assert!(matches!(timing, Err(ConfigError::Schedule { .. })));
     }
 
     #[test]

@@ -130,6 +130,17 @@ pub struct MaxPlus {
     pub settled: bool,
     /// The vectors.
     pub vectors: Vec<Vector>,
+    /// With `network.anytime`: what the node's rovers would do as things stood before this iteration.
+    pub choices: Vec<Choice>,
+}
+
+/// Which of its candidate paths a rover would take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Choice {
+    /// The rover.
+    pub rover: RoverId,
+    /// The place of the path among its candidates, from 0.
+    pub path: u32,
 }
 
 /// The message of one rover to another in max-plus, mean subtracted.

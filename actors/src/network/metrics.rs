@@ -54,18 +54,28 @@ pub struct NetworkMetrics {
     pub time_ratio: f64,
     /// Cycles from entry to goal.
     pub mean_steps: f64,
+    /// Cycles from entry to goal, summed over the rovers that arrived: the paper's total solution
+    /// length (Figure 5), if all did.
+    pub total_steps: u64,
     /// Cycles between entry and goal in which the rover did not set out.
     pub mean_stops: f64,
     /// Moves back to the vertex just left.
     pub mean_backtracks: f64,
     /// Cycles until the last rover arrived, or the run ended.
     pub cycles: u32,
+    /// Messages that links were given, lost ones included and copies not, for each rover of the team
+    /// in each cycle.
+    pub messages_per_rover_cycle: f64,
+    /// The encoded size of the same, headers not included \[B\].
+    pub bytes_per_rover_cycle: f64,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
     /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
-    pub last_confirmed: Vec<String>,
+    pub last_confirmed: Option<String>,
+    /// Nodes that the `coupled` policy's search expanded before the start.
+    pub plan_expansions: u64,
     /// Why rovers are still out, for a team that came to a standstill: how many, and where the
     /// first of them stands.
     pub standstill: Option<String>,

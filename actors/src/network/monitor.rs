@@ -49,6 +49,8 @@ pub(crate) struct Score {
     last_intervention: Option<u32>,
     iterations: u64,
     planned_cycles: u64,
+    messages: u64,
+    bytes: u64,
     last_move: u32,
     /// The least sum of remaining distances so far, and when it was reached.
     nearest: (u32, u32),
@@ -112,6 +114,11 @@ impl Observer for Monitor {
             if let Some(reason) = score.verdict(&self.site) {
                 return Ok(Flow::Stop(reason));
             }
+        }
+        if record.class.is_fate() && record.link.is_some() && record.copy == 0 {
+            score.messages += 1;
+            // The digest had it encoded: looking costs nothing.
+            score.bytes += record.body.len() as u64;
         }
         if record.class == RecordClass::Sample
             && let Some(kind) = record.kind
@@ -184,7 +191,11 @@ impl Score {
             let others = self.tracks.iter().enumerate().filter(|&(i, _)| i != at);
             self.collisions += others.filter(|(_, other)| clashes(other)).count() as u32;
         }
-        let all_gone = |t: &Track| t.arrived.is_some() && t.vertex.is_none();
+        let stays = site.stays;
+        let all_gone = |t: &Track| {
+            let there = stays && t.remaining == 0 && t.moving_to.is_none();
+            t.arrived.is_some() && (t.vertex.is_none() || there)
+        };
         if !self.ended && self.tracks.iter().all(all_gone) {
             self.ended = true;
             return Flow::Stop("all rovers have arrived".to_owned());
@@ -203,10 +214,10 @@ impl Score {
         }
         let config = &site.config;
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
-        let reason = if still(self.last_move, config.passive_window) {
+        let reason = if still(self.last_move, config.passive_window + site.patience) {
             self.deadlock = Deadlock::Passive;
             "passive deadlock"
-        } else if still(self.nearest.1, config.active_window) {
+        } else if still(self.nearest.1, config.active_window + site.patience) {
             self.deadlock = Deadlock::Active;
             "active deadlock"
         } else if self.cycle >= config.cycle_limit {
@@ -222,9 +233,12 @@ impl Score {
 
     /// Who is still out, in a sentence.
     fn remaining(&self, site: &Site) -> String {
-        let out = |t: &Track| t.arrived.is_none() || t.vertex.is_some();
+        let out = |t: &Track| match site.stays {
+            true => t.remaining > 0,
+            false => t.arrived.is_none() || t.vertex.is_some(),
+        };
         let left = self.tracks.iter().filter(|t| out(t)).count();
-        let on_the_way = |t: &Track| t.vertex.is_some();
+        let on_the_way = |t: &Track| out(t) && t.vertex.is_some();
         let first = self.tracks.iter().position(on_the_way);
         let first = first.or_else(|| self.tracks.iter().position(out));
         let Some(first) = first else {
@@ -255,18 +269,23 @@ impl Score {
             cycles: self.cycle + 1,
             confirmed_deadlocks: self.confirmed_deadlocks,
             standstill: self.standstill.clone(),
+            plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
-        metrics.last_confirmed = self.last_confirmed.iter().filter_map(name).collect();
+        let ring: Vec<_> = self.last_confirmed.iter().filter_map(name).collect();
+        metrics.last_confirmed = (!ring.is_empty()).then(|| ring.join(" > "));
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
         metrics.deadlocked = self.deadlock != Deadlock::None;
         let energies_j = self.tracks.iter().map(|track| track.transmit_energy_j);
         metrics.transmit_energy_j = energies_j.sum();
         metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
         metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
+        let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
+        metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
+        metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
             let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
                 continue;
@@ -278,6 +297,7 @@ impl Score {
             metrics.path_ratio += f64::from(steps) / shortest;
             metrics.time_ratio += f64::from(arrived + 1) / shortest;
             metrics.mean_steps += f64::from(steps);
+            metrics.total_steps += u64::from(steps);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
             metrics.mean_backtracks += f64::from(track.backtracks);
         }

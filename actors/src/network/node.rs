@@ -100,6 +100,13 @@ pub struct PhaseBegins {
 #[doc(hidden)]
 pub struct IterationOverdue;
 
+/// Timer: the processor is done with payoffs or an iteration of max-plus in this cycle.
+#[derive(Serialize, Deserialize)]
+#[doc(hidden)]
+pub struct ProcessorDone {
+    cycle: u32,
+}
+
 impl Node {
     pub(crate) fn new(site: Arc<Site>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
         Node {
@@ -148,6 +155,7 @@ impl Actor for Node {
         Resolve,
         Aside,
         CorridorNews,
+        ProcessorDone,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -163,8 +171,14 @@ impl Actor for Node {
             self.rovers.push(ctx.lookup::<Rover>(name)?);
         }
         let owned = self.site.sensors.owned(self.id);
-        ctx.durable::<Ledger>().open(owned, self.rovers.len());
-        if self.site.config.policy == Policy::Complete {
+        let ledger = ctx.durable::<Ledger>();
+        let is_new = ledger.is_new();
+        ledger.open(owned, self.rovers.len());
+        for (rover, vertex) in self.site.standing().filter(|_| is_new) {
+            let goal = self.site.missions[rover.0 as usize].1;
+            ledger.stand(vertex, rover, goal);
+        }
+        if self.site.config.policy != Policy::Paper {
             self.open_registry(ctx);
         }
         // The first cycle begins at once; after a restart, the next.

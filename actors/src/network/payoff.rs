@@ -1,6 +1,8 @@
 //! Payoffs (*network-guided*, section 3.4): what a path is worth to a rover, and what two paths are
 //! worth to a pair.
 
+use std::sync::LazyLock;
+
 use farside_worlds::{Roadmap, VertexId};
 
 use super::candidates::{CandidatePath, Destination};
@@ -18,6 +20,13 @@ pub(crate) struct Payoffs {
     /// The payoff of a pair that collides in the cycle to come: "a highly negative constant".
     pub(crate) imminent: f64,
 }
+
+/// From this cycle on, what a collision divides a payoff by no longer falls.
+const FAR: usize = 9;
+
+/// [`divisor`] of each cycle, the last of all later ones.
+static DIVISORS: LazyLock<[f32; FAR + 1]> =
+    LazyLock::new(|| std::array::from_fn(|t| divisor(t as u32) as f32));
 
 impl Payoffs {
     pub(crate) fn new(config: &NetworkConfig, roadmap: &Roadmap) -> Self {
@@ -61,7 +70,7 @@ impl Payoffs {
             None => sum,
             Some(0 | 1) => self.imminent as f32,
             // Dividing a negative sum would make the collision the better choice.
-            Some(t) => sum.min(sum / divisor(t) as f32),
+            Some(t) => sum.min(sum / DIVISORS[FAR.min(t as usize)]),
         }
     }
 }
@@ -114,6 +123,9 @@ mod tests {
         assert_eq!(divisor(2).round(), 2981.0);
         for t in [9, 10, 50] {
             assert!((divisor(t) - E).abs() < 1e-12);
+        }
+        for t in 0..40 {
+            assert_eq!(DIVISORS[FAR.min(t as usize)], divisor(t) as f32);
         }
         assert!((divisor(8) - E * E).abs() < 1e-12);
         assert!((2..9).all(|t| divisor(t) > divisor(t + 1)));

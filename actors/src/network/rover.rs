@@ -126,12 +126,17 @@ impl Actor for Rover {
             self.nodes.push(ctx.lookup::<Node>(name)?);
         }
         self.radios = ctx.links();
+        let memory = ctx.durable::<RoverMemory>();
+        if self.site.stays && memory.step == 0 {
+            memory.vertex = Some(self.entry);
+            memory.step = 1;
+        }
         // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
         if ctx.durable::<RoverMemory>().moving_to.is_some() {
             self.drive(ctx);
         }
         self.record(ctx);
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             self.proceed(ctx);
         }
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
@@ -148,7 +153,7 @@ impl Handler<CycleStarts> for Rover {
         let memory = ctx.durable::<RoverMemory>();
         let has_left = memory.vertex.is_none() && memory.step > 0;
         if !has_left {
-            ctx.timer(self.site.config.cycle, CycleStarts);
+            ctx.timer(self.site.timing.cycle, CycleStarts);
         }
         Ok(())
     }
@@ -163,7 +168,7 @@ impl Handler<PaceAllows> for Rover {
 
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             if !ctx.durable::<RoverMemory>().keep(&grant) {
                 self.beacon(ctx, grant.node);
             }
@@ -180,7 +185,7 @@ impl Rover {
     /// began.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
-        let pace = self.site.config.cycle;
+        let pace = self.site.timing.cycle;
         let memory = ctx.durable::<RoverMemory>();
         let Some(grant) = memory.next_granted().cloned() else {
             return;
@@ -222,7 +227,7 @@ impl Handler<EdgeEnds> for Rover {
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);
-            if self.site.config.policy == Policy::Complete {
+            if self.site.config.policy != Policy::Paper {
                 self.proceed(ctx);
             }
         }

@@ -87,6 +87,22 @@ impl Ledger {
         }
     }
 
+    /// A rover that has stood at `vertex` from the start, with step 1.
+    pub(crate) fn stand(&mut self, vertex: VertexId, rover: RoverId, goal: VertexId) {
+        self.force(vertex, rover, 1, None, 0);
+        if let Some(at) = self.slot(vertex)
+            && let Some(held) = &mut self.slots[at].occupant
+        {
+            held.arrived = true;
+            held.goal = Some(goal);
+        }
+    }
+
+    /// True for a ledger that has not been opened yet.
+    pub(crate) fn is_new(&self) -> bool {
+        self.slots.is_empty()
+    }
+
     fn slot(&self, vertex: VertexId) -> Option<usize> {
         self.slots.binary_search_by_key(&vertex, |s| s.vertex).ok()
     }

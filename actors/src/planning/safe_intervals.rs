@@ -197,3 +197,128 @@ pub fn prune(labels: &mut Vec<Label>, wanted: &[u32]) -> Vec<u32> {
     *labels = kept;
     wanted.iter().filter_map(|&at| place[at as usize]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::testing::{grid, v};
+    use proptest::prelude::*;
+
+    const STEP: u64 = 10;
+
+    type Busy = Vec<Vec<(u64, u64)>>;
+
+    fn ground<'a>(
+        roadmap: &'a Roadmap,
+        busy: &'a dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
+    ) -> Ground<'a> {
+        Ground {
+            roadmap,
+            gap: 1,
+            travel: &|_, _| STEP,
+            busy,
+        }
+    }
+
+    /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits one
+    /// instant or sets out, and may be nowhere within a gap of another's visit.
+    fn brute_force(roadmap: &Roadmap, busy: &Busy, start: VertexId, goal: VertexId) -> Option<u64> {
+        const END: u64 = 400;
+        let free = |u: VertexId, at: u64| {
+            let visits = &busy[u.0 as usize];
+            visits.iter().all(|&(s, e)| at > e || at < s)
+        };
+        let n = roadmap.len();
+        // open[t][u]: how long a rover that claims u at t has been on its way there, at most STEP.
+        let mut open = vec![vec![None::<u64>; n]; END as usize + 1];
+        for at in 0..END {
+            if free(start, at) {
+                let zero = &mut open[at as usize][start.0 as usize];
+                *zero = (*zero).max(Some(0));
+            }
+            // Those who set out now have not been on their way for any time: no move leads to another.
+            for u in roadmap.vertices() {
+                if open[at as usize][u.0 as usize] == Some(STEP) {
+                    if u == goal {
+                        return Some(at);
+                    }
+                    for &w in roadmap.neighbors(u).iter().filter(|&&w| free(w, at)) {
+                        let slot = &mut open[at as usize][w.0 as usize];
+                        *slot = (*slot).max(Some(0));
+                    }
+                }
+            }
+            for u in roadmap.vertices().filter(|&u| free(u, at + 1)) {
+                let age = open[at as usize][u.0 as usize];
+                let slot = &mut open[at as usize + 1][u.0 as usize];
+                *slot = (*slot).max(age.map(|age| (age + 1).min(STEP)));
+            }
+        }
+        None
+    }
+
+    fn busy(n: usize) -> impl Strategy<Value = Busy> {
+        let spans = proptest::collection::vec((1u64..40, 0u64..30), 0..4);
+        let disjoint = |spans: Vec<(u64, u64)>| {
+            let mut at = 0;
+            let place = |(wait, length): (u64, u64)| {
+                let start = at + wait;
+                at = start + length;
+                (start, at)
+            };
+            spans.into_iter().map(place).collect()
+        };
+        proptest::collection::vec(spans.prop_map(disjoint), n)
+    }
+
+    proptest! {
+        /// The search finds the earliest arrival, its way keeps clear of all visits, and a search in
+        /// two parts finds no less than one that is told to pass through them in that order.
+        #[test]
+        fn the_earliest_way_is_found(busy in busy(6), goal in 0u32..6) {
+            let map = grid(3, 2, &[(1, 4)]);
+            let look = |u: VertexId| Some(busy[u.0 as usize].clone());
+            let ground = ground(&map, &look);
+            let mut labels = ground.enter(v(0), 0, STEP);
+            let open: Vec<u32> = (0..labels.len() as u32).collect();
+            ground.expand(&mut labels, &open);
+            let there = (0..).zip(&labels).filter(|(_, label)| label.vertex == v(goal));
+            let best = there.min_by_key(|(_, label)| label.ready);
+            let expected = brute_force(&map, &busy, v(0), v(goal));
+            prop_assert_eq!(best.map(|(_, label)| label.ready), expected);
+            if let Some((at, label)) = best {
+                let way = way_to(&labels, at, label.ready);
+                prop_assert_eq!(way[0].vertex, v(0));
+                for pair in way.windows(2) {
+                    prop_assert_eq!(pair[0].end, pair[1].start);
+                    prop_assert!(pair[0].end - pair[0].start >= STEP);
+                    prop_assert!(map.are_adjacent(pair[0].vertex, pair[1].vertex));
+                }
+                for visit in &way {
+                    for &(s, e) in &busy[visit.vertex.0 as usize] {
+                        prop_assert!(visit.end < s || visit.start > e, "{:?} meets ({}, {})", visit, s, e);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pruning_keeps_ancestors_only() {
+        let map = grid(4, 1, &[]);
+        let look = |_| Some(Vec::new());
+        let ground = ground(&map, &look);
+        let mut labels = ground.enter(v(1), 5, STEP);
+        ground.expand(&mut labels, &[0]);
+        assert_eq!(labels.len(), 4, "one safe interval each");
+        let last = labels.iter().position(|l| l.vertex == v(3)).unwrap() as u32;
+        let kept = prune(&mut labels, &[last]);
+        assert_eq!(labels.len(), 3);
+        let way = way_to(&labels, kept[0], FOREVER);
+        let places: Vec<_> = way
+            .iter()
+            .map(|visit| (visit.vertex.0, visit.start))
+            .collect();
+        assert_eq!(places, [(1, 5), (2, 15), (3, 25)]);
+    }
+}

@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::{CommandError, print, print_json};
 use crate::cli::Exit;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
+use crate::study::summary::published::{Beside, LineSummary};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -28,10 +30,27 @@ struct Document {
     page: String,
     results_csv: String,
     summary_csv: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    published_csv: Option<String>,
     plots: Vec<String>,
+    /// Our figures beside published ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    published: Vec<OfCell>,
+    /// Lines through cells, for what was published to be linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lines: Vec<LineSummary>,
     runs: usize,
     missing: usize,
     failed: usize,
+}
+
+/// A published figure beside a cell's.
+#[derive(Serialize)]
+struct OfCell {
+    cell: usize,
+    factors: Map<String, Value>,
+    #[serde(flatten)]
+    beside: Beside,
 }
 
 pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
@@ -72,6 +91,18 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
     };
     let results_csv = write(out.join("results.csv"), &report.results_csv)?;
     let summary_csv = write(out.join("summary.csv"), &report.summary_csv)?;
+    let published_csv = match &report.published_csv {
+        Some(text) => Some(write(out.join("published.csv"), text)?),
+        None => None,
+    };
+    let cells = report.summary.cells.iter();
+    let published = cells.flat_map(|cell| {
+        cell.published.iter().map(|beside| OfCell {
+            cell: cell.cell,
+            factors: cell.factors.clone(),
+            beside: beside.clone(),
+        })
+    });
     let figures = report.figures.iter();
     let plots: Result<Vec<String>, CommandError> = figures
         .map(|figure| write(plots.join(&figure.file), &figure.standalone()))
@@ -85,7 +116,10 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
     Ok(Document {
         results_csv,
         summary_csv,
+        published_csv,
         plots: plots?,
+        published: published.collect(),
+        lines: report.summary.lines.clone(),
         // The page comes last: where it is, the rest is too.
         page: write(out.join("report.html"), &report.page)?,
         runs: results.runs.len(),
@@ -110,8 +144,13 @@ fn text(document: &Document) -> String {
         0 => String::new(),
         missing => format!(" of {}, the rest are not made yet", document.runs + missing),
     };
+    let beside = match &document.published_csv {
+        Some(path) => format!("  beside   {path}\n"),
+        None => String::new(),
+    };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n  plots    {plots}\n",
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{beside}  plots    \
+         {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )
 }

@@ -11,6 +11,7 @@ use super::{CommandError, interrupt, print, print_json};
 use crate::cli::Exit;
 use crate::report::csv::results_csv;
 use crate::study::results::{Results, RunOutcome};
+use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
 use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
 use crate::system::Registry;
@@ -62,6 +63,9 @@ struct Document {
     /// Runs in which something happened that must never happen.
     violated: usize,
     cells: Value,
+    /// Lines through cells, for what was published to be linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lines: Vec<LineSummary>,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
@@ -130,8 +134,8 @@ fn tell(
         |run| matches!(&run.outcome, RunOutcome::Done { violations, .. } if !violations.is_empty()),
     );
     let violated: Vec<_> = violated.collect();
-    let cells = serde_json::to_value(summarise(results).cells)?;
-    let cells = with_totals(cells, results);
+    let summary = summarise(results);
+    let cells = with_totals(serde_json::to_value(&summary.cells)?, results);
     let document = Document {
         study: manifest.study.clone(),
         question: manifest.question.clone(),
@@ -142,6 +146,7 @@ fn tell(
         missing,
         violated: violated.len(),
         cells,
+        lines: summary.lines,
     };
     if args.json {
         print_json(&document)?;

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
+use crate::study::results::{Claim, Manifest, Results, RunOutcome, RunRecord};
 use crate::study::summary::values::{Kind, kind_of, value_of};
 use crate::study::summary::{
     Difference, ListSummary, MetricSummary, NumberSummary, RateSummary, SHARES, Summary,
@@ -206,6 +206,98 @@ const COLUMNS: [&str; 25] = [
     "never",
     "words",
 ];
+
+const PUBLISHED: [&str; 14] = [
+    "metric",
+    "table",
+    "unit",
+    "claim",
+    "published",
+    "n",
+    "estimate",
+    "ci_low",
+    "ci_high",
+    "difference",
+    "inside",
+    "slope",
+    "intercept",
+    "r_squared",
+];
+
+/// One row for each cell beside which a figure was published, and one for each line through cells
+/// (its `cell` is empty, and its factors' values are those that the cells share). All figures are in
+/// the publication's `unit`; `claim` is `value`, `about`, `below`, `above` or `linear`. None if the
+/// study knows no published figures.
+pub fn published_csv(results: &Results, summary: &Summary) -> Option<String> {
+    let manifest = &results.manifest;
+    if manifest.published.is_empty() {
+        return None;
+    }
+    let mut header = vec!["cell".to_owned()];
+    header.extend(manifest.factors.iter().map(|factor| factor.name.clone()));
+    header.extend(PUBLISHED.iter().map(|&column| column.to_owned()));
+    let mut table = Table::new(header);
+    for index in 0..manifest.published.len() {
+        for cell in &summary.cells {
+            for one in cell.published.iter().filter(|one| one.table == index) {
+                let mut row = vec![cell.cell.to_string()];
+                row.extend(texts(manifest, cell.cell));
+                let (claim, published) = claimed(&one.published);
+                row.extend([one.metric.clone(), one.title.clone(), one.unit.clone()]);
+                row.extend([claim.to_owned(), published.map_or_else(String::new, number)]);
+                row.push(one.n.to_string());
+                row.extend([one.estimate, one.ci_low, one.ci_high].map(number));
+                row.push(one.difference.map_or_else(String::new, number));
+                row.push(
+                    one.inside
+                        .map_or_else(String::new, |inside| inside.to_string()),
+                );
+                row.extend([String::new(), String::new(), String::new()]);
+                table.row(row);
+            }
+        }
+        for line in summary.lines.iter().filter(|line| line.table == index) {
+            let mut row = vec![String::new()];
+            row.extend(shared(manifest, &line.cells));
+            let unit = &manifest.published[index].unit;
+            row.extend([line.metric.clone(), line.title.clone(), unit.clone()]);
+            row.extend([
+                "linear".to_owned(),
+                String::new(),
+                line.cells.len().to_string(),
+            ]);
+            row.extend(std::iter::repeat_n(String::new(), 5));
+            row.extend([line.slope, line.intercept, line.r_squared].map(number));
+            table.row(row);
+        }
+    }
+    Some(table.finish())
+}
+
+/// A claim's name, and its figure.
+fn claimed(claim: &Claim) -> (&'static str, Option<f64>) {
+    match claim {
+        Claim::Value(figure) => ("value", Some(*figure)),
+        Claim::About(figure) => ("about", Some(*figure)),
+        Claim::Below(figure) => ("below", Some(*figure)),
+        Claim::Above(figure) => ("above", Some(*figure)),
+        Claim::Linear(_) => ("linear", None),
+    }
+}
+
+/// The values that some cells share, empty where they differ.
+fn shared(manifest: &Manifest, cells: &[usize]) -> Vec<String> {
+    let mut cells = cells.iter().map(|cell| texts(manifest, *cell));
+    let mut all = cells.next().unwrap_or_default();
+    for other in cells {
+        for (text, other) in all.iter_mut().zip(other) {
+            if *text != other {
+                text.clear();
+            }
+        }
+    }
+    all
+}
 
 type Figures<'a> = BTreeMap<&'a str, String>;
 

@@ -81,17 +81,7 @@ impl Measure<'_> {
     /// What is plotted of a cell: the mean, the rate, or the median of lists. None if no run of the
     /// cell says anything.
     pub(super) fn estimate(&self, cell: &CellSummary) -> Option<Estimate> {
-        let (value, low, high) = match &cell.metrics.get(self.index)?.summary {
-            MetricSummary::Number(number) if number.n > 0 => {
-                (number.mean, number.ci_low, number.ci_high)
-            }
-            MetricSummary::Rate(rate) if rate.n > 0 => (rate.mean, rate.ci_low, rate.ci_high),
-            MetricSummary::List(list) if list.values > 0 => {
-                (list.median, list.median_low, list.median_high)
-            }
-            _ => return None,
-        };
-        Some(Estimate { value, low, high })
+        cell.metrics.get(self.index)?.summary.estimate()
     }
 
     /// How much more than in the baseline.
@@ -111,13 +101,8 @@ impl Measure<'_> {
 
     /// How many runs of a cell say anything.
     pub(super) fn n(&self, cell: &CellSummary) -> usize {
-        match cell.metrics.get(self.index).map(|named| &named.summary) {
-            Some(MetricSummary::Number(number)) => number.n,
-            Some(MetricSummary::Rate(rate)) => rate.n,
-            Some(MetricSummary::List(list)) => list.n,
-            Some(MetricSummary::Text { n, .. }) => *n,
-            _ => 0,
-        }
+        let named = cell.metrics.get(self.index);
+        named.map_or(0, |named| named.summary.n())
     }
 
     /// What is estimated, in words.

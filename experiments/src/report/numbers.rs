@@ -50,6 +50,13 @@ pub(super) fn plain(value: f64) -> String {
     decimal(value, decimals_for(value.abs() / 10.0))
 }
 
+/// A number as somebody else wrote it, with all its digits.
+pub(super) fn as_written(value: f64) -> String {
+    let text = value.to_string();
+    let decimals = text.split_once('.').map_or(0, |(_, rest)| rest.len());
+    decimal(value, decimals.min(MOST_DECIMALS))
+}
+
 /// How a metric's figures are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Style {

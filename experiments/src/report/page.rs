@@ -1,6 +1,7 @@
 //! The page that people read: one file, with its figures and its style, that loads nothing.
 
 mod method;
+pub(super) mod published;
 mod runs;
 mod tables;
 
@@ -41,12 +42,13 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     p class="question" { (manifest.question) }
                 }
                 (runs::what_was_run(study))
-                (contents(&measures, losses.is_some()))
+                (contents(study, &measures, losses.is_some()))
                 main {
                     section id="cells" {
                         h2 { "All cells" }
                         (tables::overview(study, &measures))
                     }
+                    (published::section(study))
                     @for (measure, plots) in measures.iter().zip(&plotted) {
                         (metric_section(study, measure, plots))
                     }
@@ -84,11 +86,14 @@ fn anchor(measure: &Measure<'_>) -> String {
     format!("metric-{}", measure.index)
 }
 
-fn contents(measures: &[Measure<'_>], losses: bool) -> Markup {
+fn contents(study: &Study<'_>, measures: &[Measure<'_>], losses: bool) -> Markup {
     html! {
         nav aria-label="Contents" {
             ul {
                 li { a href="#cells" { "All cells" } }
+                @if !study.results.manifest.published.is_empty() {
+                    li { a href="#published" { "Beside the published figures" } }
+                }
                 @for measure in measures {
                     li { a href={ "#" (anchor(measure)) } { (measure.metric.label) } }
                 }

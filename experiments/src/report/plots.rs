@@ -9,6 +9,7 @@ use self::curves::Shown;
 use super::layout::Shape;
 use super::measure::{Measure, Study};
 use super::svg::{Area, Figure};
+use crate::study::results::Claim;
 use crate::study::summary::values::Kind;
 
 /// The width of a figure that stands beside others; on a phone it fills the page.
@@ -51,6 +52,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
                     }
                     None => {}
                 }
+                plots.notes.extend(beside(study, measure));
                 if curves.more {
                     plots.notes.push(
                         "There are more curves than can be told apart; an even choice is shown, \
@@ -65,6 +67,20 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
         steps::distributions(study, measure, &mut plots);
     }
     plots
+}
+
+/// What marks on curves mean that are not of our runs.
+fn beside(study: &Study<'_>, measure: &Measure<'_>) -> Option<String> {
+    let name = &measure.metric.name;
+    let of_cells = study.summary.cells.iter().flat_map(|cell| &cell.published);
+    let crosses = of_cells
+        .filter(|one| one.metric == *name)
+        .any(|one| matches!(one.published, Claim::Value(_) | Claim::About(_)));
+    let fitted = study.summary.lines.iter().any(|line| line.metric == *name);
+    let crosses = crosses.then_some("Crosses are published figures.");
+    let fitted = fitted.then_some("Dotted lines are straight ones, fitted by least squares.");
+    let notes: Vec<&str> = crosses.into_iter().chain(fitted).collect();
+    (!notes.is_empty()).then(|| notes.join(" "))
 }
 
 pub(super) use losses::figure as losses;

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::*;
 use crate::study::fabricated::{self, bandwidth, latency, loss, planner};
-use crate::study::results::RunOutcome;
+use crate::study::results::{Claim, Published, PublishedFigure, RunOutcome};
 
 fn latency_and_loss() -> Results {
     fabricated::study("degradation", vec![latency(), loss()], 30)
@@ -51,6 +51,56 @@ fn hostile() -> Results {
     results
 }
 
+/// With tables of others: one of two factors, one of scattered claims, one of lines.
+fn beside() -> Results {
+    let mut results = latency_and_loss();
+    let figure = |cells: &[usize], claim| PublishedFigure {
+        cells: cells.to_vec(),
+        claim,
+        quote: "at least <half> of them".to_owned(),
+    };
+    let table = |metric: &str, (unit, scale): (&str, f64), figures| Published {
+        metric: metric.to_owned(),
+        title: format!("Table of <{metric}>"),
+        source: "A. N. Other & sons".to_owned(),
+        unit: unit.to_owned(),
+        scale,
+        rows: Some("loss".to_owned()),
+        figures,
+        note: "To be read <slowly>.".to_owned(),
+        why: "They had better rovers & links.".to_owned(),
+    };
+    let square = [
+        (0, 100.0),
+        (2, 97.0),
+        (4, 12.25),
+        (20, 60.0),
+        (22, 41.0),
+        (24, 0.0),
+    ];
+    let square = square.map(|(cell, value)| figure(&[cell], Claim::Value(value)));
+    let linear = Claim::Linear("latency".to_owned());
+    results.manifest.published = vec![
+        table("completed", ("%", 100.0), square.to_vec()),
+        table(
+            "time_ratio",
+            ("", 1.0),
+            vec![
+                figure(&[0, 5, 10], Claim::About(1.25)),
+                figure(&[6], Claim::Below(1.0)),
+                figure(&[24], Claim::Above(1e6)),
+                figure(&(0..25).collect::<Vec<_>>(), linear),
+            ],
+        ),
+        table(
+            "deadlock",
+            ("x", 1.0),
+            vec![figure(&[99], Claim::Value(1.0))],
+        ),
+    ];
+    results
+}
+
 fn studies() -> Vec<(&'static str, Results)> {
     let mut few = fabricated::study("few", vec![loss()], 1);
     few.runs.truncate(2);
@@ -76,6 +126,7 @@ fn studies() -> Vec<(&'static str, Results)> {
         ("few", few),
         ("none", none),
         ("hostile", hostile()),
+        ("beside", beside()),
     ]
 }
 
@@ -173,6 +224,56 @@ fn a_page_says_what_there_is_to_say() {
     ] {
         assert!(page.contains(said), "{said}");
     }
+}
+
+#[test]
+fn published_figures_stand_beside_ours() {
+    let report = build(&beside(), "runs");
+    let page = &report.page;
+    for said in [
+        "href=\"#published\"",
+        "Table of &lt;completed&gt;",
+        "Published in A. N. Other &amp; sons.",
+        "message loss ↓  one-way latency →",
+        "published 12.25\u{a0}%",
+        "✗ outside",
+        "✓ inside",
+        "✗ beyond",
+        "about 1.25",
+        "“at least &lt;half&gt; of them”",
+        "over 1,000,000",
+        "message loss 70%",
+        "<b>Why ours differ. </b>They had better rovers &amp; links.",
+        "Crosses are published figures. Dotted lines",
+    ] {
+        assert!(page.contains(said), "{said}");
+    }
+    let curves = report
+        .figures
+        .iter()
+        .find(|one| one.file == "time_ratio-curves.svg");
+    let svg = curves.map(Figure::standalone).unwrap_or_default();
+    assert_eq!(svg.matches("class=\"fitted").count(), 5, "{svg}");
+    assert_eq!(svg.matches("class=\"cross").count(), 3, "{svg}");
+    let rows = report.published_csv.unwrap_or_default();
+    // Six in the square, five claims, five lines.
+    assert_eq!(rows.lines().count(), 1 + 6 + 5 + 5, "{rows}");
+    let field = rows
+        .lines()
+        .find(|row| row.starts_with("4,"))
+        .unwrap_or_default();
+    assert!(
+        field.starts_with("4,5ms,70%,completed,Table of <completed>,%,value,12.25,"),
+        "{field}"
+    );
+    let line = rows.lines().last().unwrap_or_default();
+    assert!(
+        line.starts_with(",,70%,time_ratio,Table of <time_ratio>,,linear,,5,,,,,,"),
+        "{line}"
+    );
+    // Studies without have none of it.
+    let without = build(&latency_and_loss(), "runs");
+    assert!(without.published_csv.is_none() && !without.page.contains("id=\"published\""));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The scenarios that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 5] = [
+const BUILTIN: [(&str, &str); 6] = [
     (
         "network/crater-dense",
         include_str!("../../scenarios/network/crater-dense.toml"),
@@ -13,6 +13,10 @@ const BUILTIN: [(&str, &str); 5] = [
     (
         "network/crater-sparse",
         include_str!("../../scenarios/network/crater-sparse.toml"),
+    ),
+    (
+        "network/rubble",
+        include_str!("../../scenarios/network/rubble.toml"),
     ),
     (
         "traffic/contact-plan",

@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 5] = [
+const BUILTIN: [(&str, &str); 11] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),
@@ -21,6 +21,30 @@ const BUILTIN: [(&str, &str); 5] = [
     (
         "degradation/node-failure",
         include_str!("../../studies/degradation/node-failure.toml"),
+    ),
+    (
+        "network/ablation",
+        include_str!("../../studies/network/ablation.toml"),
+    ),
+    (
+        "network/figure-5",
+        include_str!("../../studies/network/figure-5.toml"),
+    ),
+    (
+        "network/growth",
+        include_str!("../../studies/network/growth.toml"),
+    ),
+    (
+        "network/robust",
+        include_str!("../../studies/network/robust.toml"),
+    ),
+    (
+        "network/table-1",
+        include_str!("../../studies/network/table-1.toml"),
+    ),
+    (
+        "network/table-2",
+        include_str!("../../studies/network/table-2.toml"),
     ),
 ];
 

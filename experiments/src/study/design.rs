@@ -48,10 +48,8 @@ pub(super) fn cells(
 }
 
 fn cell(factors: &[FactorPlan], row: &[Level]) -> Cell {
-    let sets = factors.iter().zip(row).flat_map(|(factor, level)| {
-        let set = |key: &String| level.set(key);
-        factor.keys.iter().map(set).collect::<Vec<_>>()
-    });
+    let pairs = factors.iter().zip(row);
+    let sets = pairs.flat_map(|(factor, level)| level.sets(&factor.keys));
     Cell {
         values: row.iter().map(|level| level.value.clone()).collect(),
         texts: row.iter().map(|level| level.text.clone()).collect(),
@@ -120,12 +118,22 @@ fn list(
             return Err(blame.unknown(&format!("{at}.{name}"), name, &names));
         }
         let mut row = Vec::new();
-        for name in &names {
-            let value = cell.get(*name).ok_or_else(|| {
+        for factor in factors.iter() {
+            let name = factor.factor.name.as_str();
+            let value = cell.get(name).ok_or_else(|| {
                 let message = format!("{name} is missing: a cell gives each factor a value");
                 blame.invalid(&at, message)
             })?;
-            row.push(Level::new(value));
+            let wanted = Level::new(value);
+            let variants = values(factor);
+            row.push(if variants.is_empty() {
+                wanted
+            } else {
+                let found = variants.iter().find(|v| v.is(&wanted.value, &wanted.text));
+                let known: Vec<&str> = variants.iter().map(|v| v.text.as_str()).collect();
+                let unknown = || blame.unknown(&format!("{at}.{name}"), &wanted.text, &known);
+                found.ok_or_else(unknown)?.clone()
+            });
         }
         if rows.contains(&row) {
             return Err(blame.invalid(&at, "another cell has these values"));

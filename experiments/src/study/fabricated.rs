@@ -126,6 +126,7 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
             cells: cells.collect(),
             seeds: (1..=seeds).collect(),
             stop: None,
+            published: Vec::new(),
             factors,
         },
         runs,

@@ -3,7 +3,7 @@
 use crate::scenario::{ScenarioError, Source, nearest};
 
 use super::file::{Design, FactorFile, StudyFile};
-use super::level::{Dimension, Level, Range};
+use super::level::{Dimension, Level, Range, settings};
 use super::results::{Factor, Scale};
 
 /// The most values of a factor; nobody means more.
@@ -16,6 +16,17 @@ pub(super) struct FactorPlan {
     /// The keys of the scenario that get its value.
     pub(super) keys: Vec<String>,
     pub(super) levels: Levels,
+}
+
+impl FactorPlan {
+    /// How many `--set` arguments a cell has of it.
+    pub(super) fn sets_of(&self, value: &serde_json::Value, text: &str) -> usize {
+        let Levels::Values(levels) = &self.levels else {
+            return self.keys.len();
+        };
+        let level = levels.iter().find(|level| level.is(value, text));
+        level.map_or(self.keys.len(), |level| level.sets(&self.keys).len())
+    }
 }
 
 /// Which values a factor takes.
@@ -35,25 +46,37 @@ pub(super) struct Blame<'a>(pub(super) &'a Source);
 impl Blame<'_> {
     /// A mistake in the value of `key`, dotted from the top.
     pub(super) fn invalid(&self, key: &str, message: impl ToString) -> ScenarioError {
-        let keys: Vec<String> = key.split('.').map(str::to_owned).collect();
+        self.invalid_at(&split(key), message)
+    }
+
+    /// A mistake in the value that these keys lead to; they may have dots in them.
+    pub(super) fn invalid_at(&self, keys: &[String], message: impl ToString) -> ScenarioError {
         ScenarioError::Invalid {
-            place: self.0.place_of_key(&keys),
-            key: key.to_owned(),
+            place: self.0.place_of_key(keys),
+            key: keys.join("."),
             message: message.to_string(),
         }
     }
 
     /// A name that does not exist as the value of `key`.
     pub(super) fn unknown(&self, key: &str, found: &str, known: &[&str]) -> ScenarioError {
-        let keys: Vec<String> = key.split('.').map(str::to_owned).collect();
+        self.unknown_at(&split(key), found, known)
+    }
+
+    /// The same for the value that these keys lead to; they may have dots in them.
+    pub(super) fn unknown_at(&self, keys: &[String], found: &str, known: &[&str]) -> ScenarioError {
         ScenarioError::UnknownValue {
-            place: self.0.place_of_key(&keys),
-            key: key.to_owned(),
+            place: self.0.place_of_key(keys),
+            key: keys.join("."),
             found: found.to_owned(),
             nearest: nearest(found, known.iter().copied()),
             expected: format!("one of {}", known.join(", ")),
         }
     }
+}
+
+fn split(key: &str) -> Vec<String> {
+    key.split('.').map(str::to_owned).collect()
 }
 
 /// The factors of a study.
@@ -82,7 +105,12 @@ pub(super) fn factors(
         let used = |key: &&String| plans.iter().any(|other| other.keys.contains(key));
         if let Some(key) = plan.keys.iter().find(used) {
             let message = format!("{key}: another factor sets this key");
-            return Err(blame.invalid(&at("key"), message));
+            let keys = [
+                ("key", factor.key.is_some()),
+                ("keys", factor.keys.is_some()),
+            ];
+            let given = keys.iter().find(|(_, given)| *given);
+            return Err(blame.invalid(&at(given.map_or("variants", |(key, _)| key)), message));
         }
         plans.push(plan);
     }
@@ -95,8 +123,12 @@ fn plan_of(
     design: Design,
     blame: &Blame<'_>,
 ) -> Result<FactorPlan, ScenarioError> {
-    let keys = keys(file, index, blame)?;
-    let (levels, dimension) = levels(file, index, design, blame)?;
+    let (keys, (levels, dimension)) = if file.variants.is_some() {
+        variants(file, index, blame)?
+    } else {
+        let keys = keys(file, index, blame)?;
+        (keys, levels(file, index, design, blame)?)
+    };
     let unit = match (&file.unit, dimension.unit()) {
         (Some(unit), Some(base)) if unit != base => {
             let key = format!("factor.{index}.unit");
@@ -126,7 +158,7 @@ fn keys(file: &FactorFile, index: usize, blame: &Blame<'_>) -> Result<Vec<String
         (None, Some(keys)) if !keys.is_empty() => keys.clone(),
         (None, _) => {
             let message = "no key: expected the key of the scenario that it sets, as in \
-                           key = \"links.default.loss\"";
+                           key = \"links.default.loss\", or variants, each with what it sets";
             return Err(blame.invalid(&at, message));
         }
         (Some(_), Some(_)) => {
@@ -136,17 +168,79 @@ fn keys(file: &FactorFile, index: usize, blame: &Blame<'_>) -> Result<Vec<String
     let name = if file.key.is_some() { "key" } else { "keys" };
     for (index, key) in keys.iter().enumerate() {
         let wrong = |message: String| Err(blame.invalid(&format!("{at}.{name}"), message));
-        if let Err(error) = Source::new("", String::new(), &[format!("{key}=0")]) {
-            return wrong(format!("{key:?} is no key of a scenario: {error}"));
-        }
-        if key == "seed" {
-            return wrong("seed: a study's seeds are given by its own key, seeds".to_owned());
+        if let Err(message) = check_key(key) {
+            return wrong(message);
         }
         if keys[..index].contains(key) {
             return wrong(format!("{key} is there twice"));
         }
     }
     Ok(keys)
+}
+
+/// Checks that a factor may set a key, as far as that is known without the scenario.
+fn check_key(key: &str) -> Result<(), String> {
+    if let Err(error) = Source::new("", String::new(), &[format!("{key}=0")]) {
+        return Err(format!("{key:?} is no key of a scenario: {error}"));
+    }
+    if key == "seed" {
+        return Err("seed: a study's seeds are given by its own key, seeds".to_owned());
+    }
+    Ok(())
+}
+
+/// The variants of a factor: all keys that any of them sets, and a level for each.
+fn variants(
+    file: &FactorFile,
+    index: usize,
+    blame: &Blame<'_>,
+) -> Result<(Vec<String>, (Levels, Dimension)), ScenarioError> {
+    let at = format!("factor.{index}");
+    let given = [
+        ("key", file.key.is_some()),
+        ("keys", file.keys.is_some()),
+        ("values", file.values.is_some()),
+        ("range", file.range.is_some()),
+        ("steps", file.steps.is_some()),
+    ];
+    if let Some((key, _)) = given.iter().find(|(_, given)| *given) {
+        let message = "variants say themselves what they set: expected either these or variants";
+        return Err(blame.invalid(&format!("{at}.{key}"), message));
+    }
+    let mut keys: Vec<String> = Vec::new();
+    let mut levels: Vec<Level> = Vec::new();
+    for (place, variant) in file.variants.iter().flatten().enumerate() {
+        let here = format!("{at}.variants.{place}");
+        let name = &variant.name;
+        if name.trim() != name || name.is_empty() || name.contains([',', '=']) {
+            let message = format!("{name:?}: expected a name without commas and equals signs");
+            return Err(blame.invalid(&format!("{here}.name"), message));
+        }
+        let settings = settings(&variant.set, &format!("{here}.set"));
+        for setting in &settings {
+            if let Err(message) = check_key(&setting.key) {
+                return Err(blame.invalid_at(&setting.path, message));
+            }
+            if !keys.contains(&setting.key) {
+                keys.push(setting.key.clone());
+            }
+        }
+        let level = Level::variant(name, settings.into_iter().map(|one| one.argument).collect());
+        let same = |other: &&Level| other.sets(&[]) == level.sets(&[]);
+        if let Some(other) = levels.iter().find(same) {
+            let message = format!("{name} sets the same as {}", other.text);
+            return Err(blame.invalid(&here, message));
+        }
+        levels.push(level);
+    }
+    // Names of which only some can be read as quantities are words.
+    if check_values(&levels, file.scale).is_err() {
+        levels = levels.into_iter().map(Level::into_word).collect();
+    }
+    match check_values(&levels, file.scale) {
+        Ok(dimension) => Ok((keys, (Levels::Values(levels), dimension))),
+        Err(message) => Err(blame.invalid(&format!("{at}.variants"), message)),
+    }
 }
 
 fn levels(

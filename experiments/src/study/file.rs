@@ -28,6 +28,8 @@ pub(super) struct StudyFile {
     pub(super) metrics: Vec<MetricFile>,
     pub(super) baseline: Option<toml::Table>,
     pub(super) stop: Option<StopFile>,
+    #[serde(default)]
+    pub(super) published: Vec<PublishedFile>,
 }
 
 /// How cells are made of factors.
@@ -59,6 +61,17 @@ pub(super) struct FactorFile {
     pub(super) values: Option<Vec<toml::Value>>,
     pub(super) range: Option<[toml::Value; 2]>,
     pub(super) steps: Option<u32>,
+    pub(super) variants: Option<Vec<VariantFile>>,
+}
+
+/// An entry of a factor's `variants`: a value with a name that sets several keys at once.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VariantFile {
+    pub(super) name: String,
+    /// What it sets, as in the study's own `set`; nothing for the scenario as it is.
+    #[serde(default)]
+    pub(super) set: toml::Table,
 }
 
 /// The `[stop]` table.
@@ -69,6 +82,23 @@ pub(super) struct StopFile {
     pub(super) width: f64,
     pub(super) min_seeds: u32,
     pub(super) max_seeds: u32,
+}
+
+/// A `[[published]]` table: figures of others, to set ours beside.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PublishedFile {
+    pub(super) metric: String,
+    pub(super) title: String,
+    pub(super) source: String,
+    pub(super) unit: Option<String>,
+    pub(super) scale: Option<f64>,
+    pub(super) rows: Option<String>,
+    /// Each says where it holds and what is claimed there; its keys are the factors and those of a
+    /// claim, so it is read by hand.
+    pub(super) values: Vec<toml::Table>,
+    pub(super) note: Option<String>,
+    pub(super) why: Option<String>,
 }
 
 /// How many seeds, or which.

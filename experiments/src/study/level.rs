@@ -54,6 +54,9 @@ pub(super) struct Level {
     /// As people write it.
     pub(super) text: String,
     pub(super) dimension: Dimension,
+    /// The arguments of `--set` of a variant; a value that is none gives itself to the factor's
+    /// keys.
+    variant: Option<Vec<String>>,
 }
 
 impl Level {
@@ -79,6 +82,24 @@ impl Level {
             value,
             text,
             dimension,
+            variant: None,
+        }
+    }
+
+    /// A value that is a name for what it sets.
+    pub(super) fn variant(name: &str, sets: Vec<String>) -> Self {
+        Level {
+            variant: Some(sets),
+            ..Self::new(&toml::Value::String(name.to_owned()))
+        }
+    }
+
+    /// The same as a word, even if it could be read as a quantity.
+    pub(super) fn into_word(self) -> Self {
+        Level {
+            value: Value::from(self.text.as_str()),
+            dimension: Dimension::Text,
+            ..self
         }
     }
 
@@ -106,6 +127,59 @@ impl Level {
     /// The argument of `--set` that gives `key` this value.
     pub(super) fn set(&self, key: &str) -> String {
         set_argument(key, &self.toml)
+    }
+
+    /// The arguments of `--set` that a factor with these keys makes of it.
+    pub(super) fn sets(&self, keys: &[String]) -> Vec<String> {
+        match &self.variant {
+            Some(sets) => sets.clone(),
+            None => keys.iter().map(|key| self.set(key)).collect(),
+        }
+    }
+}
+
+/// One value of a `set` table.
+pub(super) struct Setting {
+    /// The scenario's key, dotted.
+    pub(super) key: String,
+    /// The argument of `--set`.
+    pub(super) argument: String,
+    /// The keys in the study that lead to it.
+    pub(super) path: Vec<String>,
+}
+
+/// All values of a `set` table that stands at `path`, dotted, in the study.
+pub(super) fn settings(table: &toml::Table, path: &str) -> Vec<Setting> {
+    let mut settings = Vec::new();
+    let mut path: Vec<String> = path.split('.').map(str::to_owned).collect();
+    for (key, value) in table {
+        path.push(key.clone());
+        // In quotes, a dotted key is what it is as an argument.
+        flatten(key, value, &mut path, &mut settings);
+        path.pop();
+    }
+    settings
+}
+
+fn flatten(key: &str, value: &toml::Value, path: &mut Vec<String>, settings: &mut Vec<Setting>) {
+    let toml::Value::Table(table) = value else {
+        settings.push(Setting {
+            key: key.to_owned(),
+            argument: set_argument(key, value),
+            path: path.clone(),
+        });
+        return;
+    };
+    for (inner, value) in table {
+        let special = inner.contains(['.', '=', '\'']) || inner.trim() != inner || inner.is_empty();
+        let part = if special {
+            format!("\"{inner}\"")
+        } else {
+            inner.clone()
+        };
+        path.push(inner.clone());
+        flatten(&format!("{key}.{part}"), value, path, settings);
+        path.pop();
     }
 }
 

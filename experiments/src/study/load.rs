@@ -31,7 +31,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     stop: None };
+    /// #     stop: None, published: vec![] };
     /// let run = |seed| RunRecord { cell: 0, seed, outcome: RunOutcome::Failed { error: "x".into() } };
     /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
     /// let whole = Results::merge([half(2), half(1)])?.unwrap();
@@ -219,6 +219,7 @@ pub(super) fn difference(a: &Manifest, b: &Manifest) -> String {
         ("the metrics", a.metrics != b.metrics),
         ("the baseline", a.baseline != b.baseline),
         ("the stopping rule", a.stop != b.stop),
+        ("the published figures", a.published != b.published),
     ];
     for (what, differs) in parts {
         if differs {

@@ -18,7 +18,7 @@ const KERNEL: [&str; 8] = [
 ];
 
 /// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 24] = [
+const KNOWN: [(&str, &str, &str); 26] = [
     ("arrival_s", "time to the goal", "s"),
     ("arrived", "rovers at their goals", "rovers"),
     ("collisions", "collisions", ""),
@@ -57,6 +57,16 @@ const KNOWN: [(&str, &str, &str); 24] = [
         "time_ratio",
         "time of those that arrived over the shortest path",
         "",
+    ),
+    (
+        "total_steps",
+        "steps of all rovers that arrived, together",
+        "steps",
+    ),
+    (
+        "transmit_energy_j",
+        "energy of the rovers' transmissions",
+        "J",
     ),
     ("violations", "violations", ""),
 ];

@@ -16,8 +16,9 @@ use super::design;
 use super::error::StudyError;
 use super::factors::{Blame, FactorPlan, factors};
 use super::file::{Seeds, StudyFile};
-use super::level::{Level, set_argument};
+use super::level::{Level, Setting, settings};
 use super::metrics;
+use super::published::published;
 use super::results::{Cell, FORMAT, Manifest, Metric, Stop};
 
 type FilesByName = BTreeMap<String, Vec<u8>>;
@@ -145,6 +146,7 @@ impl Study {
         let stop = self.stop(&metrics, &blame)?;
         let seeds = self.seeds(seeds, &blame)?;
         let baseline = self.baseline(&blame)?;
+        let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
         self.check_arguments(sets)?;
         let base = self.scenario(sets, registry)?;
         let scenario_text = base.resolved()?;
@@ -163,6 +165,7 @@ impl Study {
             cells: self.cells,
             seeds,
             stop,
+            published,
         };
         Ok(Plan {
             manifest,
@@ -297,8 +300,8 @@ impl Study {
 
     /// The scenario with what the study and the command set laid over it.
     fn scenario(&self, sets: &[String], registry: &Registry) -> Result<Scenario, StudyError> {
-        let own = own_sets(&self.file.set);
-        let mut all: Vec<String> = own.iter().map(|(argument, _)| argument.clone()).collect();
+        let own = settings(&self.file.set, "set");
+        let mut all: Vec<String> = own.iter().map(|one| one.argument.clone()).collect();
         all.extend_from_slice(sets);
         let name = &self.file.scenario;
         let opened = if scenario::builtin_text(name).is_some() {
@@ -317,13 +320,11 @@ impl Study {
                     expected: format!("a file, or one of {known}"),
                 });
             }
-            let blamed = own
-                .iter()
-                .find(|(argument, _)| is_place_of(&error, argument));
+            let blamed = own.iter().find(|one| is_place_of(&error, &one.argument));
             match blamed {
-                Some((argument, keys)) => StudyError::Refused {
-                    place: self.source.place_of_key(keys),
-                    what: argument.clone(),
+                Some(one) => StudyError::Refused {
+                    place: self.source.place_of_key(&one.path),
+                    what: one.argument.clone(),
                     error: Box::new(error),
                 },
                 None => StudyError::Text(error),
@@ -362,11 +363,14 @@ impl Study {
     /// A cell that the scenario refuses, with the value to blame.
     fn refused(&self, index: usize, error: ScenarioError) -> StudyError {
         let cell = &self.cells[index];
-        let mut sets = cell.sets.iter();
-        let of_factors = self.factors.iter().enumerate();
-        let blamed = of_factors.flat_map(|(at, plan)| plan.keys.iter().map(move |_| at));
-        let blamed = blamed
-            .zip(&mut sets)
+        let factors = self.factors.iter().enumerate();
+        let of_factor = |(at, plan): (usize, &FactorPlan)| {
+            let sets = plan.sets_of(&cell.values[at], &cell.texts[at]);
+            std::iter::repeat_n(at, sets)
+        };
+        let blamed = factors
+            .flat_map(of_factor)
+            .zip(&cell.sets)
             .find(|(_, argument)| is_place_of(&error, argument))
             .map(|(at, _)| at);
         let (keys, what) = match blamed {
@@ -374,7 +378,7 @@ impl Study {
                 let name = &self.factors[at].factor.name;
                 let text = &cell.texts[at];
                 (
-                    self.keys_of_value(index, at),
+                    self.keys_of_value(index, at, &error),
                     format!("factor {name} = {text}"),
                 )
             }
@@ -391,7 +395,7 @@ impl Study {
     }
 
     /// The keys that lead to where a cell's value stands in the study.
-    fn keys_of_value(&self, cell: usize, factor: usize) -> Vec<String> {
+    fn keys_of_value(&self, cell: usize, factor: usize, error: &ScenarioError) -> Vec<String> {
         let file = &self.file.factor[factor];
         let owned = |keys: &[&str]| keys.iter().map(|key| (*key).to_owned()).collect();
         let at = factor.to_string();
@@ -400,6 +404,20 @@ impl Study {
             let text = &self.cells[cell].texts[factor];
             let place = values.iter().position(|v| Level::new(v).is(value, text));
             return owned(&["factor", &at, "values", &place.unwrap_or(0).to_string()]);
+        }
+        if let Some(variants) = &file.variants {
+            let text = &self.cells[cell].texts[factor];
+            let place = variants.iter().position(|variant| variant.name == *text);
+            let place = place.unwrap_or(0);
+            let set = variants.get(place).map(|variant| {
+                settings(&variant.set, &format!("factor.{at}.variants.{place}.set"))
+            });
+            let blamed = |one: &Setting| is_place_of(error, &one.argument);
+            let set = set.and_then(|set| set.into_iter().find(blamed));
+            return set.map_or_else(
+                || owned(&["factor", &at, "variants", &place.to_string()]),
+                |set| set.path,
+            );
         }
         if file.range.is_some() {
             return owned(&["factor", &at, "range"]);
@@ -426,6 +444,13 @@ impl Plan {
             let message = format!("{metric}: expected a metric that is a number, or true or false");
             return Err(blame.invalid("stop.metric", message));
         }
+        for (index, table) in self.manifest.published.iter().enumerate() {
+            if let Some(Value::String(_)) = results.get(&table.metric) {
+                let metric = &table.metric;
+                let message = format!("{metric}: expected a metric that is counted or measured");
+                return Err(blame.invalid(&format!("published.{index}.metric"), message));
+            }
+        }
         Ok(())
     }
 }
@@ -447,40 +472,4 @@ pub(super) fn of_cell(
 /// Whether the mistake is in this `--set` argument.
 fn is_place_of(error: &ScenarioError, argument: &str) -> bool {
     matches!(error.place(), Some(Place::Set { argument: blamed }) if blamed == argument)
-}
-
-/// The `--set` arguments of a `[set]` table, and the keys in the study that lead to each.
-fn own_sets(table: &toml::Table) -> Vec<(String, Vec<String>)> {
-    let mut sets = Vec::new();
-    let mut path = vec!["set".to_owned()];
-    for (key, value) in table {
-        path.push(key.clone());
-        // In quotes, a dotted key is what it is as an argument.
-        flatten(key, value, &mut path, &mut sets);
-        path.pop();
-    }
-    sets
-}
-
-fn flatten(
-    argument: &str,
-    value: &toml::Value,
-    path: &mut Vec<String>,
-    sets: &mut Vec<(String, Vec<String>)>,
-) {
-    let toml::Value::Table(table) = value else {
-        sets.push((set_argument(argument, value), path.clone()));
-        return;
-    };
-    for (key, value) in table {
-        let special = key.contains(['.', '=', '\'']) || key.trim() != key || key.is_empty();
-        let part = if special {
-            format!("\"{key}\"")
-        } else {
-            key.clone()
-        };
-        path.push(key.clone());
-        flatten(&format!("{argument}.{part}"), value, path, sets);
-        path.pop();
-    }
 }

@@ -42,6 +42,10 @@ pub struct Manifest {
     /// When a cell has seeds enough; without, each cell runs with all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
+    /// Figures of others, to set ours beside. They say nothing about what is run: a folder's runs
+    /// are kept when these change.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub published: Vec<Published>,
 }
 
 /// When a cell has seeds enough.
@@ -147,6 +151,62 @@ pub struct Metric {
     pub label: String,
     /// The unit, empty for none.
     pub unit: String,
+}
+
+/// Figures of one metric that others published.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// The metric's name in [`Manifest::metrics`].
+    pub metric: String,
+    /// What it is called there (`Table 1: deadlocks`).
+    pub title: String,
+    /// Whose it is, and where it stands.
+    pub source: String,
+    /// The unit that the published figures are in (`%`), empty for none.
+    pub unit: String,
+    /// A published figure is ours times this: 100 for a share that is published in percent.
+    pub scale: f64,
+    /// The factor whose levels make the rows where figures are shown as a table of two factors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<String>,
+    /// The figures.
+    pub figures: Vec<PublishedFigure>,
+    /// How to read them.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+    /// Why ours differ.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub why: String,
+}
+
+/// A published figure, and the cells in which it should hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PublishedFigure {
+    /// By place in [`Manifest::cells`].
+    pub cells: Vec<usize>,
+    /// What is claimed.
+    pub claim: Claim,
+    /// In the publication's own words, if it was not a table.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub quote: String,
+}
+
+/// What a publication says of a metric, in the publication's unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Claim {
+    /// A figure.
+    Value(f64),
+    /// A figure that is said to be rough.
+    About(f64),
+    /// Less than this.
+    Below(f64),
+    /// More than this.
+    Above(f64),
+    /// That it grows, or falls, linearly with a factor, which is named.
+    Linear(String),
 }
 
 /// What came of one run.

@@ -80,8 +80,8 @@ pub(super) enum Found {
     Nothing,
     /// Results of the same study.
     Same,
-    /// Results of the same study with fewer seeds.
-    FewerSeeds,
+    /// Results of the same study, with fewer seeds or beside other published figures.
+    Earlier,
 }
 
 /// A results folder that runs are written to. One process at a time has it, or the shard of it.
@@ -112,12 +112,14 @@ impl Store {
         if there == *manifest {
             return Ok(Found::Same);
         }
+        // What others published decides nothing about the runs, and is often written after them.
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
+            published: manifest.published.clone(),
             ..there.clone()
         };
         if extended == *manifest && manifest.seeds.starts_with(&there.seeds) {
-            return Ok(Found::FewerSeeds);
+            return Ok(Found::Earlier);
         }
         Err(StoreError::Other {
             path: folder.to_owned(),

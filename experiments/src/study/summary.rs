@@ -4,6 +4,7 @@
 //! each with its interval at 95 % and, paired by seed, its difference to the baseline. How each is
 //! computed, and after whom, is said in [`crate::stats`].
 
+pub mod published;
 pub mod values;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use super::results::{MessageCounts, Results, RunOutcome, RunRecord};
 use crate::stats::distribution::Ecdf;
 use crate::stats::survival::{Survival, kaplan_meier};
 use crate::stats::{Estimate, bootstrap, rates};
+use published::{Beside, LineSummary};
 use values::{Kind, kind_of, number_of, observations, value_of};
 
 /// The shares at which distributions are given.
@@ -46,6 +48,9 @@ pub struct Summary {
     pub cells: Vec<CellSummary>,
     /// Numbers and rates over all cells, by metric.
     pub overall: BTreeMap<String, OverallSummary>,
+    /// Lines through cells, for whatever was published to be linear.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<LineSummary>,
 }
 
 /// What one cell says.
@@ -70,6 +75,9 @@ pub struct CellSummary {
     /// Each metric, in the manifest's order.
     #[serde(serialize_with = "as_map")]
     pub metrics: Vec<NamedSummary>,
+    /// What others published of it, and how ours compare.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub published: Vec<Beside>,
 }
 
 /// A metric's name and what a cell says of it.
@@ -111,6 +119,32 @@ pub enum MetricSummary {
         /// Zero.
         n: usize,
     },
+}
+
+impl MetricSummary {
+    /// The figure that stands for the cell, with its interval: the mean, the rate, or the median of
+    /// lists. None if no run says anything, and for words.
+    pub fn estimate(&self) -> Option<Estimate> {
+        let (value, low, high) = match self {
+            MetricSummary::Number(one) if one.n > 0 => (one.mean, one.ci_low, one.ci_high),
+            MetricSummary::Rate(one) if one.n > 0 => (one.mean, one.ci_low, one.ci_high),
+            MetricSummary::List(one) if one.values > 0 => {
+                (one.median, one.median_low, one.median_high)
+            }
+            _ => return None,
+        };
+        Some(Estimate { value, low, high })
+    }
+
+    /// How many runs say anything.
+    pub fn n(&self) -> usize {
+        match self {
+            MetricSummary::Number(number) => number.n,
+            MetricSummary::Rate(rate) => rate.n,
+            MetricSummary::List(list) => list.n,
+            MetricSummary::Text { n, .. } | MetricSummary::Absent { n } => *n,
+        }
+    }
 }
 
 /// Numbers of a cell.
@@ -232,7 +266,7 @@ pub struct OverallSummary {
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],
 /// #     baseline: None, cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }],
-/// #     seeds: (0..8).collect(), stop: None };
+/// #     seeds: (0..8).collect(), stop: None, published: vec![] };
 /// # let run = |seed: u64| RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
 /// #     timed_out: false, events: 1, messages: MessageCounts::default(),
@@ -251,9 +285,10 @@ pub fn summarise(results: &Results) -> Summary {
         .iter()
         .map(|metric| (metric.name.clone(), kind_of(results, &metric.name)))
         .collect();
-    let cells: Vec<CellSummary> = (0..manifest.cells.len())
+    let mut cells: Vec<CellSummary> = (0..manifest.cells.len())
         .map(|cell| summarise_cell(results, cell, &kinds))
         .collect();
+    let lines = published::set_beside(manifest, &mut cells);
     let scalars = kinds
         .iter()
         .filter(|(_, kind)| matches!(kind, Kind::Number | Kind::Rate));
@@ -268,6 +303,7 @@ pub fn summarise(results: &Results) -> Summary {
         n: cells.iter().map(|cell| cell.n).sum(),
         failed: cells.iter().map(|cell| cell.failed).sum(),
         overall: overall.collect(),
+        lines,
         cells,
     }
 }
@@ -350,6 +386,7 @@ fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, Kind)]) -> C
         timed_out: 0,
         messages: MessageCounts::default(),
         metrics: Vec::with_capacity(kinds.len()),
+        published: Vec::new(),
     };
     for run in runs {
         match &run.outcome {

@@ -5,6 +5,7 @@ mod scene;
 use std::sync::Arc;
 
 use farside_actors::network::{self, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
+use farside_worlds::movingai::{self, Builtin, GridMap, GridWorld, TaskList};
 use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, WorldError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -57,7 +58,8 @@ impl Settings for NetworkScenario {
             let message = format!("{found}: expected from 1 to {MAX_ROVERS}");
             return Err(SetupError::value("team.rovers", message));
         }
-        let roadmap = Arc::new(roadmap(&self.world.roadmap, setup.files)?);
+        let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
+        let roadmap = Arc::new(roadmap);
         let sensors = self.world.place(&roadmap, setup.seed).map_err(|error| {
             let key = match error {
                 SensorError::NodeCount { .. } => "world.nodes",
@@ -71,18 +73,26 @@ impl Settings for NetworkScenario {
         let (world, team, settings) = (&self.world, &self.team, &self.network);
         let (map, posts) = (roadmap.clone(), Arc::new(sensors));
         let links = &mut *setup.links;
-        let system = network::assemble(
-            setup.sim,
-            world,
-            roadmap,
-            posts.clone(),
-            team,
-            settings,
-            setup.seed,
-            &mut |sim, from, to| {
-                links.connect(sim, from, to);
-            },
-        );
+        let connect: &mut network::Connect<'_> = &mut |sim, from, to| {
+            links.connect(sim, from, to);
+        };
+        let (sim, seed) = (&mut *setup.sim, setup.seed);
+        let system = match &grid {
+            None => network::assemble(
+                sim,
+                world,
+                roadmap,
+                posts.clone(),
+                team,
+                settings,
+                seed,
+                connect,
+            ),
+            Some(grid) => {
+                let tasks = grid.tasks().to_vec();
+                network::assemble_standing(sim, roadmap, posts.clone(), tasks, settings, connect)
+            }
+        };
         let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
         let system = Arc::new(system);
         if setup.links.has_radios() {
@@ -90,7 +100,7 @@ impl Settings for NetworkScenario {
                 setup.links.place(name, place_m);
             }
             // The built-in roadmaps lie in the default crater; of others the ground is not known.
-            if !self.world.roadmap.ends_with(".toml") {
+            if !self.world.roadmap.ends_with(".toml") && grid.is_none() {
                 let crater = Crater::generate(&CraterSettings::default())
                     .map_err(|error| SetupError::value("world.roadmap", error))?;
                 setup.links.terrain(Arc::new(crater.terrain().clone()));
@@ -103,20 +113,57 @@ impl Settings for NetworkScenario {
             of: u64::from(self.team.rovers),
             done: Box::new(move || u64::from(watched.arrived())),
         });
-        Ok(Box::new(move |_report| results(&system.metrics())))
+        let blocked = grid.map(|grid| {
+            let all = grid.blocked();
+            all.iter()
+                .map(|blocked| grid.explain(blocked))
+                .collect::<Vec<_>>()
+        });
+        Ok(Box::new(move |_report| {
+            let mut results = results(&system.metrics());
+            if let Some(blocked) = &blocked {
+                guarantee(&mut results, blocked);
+            }
+            results
+        }))
     }
 }
 
+/// Where rovers drive, and what a map of cells adds.
+struct Ground {
+    roadmap: Roadmap,
+    grid: Option<GridWorld>,
+}
+
 /// The built-in roadmap, or the one in a file.
-fn roadmap(name: &str, files: &mut Files) -> Result<Roadmap, SetupError> {
+fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground, SetupError> {
+    let name = &world.roadmap;
     let wrong = |message: String| SetupError::value("world.roadmap", message);
-    if !name.ends_with(".toml") {
-        return Roadmap::builtin(name).map_err(|error| match error {
-            WorldError::UnknownRoadmap { .. } => {
-                wrong(format!("{error} (a roadmap of your own is a .toml file)"))
-            }
-            other => wrong(other.to_string()),
+    if name.ends_with(".map") || Builtin::find(name).is_some() {
+        let grid = grid(world, rovers, files)?;
+        let roadmap = grid.roadmap().clone();
+        return Ok(Ground {
+            roadmap,
+            grid: Some(grid),
         });
+    }
+    if let Some(tasks) = &world.tasks {
+        let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
+        return Err(SetupError::value("world.tasks", message));
+    }
+    let plain = |roadmap| Ground {
+        roadmap,
+        grid: None,
+    };
+    if !name.ends_with(".toml") {
+        return Roadmap::builtin(name)
+            .map(plain)
+            .map_err(|error| match error {
+                WorldError::UnknownRoadmap { .. } => wrong(format!(
+                    "{error} (a roadmap of your own is a .toml file, or a MovingAI .map)"
+                )),
+                other => wrong(other.to_string()),
+            });
     }
     let bytes = files.read(name, MAX_ROADMAP_BYTES).map_err(wrong)?;
     let text = String::from_utf8(bytes).map_err(|error| {
@@ -125,7 +172,52 @@ fn roadmap(name: &str, files: &mut Files) -> Result<Roadmap, SetupError> {
             "{name}: byte {at} is not UTF-8; expected TOML text"
         ))
     })?;
-    Roadmap::from_toml(&text).map_err(|error| wrong(format!("{name}: {error}")))
+    let roadmap = Roadmap::from_toml(&text).map_err(|error| wrong(format!("{name}: {error}")))?;
+    Ok(plain(roadmap))
+}
+
+/// A MovingAI map with its tasks.
+fn grid(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<GridWorld, SetupError> {
+    let name = &world.roadmap;
+    let of_map = |message: String| SetupError::value("world.roadmap", message);
+    let of_tasks = |message: String| SetupError::value("world.tasks", message);
+    let limit = movingai::MAX_FILE_BYTES as u64;
+    let builtin = Builtin::find(name);
+    let (map_name, bytes) = match builtin {
+        Some(file) => (file.map_name, file.map.to_vec()),
+        None => (name.as_str(), files.read(name, limit).map_err(of_map)?),
+    };
+    let in_map = |error| of_map(format!("{name}: {error}"));
+    let map = GridMap::from_movingai(&bytes).map_err(in_map)?;
+    let (tasks_name, bytes) = match (&world.tasks, builtin) {
+        (Some(tasks), _) => (tasks.as_str(), files.read(tasks, limit).map_err(of_tasks)?),
+        (None, Some(file)) => (name.as_str(), file.tasks.to_vec()),
+        (None, None) => {
+            let message = "missing: expected a .scen file with the starts and goals on the map";
+            return Err(of_tasks(message.to_owned()));
+        }
+    };
+    let in_tasks = |error| of_tasks(format!("{tasks_name}: {error}"));
+    let tasks = TaskList::from_movingai(&bytes).map_err(in_tasks)?;
+    let first = tasks.first(rovers as usize).map_err(in_tasks)?;
+    GridWorld::new(map_name, &map, world.cell_m, first).map_err(|error| match error.line() {
+        Some(_) => in_tasks(error),
+        None => in_map(error),
+    })
+}
+
+/// Says whether rovers that stay at their goals are sure to arrive: only on well-formed instances.
+fn guarantee(results: &mut Results, blocked: &[String]) {
+    let well_formed = blocked.is_empty();
+    let metrics = &mut results.metrics;
+    metrics.insert("well_formed".to_owned(), well_formed.into());
+    metrics.insert("blocked_tasks".to_owned(), blocked.len().into());
+    let text = match blocked {
+        [] => "well-formed: there is a way for every rover, in any order".to_owned(),
+        [first] => format!("not well-formed: {first}"),
+        [first, rest @ ..] => format!("not well-formed: {first}; and {} more", rest.len()),
+    };
+    results.summary.push(("instance".to_owned(), text));
 }
 
 /// The key to blame.
@@ -144,7 +236,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 }
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 14] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -154,6 +246,8 @@ const KEYS: [&str; 12] = [
     "network.collision_penalty_factor",
     "network.noise",
     "network.convergence",
+    "network.damping",
+    "network.processor",
     "network.passive_window",
     "network.active_window",
     "network.cycle_limit",

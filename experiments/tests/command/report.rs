@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use farside_experiments::study::results::{
-    Cell, FORMAT, Factor, Manifest, MessageCounts, Metric, RunOutcome, RunRecord, Scale,
+    Cell, Claim, FORMAT, Factor, Manifest, MessageCounts, Metric, Published, PublishedFigure,
+    RunOutcome, RunRecord, Scale,
 };
 use serde_json::json;
 
@@ -38,6 +39,7 @@ fn manifest() -> Manifest {
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
         seeds: (1..=4).collect(),
         stop: None,
+        published: Vec::new(),
     }
 }
 
@@ -146,6 +148,61 @@ fn shards_are_joined() {
         let read = |of: &str| std::fs::read(folder.path().join(of).join(name)).unwrap();
         assert_eq!(read("joined"), read(whole), "{name}");
     }
+}
+
+#[test]
+fn published_figures_are_in_every_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut manifest = manifest();
+    let figure = |cell: usize, claim: Claim| PublishedFigure {
+        cells: vec![cell],
+        claim,
+        quote: String::new(),
+    };
+    manifest.published = vec![Published {
+        metric: "time_ratio".to_owned(),
+        title: "Table 7".to_owned(),
+        source: "somebody".to_owned(),
+        unit: "%".to_owned(),
+        scale: 100.0,
+        rows: None,
+        figures: vec![
+            figure(0, Claim::Value(170.0)),
+            figure(1, Claim::Below(20.0)),
+        ],
+        note: String::new(),
+        why: String::new(),
+    }];
+    let all = all();
+    fill(&folder.path().join("one"), &manifest, &all[4..]);
+    fill(&folder.path().join("other"), &manifest, &all[..4]);
+    let arguments = ["report", "one", "other", "--out", "joined", "--json"];
+    let document = json(&farside(folder.path(), &arguments));
+    let beside = &document["published"];
+    assert_eq!(beside.as_array().map(Vec::len), Some(2));
+    // Means of 1 + cell + 0.25 to 1.
+    assert_eq!(
+        (
+            &beside[0]["cell"],
+            &beside[0]["estimate"],
+            &beside[0]["difference"]
+        ),
+        (&json!(0), &json!(162.5), &json!(-7.5))
+    );
+    assert_eq!(
+        (&beside[0]["inside"], &beside[1]["inside"]),
+        (&json!(true), &json!(false))
+    );
+    assert_eq!(beside[1]["published"], json!({ "below": 20.0 }));
+    let read =
+        |name: &str| std::fs::read_to_string(folder.path().join("joined").join(name)).unwrap();
+    assert!(read("report.html").contains("Beside the published figures"));
+    let rows = read("published.csv");
+    let row = rows.lines().nth(1).unwrap();
+    assert!(
+        row.starts_with("0,0,time_ratio,Table 7,%,value,170,4,162.5,"),
+        "{rows}"
+    );
 }
 
 #[test]

@@ -239,7 +239,7 @@ fn found_instead(nearest: &Option<String>) -> String {
 }
 
 /// A text from a file, short enough for a message.
-pub(super) fn shown(text: &str) -> String {
+pub(crate) fn shown(text: &str) -> String {
     match text.char_indices().nth(40) {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),

@@ -82,7 +82,7 @@ impl Node {
 
     fn hear(&mut self, ctx: &mut Context<'_, Self>, fact: &Whereabouts, goal: Option<VertexId>) {
         let news = ctx.durable::<Ledger>().hear(fact, goal, self.cycle);
-        if self.site.config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             for &previous in &news.unheard {
                 self.report_departure(ctx, *fact, Some(previous));
             }
@@ -158,7 +158,7 @@ impl Handler<Beacon> for Node {
         if expected {
             self.report_departure(ctx, fact, beacon.previous);
         }
-        if here == Some(goal) && fact.moving_to.is_none() {
+        if here == Some(goal) && fact.moving_to.is_none() && !self.site.stays {
             self.send_grant(ctx, fact.rover, fact.step + 1, None);
         }
         Ok(())

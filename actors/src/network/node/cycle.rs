@@ -17,9 +17,9 @@ use crate::network::safety::{Ledger, Occupant};
 impl Node {
     /// A cycle begins: what was lost is said again, and queues are served.
     pub(super) fn listen(&mut self, ctx: &mut Context<'_, Self>) {
-        let config = &self.site.config;
+        let timing = &self.site.timing;
         self.cycle = self.site.cycle_at(ctx.now());
-        if config.policy == Policy::Complete {
+        if self.site.config.policy != Policy::Paper {
             let phase = Phase::Listen;
             ctx.timer(self.site.until_next_cycle(ctx.now()), PhaseBegins { phase });
             self.repeat(ctx);
@@ -27,11 +27,11 @@ impl Node {
             return;
         }
         for (phase, delay) in [
-            (Phase::Locate, config.exchange),
-            (Phase::Propose, config.exchange * 2),
-            (Phase::Optimise, config.exchange * 3),
-            (Phase::Assign, config.exchange * 3 + config.optimisation),
-            (Phase::Admit, config.decided_after()),
+            (Phase::Locate, timing.exchange),
+            (Phase::Propose, timing.exchange * 2),
+            (Phase::Optimise, timing.exchange * 3),
+            (Phase::Assign, timing.exchange * 3 + timing.optimisation),
+            (Phase::Admit, timing.decided_after()),
             (Phase::Listen, self.site.until_next_cycle(ctx.now())),
         ] {
             ctx.timer(delay, PhaseBegins { phase });
@@ -67,7 +67,9 @@ impl Node {
             self.send_grant(ctx, held.rover, held.step, Some(vertex));
         }
         let ledger = ctx.durable::<Ledger>();
-        let at_goal = |(v, held): &(VertexId, Occupant)| held.arrived && held.goal == Some(*v);
+        let stays = self.site.stays;
+        let at_goal =
+            |(v, held): &(VertexId, Occupant)| !stays && held.arrived && held.goal == Some(*v);
         let leaving: Vec<_> = ledger.occupied().filter(at_goal).map(|(_, h)| h).collect();
         for held in leaving {
             self.send_grant(ctx, held.rover, held.step + 1, None);
@@ -135,9 +137,7 @@ impl Node {
                 );
             }
         }
-        let payoffs = self.site.payoffs;
-        let tolerance = self.site.config.convergence as f32;
-        self.optimiser.pose(self.id, payoffs, tolerance, rovers);
+        self.pose(ctx, rovers);
     }
 
     /// The rovers that this node plans for: on its vertices, with somewhere to go, and not known to

@@ -3,15 +3,20 @@
 //! A node goes on to the next iteration when all its neighbours' messages of this one are here, or
 //! when they are overdue; vectors that did not come stay as they were last heard, at first zero. A
 //! node whose vectors no longer change says so once and falls silent until something new comes in.
+//!
+//! With a finite `network.processor` all this takes time. A node compares candidate paths as they
+//! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
+//! as it begins, and its messages go out when it is done. What is not done when the optimisation
+//! is over was in vain.
 
 use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::NodeId;
 
-use super::{IterationOverdue, Node, Phase};
+use super::{IterationOverdue, Node, Phase, ProcessorDone};
 use crate::network::candidates::CandidatePath;
-use crate::network::max_plus::MaxPlus as Problem;
-use crate::network::messages::{CandidatePaths, MaxPlus, RoverId};
+use crate::network::max_plus::{MaxPlus as Problem, Rules};
+use crate::network::messages::{CandidatePaths, Choice, MaxPlus, RoverId};
 use crate::network::payoff::Payoffs;
 
 /// A node's part in the optimisation of one cycle.
@@ -27,6 +32,21 @@ pub(super) struct Optimiser {
     dirty: bool,
     peers: Vec<Peer>,
     overdue: Option<TimerId>,
+    /// The processor is at work, and a timer tells when this is done.
+    task: Option<Task>,
+    /// When the payoffs of all candidate paths that came in are made.
+    payoffs_done: SimTime,
+    /// What neighbours were told that the own rovers would do.
+    announced: Vec<Choice>,
+}
+
+/// What a processor that takes time does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Task {
+    /// It makes payoffs; the next iteration waits for them.
+    Payoffs,
+    /// It computes an iteration, after which nothing changed, or something did.
+    Iteration { settled: bool },
 }
 
 /// A neighbour that takes part.
@@ -45,25 +65,17 @@ impl Optimiser {
         *self = Optimiser::default();
     }
 
-    /// Begins with the node's own rovers.
-    pub(super) fn pose(
-        &mut self,
-        node: NodeId,
-        payoffs: Payoffs,
-        tolerance: f32,
-        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
-    ) {
-        self.problem = Some(Problem::new(node, payoffs, tolerance, rovers));
-    }
-
     /// How many rovers the node plans for.
     pub(super) fn rovers(&self) -> u32 {
-        self.best().count() as u32
+        self.problem.as_ref().map_or(0, Problem::rovers) as u32
     }
 
-    /// The best path of each own rover as things stand.
-    pub(super) fn best(&self) -> impl Iterator<Item = (RoverId, &CandidatePath)> {
-        self.problem.iter().flat_map(Problem::best)
+    /// The path of each own rover as things stand.
+    pub(super) fn best(&self) -> Vec<(RoverId, &CandidatePath)> {
+        let converged = self.settled && self.peers.iter().all(|peer| peer.settled);
+        self.problem
+            .as_ref()
+            .map_or_else(Vec::new, |problem| problem.best(converged))
     }
 
     fn peer(&mut self, node: NodeId) -> Option<&mut Peer> {
@@ -84,10 +96,34 @@ impl Optimiser {
 }
 
 impl Node {
+    /// Begins with the node's own rovers.
+    pub(super) fn pose(
+        &mut self,
+        ctx: &Context<'_, Self>,
+        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
+    ) {
+        let config = &self.site.config;
+        let rules = Rules {
+            tolerance: config.convergence as f32,
+            damping: config.damping as f32,
+            anytime: config.anytime,
+        };
+        let payoffs: Payoffs = self.site.payoffs;
+        self.optimiser.problem = Some(Problem::new(payoffs, rules, rovers));
+        self.charge_payoffs(ctx);
+    }
+
+    /// The processor has more candidate paths to compare.
+    fn charge_payoffs(&mut self, ctx: &Context<'_, Self>) {
+        let optimiser = &mut self.optimiser;
+        let pairs = optimiser.problem.as_mut().map_or(0, Problem::take_compared);
+        let begins = optimiser.payoffs_done.max(ctx.now());
+        optimiser.payoffs_done = begins + self.site.config.processor.time_for(pairs);
+    }
+
     /// The optimisation begins.
     pub(super) fn optimise(&mut self, ctx: &mut Context<'_, Self>) {
-        let problem = self.optimiser.problem.as_ref();
-        if problem.is_some_and(|problem| problem.best().next().is_some()) {
+        if self.optimiser.rovers() > 0 {
             self.optimiser.running = true;
             self.iterate(ctx);
             self.advance(ctx);
@@ -96,12 +132,13 @@ impl Node {
 
     /// Iterates as long as nothing is missing; then waits, but not for ever.
     fn advance(&mut self, ctx: &mut Context<'_, Self>) {
-        while self.optimiser.awake() && self.optimiser.ready() {
+        let free = |optimiser: &Optimiser| optimiser.awake() && optimiser.task.is_none();
+        while free(&self.optimiser) && self.optimiser.ready() {
             self.iterate(ctx);
         }
-        if self.optimiser.awake() {
+        if free(&self.optimiser) {
             if self.optimiser.overdue.is_none() {
-                let timeout = self.site.config.iteration_timeout;
+                let timeout = self.site.timing.iteration_timeout;
                 self.optimiser.overdue = Some(ctx.timer(timeout, IterationOverdue));
             }
         } else if let Some(timer) = self.optimiser.overdue.take() {
@@ -109,26 +146,54 @@ impl Node {
         }
     }
 
-    /// One iteration, and its messages.
+    /// Begins an iteration, and is done with it at once if the processor takes no time.
     fn iterate(&mut self, ctx: &mut Context<'_, Self>) {
-        let optimiser = &mut self.optimiser;
+        let (optimiser, config) = (&mut self.optimiser, &self.site.config);
         if let Some(timer) = optimiser.overdue.take() {
             ctx.cancel(timer);
         }
         let Some(problem) = &mut optimiser.problem else {
             return;
         };
-        if optimiser.iteration >= self.site.config.max_iterations || problem.is_trivial() {
+        if optimiser.iteration >= config.max_iterations || problem.is_trivial() {
             optimiser.running = false;
             return;
         }
-        optimiser.iteration += 1;
+        let cycle = self.cycle;
+        if optimiser.payoffs_done > ctx.now() {
+            optimiser.task = Some(Task::Payoffs);
+            let left = optimiser.payoffs_done.since(ctx.now());
+            ctx.timer(left, ProcessorDone { cycle });
+            return;
+        }
         optimiser.dirty = false;
-        optimiser.settled = !problem.iterate();
+        let settled = !problem.compute();
+        let takes = config.processor.time_for(problem.pairs());
+        if takes.is_zero() {
+            self.complete(ctx, settled);
+        } else {
+            optimiser.task = Some(Task::Iteration { settled });
+            ctx.timer(takes, ProcessorDone { cycle });
+        }
+    }
+
+    /// An iteration is computed: its messages go out.
+    fn complete(&mut self, ctx: &mut Context<'_, Self>, settled: bool) {
+        let optimiser = &mut self.optimiser;
+        let Some(problem) = &mut optimiser.problem else {
+            return;
+        };
+        problem.deliver();
+        let choices = problem.choices();
+        // Others judge their paths by these.
+        let rethought = choices != optimiser.announced;
+        optimiser.iteration += 1;
+        optimiser.settled = settled;
         for peer in &mut optimiser.peers {
             let vectors = problem.changed_for(peer.node);
             let awaited = !optimiser.settled && !peer.settled;
-            if vectors.is_empty() && peer.told_settled == optimiser.settled && !awaited {
+            let told = peer.told_settled == optimiser.settled && !rethought;
+            if vectors.is_empty() && told && !awaited {
                 continue;
             }
             peer.told_settled = optimiser.settled;
@@ -143,9 +208,11 @@ impl Node {
                 iteration: optimiser.iteration,
                 settled: optimiser.settled,
                 vectors,
+                choices: choices.clone(),
             };
             ctx.send_keyed(self.neighbors[at].address, key, message);
         }
+        optimiser.announced = choices;
     }
 }
 
@@ -167,6 +234,8 @@ impl Handler<CandidatePaths> for Node {
             settled: false,
             told_settled: false,
         });
+        self.charge_payoffs(ctx);
+        let optimiser = &mut self.optimiser;
         // It came late: the optimisation takes it in.
         if optimiser.running {
             optimiser.dirty = true;
@@ -202,11 +271,29 @@ impl Handler<MaxPlus> for Node {
             for vector in &message.vectors {
                 optimiser.dirty |= problem.receive(vector);
             }
+            for choice in &message.choices {
+                problem.note(choice);
+            }
         }
         // Who was silent, or late, joins the iteration that the others have reached.
         let reached = iteration.saturating_sub(u32::from(!settled));
         let limit = self.site.config.max_iterations;
         optimiser.iteration = optimiser.iteration.max(reached).min(limit);
+        self.advance(ctx);
+        Ok(())
+    }
+}
+
+impl Handler<ProcessorDone> for Node {
+    fn handle(&mut self, timer: ProcessorDone, ctx: &mut Context<'_, Self>) -> Outcome {
+        if timer.cycle != self.cycle || self.phase != Phase::Optimise {
+            return Ok(());
+        }
+        match self.optimiser.task.take() {
+            Some(Task::Payoffs) => self.iterate(ctx),
+            Some(Task::Iteration { settled }) => self.complete(ctx, settled),
+            None => {}
+        }
         self.advance(ctx);
         Ok(())
     }

@@ -77,7 +77,7 @@ fn two_rovers_head_on_are_named_and_one_goes_aside() {
         met += 1;
         assert_eq!(off.deadlock, Deadlock::Passive);
         assert!(off.confirmed_deadlocks > 0);
-        assert_eq!(off.last_confirmed, ["rover_01", "rover_02"]);
+        assert_eq!(off.last_confirmed.as_deref(), Some("rover_01 > rover_02"));
         assert_eq!(
             head_on(seed, &on(false, false))
                 .unwrap()

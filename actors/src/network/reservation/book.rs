@@ -4,7 +4,8 @@
 use farside_worlds::VertexId;
 
 use super::messages::Walk;
-use crate::planning::safe_intervals::TimedVisit;
+use crate::network::messages::RoverId;
+use crate::planning::safe_intervals::{FOREVER, TimedVisit};
 
 /// A planned visit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +59,46 @@ impl Book {
                 .map(|visit| (visit.start, visit.end))
                 .collect(),
         )
+    }
+
+    /// Enters a rover that stands at `v`, for ever as far as is known.
+    pub(super) fn stand(&mut self, v: VertexId, rover: RoverId, step: u32) {
+        let walk = Walk {
+            rover,
+            attempt: 0,
+            since: 0,
+        };
+        let visit = Visit {
+            walk,
+            step,
+            from: None,
+            start: 0,
+            end: FOREVER,
+            confirmed: true,
+            granted: true,
+        };
+        self.enter(v, visit);
+    }
+
+    /// The same without those who stand there for ever.
+    pub(super) fn busy_for_now(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
+        let mut busy = self.busy(v)?;
+        busy.retain(|&(_, end)| end != FOREVER);
+        Some(busy)
+    }
+
+    /// Who stands, or will stand, at `v` for ever, as far as is known.
+    pub(super) fn standing(&self, v: VertexId) -> Option<&Visit> {
+        let last = self.pages[self.page(v)?].1.last()?;
+        (last.end == FOREVER && last.confirmed).then_some(last)
+    }
+
+    /// The rover that stands at `v` for ever will leave it after all.
+    pub(super) fn leave_by(&mut self, v: VertexId, end: u64) {
+        let Some(page) = self.page(v) else { return };
+        if let Some(last) = self.pages[page].1.last_mut() {
+            last.end = end;
+        }
     }
 
     /// Whether `visits` (with their vertices) may all be entered: apart in time from all others, and
@@ -138,5 +179,112 @@ impl Book {
             Some((*v, first))
         });
         firsts.filter(|(_, visit)| visit.confirmed && !visit.granted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::testing::v;
+
+    fn walk(rover: u32, since: u64) -> Walk {
+        Walk {
+            rover: RoverId(rover),
+            attempt: 1,
+            since,
+        }
+    }
+
+    fn book() -> Book {
+        let mut book = Book::default();
+        book.open(&[v(1), v(4)]);
+        book
+    }
+
+    fn visit(walk: Walk, start: u64, end: u64) -> Visit {
+        Visit {
+            walk,
+            step: 3,
+            from: None,
+            start,
+            end,
+            confirmed: false,
+            granted: false,
+        }
+    }
+
+    fn timed(vertex: u32, start: u64, end: u64) -> TimedVisit {
+        TimedVisit {
+            vertex: v(vertex),
+            start,
+            end,
+        }
+    }
+
+    #[test]
+    fn visits_lie_apart_and_after_what_was_granted() {
+        let mut book = book();
+        let (young, old) = (walk(7, 50), walk(2, 10));
+        book.enter(v(4), visit(young, 100, 200));
+        let check = |start, end| book.check(&old, &[timed(4, start, end)]);
+        assert_eq!(check(10, 99), Ok(()));
+        assert_eq!(check(201, FOREVER), Ok(()));
+        for (start, end) in [(10, 100), (150, 160), (200, 300), (50, FOREVER)] {
+            assert_eq!(check(start, end), Err(Clash::Younger), "{start}, {end}");
+        }
+        assert_eq!(
+            book.check(&walk(9, 60), &[timed(4, 150, 160)]),
+            Err(Clash::Firm)
+        );
+        book.confirm(&young);
+        assert_eq!(book.check(&old, &[timed(4, 150, 160)]), Err(Clash::Firm));
+        for (_, head) in book.heads() {
+            head.granted = true;
+        }
+        assert_eq!(book.check(&old, &[timed(4, 10, 99)]), Err(Clash::Firm));
+        assert_eq!(book.check(&old, &[timed(4, 300, 301)]), Ok(()));
+        assert_eq!(
+            book.check(&old, &[timed(2, 300, 301)]),
+            Err(Clash::Firm),
+            "not in this book"
+        );
+    }
+
+    #[test]
+    fn only_the_first_visit_may_be_granted_and_only_once_it_is_confirmed() {
+        let mut book = book();
+        let (first, second) = (walk(1, 0), walk(2, 0));
+        book.enter(v(1), visit(second, 20, 30));
+        book.enter(v(1), visit(first, 10, 15));
+        book.confirm(&second);
+        assert_eq!(book.heads().count(), 0, "the first is not confirmed");
+        book.confirm(&first);
+        let (at, head) = book.heads().next().unwrap();
+        assert_eq!((at, head.walk), (v(1), first));
+        book.departed(v(1));
+        assert_eq!(
+            book.heads().next().unwrap().1.walk,
+            first,
+            "it was never granted"
+        );
+        book.heads().next().unwrap().1.granted = true;
+        book.departed(v(1));
+        assert_eq!(book.heads().next().unwrap().1.walk, second);
+    }
+
+    #[test]
+    fn a_failed_attempt_leaves_nothing_behind() {
+        let mut book = book();
+        let first = walk(1, 5);
+        book.enter(v(1), visit(first, 10, 15));
+        book.enter(v(4), visit(walk(3, 9), 10, 15));
+        book.strike_earlier(&Walk {
+            attempt: 2,
+            ..first
+        });
+        assert_eq!(book.busy(v(1)), Some(Vec::new()));
+        assert_eq!(book.busy(v(4)).unwrap().len(), 1);
+        book.strike(&walk(3, 9));
+        assert_eq!(book.busy(v(4)), Some(Vec::new()));
     }
 }

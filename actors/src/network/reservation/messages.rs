@@ -42,6 +42,21 @@ pub enum Item {
     Reserve(Reserve),
     /// Forward or backward: what became of it.
     Settle(Settle),
+    /// Backward: who stands for ever on this path is asked to step aside for a while.
+    Yield(Yield),
+}
+
+/// A rover that stays at its goal would have a way if nobody stood on it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Yield {
+    /// The walk that found no other way.
+    pub walk: Walk,
+    /// The path that it would take.
+    pub path: Vec<VertexId>,
+    /// The nodes along it.
+    pub route: Vec<NodeId>,
+    /// The place in `route` of the node that this is for.
+    pub at: u32,
 }
 
 /// One attempt to reserve a way for a rover.
@@ -79,6 +94,8 @@ pub struct Probe {
     pub goal: VertexId,
     /// The step with which the way begins.
     pub first_step: u32,
+    /// Only asks what the way would be if nobody stood still for ever.
+    pub wishful: bool,
     /// Where the rover can be, and when.
     pub labels: Vec<Label>,
     /// Those of them, by place, from which the next node goes on.
@@ -120,4 +137,6 @@ pub enum Verdict {
     Released,
     /// The same, for the node that began: it tries again. Goes backward.
     Failed,
+    /// There is no way as things stand. Goes backward.
+    NoWay,
 }

@@ -126,3 +126,103 @@ impl Line {
         Some(item)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::messages::RoverId;
+    use crate::network::reservation::messages::{Settle, Verdict, Walk};
+    use proptest::prelude::*;
+
+    fn item(attempt: u32) -> Item {
+        let walk = Walk {
+            rover: RoverId(0),
+            attempt,
+            since: 0,
+        };
+        Item::Settle(Settle {
+            walk,
+            verdict: Verdict::Confirmed,
+            route: Vec::new(),
+            at: 0,
+        })
+    }
+
+    type Flight = (u64, bool, u64, Receipt, Vec<Numbered>);
+
+    proptest! {
+        /// Over a line that delays, reorders, loses and repeats, and with ends that crash, each item
+        /// is taken once.
+        #[test]
+        fn each_item_is_taken_once(
+            fates in proptest::collection::vec((0u64..400, 0u8..4), 1..200),
+            posts in proptest::collection::vec(0u64..3_000, 1..20),
+            crash in 0u64..4_000,
+        ) {
+            const MS: u64 = 1_000_000;
+            let (mut a, mut b) = (Line::default(), Line::default());
+            let mut air: Vec<Flight> = Vec::new();
+            let mut taken = Vec::new();
+            let mut sent = 0;
+            for now in (0..40_000u64).map(|ms| ms * MS) {
+                for (i, _) in (0..).zip(&posts).filter(|(_, at)| **at * MS == now) {
+                    a.post(item(i));
+                }
+                if now == crash * MS {
+                    a.restart();
+                    b.restart();
+                }
+                let (here, rest): (Vec<_>, Vec<_>) = air.into_iter().partition(|f| f.0 <= now);
+                air = rest;
+                for (_, to_b, at, receipt, items) in here {
+                    let line = if to_b { &mut b } else { &mut a };
+                    line.acknowledged(&receipt, now);
+                    for numbered in items {
+                        taken.extend(line.take(at, numbered));
+                    }
+                }
+                for (line, to_b) in [(&mut a, true), (&mut b, false)] {
+                    if let Some((receipt, items)) = line.due(now) {
+                        // Every fourth fate is a loss, another one a repetition, at least at first.
+                        let (delay, fate) = fates[sent % fates.len()];
+                        sent += 1;
+                        let lost = fate == 0 && sent < 400;
+                        let copies = usize::from(!lost) + usize::from(fate == 1);
+                        for copy in 0..copies as u64 {
+                            let at = now + (delay + 7 * copy) * MS;
+                            air.push((at, to_b, now, receipt.clone(), items.clone()));
+                        }
+                    }
+                }
+            }
+            let number = |item: &Item| match item {
+                Item::Settle(settle) => settle.walk.attempt,
+                _ => u32::MAX,
+            };
+            let mut numbers: Vec<u32> = taken.iter().map(number).collect();
+            numbers.sort_unstable();
+            prop_assert_eq!(numbers, (0..posts.len() as u32).collect::<Vec<_>>());
+            prop_assert_eq!(a.next_due(), None);
+        }
+    }
+
+    #[test]
+    fn a_round_trip_is_measured_however_often_things_are_repeated() {
+        let (mut a, mut b) = (Line::default(), Line::default());
+        a.post(item(0));
+        let first = a.due(0).unwrap();
+        // The first is lost; a repetition gets through after 3 s.
+        let wait = a.next_due().unwrap();
+        assert!(a.due(wait - 1).is_none());
+        let (_, items) = a.due(wait).unwrap();
+        assert_eq!(items, first.1);
+        let arrives = wait + 3_000_000_000;
+        for numbered in items {
+            b.take(wait, numbered);
+        }
+        let (receipt, _) = b.due(arrives).unwrap();
+        a.acknowledged(&receipt, arrives + 3_000_000_000);
+        assert_eq!(a.round_trip(), 6_000_000_000);
+        assert_eq!(a.next_due(), None);
+    }
+}

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::messages::Relay;
 use super::registry::{Desk, Registry};
 use super::relay::Receipt;
+use crate::network::config::Policy;
 use crate::network::node::Node;
 use crate::network::safety::Ledger;
 
@@ -24,7 +25,13 @@ impl Node {
 
     /// A cycle begins: rovers that wait without a way apply for one.
     pub(crate) fn apply(&mut self, ctx: &mut Context<'_, Self>) {
-        self.with_registry(ctx, |registry, desk| registry.apply(desk));
+        // Other policies have planned for all before the start.
+        let applies = self.site.config.policy == Policy::Complete;
+        self.with_registry(ctx, |registry, desk| {
+            if applies {
+                registry.apply(desk);
+            }
+        });
     }
 
     /// Vertices are free again.
@@ -91,7 +98,7 @@ impl Node {
         now: u64,
     ) -> Option<u64> {
         let config = &self.site.config;
-        let ahead = config.cycle.as_nanos() * u64::from(config.grants_ahead);
+        let ahead = self.site.timing.cycle.as_nanos() * u64::from(config.grants_ahead);
         let mut next = None::<u64>;
         for (vertex, visit) in registry.book.heads() {
             let due = visit.start.saturating_sub(ahead);

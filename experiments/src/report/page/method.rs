@@ -8,7 +8,7 @@ use crate::stats::bootstrap::RESAMPLES;
 /// A method: what it is for, and how it is done.
 type Method = (&'static str, &'static str);
 
-const METHODS: [Method; 8] = [
+const METHODS: [Method; 9] = [
     (
         "Means",
         "The interval is a bootstrap's, bias-corrected and accelerated (BCa; Efron 1987), because \
@@ -48,6 +48,15 @@ const METHODS: [Method; 8] = [
         "Over all cells",
         "A stratified bootstrap: seeds are drawn anew within each cell, and the interval is the \
          percentiles' (Agarwal and others 2021, rliable).",
+    ),
+    (
+        "Published figures",
+        "They have no intervals of their own, so the question is whether ours allows them: whether it \
+         holds the published figure, or reaches into what a bound such as \u{201c}under 1 %\u{201d} \
+         allows. Of twenty figures that agree in truth, about one is outside by chance. What was \
+         published to be linear has a line through the cells' figures by least squares, each cell \
+         counted the same, and R\u{b2}, the share of their spread that the line explains; curves that \
+         only bend upwards a little have a high one too, so the farthest cell is named as well.",
     ),
     (
         "Many comparisons",

@@ -7,13 +7,17 @@ use crate::report::colours::DASHES;
 use crate::report::layout::{Axis, Curves, Panel};
 use crate::report::measure::{Measure, Study};
 use crate::report::numbers::Style;
+use crate::report::page::published::claim;
 use crate::report::scale::{Scale, Spacing, Tick};
 use crate::report::svg::{
     Area, EndLabel, Figure, Frame, end_label_room, end_labels, marker, measured_ticks, path,
     shortened, slug, widest,
 };
 use crate::stats::Estimate;
-use crate::study::results;
+use crate::study::results::{self, Claim};
+
+/// How many pieces a fitted line has.
+const FITTED_STEPS: u32 = 24;
 
 /// What is plotted of each cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +94,8 @@ impl<'a> Plot<'a> {
             let ends = estimates
                 .iter()
                 .flat_map(|one| [one.value, one.low, one.high]);
+            let others: Vec<f64> = plot.published_values().collect();
+            let ends = ends.chain(others);
             let zero = (shown == Shown::Difference).then_some(0.0);
             let scaled = ends.map(|end| measure.style.scaled(end)).chain(zero);
             plot.y = Scale::measured(scaled);
@@ -120,6 +126,86 @@ impl<'a> Plot<'a> {
             }
         };
         Point { x, estimate, says }
+    }
+
+    /// What others published of the cells, in the metric's own unit; nothing beside differences.
+    fn published_values(&self) -> impl Iterator<Item = f64> {
+        let cells = self.study.summary.cells.iter();
+        let cells = cells.map(|cell| self.published(cell.cell).into_iter());
+        cells.flatten().map(|(value, _)| value)
+    }
+
+    /// What others published of a cell, and how they say it.
+    fn published(&self, cell: usize) -> Vec<(f64, String)> {
+        let manifest = &self.study.results.manifest;
+        let summary = self.study.summary.cells.get(cell);
+        let all = summary.map_or(&[][..], |summary| &summary.published);
+        let of_metric = all
+            .iter()
+            .filter(|one| one.metric == self.measure.metric.name);
+        let points = of_metric.filter_map(|one| match one.published {
+            Claim::Value(value) | Claim::About(value) if self.shown == Shown::Estimate => {
+                let table = manifest.published.get(one.table)?;
+                let said = claim(&one.published, &one.unit);
+                let name = self.study.cell_name(cell);
+                Some((value / table.scale, format!("{name}: published {said}")))
+            }
+            _ => None,
+        });
+        points.collect()
+    }
+
+    /// The line through some cells that others call linear, from the first to the last of them.
+    fn fitted(
+        &self,
+        area: &Area,
+        axis: &Axis,
+        x: &Along,
+        cells: &[usize],
+        series: usize,
+    ) -> Markup {
+        let manifest = &self.study.results.manifest;
+        let lines = self.study.summary.lines.iter();
+        let of_metric = lines.filter(|line| {
+            let factor = manifest.factors.get(axis.factor);
+            line.metric == self.measure.metric.name
+                && factor.is_some_and(|factor| factor.name == line.factor)
+                && line.cells.iter().all(|cell| cells.contains(cell))
+        });
+        let shown = of_metric.filter(|_| self.shown == Shown::Estimate);
+        html! {
+            @for line in shown {
+                @let scale = manifest.published.get(line.table).map_or(1.0, |table| table.scale);
+                @let values = line.cells.iter().filter_map(|cell| {
+                    manifest.cells.get(*cell)?.values.get(axis.factor)?.as_f64()
+                });
+                @let values: Vec<f64> = values.collect();
+                @let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                @let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                // On a logarithmic axis a line is bent.
+                @let points = (0..=FITTED_STEPS).map(|step| {
+                    let value = low + (high - low) * f64::from(step) / f64::from(FITTED_STEPS);
+                    (area.x(x.place_of(value)), self.at(area, line.line().at(value) / scale))
+                });
+                path class={ "fitted s" (series) } d=(path(points)) {
+                    title { "least squares, R² " (format!("{:.3}", line.r_squared)) }
+                }
+            }
+        }
+    }
+
+    /// Crosses where others published figures.
+    fn crosses(&self, area: &Area, cell: usize, at: f64, series: usize) -> Markup {
+        const ARM: f64 = 4.5;
+        html! {
+            @for (value, says) in self.published(cell) {
+                @let (x, y) = (at, self.at(area, value));
+                path class={ "cross s" (series) } d={
+                    (path([(x - ARM, y - ARM), (x + ARM, y + ARM)]))
+                    (path([(x - ARM, y + ARM), (x + ARM, y - ARM)]))
+                } { title { (says) } }
+            }
+        }
     }
 
     /// The y of a value in an area.
@@ -189,10 +275,20 @@ impl<'a> Plot<'a> {
             }));
             let aside = 11.0 * (index as f64 - (panel.series.len() - 1) as f64 / 2.0);
             marks.push(if axis.numeric {
-                self.curve(&area, &points, index)
+                html! {
+                    (self.fitted(&area, axis, &x, &series.cells, index))
+                    (self.curve(&area, &points, index))
+                }
             } else {
                 html! { @for point in &points { (self.whisker(&area, point, index, aside)) } }
             });
+            let moved = if axis.numeric { 0.0 } else { aside };
+            let pairs = series.cells.iter().zip(&points);
+            marks.extend(
+                pairs.map(|(cell, point)| {
+                    self.crosses(&area, *cell, area.x(point.x) + moved, index)
+                }),
+            );
         }
         let body = html! {
             (self.frame(&area, axis, &x).draw())
@@ -330,7 +426,11 @@ fn x_axis(axis: &Axis) -> Along {
 
 impl Along {
     fn place(&self, axis: &Axis, level: usize) -> f64 {
+        self.place_of(axis.levels[level].value)
+    }
+
+    fn place_of(&self, value: f64) -> f64 {
         // A little room, so that markers at the ends do not lie on the axis.
-        0.03 + 0.94 * self.scale.place(axis.levels[level].value)
+        0.03 + 0.94 * self.scale.place(value)
     }
 }

@@ -7,7 +7,7 @@ use super::toy::{Toy, plan, plan_with, study};
 use super::{GRID, STOP, options, run, run_all};
 
 /// The message of a study that is refused when it is planned.
-fn refused(text: &str) -> String {
+pub(super) fn refused(text: &str) -> String {
     let toy = Toy::new();
     match plan_with(&toy, text, None) {
         Err(error) => error.to_string(),
@@ -16,7 +16,7 @@ fn refused(text: &str) -> String {
 }
 
 #[track_caller]
-fn check(more: &str, starts: &str, holds: &str) {
+pub(super) fn check(more: &str, starts: &str, holds: &str) {
     let message = refused(&study(more));
     assert!(message.starts_with(starts), "{message}");
     assert!(message.contains(holds), "{holds:?} is not in {message}");

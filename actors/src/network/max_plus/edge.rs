@@ -1,0 +1,145 @@
+//! An edge of the coordination graph: what two rovers' paths are worth together, and the messages
+//! along it. Nearly all the time that planning takes is spent here.
+
+use super::Rules;
+use crate::network::candidates::CandidatePath;
+use crate::network::payoff::{Payoffs, collision};
+
+/// How many columns of payoffs are worked on at once.
+const LANES: usize = 8;
+
+/// Payoffs of one path of i with the next few of j.
+type Lanes = [f32; LANES];
+
+pub(super) type Mask = [u64; 4];
+
+/// An edge (i, j) of the coordination graph at an own rover i.
+#[derive(Debug)]
+pub(super) struct Edge {
+    /// How many paths i and j have.
+    size: (usize, usize),
+    /// Pairwise payoffs. Blocks of [`LANES`] paths of j, and within a block a row for each path
+    /// of i: what a message needs comes in the order in which it lies in memory. Columns that
+    /// only fill the last block are worth minus infinity.
+    payoffs: Vec<Lanes>,
+    /// The message from j: a value for each path of i.
+    pub(super) incoming: Vec<f32>,
+    /// The last message to j: a value for each path of j.
+    pub(super) outgoing: Vec<f32>,
+    /// The outgoing message changed in the last iteration.
+    pub(super) changed: bool,
+}
+
+/// A hash of a path's vertices.
+pub(super) fn mask(path: &CandidatePath) -> Mask {
+    let mut mask = Mask::default();
+    for v in &path.vertices {
+        mask[(v.0 / 64 % 4) as usize] |= 1 << (v.0 % 64);
+    }
+    mask
+}
+
+impl Edge {
+    /// The edge between two rovers with these paths and their masks.
+    pub(super) fn between(
+        a: (&[CandidatePath], &[Mask]),
+        b: (&[CandidatePath], &[Mask]),
+        payoffs: &Payoffs,
+    ) -> Edge {
+        Edge::new((a.0.len(), b.0.len()), |at_a, at_b| {
+            let (path_a, path_b) = (&a.0[at_a], &b.0[at_b]);
+            let meet = a.1[at_a].iter().zip(&b.1[at_b]).any(|(x, y)| x & y != 0);
+            let collision = if meet {
+                collision(path_a, path_b)
+            } else {
+                None
+            };
+            payoffs.pairwise(path_a.payoff + path_b.payoff, collision)
+        })
+    }
+
+    fn new(size: (usize, usize), worth: impl Fn(usize, usize) -> f32) -> Edge {
+        let mut payoffs = vec![[f32::NEG_INFINITY; LANES]; size.0 * size.1.div_ceil(LANES)];
+        for (block, rows) in payoffs.chunks_exact_mut(size.0.max(1)).enumerate() {
+            let first = block * LANES;
+            for (a, row) in rows.iter_mut().enumerate() {
+                for (b, payoff) in (first..size.1).zip(row) {
+                    *payoff = worth(a, b);
+                }
+            }
+        }
+        Edge {
+            size,
+            payoffs,
+            incoming: vec![0.0; size.0],
+            outgoing: vec![0.0; size.1],
+            changed: false,
+        }
+    }
+
+    /// The same edge as j sees it, with no messages yet.
+    pub(super) fn transposed(&self) -> Edge {
+        Edge::new((self.size.1, self.size.0), |a, b| self.payoff(b, a))
+    }
+
+    /// What path `a` of i and path `b` of j are worth together.
+    pub(super) fn payoff(&self, a: usize, b: usize) -> f32 {
+        self.payoffs[b / LANES * self.size.0 + a][b % LANES]
+    }
+
+    /// How many pairs of paths it has.
+    pub(super) fn pairs(&self) -> u64 {
+        (self.size.0 * self.size.1) as u64
+    }
+
+    /// Takes a message from j. False if it does not fit, or is no news.
+    pub(super) fn hear(&mut self, values: &[f32]) -> bool {
+        let fits = self.incoming.len() == values.len() && values.iter().all(|v| v.is_finite());
+        if !fits || self.incoming == values {
+            return false;
+        }
+        self.incoming.copy_from_slice(values);
+        true
+    }
+
+    /// The message to j: the best that i can do for each path of j, where `total` is what i's
+    /// paths are worth by all messages, and j's own is left out; its mean is subtracted (on cyclic
+    /// graphs messages would grow without bound). `base` and `fresh` are room to work in.
+    pub(super) fn refresh(
+        &mut self,
+        total: &[f32],
+        rules: &Rules,
+        base: &mut Vec<f32>,
+        fresh: &mut Vec<f32>,
+    ) -> bool {
+        base.clear();
+        base.extend(total.iter().zip(&self.incoming).map(|(t, m)| t - m));
+        fresh.clear();
+        for rows in self.payoffs.chunks_exact(self.size.0.max(1)) {
+            let mut best = [f32::NEG_INFINITY; LANES];
+            for (worth, row) in base.iter().zip(rows) {
+                for (best, payoff) in best.iter_mut().zip(row) {
+                    let value = worth + payoff;
+                    // Unlike `f32::max`, this compiles to one vector instruction: nothing is NaN.
+                    *best = if value > *best { value } else { *best };
+                }
+            }
+            fresh.extend_from_slice(&best);
+        }
+        fresh.truncate(self.size.1);
+        let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
+        let mut changed = false;
+        for (new, old) in fresh.iter_mut().zip(&self.outgoing) {
+            *new -= mean;
+            if rules.damping > 0.0 {
+                *new = rules.damping * old + (1.0 - rules.damping) * *new;
+            }
+            changed |= (*new - old).abs() > rules.tolerance;
+        }
+        if changed {
+            self.outgoing.copy_from_slice(fresh);
+        }
+        self.changed = changed;
+        changed
+    }
+}

@@ -1,0 +1,339 @@
+//! Max-plus against brute force and against its definition.
+
+use super::*;
+use crate::network::candidates::Destination;
+use crate::network::payoff::collision;
+use farside::random::{RandomKey, Stream};
+
+const PLAIN: Rules = Rules {
+    tolerance: 1e-3,
+    damping: 0.0,
+    anytime: false,
+};
+
+fn payoffs() -> Payoffs {
+    Payoffs {
+        longest: 100.0,
+        backtrack: 40.0,
+        leaf_wait: 45.0,
+        imminent: -1000.0,
+    }
+}
+
+/// Random paths on 6 vertices; whether they make sense on a roadmap does not matter here.
+fn random_paths(stream: &mut Stream) -> Vec<CandidatePath> {
+    // More than a block of payoffs holds, now and then.
+    let most = if stream.chance(0.2) { 12 } else { 3 };
+    let count = 2 + stream.below(most);
+    (0..count)
+        .map(|_| {
+            let vertices = (0..2 + stream.below(3))
+                .map(|_| farside_worlds::VertexId(stream.below(6) as u32))
+                .collect();
+            CandidatePath {
+                destination: Destination::Leaf,
+                vertices,
+                payoff: stream.uniform_in(0.0, 50.0) as f32,
+            }
+        })
+        .collect()
+}
+
+type Team = Vec<Vec<CandidatePath>>;
+
+fn team(stream: &mut Stream, size: usize) -> Team {
+    (0..size).map(|_| random_paths(stream)).collect()
+}
+
+/// Q (equation 1) of a joint choice.
+fn utility(rovers: &Team, pairs: &[(usize, usize)], choice: &[usize]) -> f64 {
+    let alone = choice
+        .iter()
+        .zip(rovers)
+        .map(|(&c, r)| f64::from(r[c].payoff));
+    let worth = |&(i, j): &(usize, usize)| {
+        let (a, b) = (&rovers[i][choice[i]], &rovers[j][choice[j]]);
+        f64::from(payoffs().pairwise(a.payoff + b.payoff, collision(a, b)))
+    };
+    alone.sum::<f64>() + pairs.iter().map(worth).sum::<f64>()
+}
+
+/// The joint choice that maximises Q, by trying all.
+fn exhaustive(rovers: &Team, pairs: &[(usize, usize)]) -> Vec<usize> {
+    let mut best = (f64::NEG_INFINITY, vec![]);
+    let mut choice = vec![0; rovers.len()];
+    loop {
+        let q = utility(rovers, pairs, &choice);
+        if q > best.0 {
+            best = (q, choice.clone());
+        }
+        let Some(at) = (0..choice.len()).find(|&i| choice[i] + 1 < rovers[i].len()) else {
+            return best.1;
+        };
+        choice[at] += 1;
+        choice[..at].fill(0);
+    }
+}
+
+fn problem(rules: Rules, first: u32, rovers: &[Vec<CandidatePath>]) -> MaxPlus {
+    let rovers = (first..).map(RoverId).zip(rovers.iter().cloned());
+    MaxPlus::new(payoffs(), rules, rovers.collect())
+}
+
+fn iterate(problem: &mut MaxPlus) -> bool {
+    let changed = problem.compute();
+    problem.deliver();
+    changed
+}
+
+/// A node for each rover, with its own edges of `pairs`.
+fn nodes(rules: Rules, rovers: &Team, pairs: &[(usize, usize)]) -> Vec<MaxPlus> {
+    let alone = |i: usize| problem(rules, i as u32, &rovers[i..=i]);
+    let mut nodes: Vec<_> = (0..rovers.len()).map(alone).collect();
+    for &(a, b) in pairs {
+        for (a, b) in [(a, b), (b, a)] {
+            let rover = (RoverId(b as u32), rovers[b].clone());
+            nodes[a].add(NodeId(b as u32), vec![rover]);
+        }
+    }
+    nodes
+}
+
+/// One iteration of all nodes; true if anything changed.
+fn iterate_all(nodes: &mut [MaxPlus]) -> bool {
+    let mut changed = false;
+    for node in nodes.iter_mut() {
+        changed |= iterate(node);
+    }
+    for from in 0..nodes.len() {
+        let choices = nodes[from].choices();
+        for to in 0..nodes.len() {
+            for vector in nodes[from].changed_for(NodeId(to as u32)) {
+                nodes[to].receive(&vector);
+            }
+            for choice in &choices {
+                nodes[to].note(choice);
+            }
+        }
+    }
+    changed
+}
+
+/// What all nodes choose, as places in each rover's list.
+fn joint(nodes: &[MaxPlus], rovers: &Team, converged: bool) -> Vec<usize> {
+    let chosen = nodes.iter().flat_map(|node| node.best(converged));
+    chosen
+        .zip(rovers)
+        .map(|((_, path), all)| all.iter().position(|p| p == path).unwrap())
+        .collect()
+}
+
+#[test]
+fn two_rovers_of_one_node_get_the_best_pair() {
+    let mut stream = RandomKey::new(5).text("pair").stream();
+    for _ in 0..200 {
+        let rovers = team(&mut stream, 2);
+        let mut one = problem(PLAIN, 0, &rovers);
+        while iterate(&mut one) {}
+        assert_eq!(joint(&[one], &rovers, true), exhaustive(&rovers, &[(0, 1)]));
+    }
+}
+
+/// A chain a - b - c over three nodes, where a and c do not hear each other: a tree. Damped or not,
+/// with the best kept or not, max-plus is exact on it.
+#[test]
+fn a_chain_of_nodes_finds_the_exhaustive_optimum() {
+    let mut stream = RandomKey::new(6).text("chain").stream();
+    let pairs = [(0, 1), (1, 2)];
+    for round in 0..300 {
+        let rovers = team(&mut stream, 3);
+        let (damping, anytime) = ([0.0, 0.5, 0.9][round % 3], round % 2 == 0);
+        let rules = Rules {
+            // Damped vectors stop short of their limit by several times the tolerance.
+            tolerance: 1e-4,
+            damping,
+            anytime,
+        };
+        let mut nodes = nodes(rules, &rovers, &pairs);
+        let enough = if damping == 0.0 { 6 } else { 400 };
+        for _ in 0..enough {
+            iterate_all(&mut nodes);
+        }
+        assert!(!iterate_all(&mut nodes), "a tree converges");
+        let best = utility(&rovers, &pairs, &exhaustive(&rovers, &pairs));
+        let found = utility(&rovers, &pairs, &joint(&nodes, &rovers, true));
+        // Payoffs are single, and so is the sum here.
+        assert!(found >= best - 0.1, "{found} instead of {best}");
+    }
+}
+
+/// All rovers in one node, every pair an edge: cycles, on which max-plus may not converge.
+#[test]
+fn the_best_of_all_iterations_is_never_worse_than_the_last() {
+    let mut stream = RandomKey::new(8).text("cycle").stream();
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let rules = Rules {
+        anytime: true,
+        ..PLAIN
+    };
+    let mut better = 0;
+    for _ in 0..200 {
+        let rovers = team(&mut stream, 4);
+        let (mut one, mut seen) = (problem(rules, 0, &rovers), f64::NEG_INFINITY);
+        for _ in 0..20 {
+            iterate(&mut one);
+            let last = utility(
+                &rovers,
+                &pairs,
+                &joint(std::slice::from_ref(&one), &rovers, true),
+            );
+            seen = seen.max(last);
+            let kept = joint(std::slice::from_ref(&one), &rovers, false);
+            let kept = utility(&rovers, &pairs, &kept);
+            // What it does before the first message counts too.
+            assert!(kept >= seen - 1e-3, "{kept} after {seen}");
+            better += u32::from(kept > last + 1e-3);
+        }
+    }
+    assert!(better > 0, "never of use");
+}
+
+/// A ring of four nodes with a rover each. Two nodes may keep what does not fit together, so that
+/// nothing is promised for one ring; over many, keeping helps.
+#[test]
+fn keeping_helps_in_rings_of_nodes() {
+    let mut stream = RandomKey::new(9).text("ring").stream();
+    let pairs = [(0, 1), (1, 2), (2, 3), (0, 3)];
+    let rules = Rules {
+        anytime: true,
+        ..PLAIN
+    };
+    let (mut kept, mut last) = (0.0, 0.0);
+    for _ in 0..300 {
+        let rovers = team(&mut stream, 4);
+        let mut nodes = nodes(rules, &rovers, &pairs);
+        let converged = (0..15).any(|_| !iterate_all(&mut nodes));
+        last += utility(&rovers, &pairs, &joint(&nodes, &rovers, true));
+        kept += utility(&rovers, &pairs, &joint(&nodes, &rovers, converged));
+    }
+    assert!(kept >= last, "{kept} kept, {last} in the end");
+}
+
+#[test]
+fn damping_mixes_the_old_vector_in() {
+    let mut stream = RandomKey::new(10).text("damped").stream();
+    let rovers = team(&mut stream, 2);
+    let first = |damping| {
+        let rules = Rules { damping, ..PLAIN };
+        let mut node = nodes(rules, &rovers, &[(0, 1)]).swap_remove(0);
+        iterate(&mut node);
+        let once = node.changed_for(NodeId(1)).remove(0).values;
+        iterate(&mut node);
+        let twice = node.changed_for(NodeId(1));
+        (once, twice)
+    };
+    let (plain, nothing_new) = first(0.0);
+    assert!(nothing_new.is_empty());
+    let (once, twice) = first(0.75);
+    for ((full, one), two) in plain.iter().zip(&once).zip(&twice[0].values) {
+        assert!((one - 0.25 * full).abs() < 1e-3);
+        assert!((two - (0.75 * 0.25 + 0.25) * full).abs() < 1e-3);
+    }
+}
+
+/// The same messages without blocks, short cuts or transposed payoffs.
+#[test]
+fn messages_agree_with_the_definition() {
+    let mut stream = RandomKey::new(11).text("naive").stream();
+    for round in 0..60 {
+        let rovers = team(&mut stream, 4);
+        let n = rovers.len();
+        let mut one = problem(PLAIN, 0, &rovers);
+        let mut old = vec![vec![vec![]; n]; n];
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            old[i][j] = vec![0.0f32; rovers[j].len()];
+        }
+        for _ in 0..12 {
+            iterate(&mut one);
+            let mut new = old.clone();
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                if i == j {
+                    continue;
+                }
+                let worth = |a: usize, b: usize| {
+                    let (a, b) = (&rovers[i][a], &rovers[j][b]);
+                    payoffs().pairwise(a.payoff + b.payoff, collision(a, b))
+                };
+                let base = |a: usize| {
+                    let others = (0..n).filter(|&k| k != i);
+                    let sum = others.fold(rovers[i][a].payoff, |sum, k| sum + old[k][i][a]);
+                    sum - old[j][i][a]
+                };
+                let best = |b: usize| {
+                    let all = (0..rovers[i].len()).map(|a| base(a) + worth(a, b));
+                    all.fold(f32::NEG_INFINITY, f32::max)
+                };
+                let fresh: Vec<f32> = (0..rovers[j].len()).map(best).collect();
+                let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
+                let fresh: Vec<f32> = fresh.iter().map(|value| value - mean).collect();
+                let moved = fresh
+                    .iter()
+                    .zip(&old[i][j])
+                    .any(|(x, y)| (x - y).abs() > 1e-3);
+                if moved {
+                    new[i][j] = fresh;
+                }
+            }
+            old = new;
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                if i != j {
+                    let found = &one.edges[i][place_of(i, j)].outgoing;
+                    assert_eq!(found, &old[i][j], "round {round}, {i} to {j}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn work_is_counted_by_pairs_of_paths() {
+    let mut stream = RandomKey::new(12).text("work").stream();
+    let rovers = team(&mut stream, 4);
+    let sizes: Vec<u64> = rovers.iter().map(|paths| paths.len() as u64).collect();
+    let mut one = problem(PLAIN, 0, &rovers[..2]);
+    assert_eq!(one.take_compared(), sizes[0] * sizes[1]);
+    assert_eq!(one.take_compared(), 0);
+    // Both directions of the pair within the node are computed here.
+    assert_eq!(one.pairs(), 2 * sizes[0] * sizes[1]);
+    let others = (2..).map(RoverId).zip(rovers[2..].iter().cloned());
+    one.add(NodeId(1), others.collect());
+    let more = (sizes[0] + sizes[1]) * (sizes[2] + sizes[3]);
+    assert_eq!(one.take_compared(), more);
+    assert_eq!(one.pairs(), 2 * sizes[0] * sizes[1] + more);
+}
+
+#[test]
+fn vectors_that_fit_no_edge_are_refused() {
+    let mut stream = RandomKey::new(7).text("refuse").stream();
+    let rovers = team(&mut stream, 2);
+    let mut one = problem(PLAIN, 0, &rovers[..1]);
+    assert!(one.is_trivial());
+    one.add(
+        NodeId(1),
+        vec![(RoverId(1), rovers[1].clone()), (RoverId(1), vec![])],
+    );
+    assert!(!one.is_trivial());
+    let vector = |from, to, values| Vector {
+        from: RoverId(from),
+        to: RoverId(to),
+        values,
+    };
+    let fitting = vec![1.0; rovers[0].len()];
+    assert!(!one.receive(&vector(2, 0, fitting.clone())));
+    assert!(!one.receive(&vector(0, 0, fitting.clone())));
+    assert!(!one.receive(&vector(1, 3, fitting.clone())));
+    assert!(!one.receive(&vector(1, 0, vec![f32::NAN; rovers[0].len()])));
+    assert!(!one.receive(&vector(1, 0, vec![1.0; 40])));
+    assert!(one.receive(&vector(1, 0, fitting.clone())));
+    assert!(!one.receive(&vector(1, 0, fitting)), "no news");
+}

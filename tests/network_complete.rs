@@ -1,0 +1,259 @@
+//! The `complete` policy: no team of queued rovers comes to a standstill, over perfect links and bad
+//! ones, with crashes, on both roadmaps and with all endpoints. On maps where rovers stay at their
+//! goals: all arrive on well-formed instances, and where one has to make way for another.
+
+use std::sync::Arc;
+
+use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
+use farside::prelude::*;
+use farside_actors::network::{
+    Deadlock, Network, NetworkConfig, NetworkMetrics, Policy, TeamConfig, WorldConfig, assemble,
+    assemble_standing, missions,
+};
+use farside_actors::planning::{Mission, Order, Problem, Rules, reference};
+use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};
+use farside_worlds::{Endpoints, Roadmap, SensorNetwork, VertexId};
+
+#[derive(Clone, Copy)]
+struct Radio {
+    latency_ms: u64,
+    loss: f64,
+}
+
+const PERFECT: Radio = Radio {
+    latency_ms: 5,
+    loss: 0.0,
+};
+
+impl Carrier for Radio {
+    type Change = NoChange;
+
+    fn min_delay(&self) -> SimDuration {
+        SimDuration::from_millis(self.latency_ms)
+    }
+
+    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        if parcel.random(0, 0, 0).uniform() < self.loss {
+            return verdicts.lose("loss");
+        }
+        verdicts.deliver(self.min_delay());
+    }
+
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+}
+
+fn config(policy: Policy) -> NetworkConfig {
+    NetworkConfig {
+        policy,
+        ..NetworkConfig::default()
+    }
+}
+
+fn queued(
+    world: &WorldConfig,
+    rovers: u32,
+    seed: u64,
+    radio: Radio,
+    config: &NetworkConfig,
+) -> (Simulation, Network) {
+    let roadmap = Arc::new(Roadmap::builtin(&world.roadmap).unwrap());
+    let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
+    let mut sim = Simulation::new(seed);
+    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+        sim.link(a, b, &format!("{from}-{to}"), radio);
+    };
+    let team = TeamConfig { rovers };
+    let network = assemble(
+        &mut sim,
+        world,
+        roadmap,
+        sensors,
+        &team,
+        config,
+        seed,
+        &mut connect,
+    );
+    (sim, network.unwrap())
+}
+
+fn standing(
+    roadmap: Roadmap,
+    nodes: usize,
+    tasks: Vec<(VertexId, VertexId)>,
+    radio: Radio,
+    seed: u64,
+) -> NetworkMetrics {
+    let radius_m = SensorNetwork::default_radius_m(&roadmap, nodes);
+    let sensors = SensorNetwork::place(&roadmap, nodes, radius_m, seed).unwrap();
+    let mut sim = Simulation::new(seed);
+    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+        sim.link(a, b, &format!("{from}-{to}"), radio);
+    };
+    let network = assemble_standing(
+        &mut sim,
+        Arc::new(roadmap),
+        Arc::new(sensors),
+        tasks,
+        &config(Policy::Complete),
+        &mut connect,
+    );
+    let network = network.unwrap();
+    sim.run(Executor::Inline).unwrap();
+    network.metrics()
+}
+
+#[track_caller]
+fn all_arrive(metrics: &NetworkMetrics) {
+    assert_eq!(
+        (metrics.arrived, metrics.collisions, metrics.deadlock),
+        (metrics.rovers, 0, Deadlock::None),
+        "{:?}",
+        metrics.standstill
+    );
+}
+
+#[test]
+fn all_endpoints_on_both_roadmaps() {
+    for map in ["crater-dense", "crater-sparse"] {
+        for endpoints in [
+            Endpoints::Alternating,
+            Endpoints::AnyToAny,
+            Endpoints::WestToEast,
+        ] {
+            let world = WorldConfig {
+                roadmap: map.to_owned(),
+                endpoints,
+                nodes: 21,
+                ..WorldConfig::default()
+            };
+            let (sim, network) = queued(&world, 100, 3, PERFECT, &config(Policy::Complete));
+            sim.run(Executor::Inline).unwrap();
+            all_arrive(&network.metrics());
+        }
+    }
+}
+
+#[test]
+fn late_and_lossy_links_slow_a_team_down_and_do_not_stop_it() {
+    let time = |latency_ms, loss| {
+        let radio = Radio { latency_ms, loss };
+        let world = WorldConfig::default();
+        let (sim, network) = queued(&world, 30, 5, radio, &config(Policy::Complete));
+        sim.run(Executor::Inline).unwrap();
+        all_arrive(&network.metrics());
+        network.metrics().cycles
+    };
+    let healthy = time(5, 0.0);
+    assert!(time(5, 0.5) > healthy);
+    assert!(time(3000, 0.3) > 3 * healthy);
+}
+
+#[test]
+fn nodes_and_rovers_that_crash_and_come_back() {
+    let world = WorldConfig::default();
+    let radio = Radio {
+        latency_ms: 5,
+        loss: 0.1,
+    };
+    let (mut sim, network) = queued(&world, 50, 2, radio, &config(Policy::Complete));
+    let at = |tenths: u64| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
+    for (i, name) in (0..).zip(network.node_names()) {
+        network.crash_at(&mut sim, at(1 + 9 * i), name).unwrap();
+        network.restart_at(&mut sim, at(60 + 9 * i), name).unwrap();
+    }
+    for (i, name) in (0..).zip(network.rover_names()).step_by(5) {
+        network.crash_at(&mut sim, at(100 + 7 * i), name).unwrap();
+        network.restart_at(&mut sim, at(180 + 7 * i), name).unwrap();
+    }
+    sim.run(Executor::Inline).unwrap();
+    all_arrive(&network.metrics());
+}
+
+#[test]
+fn threads_change_nothing() {
+    let run = |executor| {
+        let radio = Radio {
+            latency_ms: 20,
+            loss: 0.1,
+        };
+        let world = WorldConfig::default();
+        let (sim, network) = queued(&world, 20, 9, radio, &config(Policy::Complete));
+        let report = sim.run(executor).unwrap();
+        (network.metrics(), report)
+    };
+    assert_eq!(run(Executor::Inline), run(Executor::Kameo { threads: 2 }));
+}
+
+/// What is planned centrally is driven as it was planned, cycle by cycle.
+#[test]
+fn the_references_plan_is_driven() {
+    let world = WorldConfig::default();
+    let (sim, network) = queued(&world, 60, 4, PERFECT, &config(Policy::Reference));
+    sim.run(Executor::Inline).unwrap();
+    let metrics = network.metrics();
+    all_arrive(&metrics);
+    let roadmap = Roadmap::builtin(&world.roadmap).unwrap();
+    let all = missions(&world, &roadmap, &TeamConfig { rovers: 60 }, 4).unwrap();
+    let all = all.into_iter().map(|(a, b)| Mission::new(a, b)).collect();
+    let problem = Problem::new(&roadmap, all, Rules::Queues).unwrap();
+    let plan = reference(&problem, &Order::QueuePosition).plan;
+    let planned = plan.metrics(&problem);
+    // Following takes some milliseconds, so a rover may come a cycle early (grants are given ahead)
+    // or late.
+    let ratio = metrics.time_ratio / planned.time_ratio;
+    assert!((0.9..1.1).contains(&ratio), "{ratio}");
+    let (sim, network) = queued(&world, 60, 4, PERFECT, &config(Policy::Complete));
+    sim.run(Executor::Inline).unwrap();
+    let ratio = network.metrics().time_ratio / metrics.time_ratio;
+    assert!((0.85..1.15).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn the_baseline_that_fails_leaves_rovers_out() {
+    let world = WorldConfig::default();
+    let (sim, network) = queued(&world, 100, 1, PERFECT, &config(Policy::Prioritised));
+    sim.run(Executor::Inline).unwrap();
+    let metrics = network.metrics();
+    assert_eq!(
+        (metrics.collisions, metrics.deadlock),
+        (0, Deadlock::Passive)
+    );
+    assert!((30..95).contains(&metrics.arrived), "{}", metrics.arrived);
+    let (sim, network) = queued(&world, 4, 1, PERFECT, &config(Policy::Coupled));
+    sim.run(Executor::Inline).unwrap();
+    all_arrive(&network.metrics());
+    assert!(network.metrics().plan_expansions > 20);
+}
+
+#[test]
+fn rovers_that_stay_at_their_goals_arrive_on_a_well_formed_instance() {
+    let file = Builtin::find("rubble-32-32-10").unwrap();
+    let map = GridMap::from_movingai(file.map).unwrap();
+    let tasks = TaskList::from_movingai(file.tasks).unwrap();
+    let grid = GridWorld::new(file.map_name, &map, 10.0, tasks.first(50).unwrap()).unwrap();
+    assert!(grid.blocked().is_empty());
+    let radio = Radio {
+        latency_ms: 20,
+        loss: 0.2,
+    };
+    let metrics = standing(grid.roadmap().clone(), 16, grid.tasks().to_vec(), radio, 1);
+    all_arrive(&metrics);
+    assert!(metrics.time_ratio < 2.0, "{}", metrics.time_ratio);
+}
+
+/// The first rover's goal lies behind the second one's: it is asked to step aside, and comes back.
+#[test]
+fn a_rover_at_its_goal_makes_way() {
+    let text = b"type octile\nheight 2\nwidth 6\nmap\n......\n@@.@@@\n";
+    let map = GridMap::from_movingai(text).unwrap();
+    let scen = b"version 1\n0\ta.map\t6\t2\t0\t0\t5\t0\t5\n0\ta.map\t6\t2\t1\t0\t4\t0\t3\n";
+    let tasks = TaskList::from_movingai(scen).unwrap();
+    let grid = GridWorld::new("a.map", &map, 10.0, tasks.tasks()).unwrap();
+    assert_eq!(grid.blocked().len(), 1);
+    for nodes in [1, 2, 3] {
+        let (map, tasks) = (grid.roadmap().clone(), grid.tasks().to_vec());
+        let metrics = standing(map, nodes, tasks, PERFECT, 1);
+        all_arrive(&metrics);
+        assert!(metrics.mean_backtracks > 0.0);
+    }
+}
