@@ -181,7 +181,7 @@ impl Node {
             let mut theirs = self.neighbors.iter().flat_map(|n| &n.holdings);
             theirs.any(|holding| holding.vertex == v)
         };
-        if let Some(paths) = self.path_aside(here, held, &occupied) {
+        if let Some(paths) = self.path_aside(here, held, occupied) {
             return paths;
         }
         let closed = |v| occupied(v) || forbidden.contains(&v);

@@ -107,7 +107,7 @@ impl Node {
         }
         let after = site.config.probe_after;
         for holding in own {
-            let due = self.probes.kept(holding.rover, cycle) % after == 0;
+            let due = self.probes.kept(holding.rover, cycle).is_multiple_of(after);
             if let Some(waiting) = self.waiting(ctx, holding.vertex).filter(|_| due) {
                 self.pass_on(ctx, vec![waiting]);
             }

@@ -308,7 +308,8 @@ mod tests {
                 let mut at = 0;
                 while at < reached.len() {
                     for &next in map.neighbors(reached[at]) {
-                        if !reached.contains(&next) && !(holder(next).is_some() && need(next)) {
+                        let blocked = holder(next).is_some() && need(next);
+                        if !blocked && !reached.contains(&next) {
                             prop_assert!(holder(next).is_some() || need(next));
                             reached.push(next);
                         }
