@@ -27,7 +27,7 @@ pub trait Handler<M: Message>: Actor {
     fn handle(&mut self, message: M, ctx: &mut Context<'_, Self>) -> Outcome;
 }
 
-/// A tuple of message types, each of which `A` handles. Implemented for tuples of up to 16.
+/// A tuple of message types, each of which `A` handles. Implemented for tuples of up to 24.
 pub trait Accepts<A> {
     #[doc(hidden)]
     fn list(kinds: &mut Vec<KindEntry>);
@@ -81,6 +81,14 @@ accepts_tuples!(A B C D E F G H I J K L M);
 accepts_tuples!(A B C D E F G H I J K L M N);
 accepts_tuples!(A B C D E F G H I J K L M N O);
 accepts_tuples!(A B C D E F G H I J K L M N O P);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W);
+accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W X);
 
 /// An actor whose type the engine does not know.
 pub(crate) trait AnyActor: Send {

@@ -41,18 +41,17 @@ fn with_policy(mut case: Case, policy: Policy) -> Case {
 
 fn any_policy() -> impl Strategy<Value = Case> {
     let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
-    let all = (
-        cases(Bounds::default()),
-        policy,
-        any::<bool>(),
-        any::<bool>(),
-    );
-    all.prop_map(|(mut case, policy, chains, is_rigid)| {
+    let all = (cases(Bounds::default()), policy, any::<[bool; 5]>());
+    all.prop_map(|(mut case, policy, switches)| {
+        let [chains, is_rigid, gates, tokens, resolution] = switches;
         case.network = match is_rigid {
             true => rigid(),
             false => NetworkConfig::default(),
         };
         case.network.acceleration_chains = chains;
+        case.network.entry_gates = gates;
+        case.network.corridor_tokens = tokens;
+        case.network.junction_resolution = resolution;
         with_policy(case, policy)
     })
 }

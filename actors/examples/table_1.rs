@@ -8,7 +8,9 @@
 //! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
 //! `2M/s`), `damping`, `anytime`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
-//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`, `leaf_wait`, `noise`.
+//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
+//! `leaf_wait`, `noise`. Aids: `gates`, `tokens`, `probes`, `resolution` (true, false), `gate` (occupancy),
+//! `probe_after`, `hold` (cycles).
 
 use std::sync::Arc;
 
@@ -126,6 +128,13 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "cycle_limit" => network.cycle_limit = value.parse()?,
             "active_window" => network.active_window = value.parse()?,
             "chains" => network.acceleration_chains = value.parse()?,
+            "gates" => network.entry_gates = value.parse()?,
+            "gate" => network.entry_gate_occupancy = value.parse()?,
+            "tokens" => network.corridor_tokens = value.parse()?,
+            "probes" => network.deadlock_probes = value.parse()?,
+            "probe_after" => network.probe_after = value.parse()?,
+            "resolution" => network.junction_resolution = value.parse()?,
+            "hold" => network.aside_hold = value.parse()?,
             "acceleration" => network.acceleration = value.parse()?,
             "factor" => network.longest_path_factor = value.parse()?,
             "backtrack" => network.backtrack_penalty = value.parse()?,
@@ -192,7 +201,7 @@ fn run(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
     println!(
-        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  B/rover  total  coll",
+        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  B/rover  total  coll  confirmed",
         "map"
     );
     for map in &options.maps {
@@ -228,7 +237,7 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         results.iter().map(value).sum::<f64>() / n
     };
     println!(
-        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}",
+        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}",
         percent(&|m| m.deadlock != Deadlock::None),
         percent(&|m| m.deadlock == Deadlock::Passive),
         percent(&|m| m.deadlock == Deadlock::Active),
@@ -246,5 +255,6 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         all(&|(m, _)| m.bytes_per_rover_cycle),
         mean(&|m| m.total_steps as f64),
         all(&|(m, _)| f64::from(m.collisions)),
+        all(&|(m, _)| f64::from(m.confirmed_deadlocks)),
     );
 }

@@ -69,6 +69,7 @@ mod assemble;
 mod assignment;
 mod candidates;
 mod config;
+mod corridors;
 mod lng;
 mod max_plus;
 pub mod messages;

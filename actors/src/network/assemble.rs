@@ -9,6 +9,7 @@ use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
 use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
+use super::corridors::Corridors;
 use super::lng::LocalGraph;
 use super::messages::RoverId;
 use super::metrics::NetworkMetrics;
@@ -115,6 +116,8 @@ pub(crate) struct Site {
     /// Who gives the roadmap to all others.
     pub(crate) roadmap_from: Option<NodeId>,
     pub(crate) payoffs: Payoffs,
+    /// Where rovers cannot pass each other; none unless `corridor_tokens` asks for them.
+    pub(crate) corridors: Corridors,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
     /// Each rover's entry, or where it stands at first, and its goal.
@@ -275,6 +278,10 @@ fn assemble_missions(
     let site = Arc::new(Site {
         lines,
         payoffs: Payoffs::new(network, &roadmap),
+        corridors: match network.corridor_tokens {
+            true => Corridors::new(&roadmap, 2),
+            false => Corridors::default(),
+        },
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: network.patience(sim.slowest_link(), &timing),
         timing,

@@ -326,6 +326,24 @@ pub struct NetworkConfig {
     pub acceleration: bool,
     /// Whether it may follow one that itself follows. The paper's implementation ignores this.
     pub acceleration_chains: bool,
+    /// Entry gates: an entry's owner lets a rover in only while its neighbourhood is not too full.
+    pub entry_gates: bool,
+    /// The share of the vertices of the owner's local neighbourhood graph up to which gates are
+    /// open, from 0 to 1.
+    pub entry_gate_occupancy: f64,
+    /// Corridor tokens: chains of at least two vertices in which no two rovers can pass each other
+    /// are entered in one direction at a time. They take part in each cycle's exchanges: with links slower than
+    /// those, traffic in corridors waits for the news.
+    pub corridor_tokens: bool,
+    /// Wait-for probes, which confirm deadlocks and name the rovers in them.
+    pub deadlock_probes: bool,
+    /// A rover that has come no nearer to its goal for so many cycles waits, as probes see it; at
+    /// least 1. So often a probe is sent for it.
+    pub probe_after: u32,
+    /// Local resolution of confirmed deadlocks: one of the rovers goes aside. Sends probes too.
+    pub junction_resolution: bool,
+    /// For how many cycles it stays aside, not counting the way there.
+    pub aside_hold: u32,
     /// `complete`: along how many routes a walk looks for a way; at least 1.
     pub routes: u32,
     /// `complete`: how many cycles before its planned time a vertex may be granted. In continuous
@@ -377,6 +395,13 @@ impl Default for NetworkConfig {
             priority: Priority::default(),
             acceleration: true,
             acceleration_chains: false,
+            entry_gates: false,
+            entry_gate_occupancy: 0.15,
+            corridor_tokens: false,
+            deadlock_probes: false,
+            probe_after: 6,
+            junction_resolution: false,
+            aside_hold: 8,
             routes: 8,
             grants_ahead: 2,
             max_expansions: 1_000_000,
@@ -494,6 +519,9 @@ impl NetworkConfig {
             let fits = (0.0..=1e9).contains(&weight);
             check(key, fits, weight.to_string(), "in [0, 1e9]")?;
         }
+        let share = self.entry_gate_occupancy;
+        let fits = (0.0..=1.0).contains(&share);
+        check("entry_gate_occupancy", fits, share.to_string(), "in [0, 1]")?;
         let damps = (0.0..1.0).contains(&self.damping);
         check("damping", damps, self.damping.to_string(), "in [0, 1)")?;
         let computes = self.processor != Processor::PairsPerS(0);
@@ -507,6 +535,7 @@ impl NetworkConfig {
             }
         }
         for (key, window) in [
+            ("probe_after", self.probe_after),
             ("routes", self.routes),
             ("passive_window", self.passive_window),
             ("active_window", self.active_window),

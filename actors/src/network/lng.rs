@@ -61,6 +61,18 @@ impl LocalGraph {
         }
     }
 
+    /// The number of vertices.
+    pub(crate) fn len(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// The neighbours of `v` inside the graph, ascending; none if `v` is outside.
+    pub(crate) fn neighbors(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
+        let index = Some(self.local[v.0 as usize]).filter(|&index| index != NONE);
+        let list = index.map_or(&[][..], |index| &self.neighbors[usize::from(index)]);
+        list.iter().map(|&n| self.vertices[usize::from(n)])
+    }
+
     /// The fewest edges between two vertices of the graph on a path inside it; `None` if one is
     /// outside, or no such path exists.
     pub(crate) fn distance(&self, u: VertexId, v: VertexId) -> Option<u32> {

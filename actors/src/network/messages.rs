@@ -248,6 +248,109 @@ pub struct Assignment {
     pub path: CandidatePath,
 }
 
+/// Node to node: who waits for the holder of this vertex, and so on back to the rover that the
+/// probe was sent for. It ends where nobody waits; if it comes back, all of them wait for each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WaitProbe {
+    /// The node that sends, or passes it on.
+    pub node: NodeId,
+    /// The planning cycle in which that was.
+    pub cycle: u32,
+    /// The vertex that the last member wants, one of the receiver's.
+    pub vertex: VertexId,
+    /// Who waits: each for the next one.
+    pub members: Vec<Waiting>,
+}
+
+/// A rover that has come no nearer to its goal for some time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Waiting {
+    /// The rover.
+    pub rover: RoverId,
+    /// Where it stands.
+    pub vertex: VertexId,
+    /// Where it wants to go.
+    pub goal: VertexId,
+}
+
+/// Node to node: a confirmed deadlock for which the nodes before found no place to send a rover to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Resolve {
+    /// The node that hands it on.
+    pub node: NodeId,
+    /// The planning cycle in which that was.
+    pub cycle: u32,
+    /// Each waits for the next one, and the last for the first.
+    pub ring: Vec<Waiting>,
+    /// How many of them can go nowhere; the next one is the receiver's.
+    pub tried: u32,
+}
+
+/// Node to node, the owners of the vertices on the path: plan for this rover to go aside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Aside {
+    /// The node that decided it.
+    pub node: NodeId,
+    /// The planning cycle in which that was.
+    pub cycle: u32,
+    /// The rover.
+    pub rover: RoverId,
+    /// From where it stands to where it goes, vertex by vertex.
+    pub path: Vec<VertexId>,
+    /// The last planning cycle in which that holds.
+    pub until: u32,
+}
+
+/// Node to node: corridor reports on their way to the keepers, and tokens on their way to the members.
+/// The receiver takes what is meant for it and passes on the rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorridorNews {
+    /// The node that sends.
+    pub node: NodeId,
+    /// The planning cycle in which that was.
+    pub cycle: u32,
+    /// The neighbour it is sent to.
+    pub to: NodeId,
+    /// Reports.
+    pub reports: Vec<CorridorReport>,
+    /// Tokens.
+    pub tokens: Vec<CorridorToken>,
+}
+
+/// What a member of a corridor tells its keeper once a cycle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CorridorReport {
+    /// The corridor, from 0 in the order of their lowest vertices.
+    pub corridor: u32,
+    /// The member.
+    pub node: NodeId,
+    /// The planning cycle at whose exchange of locations this was so.
+    pub cycle: u32,
+    /// The token's epoch as the member knows it.
+    pub epoch: u32,
+    /// How many of its vertices in the corridor are not free.
+    pub inside: u32,
+    /// Whether rovers want to go in, forward and backward.
+    pub wanted: [bool; 2],
+    /// Free vertices at the exit forward and backward, where it is the member's.
+    pub room: [Option<u32>; 2],
+}
+
+/// What the keeper of a corridor tells its members once a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CorridorToken {
+    /// The corridor.
+    pub corridor: u32,
+    /// The member.
+    pub to: NodeId,
+    /// The planning cycle in which it was decided.
+    pub cycle: u32,
+    /// The state: open if odd. It is open forward in 1, 5, 9, ..., backward in 3, 7, 11, ...
+    pub epoch: u32,
+    /// There is room behind the exit for one more.
+    pub room: bool,
+}
+
 /// A rover's state as it records it at every change: the truth, not what a node believes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverState {
@@ -270,7 +373,7 @@ pub struct RoadmapKnown {
 }
 
 /// What a node records of itself once in each cycle, when vertices are granted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NodeState {
     /// The planning cycle.
     pub cycle: u32,
@@ -280,6 +383,10 @@ pub struct NodeState {
     pub iterations: u32,
     /// Rovers that it kept from a vertex that their paths enter in this cycle.
     pub forced_stops: u32,
+    /// Deadlocks confirmed in this cycle by its probes, other than the last named before.
+    pub confirmed_deadlocks: u32,
+    /// The last deadlock that it confirmed: each rover waits for the next, the last for the first.
+    pub deadlock: Vec<RoverId>,
 }
 
 /// What a deputy records when it begins to answer for another node's vertices.

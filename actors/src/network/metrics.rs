@@ -75,6 +75,10 @@ pub struct NetworkMetrics {
     pub bytes_per_rover_cycle: f64,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
+    /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
+    pub confirmed_deadlocks: u32,
+    /// The last of them: each rover waits for the next, the last for the first.
+    pub last_confirmed: Option<String>,
     /// Nodes that the `coupled` policy's search expanded before the start.
     pub plan_expansions: u64,
     /// When the last node knew the roadmap, where nodes are given it over the network \[s\]; none if

@@ -59,6 +59,8 @@ pub(crate) struct Score {
     standstill: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
     taken_over: Vec<TakenOver>,
+    confirmed_deadlocks: u32,
+    last_confirmed: Vec<RoverId>,
     ended: bool,
 }
 
@@ -156,6 +158,10 @@ impl Score {
         if state.forced_stops > 0 && self.last_intervention != Some(state.cycle) {
             self.last_intervention = Some(state.cycle);
             self.interventions += 1;
+        }
+        if state.confirmed_deadlocks > 0 {
+            self.confirmed_deadlocks += state.confirmed_deadlocks;
+            self.last_confirmed.clone_from(&state.deadlock);
         }
         if state.rovers > 0 {
             self.planned_cycles += 1;
@@ -320,6 +326,7 @@ impl Score {
             deadlock: self.deadlock,
             interventions: self.interventions,
             cycles: self.cycle + 1,
+            confirmed_deadlocks: self.confirmed_deadlocks,
             standstill: self.standstill.clone(),
             plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
@@ -338,6 +345,9 @@ impl Score {
         metrics.taken_over = self.taken_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
+        let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
+        let ring: Vec<_> = self.last_confirmed.iter().filter_map(name).collect();
+        metrics.last_confirmed = (!ring.is_empty()).then(|| ring.join(" > "));
         metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
         metrics.deadlocked = self.deadlock != Deadlock::None;
         let energies_j = self.tracks.iter().map(|track| track.transmit_energy_j);

@@ -1,11 +1,18 @@
 //! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
 //! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
-//! [`optimise`], admission in [`admit`].
+//! [`optimise`], admission in [`admit`]. What helps the paper's policy out of standstills, each behind
+//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`].
 
 mod admit;
 mod cycle;
+mod gates;
 mod optimise;
+mod probes;
+mod resolution;
 mod takeover;
+#[cfg(test)]
+mod tests;
+mod tokens;
 
 use std::sync::Arc;
 
@@ -18,15 +25,18 @@ use super::assignment::Request;
 use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
-    Account, Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Locations,
-    MaxPlus, Passed, Replaced,
+    Account, Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck,
+    Holding, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
 };
 use super::reservation::messages::Relay;
 use super::reservation::{Registry, RegistryDue};
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
+use probes::Probes;
+use resolution::Resolution;
 use takeover::Wards;
+use tokens::Watch;
 
 /// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
 /// cycle, and owns vertices by the safety protocol.
@@ -48,6 +58,10 @@ pub struct Node {
     forced_stops: u32,
     /// Who answers for which node's vertices, with `network.takeover_after`.
     wards: Option<Wards>,
+    probes: Probes,
+    resolution: Resolution,
+    /// By corridor, once tokens are used.
+    watches: Vec<Watch>,
     /// When the timer of the `complete` policy fires \[ns\].
     pub(super) alarm: Option<(u64, TimerId)>,
 }
@@ -113,6 +127,9 @@ impl Node {
             leaving: Vec::new(),
             forced_stops: 0,
             wards: None,
+            probes: Probes::default(),
+            resolution: Resolution::default(),
+            watches: Vec::new(),
             alarm: None,
         }
     }
@@ -146,6 +163,10 @@ impl Actor for Node {
         IterationOverdue,
         Relay,
         RegistryDue,
+        WaitProbe,
+        Resolve,
+        Aside,
+        CorridorNews,
         ProcessorDone,
         Account,
         Replaced,

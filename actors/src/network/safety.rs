@@ -195,6 +195,12 @@ impl Ledger {
         });
     }
 
+    /// The next rover of the queue at `vertex`.
+    pub(crate) fn next_in(&self, vertex: VertexId, queue: &[RoverId]) -> Option<RoverId> {
+        let at = self.slot(vertex)?;
+        queue.get(self.slots[at].released as usize).copied()
+    }
+
     /// Lets in the next rover of the queue at `vertex`, if the vertex is free: exactly once for
     /// each rover, whatever crashes.
     pub(crate) fn release(
@@ -204,7 +210,7 @@ impl Ledger {
         cycle: u32,
     ) -> Option<RoverId> {
         let at = self.slot(vertex)?;
-        let next = *queue.get(self.slots[at].released as usize)?;
+        let next = self.next_in(vertex, queue)?;
         if !self.grant(vertex, next, 1, None, cycle) {
             return None;
         }

@@ -18,11 +18,12 @@ const KERNEL: [&str; 8] = [
 ];
 
 /// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 25] = [
+const KNOWN: [(&str, &str, &str); 26] = [
     ("arrival_s", "time to the goal", "s"),
     ("arrived", "rovers at their goals", "rovers"),
     ("collisions", "collisions", ""),
     ("completed", "all rovers at their goals", ""),
+    ("confirmed_deadlocks", "deadlocks confirmed by probes", ""),
     ("cycles", "planning cycles", "cycles"),
     ("deadlocked", "standstill", ""),
     ("events", "events", "events"),

@@ -178,7 +178,10 @@ fn ground(world: &WorldConfig, rovers: u32, files: &mut Files) -> Result<Ground,
             grid: Some(grid),
         });
     }
-    check_no_tasks(world)?;
+    if let Some(tasks) = &world.tasks {
+        let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
+        return Err(SetupError::value("world.tasks", message));
+    }
     let plain = |roadmap| Ground {
         roadmap,
         grid: None,

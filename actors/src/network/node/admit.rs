@@ -18,6 +18,7 @@ impl Node {
     pub(super) fn admit(&mut self, ctx: &mut Context<'_, Self>) {
         self.forced_stops = 0;
         let mut wanted: Vec<VertexId> = self.requests.iter().map(|r| r.vertex).collect();
+        self.heed_tokens(ctx);
         wanted.sort_unstable();
         wanted.dedup();
         for vertex in wanted {
@@ -36,7 +37,19 @@ impl Node {
             rovers: self.optimiser.rovers(),
             iterations: self.optimiser.iteration,
             forced_stops: self.forced_stops,
+            confirmed_deadlocks: std::mem::take(&mut self.probes.confirmed),
+            deadlock: self.probes.named.clone(),
         });
+    }
+
+    /// Strikes out what corridor tokens forbid in this cycle.
+    fn heed_tokens(&mut self, ctx: &mut Context<'_, Self>) {
+        if !self.site.config.corridor_tokens {
+            return;
+        }
+        let mut requests = std::mem::take(&mut self.requests);
+        requests.retain(|request| self.token_permits(ctx, request));
+        self.requests = requests;
     }
 
     /// Admits the best of those that ask for `vertex`, if it is free. False if nobody is.
@@ -172,7 +185,7 @@ impl Node {
         self.send_departed(ctx, to, whereabouts);
     }
 
-    fn is_rover(&self, rover: RoverId) -> bool {
+    pub(super) fn is_rover(&self, rover: RoverId) -> bool {
         (rover.0 as usize) < self.rovers.len()
     }
 }
@@ -237,16 +250,16 @@ impl Handler<Assignments> for Node {
             // Too late to be weighed against others. Granted if the vertex is free, so that
             // latency slows rovers down and does not stop them.
             let request = Request::of(assignment).filter(|r| self.owns(r.vertex));
-            let Some(Request {
+            let Some(request) = request.filter(|r| self.token_permits(ctx, r)) else {
+                continue;
+            };
+            let Request {
                 rover,
                 step,
                 from,
                 vertex,
                 ..
-            }) = request
-            else {
-                continue;
-            };
+            } = request;
             let ledger = ctx.durable::<Ledger>();
             if ledger.grant(vertex, rover, step, Some(from), self.cycle) {
                 self.send_grant(ctx, rover, step, Some(vertex));

@@ -46,12 +46,24 @@ impl Node {
         self.watch(ctx);
         self.repeat(ctx);
         let site = self.site.clone();
-        for (entry, queue) in site.queues.iter().filter(|(entry, _)| self.owns(*entry)) {
+        for (entry, queue) in &site.queues {
+            if !self.owns(*entry) || !self.lets_in(ctx, *entry, queue) {
+                continue;
+            }
             let released = ctx.durable::<Ledger>().release(*entry, queue, self.cycle);
             if let Some(rover) = released {
                 self.send_grant(ctx, rover, 1, Some(*entry));
             }
         }
+    }
+
+    /// Whether gates and tokens let the next rover of a queue in.
+    fn lets_in(&mut self, ctx: &mut Context<'_, Self>, entry: VertexId, queue: &[RoverId]) -> bool {
+        let Some(next) = ctx.durable::<Ledger>().next_in(entry, queue) else {
+            return false;
+        };
+        let (_, goal) = self.site.missions[next.0 as usize];
+        self.gate_is_open(ctx) && self.token_admits(ctx, entry, goal)
     }
 
     /// Repeats grants and departures that were not answered.
@@ -83,7 +95,7 @@ impl Node {
         ctx.send(self.rovers[rover.0 as usize], Grant { node, step, to });
     }
 
-    /// Step 1.
+    /// Step 1, and corridors' reports beside it.
     pub(super) fn locate(&mut self, ctx: &mut Context<'_, Self>) {
         if !self.spread(ctx) {
             return;
@@ -101,11 +113,14 @@ impl Node {
             );
         }
         self.tell_partners(ctx, &Content::Locations(message));
+        self.report_corridors(ctx);
     }
 
     /// Steps 2 and 3.
     pub(super) fn propose(&mut self, ctx: &mut Context<'_, Self>) {
         self.survey();
+        self.decide_corridors(ctx);
+        self.probe(ctx);
         let rovers: Vec<_> = self
             .movable(ctx)
             .into_iter()
@@ -159,6 +174,12 @@ impl Node {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
+        let mut forbidden = Vec::new();
+        for next in self.graph.neighbors(here) {
+            if self.token_forbids(ctx, here, next) {
+                forbidden.push(next);
+            }
+        }
         let ledger = ctx.durable::<Ledger>();
         let occupied = |v| {
             if self.owns(v) {
@@ -166,13 +187,19 @@ impl Node {
             }
             self.reports().any(|holding| holding.vertex == v)
         };
-        let mut paths = candidates(self.surveyed(), here, goal, occupied);
+        if let Some(paths) = self.path_aside(here, held, occupied) {
+            return paths;
+        }
+        let closed = |v| occupied(v) || forbidden.contains(&v);
+        let mut paths = candidates(self.surveyed(), here, goal, closed);
+        // Who was sent here goes back at no penalty.
+        let previous = held.previous.filter(|_| !self.was_sent(held.rover, here));
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
             let noise = draws.uniform_in(0.0, self.site.config.noise);
             let (roadmap, payoffs) = (&self.site.roadmap, &self.site.payoffs);
-            path.payoff = payoffs.unary(roadmap, path, goal, held.previous, noise);
+            path.payoff = payoffs.unary(roadmap, path, goal, previous, noise);
         }
         paths
     }
