@@ -19,12 +19,13 @@
 //! the exit, needs no room. Room is counted, not reserved: of two corridors that share an exit both
 //! may count the same vertex.
 //!
-//! **What was tried and is worse** (dense map, 28 nodes, 2 iterations, 75 rovers: all of the runs or half
-//! of them came to a standstill that none comes to without tokens): to forbid moves against the
-//! flow inside, which takes from rovers the way back by which the paper's policy gets them out of
-//! each other's way; to keep an exit free of rovers that wait there for the same corridor in the
-//! opposite direction, by which rovers in two corridors that meet there wait for each other; and
-//! tokens for chains of one vertex. So only entering needs a token, and a rover inside may turn.
+//! **What was tried and is worse** (dense map, 28 nodes, 2 iterations, 75 rovers, only two runs
+//! each, none of which comes to a standstill without tokens): to forbid moves against the flow
+//! inside, which takes from rovers the way back by which the paper's policy gets them out of each
+//! other's way; to keep an exit free of rovers that wait there for the same corridor in the opposite
+//! direction, by which rovers in two corridors that meet there wait for each other; and tokens for
+//! chains of one vertex, with which teams are slower. So only entering needs a token, and a rover
+//! inside may turn.
 
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
