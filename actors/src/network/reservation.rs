@@ -4,7 +4,7 @@
 //!
 //! A **book** of each node holds, for each of its vertices, the planned visits in order. The node at
 //! whose entry a rover waits sends probes along a few routes, each a sequence of neighbouring
-//! nodes ([`routes`]). Each node on it works out where in its own part of the roadmap the rover could
+//! nodes (`routes`). Each node on it works out where in its own part of the roadmap the rover could
 //! be and when, from its own book alone ([`crate::planning::safe_intervals`]), and passes that on. The
 //! owner of the goal picks the earliest arrival of all routes and sends the way back; each node
 //! enters its part in its book, tentatively. When the first node has entered its part, the way is
