@@ -12,7 +12,7 @@
 //! | what "no collision in 300 runs" is worth | [`rates`] |
 //! | when rovers arrive, if some never do | [`survival`] |
 //! | quantiles and their definition | [`distribution`] |
-//! | whether figures grow linearly | [`line`] |
+//! | whether figures grow linearly | [`mod@line`] |
 
 pub mod bootstrap;
 pub mod distribution;
