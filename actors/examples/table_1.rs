@@ -192,9 +192,6 @@ fn run(
     if let Some(fault) = report.fault() {
         return Err(fault.to_string().into());
     }
-    if let Some(s) = &network.metrics().standstill {
-        eprintln!("seed {seed}: {s} {} cycles", network.metrics().cycles);
-    }
     Ok((network.metrics(), report))
 }
 

@@ -73,7 +73,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         (sheet.posts())
         (sheet.arrows(&rovers, &waits))
         @for seen in &rovers { (sheet.rover(seen, &waits)) }
-        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, &waits))
+        (legend(SIDE + sheet.width + 24.0, TOP + 10.0))
     };
     Figure {
         file: "map.svg".to_owned(),
@@ -470,7 +470,7 @@ fn exit_mark((x, y): (f64, f64)) -> String {
     format!("{}Z", path((0..6).map(corner)))
 }
 
-fn legend(x: f64, y: f64, waits: &Waits) -> Markup {
+fn legend(x: f64, y: f64) -> Markup {
     let at = |row: usize| y + 24.0 * row as f64;
     let text = |row: usize, says: &str| {
         debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
@@ -485,7 +485,6 @@ fn legend(x: f64, y: f64, waits: &Waits) -> Markup {
         }
     };
     let line = |row: usize| path([(x, at(row)), (x + 26.0, at(row))]);
-    let _ = waits;
     html! {
         g {
             (disc(0, "")) (text(0, "rover, and where it wants to go"))
