@@ -351,8 +351,9 @@ pub struct NetworkConfig {
     pub grants_ahead: u32,
     /// `coupled`: the most nodes that the search may expand.
     pub max_expansions: u64,
-    /// `paper`: a node that was not heard for so many cycles, at least 1, is replaced by a neighbour,
-    /// for the rest of the run. Without it (the default) its vertices stay closed until it is back.
+    /// `paper`, `complete`: a node that was not heard for so many cycles, at least 1, is replaced by a
+    /// neighbour, for the rest of the run. Without it (the default) its vertices stay closed until it
+    /// is back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub takeover_after: Option<u32>,
     /// Passive deadlock: no move and no entry for so many cycles.
@@ -469,9 +470,9 @@ pub enum ConfigError {
         /// What it may be.
         expected: &'static str,
     },
-    /// A key that only the policy `paper` knows.
-    #[error("network.{key} is for the policy paper; leave it out")]
-    PaperOnly {
+    /// A key for policies whose nodes decide as they go.
+    #[error("network.{key} is for the policies paper and complete; leave it out")]
+    Planned {
         /// The key.
         key: &'static str,
     },
@@ -530,8 +531,8 @@ impl NetworkConfig {
         if let Some(cycles) = self.takeover_after {
             let key = "takeover_after";
             check(key, cycles > 0, cycles.to_string(), "at least 1")?;
-            if self.policy != Policy::Paper {
-                return Err(ConfigError::PaperOnly { key });
+            if !matches!(self.policy, Policy::Paper | Policy::Complete) {
+                return Err(ConfigError::Planned { key });
             }
         }
         for (key, window) in [

@@ -5,6 +5,7 @@ use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
 use super::candidates::CandidatePath;
+use super::reservation::messages::{Relay, Way};
 
 /// The number of a rover, from 0; its actor is called `rover_` and the number plus one.
 #[derive(
@@ -99,6 +100,8 @@ pub struct Account {
     pub previous: Option<VertexId>,
     /// Where it wants to go.
     pub goal: VertexId,
+    /// The ways reserved for it that it has not driven to their ends, with the policy `complete`.
+    pub ways: Vec<Way>,
 }
 
 /// Node to neighbours, each cycle: which nodes are replaced, as far as it knows.
@@ -140,6 +143,8 @@ pub enum Content {
     Departed(Departed),
     /// That is on record.
     DepartedAck(DepartedAck),
+    /// Steps of walks, with the policy `complete`.
+    Relay(Relay),
 }
 
 /// Step 1 of a planning cycle, node to neighbours: who is, or may be, on the node's vertices.

@@ -28,8 +28,8 @@ use super::messages::{
     Account, Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck,
     Holding, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
 };
-use super::reservation::messages::Relay;
-use super::reservation::{Registry, RegistryDue};
+use super::reservation::messages::{ItineraryAnswer, Relay};
+use super::reservation::{Atlas, RegistryDue};
 use super::rover::Rover;
 use super::safety::Ledger;
 use optimise::Optimiser;
@@ -47,7 +47,7 @@ pub struct Node {
     pub(super) id: NodeId,
     graph: Arc<LocalGraph>,
     pub(super) neighbors: Vec<Neighbor>,
-    rovers: Vec<Address<Rover>>,
+    pub(super) rovers: Vec<Address<Rover>>,
     pub(super) cycle: u32,
     phase: Phase,
     optimiser: Optimiser,
@@ -138,10 +138,15 @@ impl Node {
         self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
     }
 
+    /// Whether there is anything to reserve, or to be given over the network.
+    fn keeps_registry(&self) -> bool {
+        self.site.config.policy != Policy::Paper || self.site.roadmap_from.is_some()
+    }
+
     /// Whether it may take part: where nodes are given the roadmap over the network, only with all of it.
     pub(super) fn knows_roadmap(&self, ctx: &mut Context<'_, Self>) -> bool {
         let source = self.site.roadmap_from;
-        source.is_none() || ctx.durable::<Registry>().knows_roadmap(source)
+        source.is_none() || ctx.durable::<Atlas>().is_known(source)
     }
 
     /// Whether it answers for `v`: its own vertex, or one that it took over.
@@ -171,6 +176,7 @@ impl Actor for Node {
         Account,
         Replaced,
         Passed,
+        ItineraryAnswer,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -198,7 +204,7 @@ impl Actor for Node {
             let goal = self.site.missions[rover.0 as usize].1;
             ledger.stand(vertex, rover, goal);
         }
-        if self.site.config.policy != Policy::Paper || self.site.roadmap_from.is_some() {
+        if self.keeps_registry() {
             self.open_registry(ctx);
         }
         // The first cycle begins at once; after a restart, the next.

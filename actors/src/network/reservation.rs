@@ -46,6 +46,8 @@ mod registry;
 mod relay;
 mod routes;
 mod steps;
+mod ways;
 
-pub(crate) use registry::Registry;
-pub(crate) use steps::RegistryDue;
+pub(crate) use atlas::Atlas;
+pub(crate) use steps::{Registries, RegistryDue};
+pub(crate) use ways::Ways;

@@ -12,6 +12,8 @@ use super::assemble::Site;
 use super::config::{Motion, Policy, Sabotage};
 use super::messages::{Account, Beacon, Grant, Inquiry, RoverId, RoverState, Whereabouts};
 use super::node::Node;
+use super::reservation::Ways;
+use super::reservation::messages::{Itinerary, ItineraryAnswer};
 use super::safety::{Answer, RoverMemory};
 use super::takeover::Fences;
 use crate::radio::RadioChange;
@@ -176,16 +178,25 @@ impl Rover {
         }
     }
 
+    /// Whether who grants a vertex answers for it, as far as the rover was told.
+    fn obeys(&self, ctx: &mut Context<'_, Self>, grant: &Grant) -> bool {
+        let heeds = self.site.config.sabotage != Sabotage::IgnoreFences;
+        let acting = grant.to.map(|to| self.acting(ctx, to));
+        !heeds || acting.is_none_or(|acting| acting == grant.node)
+    }
+
     /// Tells `to` where it is, and whom it obeys about the vertices of `home`.
     fn account(&self, ctx: &mut Context<'_, Self>, to: NodeId, home: NodeId) {
         let rank = ctx.durable::<Fences>().rank(home);
         let memory = ctx.durable::<RoverMemory>();
+        let (step, previous) = (memory.step, memory.previous);
         let account = Account {
             home,
             rank,
             whereabouts: memory.whereabouts(self.id),
-            previous: memory.previous,
+            previous,
             goal: self.goal,
+            ways: ctx.durable::<Ways>().left(step).to_vec(),
         };
         ctx.send(self.nodes[to.0 as usize], account);
     }
@@ -205,7 +216,15 @@ impl Rover {
 }
 
 impl Actor for Rover {
-    type Accepts = (Grant, CycleStarts, EdgeEnds, PaceAllows, OffVertex, Inquiry);
+    type Accepts = (
+        Grant,
+        CycleStarts,
+        EdgeEnds,
+        PaceAllows,
+        OffVertex,
+        Inquiry,
+        Itinerary,
+    );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         for name in &self.site.node_names {
@@ -254,34 +273,74 @@ impl Handler<PaceAllows> for Rover {
 
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.site.config.policy != Policy::Paper {
-            if !ctx.durable::<RoverMemory>().keep(&grant) {
-                self.beacon(ctx, grant.node);
+        if !self.obeys(ctx, &grant) {
+            // The node does not know that it was replaced.
+            if let Some(to) = grant.to {
+                self.account(ctx, grant.node, self.site.sensors.owner(to));
             }
-            self.proceed(ctx);
             return Ok(());
         }
-        if let Some(to) = grant.to
-            && self.acting(ctx, to) != grant.node
-            && self.site.config.sabotage != Sabotage::IgnoreFences
-        {
-            // It does not know that it was replaced.
-            self.account(ctx, grant.node, self.site.sensors.owner(to));
+        if self.site.config.policy == Policy::Paper {
+            self.obey(&grant, ctx);
             return Ok(());
         }
-        self.obey(&grant, ctx);
+        if !ctx.durable::<RoverMemory>().keep(&grant) {
+            self.beacon(ctx, grant.node);
+        }
+        self.proceed(ctx);
         Ok(())
     }
 }
 
 impl Handler<Inquiry> for Rover {
     fn handle(&mut self, inquiry: Inquiry, ctx: &mut Context<'_, Self>) -> Outcome {
-        let line = self.site.lines.get(inquiry.home.0 as usize);
-        let entitled = line.and_then(|line| line.get(inquiry.rank as usize));
-        if entitled == Some(&inquiry.node) {
-            ctx.durable::<Fences>().raise(inquiry.home, inquiry.rank);
-            self.account(ctx, inquiry.node, inquiry.home);
+        let Inquiry { node, home, rank } = inquiry;
+        let line = self.site.lines.get(home.0 as usize);
+        if line.and_then(|line| line.get(rank as usize)) != Some(&node) {
+            return Ok(());
         }
+        let site = self.site.clone();
+        let is_higher = rank > ctx.durable::<Fences>().rank(home);
+        let of_home = |v: VertexId| site.sensors.owner(v) == home;
+        let memory = ctx.durable::<RoverMemory>();
+        if is_higher && memory.granted_beyond().is_some_and(of_home) && self.speed > 0.0 {
+            // It cannot stop before a vertex that it is about to roll on to. It answers when it is there.
+            return Ok(());
+        }
+        ctx.durable::<Fences>().raise(home, rank);
+        if is_higher {
+            let is_void = |grant: &Grant| grant.to.is_some_and(of_home);
+            ctx.durable::<RoverMemory>().forget(is_void);
+        }
+        self.account(ctx, node, home);
+        Ok(())
+    }
+}
+
+impl Handler<Itinerary> for Rover {
+    fn handle(&mut self, itinerary: Itinerary, ctx: &mut Context<'_, Self>) -> Outcome {
+        let Itinerary {
+            node,
+            way,
+            replaced,
+        } = itinerary;
+        let walk = way.walk;
+        let reserved_at = |home| {
+            let of = replaced.iter().find(|r| r.home == home);
+            of.map_or(0, |r| r.rank)
+        };
+        let site = self.site.clone();
+        let fences = ctx.durable::<Fences>();
+        let mut homes = way.visits.iter().map(|v| site.sensors.owner(v.vertex));
+        let holds = homes.all(|home| fences.rank(home) == reserved_at(home))
+            || site.config.sabotage == Sabotage::IgnoreFences;
+        let ways = ctx.durable::<Ways>();
+        let known = ways.has(&walk);
+        if holds && !known {
+            ways.take(way);
+        }
+        let taken = holds || known;
+        ctx.send(self.nodes[node.0 as usize], ItineraryAnswer { walk, taken });
         Ok(())
     }
 }

@@ -325,6 +325,11 @@ impl RoverMemory {
         true
     }
 
+    /// Forgets the grants for steps to come that are void.
+    pub(crate) fn forget(&mut self, is_void: impl Fn(&Grant) -> bool) {
+        self.ahead.retain(|kept| !is_void(kept));
+    }
+
     /// The grant kept for the next step, if the rover stands still.
     pub(crate) fn next_granted(&mut self) -> Option<&Grant> {
         let step = self.step;

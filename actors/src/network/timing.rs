@@ -53,14 +53,19 @@ impl Timing {
 impl NetworkConfig {
     /// By how many cycles the windows of a standstill are longer over links of this latency. The phases
     /// of the paper's policy stretch, and with them its cycles; of other policies cycles do not, while
-    /// a walk is some tens of messages, one after the other, and some of them twice.
+    /// a walk is some tens of messages, one after the other, and some of them twice. And a node that fails
+    /// is replaced only when it has been silent for long enough.
     pub(crate) fn patience(&self, latency: SimDuration, timing: &Timing) -> u32 {
         const MESSAGES: u64 = 150;
+        let silence = self.takeover_after.unwrap_or(0).min(u32::MAX / 4);
         if self.policy == Policy::Paper {
-            return 0;
+            return silence;
         }
         let cycles = (latency * MESSAGES).as_nanos() / timing.cycle.as_nanos().max(1);
-        u32::try_from(cycles).unwrap_or(u32::MAX / 2)
+        u32::try_from(cycles)
+            .unwrap_or(u32::MAX / 4)
+            .min(u32::MAX / 4)
+            + silence
     }
 
     /// How long the parts of a cycle last where the slowest link takes `latency`.

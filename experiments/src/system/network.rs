@@ -269,11 +269,10 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
         NetworkError::SlowEdge { .. } => "network.speed",
         NetworkError::UnknownSource { .. } => "network.roadmap_from",
-        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::PaperOnly { key }) => {
-            KEYS.iter()
-                .find(|known| known.ends_with(&format!(".{key}")))
-                .unwrap_or(&"network")
-        }
+        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::Planned { key }) => KEYS
+            .iter()
+            .find(|known| known.ends_with(&format!(".{key}")))
+            .unwrap_or(&"network"),
         _ => "network",
     }
 }

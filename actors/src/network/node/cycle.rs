@@ -26,8 +26,13 @@ impl Node {
             if !knows_roadmap {
                 return;
             }
+            self.watch(ctx);
             self.repeat(ctx);
             self.apply(ctx);
+            if self.takes_over() {
+                // Silence tells; and who has lost a report is told again.
+                self.locate(ctx);
+            }
             return;
         }
         for (phase, delay) in [

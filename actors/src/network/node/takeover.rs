@@ -17,6 +17,7 @@ use crate::network::messages::{
     Account, Content, Departed, DepartedAck, Holding, Inquiry, Locations, Passed, Replaced,
     Replacement, RoverId, TakenOver, Whereabouts,
 };
+use crate::network::reservation::Registries;
 use crate::network::safety::Ledger;
 use crate::network::takeover::{Charter, Inquest, holder, released};
 
@@ -92,7 +93,12 @@ impl Node {
         wards.partners.sort_by_key(|partner| partner.id);
     }
 
-    pub(super) fn answers_for(&self, home: NodeId) -> bool {
+    /// Whether nodes that fall silent are replaced.
+    pub(in crate::network) fn takes_over(&self) -> bool {
+        self.wards.is_some()
+    }
+
+    pub(in crate::network) fn answers_for(&self, home: NodeId) -> bool {
         match &self.wards {
             Some(wards) => wards.homes.binary_search(&home).is_ok(),
             None => home == self.id,
@@ -100,7 +106,7 @@ impl Node {
     }
 
     /// Who answers for the vertices of `home`, as far as is known here.
-    fn acting(&self, home: NodeId) -> NodeId {
+    pub(in crate::network) fn acting(&self, home: NodeId) -> NodeId {
         let wards = self.wards.as_ref();
         wards.map_or(home, |wards| wards.acting[home.0 as usize])
     }
@@ -232,6 +238,9 @@ impl Node {
             ledger.adopt(vertex, holder(&accounts, vertex, self.cycle), entered);
         }
         self.mirror(ctx);
+        if self.keeps_registry() {
+            self.succeed(ctx, home, Some(&accounts));
+        }
         ctx.sample(&TakenOver {
             home,
             deputy: self.id,
@@ -246,6 +255,21 @@ impl Node {
             ctx.durable::<Ledger>().abandon(owned);
             self.requests
                 .retain(|r| owned.binary_search(&r.vertex).is_err());
+            ctx.durable::<Registries>().remove(home);
+        }
+        self.mirror(ctx);
+    }
+
+    /// Takes note of who answers for a home, if that is news.
+    pub(in crate::network) fn learn(&mut self, ctx: &mut Context<'_, Self>, news: Replacement) {
+        let Replacement { home, rank } = news;
+        if !self.is_member(home, rank) || ctx.durable::<Charter>().ranks[home.0 as usize] >= rank {
+            return;
+        }
+        ctx.durable::<Charter>().ranks[home.0 as usize] = rank;
+        self.yield_to(ctx, home, rank);
+        if self.keeps_registry() {
+            self.succeed(ctx, home, None);
         }
     }
 
@@ -272,7 +296,12 @@ impl Node {
     }
 
     /// Says something to a node, directly or by way of common neighbours.
-    pub(super) fn tell(&self, ctx: &mut Context<'_, Self>, to: NodeId, content: Content) {
+    pub(in crate::network) fn tell(
+        &self,
+        ctx: &mut Context<'_, Self>,
+        to: NodeId,
+        content: Content,
+    ) {
         if let Some(at) = self.neighbor(to) {
             let address = self.neighbors[at].address;
             return match content {
@@ -280,6 +309,7 @@ impl Node {
                 Content::Assignments(message) => ctx.send(address, message),
                 Content::Departed(message) => ctx.send(address, message),
                 Content::DepartedAck(message) => ctx.send(address, message),
+                Content::Relay(message) => ctx.send(address, message),
             };
         }
         let passed = Passed {
@@ -399,7 +429,6 @@ impl Handler<Account> for Node {
             let line = &self.site.lines[home.0 as usize];
             if line.iter().position(|&id| id == self.id) < Some(rank as usize) {
                 self.yield_to(ctx, home, rank);
-                self.mirror(ctx);
             }
         } else if ctx.durable::<Charter>().answered(account) {
             self.take_over(ctx, home, rank);
@@ -410,14 +439,8 @@ impl Handler<Account> for Node {
 
 impl Handler<Replaced> for Node {
     fn handle(&mut self, message: Replaced, ctx: &mut Context<'_, Self>) -> Outcome {
-        for Replacement { home, rank } in message.homes {
-            let news = self.is_member(home, rank)
-                && ctx.durable::<Charter>().ranks[home.0 as usize] < rank;
-            if news {
-                ctx.durable::<Charter>().ranks[home.0 as usize] = rank;
-                self.yield_to(ctx, home, rank);
-                self.mirror(ctx);
-            }
+        for news in message.homes {
+            self.learn(ctx, news);
         }
         Ok(())
     }
@@ -436,6 +459,7 @@ impl Handler<Passed> for Node {
             Content::Assignments(message) => self.handle(message, ctx),
             Content::Departed(message) => self.handle(message, ctx),
             Content::DepartedAck(message) => self.handle(message, ctx),
+            Content::Relay(message) => self.handle(message, ctx),
         }
     }
 }

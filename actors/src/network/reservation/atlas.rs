@@ -11,14 +11,14 @@ use super::registry::{Desk, Registry};
 /// Vertices in a part: a part is then a message of some hundred bytes.
 const PART: usize = 16;
 
-/// What a node knows of the roadmap.
+/// What a node knows of the roadmap, durably.
 #[derive(Debug, Default)]
 pub(crate) struct Atlas {
     /// By number.
     parts: BTreeMap<u32, RoadmapPart>,
     complete: bool,
-    /// Steps of walks that came before the roadmap was known.
-    held: Vec<Item>,
+    /// Steps of walks that came before the roadmap was known, and for which home.
+    held: Vec<(NodeId, Item)>,
     /// The first part that was wrong.
     wrong: Option<String>,
 }
@@ -81,52 +81,84 @@ impl Atlas {
     }
 }
 
-impl Registry {
+impl Atlas {
     /// Whether the node may take part: it knows the roadmap, or need not be given it.
-    pub(crate) fn knows_roadmap(&self, desk_source: Option<NodeId>) -> bool {
-        desk_source.is_none() || self.atlas.complete
+    pub(crate) fn is_known(&self, source: Option<NodeId>) -> bool {
+        source.is_none() || self.complete
     }
 
     /// What was wrong with what the node was given, if anything was.
-    pub(crate) fn wrong_roadmap(&self) -> Option<&str> {
-        self.atlas.wrong.as_deref()
+    pub(crate) fn wrong(&self) -> Option<&str> {
+        self.wrong.as_deref()
     }
 
     /// The node that knows the roadmap from the start tells its neighbours.
-    pub(super) fn publish_roadmap(&mut self, desk: &Desk<'_>) {
-        if desk.site.roadmap_from != Some(desk.node) {
+    pub(super) fn publish(&mut self, registry: &mut Registry, desk: &Desk<'_>) {
+        if desk.site.roadmap_from != Some(desk.home) || !self.parts.is_empty() {
             return;
         }
         let (roadmap, sensors) = (&desk.site.roadmap, &desk.site.sensors);
         for part in 0..RoadmapPart::count(roadmap) {
-            self.learn(desk, desk.node, RoadmapPart::of(roadmap, sensors, part));
+            let part = RoadmapPart::of(roadmap, sensors, part);
+            self.take_in(registry, desk, desk.home, part);
         }
     }
 
-    /// Takes an item that came from a neighbour, or keeps it until the roadmap is known.
-    pub(super) fn receive(&mut self, desk: &Desk<'_>, from: NodeId, item: Item) {
+    /// Tells the neighbours of a home that was taken over, which may have missed parts.
+    pub(super) fn share(&self, registry: &mut Registry, desk: &Desk<'_>) {
+        for part in self.parts.values() {
+            for &to in desk.site.sensors.neighbors(desk.home) {
+                registry.post(to, Item::Roadmap(part.clone()));
+            }
+        }
+    }
+
+    /// Takes an item that came from a neighbour of `desk`'s home. Returns it if it is the step of a walk
+    /// and the roadmap is known; keeps it until then.
+    pub(super) fn receive(
+        &mut self,
+        registry: &mut Registry,
+        desk: &Desk<'_>,
+        from: NodeId,
+        item: Item,
+    ) -> Option<Item> {
         match item {
-            Item::Roadmap(part) => self.learn(desk, from, part),
-            item if self.knows_roadmap(desk.site.roadmap_from) => self.take(desk, item),
-            item => self.atlas.held.push(item),
+            Item::Roadmap(part) => {
+                self.take_in(registry, desk, from, part);
+                None
+            }
+            item if self.is_known(desk.site.roadmap_from) => Some(item),
+            item => {
+                self.held.push((desk.home, item));
+                None
+            }
+        }
+    }
+
+    /// What was held, once the roadmap is known.
+    pub(super) fn release(&mut self) -> Vec<(NodeId, Item)> {
+        match self.complete {
+            true => std::mem::take(&mut self.held),
+            false => Vec::new(),
         }
     }
 
     /// A part has come: it goes on to all other neighbours, if it is new.
-    fn learn(&mut self, desk: &Desk<'_>, from: NodeId, part: RoadmapPart) {
+    fn take_in(
+        &mut self,
+        registry: &mut Registry,
+        desk: &Desk<'_>,
+        from: NodeId,
+        part: RoadmapPart,
+    ) {
         let (roadmap, sensors) = (&desk.site.roadmap, &desk.site.sensors);
-        match self.atlas.learn(&part, roadmap, sensors) {
-            Err(wrong) => self.atlas.wrong = Some(wrong),
+        match self.learn(&part, roadmap, sensors) {
+            Err(wrong) => self.wrong = Some(wrong),
             Ok(false) => {}
             Ok(true) => {
-                let others = sensors.neighbors(desk.node).iter();
+                let others = sensors.neighbors(desk.home).iter();
                 for &to in others.filter(|&&to| to != from) {
-                    self.post(to, Item::Roadmap(part.clone()));
-                }
-                if self.atlas.complete {
-                    for item in std::mem::take(&mut self.atlas.held) {
-                        self.take(desk, item);
-                    }
+                    registry.post(to, Item::Roadmap(part.clone()));
                 }
             }
         }

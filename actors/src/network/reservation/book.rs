@@ -123,6 +123,16 @@ impl Book {
         result
     }
 
+    /// Whether `walk` has entered these visits.
+    pub(super) fn has(&self, walk: &Walk, visits: &[TimedVisit]) -> bool {
+        let entered = |new: &TimedVisit| {
+            let page = self.page(new.vertex).map(|page| &self.pages[page].1);
+            let same = |old: &Visit| old.walk == *walk && old.start == new.start;
+            page.is_some_and(|visits| visits.iter().any(same))
+        };
+        !visits.is_empty() && visits.iter().all(entered)
+    }
+
     /// Enters a visit that was checked.
     pub(super) fn enter(&mut self, v: VertexId, visit: Visit) {
         let Some(page) = self.page(v) else { return };
@@ -151,10 +161,7 @@ impl Book {
 
     /// Strikes out what earlier attempts have entered: they have failed, if there is a later one.
     pub(super) fn strike_earlier(&mut self, walk: &Walk) {
-        self.retain(|visit| {
-            let same = visit.walk.rover == walk.rover && visit.walk.since == walk.since;
-            !same || visit.confirmed || visit.walk.attempt >= walk.attempt
-        });
+        self.retain(|visit| visit.confirmed || !visit.walk.is_before(walk));
     }
 
     fn retain(&mut self, keep: impl Fn(&Visit) -> bool) {

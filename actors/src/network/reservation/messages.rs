@@ -4,7 +4,7 @@
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
-use crate::network::messages::RoverId;
+use crate::network::messages::{Replacement, RoverId};
 use crate::planning::safe_intervals::{Label, TimedVisit};
 
 /// Node to neighbour: items, each to be taken once, and a receipt for those that came the other way.
@@ -22,6 +22,56 @@ pub struct Relay {
     pub echo: Option<u64>,
     /// New and repeated items.
     pub items: Vec<Numbered>,
+    /// With `network.takeover_after`: between whom this is, and who answers for them.
+    pub between: Option<Between>,
+}
+
+/// The two homes that a [`Relay`] goes between, each with the rank that answers for it: numbers begin
+/// anew when one of them is replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Between {
+    /// For whose vertices the sender speaks.
+    pub from: NodeId,
+    /// Its place in that node's line of succession, from 0.
+    pub from_rank: u32,
+    /// Whose vertices this is about.
+    pub to: NodeId,
+    /// The place of whom the sender takes to answer for those.
+    pub to_rank: u32,
+}
+
+/// Node to rover, with `network.takeover_after`: a way could be reserved for you. It is yours once you
+/// have taken it, which you do unless one of its vertices has been taken over since. Repeated each
+/// cycle until answered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Itinerary {
+    /// The node that answers for where the way begins.
+    pub node: NodeId,
+    /// The way.
+    pub way: Way,
+    /// Who answered for the way's vertices as it was reserved: the nodes that were replaced by then. All
+    /// others by themselves.
+    pub replaced: Vec<Replacement>,
+}
+
+/// Rover to node: whether it has taken the way of an [`Itinerary`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ItineraryAnswer {
+    /// The rover's walk.
+    pub walk: Walk,
+    /// It has, for good.
+    pub taken: bool,
+}
+
+/// A reserved way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Way {
+    /// The walk that reserved it.
+    pub walk: Walk,
+    /// The step of the first visit; each further one is one step on.
+    pub first_step: u32,
+    /// All visits, in order.
+    pub visits: Vec<TimedVisit>,
 }
 
 /// An item with its number on the way from one node to another, from 0.
@@ -99,6 +149,11 @@ pub struct Walk {
 }
 
 impl Walk {
+    /// Whether this is an earlier attempt of the same walk.
+    pub(super) fn is_before(&self, other: &Walk) -> bool {
+        (self.rover, self.since) == (other.rover, other.since) && self.attempt < other.attempt
+    }
+
     /// Whether this walk goes before `other`.
     pub fn is_older_than(&self, other: &Walk) -> bool {
         (self.since, self.rover) < (other.since, other.rover)
@@ -141,6 +196,19 @@ pub struct Reserve {
     pub way: Vec<TimedVisit>,
     /// The last visit that is not entered yet.
     pub at: u32,
+    /// With `network.takeover_after`: the ranks of those who have entered a part as deputies.
+    pub replaced: Vec<Replacement>,
+}
+
+impl Reserve {
+    /// The way, for its rover.
+    pub(super) fn into_way(self) -> Way {
+        Way {
+            walk: self.walk,
+            first_step: self.first_step,
+            visits: self.way,
+        }
+    }
 }
 
 /// What became of a walk, passed on along its route.

@@ -1,21 +1,24 @@
-//! What a node keeps for the `complete` policy, all of it durable, and who seeks a way from where.
-//! Pure: items go to `lines`, grants to the caller. What is done with items is in [`walks`].
+//! What is kept for the vertices of one home with the `complete` policy, all of it durable, and who
+//! seeks a way from where. A node keeps a registry for itself, and one for each home that it takes over.
+//! Pure: items go to `lines`, grants to the caller. What is done with items is in [`walks`], what
+//! becomes of it when a node is replaced in [`succession`].
 
 mod making_way;
+mod succession;
 mod walks;
 
 use std::collections::BTreeMap;
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::atlas::Atlas;
 use super::book::{Book, Visit};
 use super::messages::{Item, Probe, Reserve, Walk};
 use super::relay::Line;
 use super::routes::routes;
 use crate::network::assemble::Site;
-use crate::network::messages::RoverId;
+use crate::network::messages::{Replacement, RoverId};
 use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
+use succession::Succession;
 
 /// A rover, or a queue of rovers, for which a way is sought.
 #[derive(Debug)]
@@ -28,6 +31,12 @@ struct Applicant {
     again: Option<(Walk, u64)>,
     /// Attempts that found no way at all.
     in_vain: u32,
+}
+
+impl Applicant {
+    fn is_on(&self, walk: &Walk) -> bool {
+        self.walk.is_some_and(|(mine, _)| mine == *walk)
+    }
 }
 
 /// Where a way is to lead.
@@ -75,66 +84,86 @@ struct Offers {
     deadline: u64,
 }
 
-/// All that a node keeps.
+/// All that is kept for the vertices of one node.
 #[derive(Debug, Default)]
 pub(crate) struct Registry {
+    is_open: bool,
     pub(super) book: Book,
     pub(super) lines: BTreeMap<NodeId, Line>,
-    /// What the node was given of the roadmap.
-    pub(super) atlas: Atlas,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
     /// Ways that wait for younger walks to be settled.
     parked: Vec<Reserve>,
     /// How long a walk takes from its first probe to its confirmation, smoothed [ns].
     walk_time: u64,
+    succession: Succession,
 }
 
-/// Who acts, and when.
+/// For whose vertices something is done, and when.
 pub(super) struct Desk<'a> {
     pub(super) site: &'a Site,
-    pub(super) node: NodeId,
+    /// The node whose vertices are meant; another one may answer for them.
+    pub(super) home: NodeId,
     pub(super) now: u64,
+    /// The rank that answers for each home, with `network.takeover_after`; else none.
+    pub(super) ranks: &'a [u32],
+}
+
+impl Desk<'_> {
+    fn may_be_replaced(&self) -> bool {
+        !self.ranks.is_empty()
+    }
+
+    /// The rank that answers for this home, unless it does itself.
+    fn replacement(&self) -> Option<Replacement> {
+        let (home, rank) = (self.home, *self.ranks.get(self.home.0 as usize)?);
+        (rank > 0).then_some(Replacement { home, rank })
+    }
 }
 
 impl Registry {
-    /// Makes a new registry ready; leaves one that has survived a crash as it is.
+    /// Makes a new registry ready; in one that has survived a crash, all that was on its way is
+    /// repeated.
     pub(super) fn open(&mut self, desk: &Desk<'_>) {
-        let sensors = &desk.site.sensors;
-        self.book.open(sensors.owned(desk.node));
-        if self.lines.is_empty() {
-            for &neighbor in sensors.neighbors(desk.node) {
-                self.lines.insert(neighbor, Line::default());
-            }
-            let own = |v: &VertexId| sensors.owner(*v) == desk.node;
-            let queues = desk.site.queues.iter().map(|(entry, _)| *entry);
-            for entry in queues.filter(own) {
-                self.seek(Origin::Queue {
-                    entry,
-                    served: 0,
-                    last_entry: 0,
-                });
-            }
-            self.preload(desk);
-            self.publish_roadmap(desk);
-            let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
-            for (rover, vertex) in standing {
-                if desk.site.schedule.is_some() {
-                    continue;
-                }
-                self.book.stand(vertex, rover, 1);
-                if desk.site.missions[rover.0 as usize].1 != vertex {
-                    self.seek(Origin::Stand {
-                        rover,
-                        vertex,
-                        step: 1,
-                    });
-                }
-            }
-        } else {
+        if self.is_open {
             for line in self.lines.values_mut() {
                 line.restart();
             }
+            return;
+        }
+        self.open_empty(desk);
+        let own = |v: &VertexId| desk.site.sensors.owner(*v) == desk.home;
+        let queues = desk.site.queues.iter().map(|(entry, _)| *entry);
+        for entry in queues.filter(own) {
+            self.seek(Origin::Queue {
+                entry,
+                served: 0,
+                last_entry: 0,
+            });
+        }
+        self.preload(desk);
+        if desk.site.schedule.is_some() {
+            return;
+        }
+        let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
+        for (rover, vertex) in standing {
+            self.book.stand(vertex, rover, 1);
+            if desk.site.missions[rover.0 as usize].1 != vertex {
+                self.seek(Origin::Stand {
+                    rover,
+                    vertex,
+                    step: 1,
+                });
+            }
+        }
+    }
+
+    fn open_empty(&mut self, desk: &Desk<'_>) {
+        let sensors = &desk.site.sensors;
+        self.is_open = true;
+        self.book.open(sensors.owned(desk.home));
+        for &neighbor in sensors.neighbors(desk.home) {
+            self.lines.insert(neighbor, Line::default());
         }
     }
 
@@ -148,7 +177,7 @@ impl Registry {
                 since: 0,
             };
             for (i, timed) in way.iter().enumerate() {
-                if desk.site.sensors.owner(timed.vertex) != desk.node {
+                if desk.site.sensors.owner(timed.vertex) != desk.home {
                     continue;
                 }
                 let visit = Visit {
@@ -298,7 +327,7 @@ impl Registry {
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Yield(request) => self.make_way(desk, request),
-            // Taken before: see `receive`.
+            // Taken before: see `Atlas::receive`.
             Item::Roadmap(_) => {}
         }
     }
@@ -311,7 +340,7 @@ impl Registry {
 
     /// The rover of this walk has its way: the next one of the queue is served.
     fn served(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
-        let current = |a: &Applicant| a.walk.is_some_and(|(mine, _)| mine == reserve.walk);
+        let current = |a: &Applicant| a.is_on(&reserve.walk);
         let Some(at) = self.applicants.iter().position(current) else {
             return;
         };
@@ -337,14 +366,16 @@ impl Registry {
         self.apply(desk);
     }
 
-    /// When something is to be done without being told.
-    pub(super) fn next_due(&self) -> Option<u64> {
-        let lines = self.lines.values().filter_map(Line::next_due);
+    /// When something is to be done without being told; of lines, only those that may be used.
+    pub(super) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
+        let lines = self.lines.iter().filter(|(to, _)| may_use(**to));
+        let lines = lines.filter_map(|(_, line)| line.next_due());
+        let proposals = self.succession.next_due();
         let open = self
             .offers
             .values()
             .filter(|o| !o.decided && o.best.is_some());
-        lines.chain(open.map(|o| o.deadline)).min()
+        lines.chain(open.map(|o| o.deadline)).chain(proposals).min()
     }
 }
 

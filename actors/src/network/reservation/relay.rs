@@ -106,6 +106,22 @@ impl Line {
         }
     }
 
+    /// One of the ends is replaced: numbers begin anew, and what was not acknowledged is said again, to whom
+    /// that may have been news before.
+    pub(super) fn renew(&mut self) {
+        let pending = std::mem::take(&mut self.pending);
+        *self = Line::default();
+        for item in pending.into_values().map(|pending| pending.item) {
+            self.post(item);
+        }
+    }
+
+    /// Takes what is to be said off the line: who is at its other end is here.
+    pub(super) fn hand_over(&mut self) -> Vec<Item> {
+        let pending = std::mem::take(&mut self.pending);
+        pending.into_values().map(|pending| pending.item).collect()
+    }
+
     /// A receipt has come. What it echoes says how long a round trip takes, however often things were
     /// repeated.
     pub(super) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {

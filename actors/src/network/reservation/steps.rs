@@ -2,33 +2,66 @@
 //! wants goes out, and vertices are granted to the first of their books.
 
 use farside::prelude::*;
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
-use super::messages::Relay;
+use super::atlas::Atlas;
+use super::messages::{Between, ItineraryAnswer, Relay};
 use super::registry::{Desk, Registry};
 use super::relay::Receipt;
 use crate::network::config::Policy;
-use crate::network::messages::RoadmapKnown;
+use crate::network::messages::{Account, Content, Replacement, RoadmapKnown, RoverId};
 use crate::network::node::Node;
 use crate::network::safety::Ledger;
+use crate::network::takeover::Charter;
 
 /// Timer: something is overdue, or a vertex is to be granted.
 #[derive(Serialize, Deserialize)]
 #[doc(hidden)]
 pub struct RegistryDue;
 
+/// The registries of all homes that a node answers for, ascending; durable.
+#[derive(Debug, Default)]
+pub(crate) struct Registries {
+    all: Vec<(NodeId, Registry)>,
+}
+
+impl Registries {
+    fn find(&mut self, home: NodeId) -> Option<&mut Registry> {
+        let found = self.all.iter_mut().find(|(id, _)| *id == home);
+        found.map(|(_, registry)| registry)
+    }
+
+    /// This node does not answer for `home` any more.
+    pub(crate) fn remove(&mut self, home: NodeId) {
+        self.all.retain(|(id, _)| *id != home);
+    }
+
+    fn insert(&mut self, home: NodeId, registry: Registry) {
+        let at = self.all.partition_point(|(id, _)| *id < home);
+        self.all.insert(at, (home, registry));
+    }
+}
+
 impl Node {
-    /// Opens the registry; after a crash, what was on its way is repeated.
+    /// Opens the registries; after a crash, what was on its way is repeated.
     pub(crate) fn open_registry(&mut self, ctx: &mut Context<'_, Self>) {
-        self.with_registry(ctx, |registry, desk| registry.open(desk));
+        if self.answers_for(self.id) && ctx.durable::<Registries>().all.is_empty() {
+            let home = self.id;
+            ctx.durable::<Registries>()
+                .insert(home, Registry::default());
+        }
+        self.with_registries(ctx, |registry, atlas, desk| {
+            registry.open(desk);
+            atlas.publish(registry, desk);
+        });
     }
 
     /// A cycle begins: rovers that wait without a way apply for one.
     pub(crate) fn apply(&mut self, ctx: &mut Context<'_, Self>) {
         // Other policies have planned for all before the start.
         let applies = self.site.config.policy == Policy::Complete;
-        self.with_registry(ctx, |registry, desk| {
+        self.with_registries(ctx, |registry, _, desk| {
             if applies {
                 registry.apply(desk);
             }
@@ -37,62 +70,120 @@ impl Node {
 
     /// Vertices are free again.
     pub(crate) fn departed(&mut self, ctx: &mut Context<'_, Self>, freed: &[VertexId]) {
-        self.with_registry(ctx, |registry, _| {
+        self.with_registries(ctx, |registry, _, _| {
             for &vertex in freed {
                 registry.book.departed(vertex);
             }
         });
     }
 
-    /// Lets `work` change the registry, then does what follows from it.
-    fn with_registry(
+    /// Another one than before answers for `home`; with rovers' accounts, this node does.
+    pub(crate) fn succeed(
         &mut self,
         ctx: &mut Context<'_, Self>,
-        work: impl FnOnce(&mut Registry, &Desk<'_>),
+        home: NodeId,
+        accounts: Option<&[Account]>,
     ) {
-        let mut registry = std::mem::take(ctx.durable::<Registry>());
+        self.with_registries(ctx, |registry, _, desk| registry.renew(desk, home));
+        if let Some(accounts) = accounts {
+            ctx.durable::<Registries>()
+                .insert(home, Registry::default());
+            self.with_registries(ctx, |registry, atlas, desk| {
+                if desk.home == home {
+                    *registry = Registry::succeed(desk, accounts);
+                    atlas.share(registry, desk);
+                }
+            });
+        }
+    }
+
+    /// Lets `work` change each registry, then does what follows from it.
+    fn with_registries(
+        &mut self,
+        ctx: &mut Context<'_, Self>,
+        mut work: impl FnMut(&mut Registry, &mut Atlas, &Desk<'_>),
+    ) {
+        let mut registries = std::mem::take(ctx.durable::<Registries>());
+        let mut atlas = std::mem::take(ctx.durable::<Atlas>());
         let site = self.site.clone();
         let now = ctx.now().as_nanos();
-        let desk = Desk {
+        let ranks = match self.takes_over() {
+            true => ctx.durable::<Charter>().ranks.clone(),
+            false => Vec::new(),
+        };
+        let desk = |home| Desk {
             site: &site,
-            node: self.id,
+            home,
             now,
+            ranks: &ranks,
         };
-        work(&mut registry, &desk);
-        registry.decide_overdue(&desk);
-        let knows_roadmap = registry.knows_roadmap(site.roadmap_from);
-        let next_grant = match knows_roadmap {
-            true => self.grant_heads(ctx, &mut registry, now),
-            false => None,
-        };
+        for (home, registry) in &mut registries.all {
+            work(registry, &mut atlas, &desk(*home));
+        }
+        for (home, item) in atlas.release() {
+            if let Some(registry) = registries.find(home) {
+                registry.take(&desk(home), item);
+            }
+        }
+        hand_over(&mut registries, &mut atlas, &desk);
+        let mut next_due = None;
+        for (home, registry) in &mut registries.all {
+            registry.decide_overdue(&desk(*home));
+            let next_grant = match atlas.is_known(site.roadmap_from) {
+                true => self.grant_heads(ctx, registry, now),
+                false => None,
+            };
+            for itinerary in registry.proposals_due(&desk(*home), self.id) {
+                let RoverId(rover) = itinerary.way.walk.rover;
+                ctx.send(self.rovers[rover as usize], itinerary);
+            }
+            self.send_items(ctx, *home, registry, &ranks);
+            let may_use = |to| self.acting(to) != self.id;
+            let dues = [next_due, next_grant, registry.next_due(may_use)];
+            next_due = dues.into_iter().flatten().min();
+        }
+        *ctx.durable::<Registries>() = registries;
+        *ctx.durable::<Atlas>() = atlas;
+        self.wake_at(ctx, next_due, now);
+    }
+
+    /// Sends what is due on the lines of a home.
+    fn send_items(
+        &self,
+        ctx: &mut Context<'_, Self>,
+        home: NodeId,
+        registry: &mut Registry,
+        ranks: &[u32],
+    ) {
+        let now = ctx.now().as_nanos();
         for (&to, line) in &mut registry.lines {
-            let Some((
-                Receipt {
-                    taken,
-                    beyond,
-                    echo,
-                },
-                items,
-            )) = line.due(now)
-            else {
+            let acting = self.acting(to);
+            if acting == self.id {
+                // It gave that home up, and has not heard to whom: until then it says nothing.
+                continue;
+            }
+            let Some((receipt, items)) = line.due(now) else {
                 continue;
             };
-            let Some(at) = self.neighbor(to) else {
-                continue;
-            };
+            let rank = |home: NodeId| ranks.get(home.0 as usize).copied();
+            let between = rank(home).zip(rank(to));
+            let between = between.map(|(from_rank, to_rank)| Between {
+                from: home,
+                from_rank,
+                to,
+                to_rank,
+            });
             let relay = Relay {
                 node: self.id,
-                taken,
-                beyond,
+                taken: receipt.taken,
+                beyond: receipt.beyond,
                 sent: now,
-                echo,
+                echo: receipt.echo,
                 items,
+                between,
             };
-            ctx.send(self.neighbors[at].address, relay);
+            self.tell(ctx, acting, Content::Relay(relay));
         }
-        let due = registry.next_due().into_iter().chain(next_grant).min();
-        *ctx.durable::<Registry>() = registry;
-        self.wake_at(ctx, due, now);
     }
 
     /// Grants the vertices whose first visit is due. Returns when the next one is.
@@ -143,51 +234,117 @@ impl Node {
     }
 }
 
+/// Homes that the same node answers for hear from each other at once.
+fn hand_over<'a>(
+    registries: &mut Registries,
+    atlas: &mut Atlas,
+    desk: &impl Fn(NodeId) -> Desk<'a>,
+) {
+    let homes: Vec<NodeId> = match registries.all.len() {
+        0 | 1 => return,
+        _ => registries.all.iter().map(|(home, _)| *home).collect(),
+    };
+    loop {
+        let mut local = Vec::new();
+        for (home, registry) in &mut registries.all {
+            for (&to, line) in &mut registry.lines {
+                if homes.contains(&to) {
+                    local.extend(line.hand_over().into_iter().map(|item| (*home, to, item)));
+                }
+            }
+        }
+        if local.is_empty() {
+            return;
+        }
+        for (from, to, item) in local {
+            let Some(registry) = registries.find(to) else {
+                continue;
+            };
+            if let Some(step) = atlas.receive(registry, &desk(to), from, item) {
+                registry.take(&desk(to), step);
+            }
+        }
+    }
+}
+
 impl Handler<RegistryDue> for Node {
     fn handle(&mut self, _timer: RegistryDue, ctx: &mut Context<'_, Self>) -> Outcome {
         self.alarm = None;
-        self.with_registry(ctx, |_, _| {});
+        self.with_registries(ctx, |_, _, _| {});
         Ok(())
     }
 }
 
 impl Handler<Relay> for Node {
     fn handle(&mut self, relay: Relay, ctx: &mut Context<'_, Self>) -> Outcome {
+        let Some((from, to)) = self.between(ctx, &relay) else {
+            return Ok(());
+        };
         let Relay {
-            node,
             taken,
             beyond,
             sent,
             echo,
             items,
+            ..
         } = relay;
+        let receipt = Receipt {
+            taken,
+            beyond,
+            echo,
+        };
+        let mut items = Some(items);
         let knew = self.knows_roadmap(ctx);
-        self.with_registry(ctx, |registry, desk| {
-            let Some(line) = registry.lines.get_mut(&node) else {
+        self.with_registries(ctx, |registry, atlas, desk| {
+            let line = registry.lines.get_mut(&from);
+            let Some(line) = line.filter(|_| desk.home == to) else {
                 return;
             };
-            line.acknowledged(
-                &Receipt {
-                    taken,
-                    beyond,
-                    echo,
-                },
-                desk.now,
-            );
-            let new: Vec<_> = items
-                .into_iter()
-                .filter_map(|item| line.take(sent, item))
-                .collect();
+            line.acknowledged(&receipt, desk.now);
+            let all = items.take().into_iter().flatten();
+            let new: Vec<_> = all.filter_map(|item| line.take(sent, item)).collect();
             for item in new {
-                registry.receive(desk, node, item);
+                if let Some(step) = atlas.receive(registry, desk, from, item) {
+                    registry.take(desk, step);
+                }
             }
         });
         if !knew && self.knows_roadmap(ctx) {
             ctx.sample(&RoadmapKnown { node: self.id });
         }
-        match ctx.durable::<Registry>().wrong_roadmap() {
+        match ctx.durable::<Atlas>().wrong() {
             Some(wrong) => Err(HandlerError::new(wrong)),
             None => Ok(()),
         }
+    }
+}
+
+impl Node {
+    /// The homes between which a relay goes; none if it is not for this node, or one of the homes was
+    /// replaced since. What it says of replacements is learned.
+    fn between(&mut self, ctx: &mut Context<'_, Self>, relay: &Relay) -> Option<(NodeId, NodeId)> {
+        let Some(between) = relay.between.filter(|_| self.takes_over()) else {
+            return Some((relay.node, self.id));
+        };
+        let Between {
+            from,
+            from_rank,
+            to,
+            to_rank,
+        } = between;
+        for (home, rank) in [(from, from_rank), (to, to_rank)] {
+            self.learn(ctx, Replacement { home, rank });
+        }
+        let ranks = &ctx.durable::<Charter>().ranks;
+        let rank = |home: NodeId| ranks.get(home.0 as usize).copied();
+        let holds = rank(from) == Some(from_rank) && rank(to) == Some(to_rank);
+        holds.then_some((from, to))
+    }
+}
+
+impl Handler<ItineraryAnswer> for Node {
+    fn handle(&mut self, answer: ItineraryAnswer, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.with_registries(ctx, |registry, _, desk| registry.answered(desk, answer));
+        Ok(())
     }
 }

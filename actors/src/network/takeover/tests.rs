@@ -63,6 +63,7 @@ impl Carrier for Bad {
 /// A team and what happens to its nodes.
 #[derive(Clone, Debug)]
 struct Trial {
+    policy: Policy,
     seed: u64,
     rovers: u32,
     nodes: u32,
@@ -78,8 +79,11 @@ struct Trial {
     sabotage: Sabotage,
 }
 
-fn crater(seed: u64) -> Trial {
+const POLICIES: [Policy; 2] = [Policy::Paper, Policy::Complete];
+
+fn crater(policy: Policy, seed: u64) -> Trial {
     Trial {
+        policy,
         seed,
         rovers: 25,
         nodes: 28,
@@ -157,8 +161,11 @@ fn run_on(
         sim.link(a, b, &format!("{from}-{to}"), link);
     };
     let settings = NetworkConfig {
+        policy: trial.policy,
         takeover_after: trial.after,
         cycle_limit: trial.cycle_limit,
+        // These links do not say how late they may be.
+        passive_window: 20 + trial.link.jitter_ms as u32 / 5,
         sabotage: trial.sabotage,
         ..NetworkConfig::default()
     };
@@ -233,8 +240,11 @@ fn all_arrive(trial: &Trial, takeovers: u32) {
 /// some never do.
 #[test]
 fn a_neighbour_takes_over_for_a_node_that_is_gone_for_good() {
-    for seed in 1..=4 {
-        let mut trial = crater(seed);
+    for (policy, seed) in POLICIES
+        .iter()
+        .flat_map(|&p| (1..=4).map(move |seed| (p, seed)))
+    {
+        let mut trial = crater(policy, seed);
         let victim = busiest(&trial)[0];
         trial.crashes = vec![(victim.0, CRASH_MS, None)];
         all_arrive(&trial, 1);
@@ -246,94 +256,113 @@ fn a_neighbour_takes_over_for_a_node_that_is_gone_for_good() {
 
 #[test]
 fn a_takeover_outlasts_the_loss_of_a_third_of_all_messages() {
-    let mut trial = crater(2);
-    trial.rovers = 12;
-    let victim = busiest(&trial)[0];
-    trial.link.loss = 0.3;
-    // Of six messages one is nearly always heard.
-    trial.after = Some(8);
-    trial.cycle_limit = 2000;
-    trial.crashes = vec![(victim.0, CRASH_MS, None)];
-    all_arrive(&trial, 1);
+    for policy in POLICIES {
+        let mut trial = crater(policy, 2);
+        trial.rovers = 12;
+        let victim = busiest(&trial)[0];
+        trial.link.loss = 0.3;
+        // Of six messages one is nearly always heard.
+        trial.after = Some(8);
+        trial.cycle_limit = 2000;
+        trial.crashes = vec![(victim.0, CRASH_MS, None)];
+        all_arrive(&trial, 1);
+    }
 }
 
 #[test]
 fn two_nodes_far_apart_are_taken_over_by_two() {
-    let mut trial = crater(3);
-    let busy = busiest(&trial);
-    let (_, map, sensors) = world(&trial);
-    let lines = lines(&map, &sensors);
-    let first = busy[0];
-    let apart = |n: &&NodeId| {
-        lines[n.0 as usize]
-            .iter()
-            .all(|m| *m != first && !sensors.are_neighbors(first, *m))
-    };
-    let second = *busy.iter().find(apart).expect("a busy node far away");
-    trial.crashes = vec![(first.0, CRASH_MS, None), (second.0, CRASH_MS, None)];
-    all_arrive(&trial, 2);
+    for policy in POLICIES {
+        let mut trial = crater(policy, 3);
+        let busy = busiest(&trial);
+        let (_, map, sensors) = world(&trial);
+        let lines = lines(&map, &sensors);
+        let first = busy[0];
+        let apart = |n: &&NodeId| {
+            lines[n.0 as usize]
+                .iter()
+                .all(|m| *m != first && !sensors.are_neighbors(first, *m))
+        };
+        let second = *busy.iter().find(apart).expect("a busy node far away");
+        trial.crashes = vec![(first.0, CRASH_MS, None), (second.0, CRASH_MS, None)];
+        all_arrive(&trial, 2);
+    }
 }
 
 /// When the deputy fails too, the next in line goes on for both of its homes.
 #[test]
 fn the_next_in_line_follows_a_deputy_that_fails_too() {
-    let mut trial = crater(1);
-    let victim = busiest(&trial)[0];
-    let (_, map, sensors) = world(&trial);
-    let line = lines(&map, &sensors)[victim.0 as usize].clone();
-    assert!(line.len() > 2);
-    trial.crashes = vec![
-        (victim.0, CRASH_MS, None),
-        (line[1].0, CRASH_MS + 6000, None),
-    ];
-    all_arrive(&trial, 3);
+    for policy in POLICIES {
+        let mut trial = crater(policy, 1);
+        let victim = busiest(&trial)[0];
+        let (_, map, sensors) = world(&trial);
+        let line = lines(&map, &sensors)[victim.0 as usize].clone();
+        assert!(line.len() > 2);
+        trial.crashes = vec![
+            (victim.0, CRASH_MS, None),
+            (line[1].0, CRASH_MS + 6000, None),
+        ];
+        all_arrive(&trial, 3);
+    }
 }
 
 /// Who comes back, or was only unheard, stays out.
 #[test]
 fn a_node_that_was_replaced_stays_out() {
-    let mut trial = crater(2);
-    let victim = busiest(&trial)[0];
-    trial.crashes = vec![(victim.0, CRASH_MS, Some(8_000))];
-    all_arrive(&trial, 1);
-    trial.crashes.clear();
-    trial.unheard = vec![(victim.0, (10, 20))];
-    all_arrive(&trial, 1);
+    for policy in POLICIES {
+        let mut trial = crater(policy, 2);
+        let victim = busiest(&trial)[0];
+        trial.crashes = vec![(victim.0, CRASH_MS, Some(8_000))];
+        all_arrive(&trial, 1);
+        trial.crashes.clear();
+        trial.unheard = vec![(victim.0, (10, 20))];
+        all_arrive(&trial, 1);
+    }
+}
+
+/// Whichever node fails, and whenever: with the policy `complete` no reserved way is lost.
+#[test]
+fn whoever_fails_every_way_is_driven_to_its_end() {
+    for (node, at) in (0..28).zip([700u64, 5_003, 9_011, 14_002].into_iter().cycle()) {
+        let mut trial = crater(Policy::Complete, 5);
+        trial.rovers = 60;
+        trial.crashes = vec![(node, at, None)];
+        all_arrive(&trial, 1);
+    }
 }
 
 #[test]
 fn threads_change_nothing() {
-    let mut trial = crater(4);
-    let victim = busiest(&trial)[0];
-    trial.link = Bad {
-        loss: 0.05,
-        jitter_ms: 3,
-        ..GOOD
-    };
-    trial.crashes = vec![(victim.0, CRASH_MS, None)];
-    let threads = run_on(
-        &trial,
-        Executor::Kameo { threads: 2 },
-        None,
-        Places::default(),
-    );
-    let inline = run(&trial);
-    assert_eq!(inline.0.takeovers, 1);
-    assert_eq!(threads, inline);
+    for policy in POLICIES {
+        let mut trial = crater(policy, 4);
+        let victim = busiest(&trial)[0];
+        trial.link = Bad {
+            loss: 0.05,
+            jitter_ms: 3,
+            ..GOOD
+        };
+        trial.crashes = vec![(victim.0, CRASH_MS, None)];
+        let threads = Executor::Kameo { threads: 2 };
+        let threads = run_on(&trial, threads, None, Places::default());
+        let inline = run(&trial);
+        assert_eq!(inline.0.takeovers, 1);
+        assert_eq!(threads, inline);
+    }
 }
 
 #[test]
-fn only_the_papers_policy_takes_over() {
+fn only_nodes_that_decide_as_they_go_are_replaced() {
     let mut network = NetworkConfig {
         takeover_after: Some(3),
         ..NetworkConfig::default()
     };
     assert!(network.check().is_ok());
     network.policy = Policy::Complete;
+    assert!(network.check().is_ok());
+    network.policy = Policy::Reference;
     let text = network.check().unwrap_err().to_string();
     assert_eq!(
         text,
-        "network.takeover_after is for the policy paper; leave it out"
+        "network.takeover_after is for the policies paper and complete; leave it out"
     );
     network.takeover_after = Some(0);
     let text = network.check().unwrap_err().to_string();
@@ -345,7 +374,7 @@ fn only_the_papers_policy_takes_over() {
 #[test]
 fn a_line_is_a_clique_and_its_first_reaches_the_most() {
     for seed in 1..=5 {
-        let (_, map, sensors) = world(&crater(seed));
+        let (_, map, sensors) = world(&crater(Policy::Paper, seed));
         for (home, line) in sensors.nodes().zip(lines(&map, &sensors)) {
             assert_eq!(line[0], home);
             for m in sensors.nodes() {
@@ -382,8 +411,11 @@ fn trial() -> impl Strategy<Value = Trial> {
     let unheard = prop::collection::vec(cut, 0..3);
     let back = prop_oneof![Just(None), (100..20_000u64).prop_map(Some)];
     let crashes = prop::collection::vec((0..10u32, 500..40_000u64, back), 0..5);
-    (size, link, unheard, crashes, 1..5u32).prop_map(|(size, link, unheard, crashes, after)| {
+    let rest = (1..5u32, prop::sample::select(&POLICIES));
+    (size, link, unheard, crashes, rest).prop_map(|(size, link, unheard, crashes, rest)| {
+        let (after, policy) = rest;
         Trial {
+            policy,
             seed: size.0,
             grid: Some((size.1, size.2)),
             nodes: size.3.min(size.1 * size.2),
@@ -418,18 +450,62 @@ proptest! {
     }
 }
 
+/// A team of the crater of which nodes fail for good, or are unheard for a while, over links that lose and
+/// delay.
+fn failures() -> impl Strategy<Value = Trial> {
+    let link = (0.0..0.3, prop_oneof![Just(0u64), 0..800u64], 0.0..0.2);
+    let crashes = prop::collection::vec((0..28u32, 300..30_000u64), 1..3);
+    let unheard = prop::collection::vec((0..28u32, (1..25u64, 5..30u64)), 0..2);
+    (1..1000u64, link, crashes, unheard).prop_map(|(seed, link, crashes, unheard)| Trial {
+        rovers: 20,
+        link: Bad {
+            loss: link.0,
+            jitter_ms: link.1,
+            duplicates: link.2,
+            outage_s: (0, 0),
+        },
+        crashes: crashes.into_iter().map(|(n, at)| (n, at, None)).collect(),
+        unheard: unheard
+            .into_iter()
+            .map(|(n, (from, lasts))| (n, (from, from + lasts)))
+            .collect(),
+        after: Some(8),
+        cycle_limit: 3000,
+        ..crater(Policy::Complete, seed)
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all arrive.
+    #[test]
+    fn all_arrive_whoever_fails(trial in failures()) {
+        let (metrics, report) = run(&trial);
+        prop_assert_eq!(
+            (metrics.arrived, metrics.collisions),
+            (trial.rovers, 0),
+            "{} {:?}", report.end.detail(), metrics.taken_over
+        );
+    }
+}
+
 /// Whether one of many small runs with this fault shows a collision: a node that others do not hear,
 /// and rovers do.
-fn collides_with(sabotage: Sabotage) -> bool {
+fn collides_with(policy: Policy, sabotage: Sabotage) -> bool {
     (1..=200).any(|seed| {
         let trial = Trial {
-            rovers: 10,
+            rovers: 20,
             nodes: 3,
             grid: Some((5, 4)),
-            unheard: vec![((seed % 3) as u32, (4, 60))],
+            link: Bad {
+                jitter_ms: 700,
+                ..GOOD
+            },
+            unheard: vec![((seed % 3) as u32, (6, 60))],
             cycle_limit: 100,
             sabotage,
-            ..crater(seed)
+            ..crater(policy, seed)
         };
         run(&trial).0.collisions > 0
     })
@@ -437,17 +513,29 @@ fn collides_with(sabotage: Sabotage) -> bool {
 
 #[test]
 fn the_same_runs_without_a_fault_show_none() {
-    assert!(!collides_with(Sabotage::None));
+    assert!(
+        !POLICIES
+            .iter()
+            .any(|&policy| collides_with(policy, Sabotage::None))
+    );
 }
 
 /// The monitor notices if rovers obey a node that is replaced.
 #[test]
 fn ignoring_fences_is_noticed() {
-    assert!(collides_with(Sabotage::IgnoreFences));
+    assert!(
+        POLICIES
+            .iter()
+            .all(|&policy| collides_with(policy, Sabotage::IgnoreFences))
+    );
 }
 
 /// And if a deputy opens vertices without asking who is there.
 #[test]
 fn forgetting_accounts_is_noticed() {
-    assert!(collides_with(Sabotage::ForgetAccounts));
+    assert!(
+        POLICIES
+            .iter()
+            .all(|&policy| collides_with(policy, Sabotage::ForgetAccounts))
+    );
 }

@@ -58,7 +58,7 @@ impl Registry {
             return;
         }
         let goal = desk.site.missions[walk.rover.0 as usize].1;
-        for &vertex in desk.site.sensors.owned(desk.node) {
+        for &vertex in desk.site.sensors.owned(desk.home) {
             let Some(visit) = self.book.standing(vertex) else {
                 continue;
             };

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::{Applicant, Desk, Offers, Registry, owners};
+use super::{Desk, Offers, Registry, owners};
 use crate::network::messages::RoverId;
 use crate::network::reservation::book::{Clash, Visit};
 use crate::network::reservation::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Yield};
@@ -31,7 +31,7 @@ impl Registry {
         let site = desk.site;
         let borders = |label: &Label| {
             let onward = site.roadmap.neighbors(label.vertex);
-            site.sensors.owner(label.vertex) == desk.node
+            site.sensors.owner(label.vertex) == desk.home
                 && onward.iter().any(|&v| site.sensors.owner(v) == next)
         };
         let frontier = frontier(&labels, borders);
@@ -127,6 +127,7 @@ impl Registry {
                     first_step,
                     way,
                     at,
+                    replaced: Vec::new(),
                 };
                 self.reserve(desk, reserve);
             }
@@ -143,22 +144,40 @@ impl Registry {
         }
     }
 
-    /// Enters this node's part of a way, from the back.
+    /// Enters this home's part of a way, from the back.
     pub(super) fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
+        if desk.may_be_replaced() && self.is_taken(desk, &reserve) {
+            return;
+        }
         self.book.strike_earlier(&reserve.walk);
+        self.succession.close(|open| open.is_before(&reserve.walk));
         let hi = reserve.at as usize;
-        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.node;
+        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.home;
         let part = reserve.way[..=hi]
             .iter()
             .rev()
             .take_while(|visit| mine(visit))
             .count();
         let lo = hi + 1 - part;
+        let walk = reserve.walk;
+        if lo == 0 && desk.may_be_replaced() {
+            if self.succession.is_proposed(&walk) {
+                return;
+            }
+            // Given up meanwhile, because somebody was replaced.
+            if !self.applicants.iter().any(|a| a.is_on(&walk)) {
+                self.release(desk, &reserve, lo);
+                return;
+            }
+        }
         // A rover that stands on the map has its first vertex already.
         let stands = lo == 0 && desk.site.stays;
         let first = lo + usize::from(stands);
-        match self.book.check(&reserve.walk, &reserve.way[first..=hi]) {
-            Ok(()) => {}
+        // What was passed on to a home that is replaced may come a second time.
+        let again = desk.may_be_replaced() && self.book.has(&walk, &reserve.way[first..=hi]);
+        match self.book.check(&walk, &reserve.way[first..=hi]) {
+            _ if again => {}
+            Ok(()) => self.enter(&reserve, first, hi),
             Err(Clash::Younger) => {
                 self.parked.push(reserve);
                 return;
@@ -168,7 +187,24 @@ impl Registry {
                 return;
             }
         }
-        for i in first..=hi {
+        reserve.replaced.extend(desk.replacement());
+        if lo > 0 {
+            reserve.at = lo as u32 - 1;
+            if desk.may_be_replaced() {
+                self.succession.pass(&reserve);
+            }
+            let to = desk.site.sensors.owner(reserve.way[lo - 1].vertex);
+            self.post(to, Item::Reserve(reserve));
+        } else if desk.may_be_replaced() {
+            self.propose(reserve);
+        } else {
+            self.confirm(desk, &reserve);
+        }
+    }
+
+    /// Enters visits `first` to `last` of a way, tentatively.
+    fn enter(&mut self, reserve: &Reserve, first: usize, last: usize) {
+        for i in first..=last {
             let TimedVisit { vertex, start, end } = reserve.way[i];
             let visit = Visit {
                 walk: reserve.walk,
@@ -176,24 +212,21 @@ impl Registry {
                 from: i.checked_sub(1).map(|before| reserve.way[before].vertex),
                 start,
                 end,
-                confirmed: lo == 0,
+                confirmed: false,
                 granted: false,
             };
             self.book.enter(vertex, visit);
         }
-        if lo > 0 {
-            reserve.at = lo as u32 - 1;
-            let to = desk.site.sensors.owner(reserve.way[lo - 1].vertex);
-            self.post(to, Item::Reserve(reserve));
-            return;
-        }
-        // The whole way is entered: from here on it holds.
-        self.book.confirm(&reserve.walk);
-        if stands {
+    }
+
+    /// The whole way is entered: from here on it holds.
+    pub(super) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
+        self.settled(desk, &reserve.walk, Verdict::Confirmed);
+        if desk.site.stays {
             let TimedVisit { vertex, end, .. } = reserve.way[0];
             self.book.leave_by(vertex, end);
         }
-        self.served(desk, &reserve);
+        self.served(desk, reserve);
         self.return_later(desk, &reserve.walk);
         let settle = Settle {
             walk: reserve.walk,
@@ -205,30 +238,44 @@ impl Registry {
         self.unpark(desk);
     }
 
-    /// The first part of the way, from visit `lo` on, cannot be entered.
-    pub(super) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
-        let route = owners(desk, &reserve.way);
-        let at = owners(desk, &reserve.way[..=lo]).len() as u32 - 1;
-        let walk = reserve.walk;
+    /// What this home has of a walk holds, or is struck out.
+    fn settled(&mut self, desk: &Desk<'_>, walk: &Walk, verdict: Verdict) {
+        match verdict {
+            Verdict::Confirmed => self.book.confirm(walk),
+            _ => self.book.strike(walk),
+        }
+        if desk.may_be_replaced() {
+            self.succession.close(|open| open == walk);
+            if verdict == Verdict::Confirmed {
+                self.succession.take(*walk);
+            }
+        }
+    }
+
+    /// Strikes out all of a way that was entered, from visit `lo` on.
+    pub(super) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         let released = Settle {
-            walk,
+            walk: reserve.walk,
             verdict: Verdict::Released,
-            route: route.clone(),
-            at,
+            route: owners(desk, &reserve.way),
+            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
         };
         self.forward(released);
-        // A route may pass this node twice.
-        self.book.strike(&walk);
+        // A route may pass this home twice.
+        self.settled(desk, &reserve.walk, Verdict::Released);
         self.unpark(desk);
-        self.fail(
-            desk,
-            Settle {
-                walk,
-                verdict: Verdict::Failed,
-                route,
-                at,
-            },
-        );
+    }
+
+    /// The first part of the way, from visit `lo` on, cannot be entered.
+    pub(super) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+        self.release(desk, reserve, lo);
+        let failed = Settle {
+            walk: reserve.walk,
+            verdict: Verdict::Failed,
+            route: owners(desk, &reserve.way),
+            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
+        };
+        self.fail(desk, failed);
     }
 
     pub(super) fn forward(&mut self, settle: Settle) {
@@ -246,8 +293,7 @@ impl Registry {
             return;
         }
         let walk = settle.walk;
-        let current = |a: &Applicant| a.walk.is_some_and(|(mine, _)| mine == walk);
-        let Some(at) = self.applicants.iter().position(current) else {
+        let Some(at) = self.applicants.iter().position(|a| a.is_on(&walk)) else {
             return;
         };
         let attempt = walk.attempt + 1;
@@ -268,10 +314,10 @@ impl Registry {
         match settle.verdict {
             Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
             Verdict::Confirmed => {
-                self.book.confirm(&settle.walk);
+                self.settled(desk, &settle.walk, Verdict::Confirmed);
                 self.return_later(desk, &settle.walk);
             }
-            Verdict::Released => self.book.strike(&settle.walk),
+            Verdict::Released => self.settled(desk, &settle.walk, Verdict::Released),
         }
         self.forward(settle);
         self.unpark(desk);
