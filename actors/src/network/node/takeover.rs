@@ -24,9 +24,6 @@ use crate::network::takeover::{Charter, Inquest, holder, released};
 /// By how many ways a message to a node out of radio range sets out: one of them may be lost.
 const WAYS: usize = 2;
 
-/// How often it may be passed on: as far as two ends of a ring around a node and its neighbours.
-const HOPS: u32 = 5;
-
 /// What a node knows of takeovers between two crashes; what must outlive one is in its [`Charter`].
 pub(super) struct Wards {
     /// A node is silent that was not heard for more cycles than this.
@@ -314,7 +311,8 @@ impl Node {
         }
         let passed = Passed {
             to,
-            hops: HOPS,
+            // No way is longer, and what goes round in a circle comes to an end.
+            hops: self.site.sensors.len() as u32,
             content,
         };
         self.pass_on(ctx, passed, WAYS);
