@@ -433,11 +433,11 @@ mod gaps {
             };
             for (sent, beacon) in &seen.beacons {
                 let said = beacon.whereabouts;
-                let changes = seen
+                let mut changes = seen
                     .changes
                     .iter()
                     .filter(|(time, state)| time <= sent && state.whereabouts.rover == said.rover);
-                let (since, state) = changes.last().unwrap();
+                let (since, state) = changes.next_back().unwrap();
                 if in_gap(state) {
                     assert!(since == sent && said.vertex.is_some_and(|v| sensors.covers(v)));
                 }

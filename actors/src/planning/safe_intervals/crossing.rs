@@ -254,6 +254,28 @@ mod tests {
         }
     }
 
+    /// A node that is handed a label within a crossing does not know where the crossing began but by
+    /// its labels.
+    #[test]
+    fn a_crossing_does_not_lead_back_to_where_it_began() {
+        let map = grid(2, 1, &[]);
+        let covers = |u: VertexId| u != v(1);
+        let look = |_| Some(Vec::new());
+        let ground = Ground {
+            roadmap: &map,
+            gap: 1,
+            travel: &|_, _| STEP,
+            busy: &look,
+            covers: &covers,
+        };
+        let mut labels = ground.enter(v(0), 0, STEP);
+        ground.expand(&mut labels, &[0]);
+        let places: Vec<VertexId> = labels.iter().map(|label| label.vertex).collect();
+        assert_eq!(places, [v(0), v(1)]);
+        ground.expand(&mut labels, &[1]);
+        assert_eq!(labels.len(), 2);
+    }
+
     #[test]
     fn one_sets_out_late_enough_for_the_last_vertex() {
         let map = grid(4, 1, &[]);
