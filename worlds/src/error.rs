@@ -312,13 +312,15 @@ pub enum SensorError {
     /// The search for a random placement found none.
     #[error(
         "no placement of {nodes} nodes with a radius of {radius_m} m was found in {attempts} \
-         attempts{}; the last one: {last}", advice(*radius_m, *suggested_m, last)
+         attempts{}; the last one: {last}", advice(*radius_m, *coverage_m, *suggested_m)
     )]
     NoPlacement {
         /// The nodes asked for.
         nodes: usize,
         /// The radio radius \[m\].
         radius_m: f64,
+        /// How far they were to reach rovers \[m\].
+        coverage_m: f64,
         /// The placements tried.
         attempts: usize,
         /// What was wrong with the last one.
@@ -338,8 +340,8 @@ fn list(edges: &[(VertexId, VertexId)]) -> String {
 }
 
 /// What to do about a placement that was not found.
-fn advice(radius_m: f64, suggested_m: f64, last: &SensorError) -> String {
-    if matches!(last, SensorError::Uncovered { radius_m: reach_m, .. } if *reach_m < radius_m) {
+fn advice(radius_m: f64, coverage_m: f64, suggested_m: f64) -> String {
+    if coverage_m < radius_m {
         " (a coverage nearer to the radius usually does)".to_owned()
     } else if radius_m < suggested_m {
         format!(" (a radius of {suggested_m} m usually does)")

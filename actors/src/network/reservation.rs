@@ -37,7 +37,7 @@
 //! are heard. This holds however late the team is, because planned times are never changed.
 //!
 //! *Gaps change nothing of that.* Nobody hears a rover that crosses a gap in the coverage
-//! ([`gaps`](super::gaps)), so it sets out into one only with all grants for the crossing. That is one
+//! ([`Gaps`](super::Gaps)), so it sets out into one only with all grants for the crossing. That is one
 //! claim, of all its vertices and the covered one beyond, and all these visits begin in planned time
 //! when it sets out. So the whole claim waits for visits that began earlier: its rover's one before it,
 //! and at each of its vertices the one before it in the book, which ends when that rover goes on. From a

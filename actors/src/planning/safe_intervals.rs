@@ -12,7 +12,7 @@
 //! visit after the other one has ended.
 //!
 //! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up to
-//! that of the covered vertex beyond, begin when it sets out into it. How that is searched: [`crossing`].
+//! that of the covered vertex beyond, begin when it sets out into it. How that is searched: `crossing`.
 
 mod crossing;
 

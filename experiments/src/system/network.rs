@@ -146,12 +146,11 @@ fn place(world: &WorldConfig, roadmap: &Roadmap, seed: u64) -> Result<SensorNetw
             SensorError::NodeCount { .. } => "world.nodes",
             SensorError::Radius { .. } => "world.radius",
             SensorError::Coverage { .. } => "world.coverage",
-            SensorError::NoPlacement { ref last, .. }
-                if world.coverage_m.is_some()
-                    && matches!(**last, SensorError::Uncovered { .. }) =>
-            {
-                "world.coverage"
-            }
+            SensorError::NoPlacement {
+                radius_m,
+                coverage_m,
+                ..
+            } if coverage_m < radius_m => "world.coverage",
             // Which of the two to change is the user's choice; the message suggests a radius.
             _ if world.radius_m.is_some() => "world.radius",
             _ => "world.nodes",

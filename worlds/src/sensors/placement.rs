@@ -93,6 +93,7 @@ impl SensorNetwork {
         Err(SensorError::NoPlacement {
             nodes,
             radius_m,
+            coverage_m,
             attempts,
             last,
             suggested_m,
