@@ -7,8 +7,8 @@ use std::sync::Arc;
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, Network, NetworkConfig, NetworkMetrics, Policy, TeamConfig, WorldConfig, assemble,
-    assemble_standing, missions,
+    Deadlock, Gaps, Network, NetworkConfig, NetworkMetrics, Policy, TeamConfig, WorldConfig,
+    assemble, assemble_standing, missions,
 };
 use farside_actors::planning::{Mission, Order, Problem, Rules, reference};
 use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};
@@ -91,6 +91,7 @@ fn standing(
     };
     let network = assemble_standing(
         &mut sim,
+        &WorldConfig::default(),
         Arc::new(roadmap),
         Arc::new(sensors),
         tasks,
@@ -167,6 +168,38 @@ fn nodes_and_rovers_that_crash_and_come_back() {
     }
     sim.run(Executor::Inline).unwrap();
     all_arrive(&network.metrics());
+}
+
+/// A third of the vertices is out of everybody's hearing.
+#[test]
+fn a_team_crosses_gaps_over_lossy_links_and_past_crashes() {
+    let world = WorldConfig {
+        coverage_m: Some(50.0),
+        gaps: Gaps::Cross,
+        ..WorldConfig::default()
+    };
+    let radio = Radio {
+        latency_ms: 5,
+        loss: 0.2,
+    };
+    let (mut sim, network) = queued(&world, 60, 2, radio, &config(Policy::Complete));
+    let at = |tenths: u64| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
+    for (i, name) in (0..).zip(network.node_names()) {
+        network.crash_at(&mut sim, at(1 + 9 * i), name).unwrap();
+        network.restart_at(&mut sim, at(60 + 9 * i), name).unwrap();
+    }
+    for (i, name) in (0..).zip(network.rover_names()).step_by(3) {
+        network.crash_at(&mut sim, at(100 + 7 * i), name).unwrap();
+        network.restart_at(&mut sim, at(180 + 7 * i), name).unwrap();
+    }
+    sim.run(Executor::Inline).unwrap();
+    let metrics = network.metrics();
+    let roadmap = Roadmap::builtin(world.roadmap.name()).unwrap();
+    let gaps = world.place(&roadmap, 2).unwrap().gaps().len();
+    assert!(gaps * 10 > roadmap.len(), "{gaps} gaps");
+    assert!(metrics.arrived > 20, "{:?}", metrics.standstill);
+    let done = (metrics.arrived + metrics.refused, metrics.collisions);
+    assert_eq!(done, (60, 0), "{:?}", metrics.standstill);
 }
 
 #[test]

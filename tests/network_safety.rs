@@ -7,10 +7,10 @@
 use std::cell::Cell;
 
 use farside::prelude::*;
-use farside_actors::invariants::strategies::{Bounds, cases, cut_grid};
+use farside_actors::invariants::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
 use farside_actors::invariants::{Case, Downtime};
 use farside_actors::network::{
-    Deadlock, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
+    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
 };
 use farside_experiments::scenario::Scenario;
 use farside_experiments::system::{Files, Registry, Results};
@@ -54,6 +54,17 @@ fn any_policy() -> impl Strategy<Value = Case> {
         case.network.junction_resolution = resolution;
         with_policy(case, policy)
     })
+}
+
+/// The `complete` policy, with a monitor that waits.
+fn patient() -> NetworkConfig {
+    NetworkConfig {
+        policy: Policy::Complete,
+        passive_window: 2000,
+        active_window: 4000,
+        cycle_limit: 20_000,
+        ..NetworkConfig::default()
+    }
 }
 
 /// Phases that do not stretch with latency, so that messages come cycles late.
@@ -111,15 +122,49 @@ proptest! {
         ..Bounds::default()
     })) {
         let mut case = case;
-        case.network = NetworkConfig {
-            policy: Policy::Complete,
-            passive_window: 2000,
-            active_window: 4000,
-            cycle_limit: 20_000,
-            ..NetworkConfig::default()
-        };
+        case.network = patient();
         let (metrics, report) = run(&case);
         prop_assert!(metrics.completed, "{}", report.end.detail());
+        prop_assert_eq!(metrics.collisions, 0);
+    }
+}
+
+fn any_gaps() -> impl Strategy<Value = Case> {
+    let with = |gaps, policy| {
+        let cases = cases_with_gaps(Bounds::default(), gaps);
+        cases.prop_map(move |case| with_policy(case, policy))
+    };
+    prop_oneof![
+        with(Gaps::Close, Policy::Paper),
+        with(Gaps::Close, Policy::Complete),
+        with(Gaps::Cross, Policy::Complete),
+    ]
+}
+
+proptest! {
+    #![proptest_config(config(192))]
+
+    #[test]
+    fn rovers_never_collide_in_gaps_or_beside_them(case in any_gaps()) {
+        prop_assert_eq!(run(&case).0.collisions, 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(config(96))]
+
+    /// Liveness with gaps, which only some of the links' faults reach: nobody waits before one for ever.
+    #[test]
+    fn all_that_have_a_way_cross_gaps_and_arrive(case in cases_with_gaps(Bounds {
+        loss_percent: 50,
+        latency: SimDuration::from_millis(1500),
+        ..Bounds::default()
+    }, Gaps::Cross)) {
+        let mut case = case;
+        case.network = patient();
+        let (metrics, report) = run(&case);
+        let done = metrics.arrived + metrics.refused;
+        prop_assert_eq!(done, metrics.rovers, "{}", report.end.detail());
         prop_assert_eq!(metrics.collisions, 0);
     }
 }
@@ -144,7 +189,9 @@ proptest! {
     #![proptest_config(config(48))]
 
     #[test]
-    fn what_a_case_prints_is_a_scenario_that_does_the_same(case in any_policy()) {
+    fn what_a_case_prints_is_a_scenario_that_does_the_same(
+        case in prop_oneof![any_policy(), any_gaps()],
+    ) {
         let mut case = case;
         case.network.cycle_limit = 25;
         let (metrics, report) = run(&case);

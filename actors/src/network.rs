@@ -62,7 +62,7 @@
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
 //! `max_plus`, `assignment`; how long it takes: `processor`, `timing`; how long an edge takes: `motion`.
 //! The protocol: [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet),
-//! `takeover` (who answers for a node that has fallen silent), `node` and `rover` (the actors).
+//! `takeover` (who answers for a node that has fallen silent), `gaps` (where nobody hears a rover), `node` and `rover` (the actors).
 //! Outside both: `monitor`.
 
 mod assemble;
@@ -70,6 +70,7 @@ mod assignment;
 mod candidates;
 mod config;
 mod corridors;
+mod gaps;
 mod lng;
 mod max_plus;
 pub mod messages;
@@ -96,6 +97,7 @@ pub use config::{
     ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
     WorldConfig,
 };
+pub use gaps::Gaps;
 pub use metrics::{Deadlock, NetworkMetrics};
 pub use node::Node;
 pub use processor::Processor;

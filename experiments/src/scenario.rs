@@ -158,7 +158,7 @@ pub struct Assembled {
     pub files: Files,
     /// The contacts of its links, if the scenario has a plan.
     pub contacts: Option<LinkContacts>,
-    /// What became of the files that other programs wrote, a line at a time, for people.
+    /// What became of the files that other programs wrote, and of the world, a line at a time, for people.
     pub notes: Vec<String>,
     /// What the scenario says of links that has no effect, for people.
     pub remarks: Vec<String>,
@@ -347,9 +347,11 @@ impl Scenario {
             files: &mut files,
             goal: None,
             scene: None,
+            notes: Vec::new(),
         };
         let conclude = self.settings.assemble(&mut setup);
         let (goal, scene) = (setup.goal, setup.scene);
+        notes.extend(setup.notes);
         let conclude = conclude.map_err(wrong)?;
         self.check_places(&sim)?;
         let remarks = links.remarks().into_iter();

@@ -78,6 +78,8 @@ pub struct Setup<'a> {
     pub goal: Option<Goal>,
     /// Draws the run for viewers; a system that can sets it.
     pub scene: Option<Box<dyn Scene>>,
+    /// What people may want to know of the world that is built, a line at a time.
+    pub notes: Vec<String>,
 }
 
 /// What a run is to achieve, in units that can be counted while it lasts.

@@ -262,6 +262,12 @@ pub enum SensorError {
         /// The radius found \[m\].
         actual_m: f64,
     },
+    /// How far nodes reach rovers is not a positive finite number.
+    #[error("the coverage must be a positive number of metres; it is {actual_m}")]
+    Coverage {
+        /// The coverage found \[m\].
+        actual_m: f64,
+    },
     /// A node's position is not a finite number within the limit.
     #[error("node {} lies at ({x_m} m, {y_m} m); coordinates must be within +-{limit_m} m", node.0)]
     Position {
@@ -288,7 +294,7 @@ pub enum SensorError {
     Uncovered {
         /// All such vertices, sorted.
         vertices: Vec<VertexId>,
-        /// The radio radius \[m\].
+        /// How far nodes reach: the radio radius, or the coverage \[m\].
         radius_m: f64,
     },
     /// Owners of the ends of an edge are out of each other's radio range, so that no rover could be
@@ -306,13 +312,15 @@ pub enum SensorError {
     /// The search for a random placement found none.
     #[error(
         "no placement of {nodes} nodes with a radius of {radius_m} m was found in {attempts} \
-         attempts{}; the last one: {last}", advice(*radius_m, *suggested_m)
+         attempts{}; the last one: {last}", advice(*radius_m, *coverage_m, *suggested_m)
     )]
     NoPlacement {
         /// The nodes asked for.
         nodes: usize,
         /// The radio radius \[m\].
         radius_m: f64,
+        /// How far they were to reach rovers \[m\].
+        coverage_m: f64,
         /// The placements tried.
         attempts: usize,
         /// What was wrong with the last one.
@@ -332,8 +340,10 @@ fn list(edges: &[(VertexId, VertexId)]) -> String {
 }
 
 /// What to do about a placement that was not found.
-fn advice(radius_m: f64, suggested_m: f64) -> String {
-    if radius_m < suggested_m {
+fn advice(radius_m: f64, coverage_m: f64, suggested_m: f64) -> String {
+    if coverage_m < radius_m {
+        " (a coverage nearer to the radius usually does)".to_owned()
+    } else if radius_m < suggested_m {
         format!(" (a radius of {suggested_m} m usually does)")
     } else {
         " (fewer nodes usually do)".to_owned()

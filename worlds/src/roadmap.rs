@@ -5,6 +5,7 @@
 //! [`crate::sensors`].
 
 mod check;
+mod closed;
 mod endpoints;
 mod file;
 mod well_formed;
@@ -113,7 +114,11 @@ impl Roadmap {
         for list in &mut neighbors {
             list.sort_unstable();
         }
-        let hops = all_hops(&neighbors)?;
+        let hops = all_hops(&neighbors);
+        if let Some(at) = hops.iter().position(|&hop| hop == NO_WAY) {
+            let unreachable = VertexId((at % positions_m.len()) as u32);
+            return Err(RoadmapError::Disconnected { unreachable });
+        }
         let diameter = hops.iter().copied().max().map_or(0, u32::from);
         sort_round_the_rim(&positions_m, &mut boundary);
         let heights_m = vec![0.0; positions_m.len()];
@@ -195,7 +200,8 @@ impl Roadmap {
         &self.boundary
     }
 
-    /// The fewest edges between `u` and `v`.
+    /// The fewest edges between `u` and `v`; [`Roadmap::UNREACHABLE`] if none lead there, which only
+    /// happens where vertices are closed ([`Roadmap::without`]).
     pub fn distance(&self, u: VertexId, v: VertexId) -> u32 {
         assert!(
             (v.0 as usize) < self.len(),
@@ -206,13 +212,16 @@ impl Roadmap {
         u32::from(self.hops[u.0 as usize * self.len() + v.0 as usize])
     }
 
-    /// The largest distance between two vertices.
+    /// The largest distance between two vertices, of those that have one.
     pub fn diameter(&self) -> u32 {
         self.diameter
     }
 
     /// A path of fewest edges from `u` to `v`, both included; of several, the one whose vertices
     /// come first in order (each step goes to the lowest vertex that is nearer to `v`).
+    ///
+    /// # Panics
+    /// Also when none leads there.
     pub fn shortest_path(&self, u: VertexId, v: VertexId) -> Vec<VertexId> {
         let mut path = Vec::with_capacity(self.distance(u, v) as usize + 1);
         let mut here = u;
@@ -223,17 +232,20 @@ impl Roadmap {
                 .neighbors(here)
                 .iter()
                 .find(|&&w| self.distance(w, v) + 1 == left);
-            here = *next.expect("in a connected graph some neighbour is nearer");
+            here = *next.expect("where a path leads there some neighbour is nearer");
             path.push(here);
         }
         path
     }
 }
 
+/// Marks a pair without a path.
+const NO_WAY: u16 = u16::MAX;
+
 /// Hops between all pairs, row by row, by a breadth-first search from each vertex.
-fn all_hops(neighbors: &[Vec<VertexId>]) -> Result<Vec<u16>, RoadmapError> {
+fn all_hops(neighbors: &[Vec<VertexId>]) -> Vec<u16> {
     let n = neighbors.len();
-    let mut hops = vec![u16::MAX; n * n];
+    let mut hops = vec![NO_WAY; n * n];
     let mut queue = VecDeque::new();
     for (source, row) in hops.chunks_exact_mut(n).enumerate() {
         row[source] = 0;
@@ -241,19 +253,14 @@ fn all_hops(neighbors: &[Vec<VertexId>]) -> Result<Vec<u16>, RoadmapError> {
         while let Some(u) = queue.pop_front() {
             for v in &neighbors[u] {
                 let v = v.0 as usize;
-                if row[v] == u16::MAX {
+                if row[v] == NO_WAY {
                     row[v] = row[u] + 1;
                     queue.push_back(v);
                 }
             }
         }
-        if let Some(unreachable) = row.iter().position(|&hop| hop == u16::MAX) {
-            return Err(RoadmapError::Disconnected {
-                unreachable: VertexId(unreachable as u32),
-            });
-        }
     }
-    Ok(hops)
+    hops
 }
 
 /// Sorts the boundary by angle round the mean of all positions, equal angles by vertex.

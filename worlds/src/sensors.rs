@@ -1,9 +1,10 @@
 //! Sensor networks: static radio nodes that divide a roadmap among themselves.
 //!
 //! This file holds a network, its checks and who owns what; the search for a random one is in
-//! `placement`. What the nodes compute and send is no affair of this crate, and neither is the
+//! `placement`, how far nodes reach rovers in `coverage`. What the nodes compute and send is no affair of this crate, and neither is the
 //! radio: here two nodes are neighbours when they are within one radius of each other.
 
+mod coverage;
 mod placement;
 
 use nalgebra::Point2;
@@ -28,7 +29,8 @@ pub struct NodeId(pub u32);
 /// nearest to it; nodes within the radius of each other are neighbours. Immutable.
 ///
 /// Every network here keeps four promises: it is connected, every node owns a vertex, every vertex
-/// is within the radius of its owner ("coverage of all roadmap vertices", section 4), and it is
+/// is within the radius of its owner ("coverage of all roadmap vertices", section 4; rovers may be
+/// reached less far, see [`SensorNetwork::with_coverage`]), and it is
 /// **consistent with the roadmap**: the owners of the two ends of every edge are the same node or
 /// neighbours, so that a rover is never handed over out of radio range. The last one is not in the
 /// paper; without it rovers stand at such edges for ever.
@@ -48,6 +50,10 @@ pub struct SensorNetwork {
     neighbors: Vec<Vec<NodeId>>,
     owners: Vec<NodeId>,
     owned: Vec<Vec<VertexId>>,
+    /// How far a node reaches rovers; as far as nodes, if nothing else is said.
+    coverage_m: f64,
+    /// Vertices out of it, sorted.
+    gaps: Vec<VertexId>,
 }
 
 impl SensorNetwork {
@@ -101,6 +107,8 @@ impl SensorNetwork {
             neighbors,
             owners,
             owned,
+            coverage_m: radius_m,
+            gaps: Vec::new(),
         };
         network.check(roadmap)?;
         Ok(network)
@@ -111,11 +119,7 @@ impl SensorNetwork {
             return Err(SensorError::Idle { node });
         }
         let radius_m = self.radius_m;
-        let far = |&v: &VertexId| {
-            let reach = self.position_m(self.owner(v)) - roadmap.position_m(v);
-            reach.norm_squared() > radius_m * radius_m
-        };
-        let vertices: Vec<VertexId> = roadmap.vertices().filter(far).collect();
+        let vertices = self.beyond(roadmap, radius_m);
         if !vertices.is_empty() {
             return Err(SensorError::Uncovered { vertices, radius_m });
         }

@@ -17,14 +17,14 @@
 //! # }
 //! ```
 
-use farside::SimDuration;
+use farside::{SimDuration, Simulation};
 use farside_worlds::{Endpoints, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point2;
 use proptest::prelude::*;
 
 use super::case::{Case, Downtime};
 use crate::link::{Degrade, LinkOverrides, LinkParams};
-use crate::network::{TeamConfig, WorldConfig};
+use crate::network::{Gaps, Policy, TeamConfig, WorldConfig};
 
 /// How large and how bad cases may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -289,6 +289,37 @@ pub fn cases(bounds: Bounds) -> impl Strategy<Value = Case> {
             crash: crash.collect(),
             ..Case::default()
         }
+    })
+}
+
+/// The same with nodes that reach rovers less far, so that up to two thirds of the vertices are gaps,
+/// closed or crossed; at least half of the rovers keep a way. They shrink to no gaps.
+///
+/// # Panics
+/// The strategy, when `gaps` is [`Gaps::Refuse`].
+pub fn cases_with_gaps(bounds: Bounds, gaps: Gaps) -> impl Strategy<Value = Case> {
+    assert!(gaps != Gaps::Refuse, "then there are none");
+    (cases(bounds), 0..=66u32).prop_map(move |(mut case, uncovered)| {
+        case.world.gaps = gaps;
+        if gaps == Gaps::Cross {
+            case.network.policy = Policy::Complete;
+        }
+        let map = case.roadmap().expect("it is written out");
+        let sensors = case.world.place(&map, case.seed).expect("it was feasible");
+        let reach_m = |v| (sensors.position_m(sensors.owner(v)) - map.position_m(v)).norm();
+        let mut reaches_m: Vec<f64> = map.vertices().map(reach_m).collect();
+        reaches_m.sort_by(f64::total_cmp);
+        let first = map.len() - 1 - map.len() * uncovered as usize / 100;
+        for reach_m in &reaches_m[first.min(map.len() - 1)..] {
+            // Whole metres are easier to read, and none is farther than the last.
+            case.world.coverage_m = Some(libm::ceil(*reach_m).max(1.0));
+            let system = case.assemble(&mut Simulation::new(case.seed));
+            let refused = system.map(|system| system.refused().len() as u32);
+            if refused.is_ok_and(|refused| 2 * refused <= case.team.rovers) {
+                break;
+            }
+        }
+        case
     })
 }
 

@@ -10,6 +10,7 @@ use nalgebra::Point3;
 
 use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
 use super::corridors::Corridors;
+use super::gaps::{self, Refused};
 use super::lng::LocalGraph;
 use super::messages::RoverId;
 use super::metrics::NetworkMetrics;
@@ -53,6 +54,21 @@ pub enum NetworkError {
         what: &'static str,
         /// Where.
         vertex: VertexId,
+    },
+    /// Vertices are out of the nodes' coverage where none may be.
+    #[error("no node covers {} vertices: {}; world.gaps says what becomes of them", .vertices.len(), listed(.vertices))]
+    Uncovered {
+        /// The vertices.
+        vertices: Vec<VertexId>,
+    },
+    /// Only walks reserve crossings.
+    #[error("gaps can be crossed with network.policy = \"complete\" only; close them, or use that")]
+    CannotCross,
+    /// Gaps leave rovers without a way: all of them, or some that stand on the map.
+    #[error("{}", .all.join("; "))]
+    Refused {
+        /// A sentence for each.
+        all: Vec<String>,
     },
     /// A vertex that the roadmap does not have.
     #[error("a rover's {what} is vertex {}, which the roadmap does not have", .vertex.0)]
@@ -102,8 +118,15 @@ pub enum NetworkError {
     },
 }
 
+/// `3, 7`.
+fn listed(vertices: &[VertexId]) -> String {
+    let all: Vec<String> = vertices.iter().map(VertexId::to_string).collect();
+    all.join(", ")
+}
+
 /// What all nodes and rovers of a run know from the start, and what does not change.
 pub(crate) struct Site {
+    /// What rovers may use of it.
     pub(crate) roadmap: Arc<Roadmap>,
     pub(crate) sensors: Arc<SensorNetwork>,
     pub(crate) config: NetworkConfig,
@@ -130,6 +153,8 @@ pub(crate) struct Site {
     pub(crate) schedule: Option<Schedule>,
     /// Who waits at each entry, in order.
     pub(crate) queues: Vec<(VertexId, Vec<RoverId>)>,
+    /// Who never enters, ascending.
+    pub(crate) refused: Vec<Refused>,
 }
 
 impl Site {
@@ -149,6 +174,13 @@ impl Site {
     pub(crate) fn queue(&self, entry: VertexId) -> &[RoverId] {
         let at = self.queues.binary_search_by_key(&entry, |queue| queue.0);
         at.map_or(&[], |at| &self.queues[at].1)
+    }
+
+    /// Whether a rover has no way, and stays out.
+    pub(crate) fn is_refused(&self, rover: RoverId) -> bool {
+        self.refused
+            .binary_search_by_key(&rover, |r| r.rover)
+            .is_ok()
     }
 
     /// Where a vertex is, on the ground, in the world's frame [m].
@@ -196,12 +228,12 @@ pub type Connect<'a> = dyn FnMut(&mut Simulation, (HostId, &str), (HostId, &str)
 /// both directions between neighbouring nodes and between each node and each rover; and the
 /// monitor, which ends the run. `seed` decides entries and goals.
 ///
-/// `roadmap` and `sensors` are what `world` describes; of `world` itself only the endpoints are
-/// read here.
+/// `roadmap` and `sensors` are what `world` describes; of `world` itself only the endpoints and what
+/// becomes of gaps are read here.
 ///
 /// # Errors
-/// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, or the
-/// roadmap's boundary has no two places to drive between.
+/// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, the
+/// roadmap's boundary has no two places to drive between, or gaps are not as they may be.
 #[allow(clippy::too_many_arguments, reason = "each is a part of a scenario")]
 pub fn assemble(
     sim: &mut Simulation,
@@ -214,17 +246,22 @@ pub fn assemble(
     connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
     let missions = missions(world, &roadmap, team, seed)?;
-    assemble_missions(sim, roadmap, sensors, missions, false, network, connect)
+    let drivers = Drivers {
+        missions,
+        stays: false,
+    };
+    assemble_missions(sim, world, roadmap, sensors, drivers, network, connect)
 }
 
 /// The same with the missions given, for rovers that stand on the map from the start and stay at
 /// their goals: each rover's start and goal, no two starts and no two goals alike.
 ///
 /// # Errors
-/// When a setting makes no sense, the team is empty, or two rovers would share a vertex at the start
-/// or the end.
+/// When a setting makes no sense, the team is empty, two rovers would share a vertex at the start or
+/// the end, or gaps leave a rover without a way.
 pub fn assemble_standing(
     sim: &mut Simulation,
+    world: &WorldConfig,
     roadmap: Arc<Roadmap>,
     sensors: Arc<SensorNetwork>,
     missions: Vec<(VertexId, VertexId)>,
@@ -243,15 +280,25 @@ pub fn assemble_standing(
             return Err(NetworkError::Outside { what, vertex });
         }
     }
-    assemble_missions(sim, roadmap, sensors, missions, true, network, connect)
+    let drivers = Drivers {
+        missions,
+        stays: true,
+    };
+    assemble_missions(sim, world, roadmap, sensors, drivers, network, connect)
+}
+
+/// Who drives from where to where.
+struct Drivers {
+    missions: Vec<(VertexId, VertexId)>,
+    stays: bool,
 }
 
 fn assemble_missions(
     sim: &mut Simulation,
+    world: &WorldConfig,
     roadmap: Arc<Roadmap>,
     sensors: Arc<SensorNetwork>,
-    missions: Vec<(VertexId, VertexId)>,
-    stays: bool,
+    Drivers { missions, stays }: Drivers,
     network: &NetworkConfig,
     connect: &mut Connect<'_>,
 ) -> Result<Network, NetworkError> {
@@ -259,18 +306,29 @@ fn assemble_missions(
     if missions.is_empty() {
         return Err(NetworkError::NoRovers);
     }
+    world.gaps.check(&sensors, network.policy)?;
+    let roadmap = world.open_part(&roadmap, &sensors);
+    let refused = gaps::refused(&roadmap, &sensors, &missions);
+    let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
     let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
     if !stays {
-        for (id, (entry, _)) in (0..).map(RoverId).zip(&missions) {
+        let all = (0..).map(RoverId).zip(&missions);
+        for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
             queues.entry(*entry).or_default().push(id);
         }
     }
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
+    gaps::check_refused(&refused, &rover_names, stays)?;
     declare_links(sim, &sensors, (&node_names, &rover_names), connect);
     let timing = timing(&roadmap, network, sim.slowest_link())?;
     let longest_step = longest_step(&roadmap, network, &timing)?;
-    let schedule = Schedule::of(network, &timing, &roadmap, &missions, stays);
+    let planned: Vec<_> = (0..)
+        .map(RoverId)
+        .zip(missions.iter().copied())
+        .filter(|(id, _)| has_way(id))
+        .collect();
+    let schedule = Schedule::of(network, &timing, &roadmap, &planned, stays);
     let lines = match network.takeover_after {
         Some(_) => takeover::lines(&roadmap, &sensors),
         None => Vec::new(),
@@ -290,6 +348,7 @@ fn assemble_missions(
         rover_names,
         config: network.clone(),
         queues: queues.into_iter().collect(),
+        refused,
         longest_step,
         roadmap,
         sensors,
@@ -550,6 +609,12 @@ impl Network {
     /// Each rover's entry and goal, in the order of the names.
     pub fn missions(&self) -> &[(VertexId, VertexId)] {
         &self.site.missions
+    }
+
+    /// The rovers that gaps leave without a way, which never enter: a sentence for each.
+    pub fn refused(&self) -> Vec<String> {
+        let sentence = |r: &Refused| r.sentence(&self.site.rover_names);
+        self.site.refused.iter().map(sentence).collect()
     }
 
     /// Crashes the node or rover called `actor` at `time`: it loses its plans, keeps what is

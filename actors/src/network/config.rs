@@ -10,6 +10,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::gaps::Gaps;
 use super::processor::Processor;
 use super::timing;
 use crate::units;
@@ -43,6 +44,17 @@ pub struct WorldConfig {
         skip_serializing_if = "Option::is_none"
     )]
     pub radius_m: Option<f64>,
+    /// How far each node reaches rovers, in metres; by default as far as nodes.
+    #[serde(
+        rename = "coverage",
+        with = "units::length_m::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub coverage_m: Option<f64>,
+    /// What becomes of vertices out of the coverage of their owners. By default there must be none, and
+    /// nodes are placed so; else they are placed as if coverage were the radius.
+    #[serde(skip_serializing_if = "Gaps::is_refuse")]
+    pub gaps: Gaps,
     /// Which boundary vertices are entries, and which exits.
     pub endpoints: Endpoints,
     /// The seed of the nodes' places; by default the run's seed.
@@ -58,6 +70,8 @@ impl Default for WorldConfig {
             tasks: None,
             nodes: 28,
             radius_m: None,
+            coverage_m: None,
+            gaps: Gaps::default(),
             endpoints: Endpoints::default(),
             placement_seed: None,
         }
@@ -147,13 +161,21 @@ impl WorldConfig {
     /// Places the nodes over `roadmap`, which is the one that [`WorldConfig::roadmap`] names.
     ///
     /// # Errors
-    /// When no network with these settings is consistent with the roadmap.
+    /// When no network with these settings is consistent with the roadmap, or it would have gaps and may
+    /// not.
     pub fn place(&self, roadmap: &Roadmap, run_seed: u64) -> Result<SensorNetwork, SensorError> {
         let nodes = self.nodes as usize;
         let default = || SensorNetwork::default_radius_m(roadmap, nodes.max(1));
         let radius_m = self.radius_m.unwrap_or_else(default);
         let seed = self.placement_seed.unwrap_or(run_seed);
-        SensorNetwork::place(roadmap, nodes, radius_m, seed)
+        let coverage_m = self.coverage_m.unwrap_or(radius_m);
+        match self.gaps {
+            Gaps::Refuse => {
+                SensorNetwork::place_covering(roadmap, nodes, radius_m, coverage_m, seed)
+            }
+            Gaps::Close | Gaps::Cross => SensorNetwork::place(roadmap, nodes, radius_m, seed)?
+                .with_coverage(roadmap, coverage_m),
+        }
     }
 }
 

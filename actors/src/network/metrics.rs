@@ -32,6 +32,11 @@ pub struct NetworkMetrics {
     pub rovers: u32,
     /// Rovers that reached their goals.
     pub arrived: u32,
+    /// Rovers that gaps in the coverage leave without a way; they never enter.
+    pub refused: u32,
+    /// Who they are, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refused_missions: Vec<String>,
     /// Every rover reached its goal.
     pub completed: bool,
     /// The team came to a standstill, see `deadlock`.

@@ -74,15 +74,18 @@ pub(crate) struct Monitor {
 impl Monitor {
     /// A monitor, and what it will write the score to.
     pub(crate) fn new(site: Arc<Site>) -> (Monitor, Arc<Mutex<Score>>) {
-        let start = |&(entry, goal): &(VertexId, VertexId)| {
-            let remaining = site.roadmap.distance(entry, goal);
+        let start = |(rover, &(entry, goal)): (RoverId, &(VertexId, VertexId))| {
+            let remaining = match site.is_refused(rover) {
+                true => 0,
+                false => site.roadmap.distance(entry, goal),
+            };
             Track {
                 remaining,
                 remaining_then: remaining,
                 ..Track::default()
             }
         };
-        let tracks: Vec<Track> = site.missions.iter().map(start).collect();
+        let tracks: Vec<Track> = (0..).map(RoverId).zip(&site.missions).map(start).collect();
         let sum = tracks.iter().map(|t| t.remaining).sum();
         let mut collisions = Collisions::new();
         for name in &site.rover_names {
@@ -207,7 +210,11 @@ impl Score {
         let gone = |rover: usize| !self.is_out(site, rover);
         if !self.ended && (0..self.tracks.len()).all(gone) {
             self.ended = true;
-            return Flow::Stop("all rovers have arrived".to_owned());
+            let all = match site.refused.is_empty() {
+                true => "all rovers have arrived",
+                false => "all rovers that have a way have arrived",
+            };
+            return Flow::Stop(all.to_owned());
         }
         Flow::Continue
     }
@@ -249,6 +256,9 @@ impl Score {
 
     /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
     fn is_out(&self, site: &Site, rover: usize) -> bool {
+        if site.is_refused(RoverId(rover as u32)) {
+            return false;
+        }
         let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
         match site.stays {
             true => track.remaining > 0 || !matches!(place, Place::At(_)),
@@ -279,7 +289,9 @@ impl Score {
         for (rover, &(entry, goal)) in site.missions.iter().enumerate() {
             let next = match self.collisions.place(rover) {
                 Place::At(here) if here != goal => site.roadmap.shortest_path(here, goal)[1],
-                Place::Away if self.tracks[rover].entered.is_none() => entry,
+                Place::Away if self.tracks[rover].entered.is_none() && self.is_out(site, rover) => {
+                    entry
+                }
                 _ => continue,
             };
             for &holder in self.collisions.holders(next) {
@@ -341,6 +353,9 @@ impl Score {
             let (home, deputy) = (name(t.home), name(t.deputy));
             format!("{home} by {deputy} in cycle {}", t.cycle)
         };
+        metrics.refused = site.refused.len() as u32;
+        let refused = site.refused.iter();
+        metrics.refused_missions = refused.map(|r| r.sentence(&site.rover_names)).collect();
         metrics.takeovers = self.taken_over.len() as u32;
         metrics.taken_over = self.taken_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);

@@ -1,5 +1,5 @@
 //! The paper's open questions (section 5), on small teams: continuous motion, uncertain locations,
-//! roadmaps that nodes are given over the network, balanced loads.
+//! roadmaps that nodes are given over the network, balanced loads, gaps in the coverage.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -80,6 +80,8 @@ struct Case {
     loss: f64,
     /// Nodes hear rovers, but not each other.
     are_nodes_deaf: bool,
+    coverage_m: Option<f64>,
+    gaps: Gaps,
     seed: u64,
     network: NetworkConfig,
 }
@@ -91,6 +93,8 @@ impl Case {
             rovers: 6,
             loss: 0.0,
             are_nodes_deaf: false,
+            coverage_m: None,
+            gaps: Gaps::default(),
             seed: 1,
             network,
         }
@@ -100,6 +104,8 @@ impl Case {
         let world = WorldConfig {
             nodes: 4,
             radius_m: Some(60.0),
+            coverage_m: self.coverage_m,
+            gaps: self.gaps,
             ..WorldConfig::default()
         };
         let sensors = world.place(&self.map, self.seed).unwrap();
@@ -377,5 +383,146 @@ mod roadmap {
             text,
             "network.roadmap_from is node_5, but there are node_01 to node_04"
         );
+    }
+}
+
+mod gaps {
+    use super::*;
+
+    fn with_gaps(policy: Policy, gaps: Gaps, seed: u64) -> Case {
+        let network = NetworkConfig {
+            policy,
+            ..NetworkConfig::default()
+        };
+        Case {
+            gaps,
+            seed,
+            ..Case::new(network)
+        }
+    }
+
+    /// With the least coverage that leaves half of the rovers a way: all of these arrive.
+    fn run(case: &mut Case) -> (SensorNetwork, Seen) {
+        let run = |metres: u32| {
+            case.coverage_m = Some(f64::from(metres));
+            let found = case.run().ok()?;
+            (2 * found.0.refused <= case.rovers).then_some(found)
+        };
+        let (metrics, report, seen) = (4..60).find_map(run).unwrap();
+        let (_, sensors) = case.world();
+        let done = (metrics.arrived + metrics.refused, metrics.collisions);
+        assert_eq!(done, (case.rovers, 0), "{}", report.end.detail());
+        assert_eq!(metrics.completed, metrics.refused == 0);
+        assert!(!sensors.gaps().is_empty());
+        (sensors, seen)
+    }
+
+    /// From setting out into a gap to coming out nobody hears a rover but for LEAVING, and it goes on
+    /// as fast as it can.
+    #[test]
+    fn who_crosses_is_silent_and_does_not_wait() {
+        let mut crossings = 0;
+        for seed in 1..=12 {
+            let mut case = with_gaps(Policy::Complete, Gaps::Cross, seed);
+            (case.loss, case.rovers) = (if seed % 2 == 0 { 0.3 } else { 0.0 }, 10);
+            let (sensors, seen) = run(&mut case);
+            let in_gap = |state: &RoverState| {
+                let at = state.whereabouts;
+                let ends = [at.vertex, at.moving_to];
+                ends.into_iter().flatten().any(|v| !sensors.covers(v))
+            };
+            for (sent, beacon) in &seen.beacons {
+                let said = beacon.whereabouts;
+                let mut changes = seen
+                    .changes
+                    .iter()
+                    .filter(|(time, state)| time <= sent && state.whereabouts.rover == said.rover);
+                let (since, state) = changes.next_back().unwrap();
+                if in_gap(state) {
+                    assert!(since == sent && said.vertex.is_some_and(|v| sensors.covers(v)));
+                }
+            }
+            let all = moves(&seen);
+            for (_, gap, begin, _) in all.iter().filter(|m| !sensors.covers(m.1)) {
+                let cycle = case.network.cycle.unwrap_or(SimDuration::from_secs(1));
+                let next = all.iter().find(|m| m.0 == *gap && m.2 == *begin + cycle);
+                assert!(next.is_some(), "nobody goes on from {gap:?} at {begin:?}");
+                crossings += 1;
+            }
+        }
+        assert!(crossings >= 6, "{crossings}");
+    }
+
+    /// Rolling through and uncertain locations make no difference to that.
+    #[test]
+    fn gaps_are_crossed_in_continuous_motion() {
+        let mut crossings = 0;
+        for seed in 1..=12 {
+            let mut case = with_gaps(Policy::Complete, Gaps::Cross, seed);
+            case.network.motion = Motion::Continuous;
+            case.network.location_sigma_m = if seed % 3 == 0 { 0.5 } else { 0.0 };
+            (case.loss, case.rovers) = (0.2, 10);
+            let (sensors, seen) = run(&mut case);
+            let all = moves(&seen);
+            crossings += all.iter().filter(|m| !sensors.covers(m.1)).count();
+        }
+        assert!(crossings >= 6, "{crossings}");
+    }
+
+    #[test]
+    fn closed_gaps_are_never_entered() {
+        for policy in [
+            Policy::Paper,
+            Policy::Complete,
+            Policy::Reference,
+            Policy::Prioritised,
+        ] {
+            for seed in 1..=3 {
+                let mut case = with_gaps(policy, Gaps::Close, seed);
+                case.rovers = 4;
+                let (sensors, seen) = run(&mut case);
+                assert!(moves(&seen).iter().all(|m| sensors.covers(m.1)));
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_and_named() {
+        let error = |case: Case| case.run().err().unwrap().to_string();
+        let text = error(with_gaps(Policy::Paper, Gaps::Cross, 1));
+        assert!(text.contains("network.policy = \"complete\""), "{text}");
+        let mut nowhere = with_gaps(Policy::Complete, Gaps::Close, 1);
+        nowhere.coverage_m = Some(0.1);
+        let text = error(nowhere);
+        assert!(text.contains("rover_01 has its entry at vertex"), "{text}");
+        let (map, sensors) = (Arc::new(grid(3, 1, &[])), [0.0, 20.0]);
+        let posts = sensors.map(|x| nalgebra::Point2::new(x, 0.0)).to_vec();
+        let sensors = SensorNetwork::new(&map, posts, 20.0).unwrap();
+        let sensors = Arc::new(sensors.with_coverage(&map, 5.0).unwrap());
+        let assemble = |gaps, missions: &[(u32, u32)]| {
+            let world = WorldConfig {
+                gaps,
+                ..WorldConfig::default()
+            };
+            let network = NetworkConfig {
+                policy: Policy::Complete,
+                ..NetworkConfig::default()
+            };
+            let v = super::super::testing::v;
+            let missions = missions.iter().map(|&(a, b)| (v(a), v(b))).collect();
+            let (sim, (map, posts)) = (&mut Simulation::new(1), (map.clone(), sensors.clone()));
+            let connect: &mut Connect<'_> = &mut |sim, (a, _), (b, _)| {
+                sim.link(a, b, &format!("{a:?}-{b:?}"), Lossy(0.0));
+            };
+            let made = assemble_standing(sim, &world, map, posts, missions, &network, connect);
+            made.err().map(|error| error.to_string())
+        };
+        let text = assemble(Gaps::Refuse, &[(0, 2)]).unwrap();
+        assert!(text.starts_with("no node covers 1 vertices: 1;"), "{text}");
+        let text = assemble(Gaps::Close, &[(0, 2)]).unwrap();
+        assert_eq!(text, "rover_01 has no way from vertex 0 to 2 without gaps");
+        let text = assemble(Gaps::Cross, &[(0, 2), (2, 1)]).unwrap();
+        assert_eq!(text, "rover_02 has its goal at vertex 1, in a gap");
+        assert_eq!(assemble(Gaps::Cross, &[(0, 2)]), None);
     }
 }

@@ -36,6 +36,15 @@
 //! with the earliest planned time waits for nothing but messages, and those are repeated until they
 //! are heard. This holds however late the team is, because planned times are never changed.
 //!
+//! *Gaps change nothing of that.* Nobody hears a rover that crosses a gap in the coverage
+//! ([`Gaps`](super::Gaps)), so it sets out into one only with all grants for the crossing. That is one
+//! claim, of all its vertices and the covered one beyond, and all these visits begin in planned time
+//! when it sets out. So the whole claim waits for visits that began earlier: its rover's one before it,
+//! and at each of its vertices the one before it in the book, which ends when that rover goes on. From a
+//! vertex in a gap it goes on without waiting for anything, and it is heard when it has come out. And there
+//! is still a way to find: a shortest way through covered vertices and gaps, which a walk looks along
+//! first, has each crossing lead from one covered vertex to another, past no vertex twice.
+//!
 //! Both need links that lose less than all, and nodes and rovers that come back: what they keep is
 //! durable.
 

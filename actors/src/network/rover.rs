@@ -1,5 +1,6 @@
 //! The rover: stands, drives along an edge, says where it is. It decides nothing: without a valid
-//! command it holds, for ever if need be.
+//! command it holds, for ever if need be; and in a gap of the coverage it is deaf and mute
+//! ([`gaps`](super::gaps)).
 
 use std::sync::Arc;
 
@@ -97,7 +98,8 @@ impl Rover {
         let step = memory.step;
         let sigma_m = self.site.config.location_sigma_m;
         let is_certain = sigma_m == 0.0;
-        let beyond = memory.granted_beyond().filter(|_| is_certain);
+        let beyond = memory.granted_beyond(|v| self.site.sensors.covers(v));
+        let beyond = beyond.filter(|_| is_certain);
         let drive = self.site.ways().drive((here, next), beyond, self.speed);
         self.speed = drive.end;
         ctx.timer(drive.time, EdgeEnds);
@@ -147,7 +149,27 @@ impl Rover {
         is_lost
     }
 
+    fn is_in_gap(&self, ctx: &mut Context<'_, Self>) -> bool {
+        ctx.durable::<RoverMemory>().is_in_gap(&self.site.sensors)
+    }
+
+    /// Says where it is, if anybody can hear it.
     fn beacon(&self, ctx: &mut Context<'_, Self>, to: NodeId) {
+        if !self.is_in_gap(ctx) {
+            self.say(ctx, to);
+        }
+    }
+
+    /// Tells the owner of the vertex that it leaves: the last that is heard of it before a gap.
+    fn say_leaving(&self, ctx: &mut Context<'_, Self>) {
+        let here = ctx.durable::<RoverMemory>().vertex;
+        if let Some(here) = here.filter(|&v| self.site.sensors.covers(v)) {
+            let to = self.acting(ctx, here);
+            self.say(ctx, to);
+        }
+    }
+
+    fn say(&self, ctx: &mut Context<'_, Self>, to: NodeId) {
         let memory = ctx.durable::<RoverMemory>();
         let whereabouts = memory.whereabouts(self.id);
         let beacon = Beacon {
@@ -273,6 +295,9 @@ impl Handler<PaceAllows> for Rover {
 
 impl Handler<Grant> for Rover {
     fn handle(&mut self, grant: Grant, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.is_in_gap(ctx) {
+            return Ok(());
+        }
         if !self.obeys(ctx, &grant) {
             // The node does not know that it was replaced.
             if let Some(to) = grant.to {
@@ -296,7 +321,8 @@ impl Handler<Inquiry> for Rover {
     fn handle(&mut self, inquiry: Inquiry, ctx: &mut Context<'_, Self>) -> Outcome {
         let Inquiry { node, home, rank } = inquiry;
         let line = self.site.lines.get(home.0 as usize);
-        if line.and_then(|line| line.get(rank as usize)) != Some(&node) {
+        let entitled = line.and_then(|line| line.get(rank as usize));
+        if entitled != Some(&node) || self.is_in_gap(ctx) {
             return Ok(());
         }
         let site = self.site.clone();
@@ -319,6 +345,9 @@ impl Handler<Inquiry> for Rover {
 
 impl Handler<Itinerary> for Rover {
     fn handle(&mut self, itinerary: Itinerary, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.is_in_gap(ctx) {
+            return Ok(());
+        }
         let Itinerary {
             node,
             way,
@@ -347,7 +376,8 @@ impl Handler<Itinerary> for Rover {
 
 impl Rover {
     /// Takes the next step if it was granted ahead, and no sooner than a cycle after the last move
-    /// began; in continuous motion at once, but for a cycle at the entry.
+    /// began; in continuous motion at once, but for a cycle at the entry. Into a gap only with the grants
+    /// for the way through.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
         let memory = ctx.durable::<RoverMemory>();
@@ -359,6 +389,9 @@ impl Rover {
         let Some(grant) = memory.next_granted().cloned() else {
             return;
         };
+        if !memory.holds_through(grant.step, |v| self.site.sensors.covers(v)) {
+            return;
+        }
         let begins = memory.last_move.map_or(now, |last| last + pace);
         if grant.to.is_some() && begins > now {
             let wait = begins.as_nanos() - now.as_nanos();
@@ -383,7 +416,7 @@ impl Rover {
                 // LEAVING goes to the owner of the vertex left, which is not the one that granted
                 // the next one. Said later, if the rover cannot be certain yet.
                 if self.off {
-                    self.beacon_here(ctx);
+                    self.say_leaving(ctx);
                 }
                 return;
             }
@@ -398,7 +431,7 @@ impl Handler<OffVertex> for Rover {
         let memory = ctx.durable::<RoverMemory>();
         if memory.step == timer.step && memory.moving_to.is_some() {
             self.off = true;
-            self.beacon_here(ctx);
+            self.say_leaving(ctx);
         }
         Ok(())
     }

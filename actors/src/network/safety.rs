@@ -340,11 +340,20 @@ impl RoverMemory {
             .find(|kept| stands && kept.step == step + 1)
     }
 
-    /// Where the step after the one under way leads, if that was granted already.
-    pub(crate) fn granted_beyond(&self) -> Option<VertexId> {
+    /// Whether it holds the grant for `step`, and where that leads into a gap those for all further
+    /// steps, up to the first that leads to a vertex that is covered.
+    pub(crate) fn holds_through(&self, step: u32, covers: impl Fn(VertexId) -> bool) -> bool {
+        let held = |step| self.ahead.iter().find(|kept| kept.step == step);
+        let mut held = (step..).map_while(held);
+        held.any(|grant| grant.to.is_none_or(&covers))
+    }
+
+    /// Where the step after the one under way leads, if it could be taken at once.
+    pub(crate) fn granted_beyond(&self, covers: impl Fn(VertexId) -> bool) -> Option<VertexId> {
         let after = |kept: &&Grant| kept.step == self.step + 2;
         self.moving_to?;
-        self.ahead.iter().find(after)?.to
+        let next = self.ahead.iter().find(after)?;
+        next.to.filter(|_| self.holds_through(next.step, covers))
     }
 
     /// Obeys a grant, if it is for the next step and leads from here: into the roadmap at `entry`,

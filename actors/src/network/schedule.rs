@@ -4,21 +4,23 @@
 use farside_worlds::{Roadmap, VertexId};
 
 use super::config::{NetworkConfig, Policy};
+use super::messages::RoverId;
 use super::timing::Timing;
 use crate::planning::safe_intervals::{FOREVER, TimedVisit};
 use crate::planning::{
     CoupledConfig, Mission, Order, Plan, Problem, Rules, coupled, prioritised, reference,
 };
 
-/// Each rover's visits, none for one that has no way; and what it took to find them.
+/// Each rover's visits; and what it took to find them.
 #[derive(Debug, Default)]
 pub(crate) struct Schedule {
-    pub(crate) visits: Vec<Vec<TimedVisit>>,
+    pub(crate) visits: Vec<(RoverId, Vec<TimedVisit>)>,
     pub(crate) expansions: u64,
 }
 
 impl Schedule {
-    /// The plan of a policy that plans ahead; of another none.
+    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that have
+    /// a way.
     ///
     /// # Errors
     /// When there is no plan, or it would take too long to find.
@@ -26,7 +28,7 @@ impl Schedule {
         config: &NetworkConfig,
         timing: &Timing,
         roadmap: &Roadmap,
-        missions: &[(VertexId, VertexId)],
+        missions: &[(RoverId, (VertexId, VertexId))],
         stays: bool,
     ) -> Result<Option<Schedule>, String> {
         if matches!(config.policy, Policy::Paper | Policy::Complete) {
@@ -35,7 +37,7 @@ impl Schedule {
         let rules = if stays { Rules::OnMap } else { Rules::Queues };
         let all = missions
             .iter()
-            .map(|&(entry, goal)| Mission::new(entry, goal));
+            .map(|&(_, (entry, goal))| Mission::new(entry, goal));
         let problem = Problem::new(roadmap, all.collect(), rules);
         let problem = problem.map_err(|error| error.to_string())?;
         let (plan, expansions) = match config.policy {
@@ -52,8 +54,10 @@ impl Schedule {
             }
             _ => (reference(&problem, &Order::QueuePosition).plan, 0),
         };
+        let rovers = missions.iter().map(|(rover, _)| *rover);
+        let visits = timed(&plan, &problem, timing.cycle.as_nanos());
         Ok(Some(Schedule {
-            visits: timed(&plan, &problem, timing.cycle.as_nanos()),
+            visits: rovers.zip(visits).collect(),
             expansions,
         }))
     }

@@ -10,12 +10,19 @@
 //! that follows, since it may wait. So a search keeps one [`Label`] for each vertex and interval.
 //! Swapping along an edge needs no rule of its own: each of the two rovers would have to begin its
 //! visit after the other one has ended.
+//!
+//! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up to
+//! that of the covered vertex beyond, begin when it sets out into it. How that is searched: `crossing`.
+
+mod crossing;
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 
 use farside_worlds::{Roadmap, VertexId};
 use serde::{Deserialize, Serialize};
+
+use crossing::{Best, Course};
 
 /// A time later than all others \[ns\].
 pub const FOREVER: u64 = u64::MAX;
@@ -29,7 +36,8 @@ pub struct Label {
     pub start: u64,
     /// When the rover then stands there \[ns\].
     pub ready: u64,
-    /// When the visit must have ended \[ns\]: the safe interval's end.
+    /// When the visit must have ended \[ns\]: the safe interval's end. At a vertex that is not covered the
+    /// latest time to pass it, as the crossing goes so far.
     pub until: u64,
     /// The label it comes from, by its place in the same list; none where the way begins.
     pub parent: Option<u32>,
@@ -57,6 +65,8 @@ pub struct Ground<'a> {
     /// The visits planned at a vertex, as (start, end), disjoint and in order; none for a vertex
     /// that the search may not enter.
     pub busy: &'a dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
+    /// Whether a rover may wait at a vertex; where it may not, it drives through.
+    pub covers: &'a dyn Fn(VertexId) -> bool,
 }
 
 /// The safe intervals left by visits `busy`, as (first begin, last end).
@@ -105,43 +115,36 @@ impl Ground<'_> {
     /// [`Ground::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
         let mut queue = BinaryHeap::new();
-        let mut best = BTreeMap::<(VertexId, u64), u64>::new();
+        let mut best = Best::new(self.covers);
         for &at in open {
             let label = labels[at as usize];
-            best.insert((label.vertex, label.until), label.ready);
+            best.insert(&label);
             queue.push(Reverse((label.ready, at)));
         }
-        while let Some(Reverse((ready, at))) = queue.pop() {
+        while let Some(Reverse((_, at))) = queue.pop() {
             let from = labels[at as usize];
-            if best.get(&(from.vertex, from.until)) != Some(&ready) {
+            if !best.has(&from) {
                 continue;
             }
+            let in_gap = !(self.covers)(from.vertex);
+            let course = Course::of(&from, !in_gap);
             for &to in self.roadmap.neighbors(from.vertex) {
                 let Some(busy) = (self.busy)(to) else {
                     continue;
                 };
+                if in_gap && crossing::passes(labels, at, to, self.covers) {
+                    continue;
+                }
                 let travel = (self.travel)(from.vertex, to);
-                for (safe_from, until) in safe_intervals(&busy, self.gap) {
-                    let start = safe_from.max(ready);
-                    if start > from.until {
-                        break;
+                let in_time = |safe: &(u64, u64)| course.sets_out(safe.0).is_some();
+                for safe in safe_intervals(&busy, self.gap).take_while(in_time) {
+                    let parent = Some(at);
+                    let label = course.label(to, travel, safe, (self.covers)(to));
+                    let label = label.map(|label| Label { parent, ..label });
+                    if let Some(label) = label.filter(|label| best.improves(label)) {
+                        queue.push(Reverse((label.ready, labels.len() as u32)));
+                        labels.push(label);
                     }
-                    let Some(there) = start.checked_add(travel).filter(|&t| t <= until) else {
-                        continue;
-                    };
-                    let known = best.entry((to, until)).or_insert(FOREVER);
-                    if there >= *known {
-                        continue;
-                    }
-                    *known = there;
-                    queue.push(Reverse((there, labels.len() as u32)));
-                    labels.push(Label {
-                        vertex: to,
-                        start,
-                        ready: there,
-                        until,
-                        parent: Some(at),
-                    });
                 }
             }
         }
@@ -150,13 +153,28 @@ impl Ground<'_> {
 
 /// The way that ends with the label at `last`: each visit begins as early as can be, but the first
 /// one as late as the second allows, so that a rover that comes from outside waits there and not in
-/// the way of others. The last visit ends at `end`.
-pub fn way_to(labels: &[Label], last: u32, end: u64) -> Vec<TimedVisit> {
+/// the way of others. The last visit ends at `end`. Vertices that `covers` does not say are covered are
+/// driven through.
+pub fn way_to(
+    labels: &[Label],
+    last: u32,
+    end: u64,
+    covers: impl Fn(VertexId) -> bool,
+) -> Vec<TimedVisit> {
     let mut way = Vec::new();
     let (mut next, mut end) = (Some(last), end);
     while let Some(at) = next {
         let label = labels[at as usize];
         next = label.parent;
+        if !covers(label.vertex) {
+            // All visits of a crossing begin together, as late as the one after it allows.
+            way.push(TimedVisit {
+                vertex: label.vertex,
+                start: end,
+                end: end + (label.ready - label.start),
+            });
+            continue;
+        }
         let start = match next {
             // Where the way begins and ends at once there is nothing to wait for.
             None if !way.is_empty() => end - (label.ready - label.start),
@@ -199,14 +217,14 @@ pub fn prune(labels: &mut Vec<Label>, wanted: &[u32]) -> Vec<u32> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::network::testing::{grid, v};
     use proptest::prelude::*;
 
-    const STEP: u64 = 10;
+    pub(super) const STEP: u64 = 10;
 
-    type Busy = Vec<Vec<(u64, u64)>>;
+    pub(super) type Busy = Vec<Vec<(u64, u64)>>;
 
     fn ground<'a>(
         roadmap: &'a Roadmap,
@@ -217,12 +235,21 @@ mod tests {
             gap: 1,
             travel: &|_, _| STEP,
             busy,
+            covers: &|_| true,
         }
     }
 
     /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits one
-    /// instant or sets out, and may be nowhere within a gap of another's visit.
-    fn brute_force(roadmap: &Roadmap, busy: &Busy, start: VertexId, goal: VertexId) -> Option<u64> {
+    /// instant or sets out, and may be nowhere within a gap of another's visit. Through vertices
+    /// that are not covered it drives without a stop, and claims all of them, and the one beyond, as it
+    /// sets out.
+    pub(super) fn brute_force(
+        roadmap: &Roadmap,
+        busy: &Busy,
+        covers: &dyn Fn(VertexId) -> bool,
+        start: VertexId,
+        goal: VertexId,
+    ) -> Option<u64> {
         const END: u64 = 400;
         let free = |u: VertexId, at: u64| {
             let visits = &busy[u.0 as usize];
@@ -242,9 +269,21 @@ mod tests {
                     if u == goal {
                         return Some(at);
                     }
-                    for &w in roadmap.neighbors(u).iter().filter(|&&w| free(w, at)) {
+                    let open_to = |w: &&VertexId| covers(**w) && free(**w, at);
+                    for &w in roadmap.neighbors(u).iter().filter(open_to) {
                         let slot = &mut open[at as usize][w.0 as usize];
                         *slot = (*slot).max(Some(0));
+                    }
+                    for through in crossings(roadmap, covers, &[u]) {
+                        let drives = |i: usize| at + STEP * i as u64;
+                        let is_free = |(i, &w): (usize, &VertexId)| {
+                            i == 0 || (at..=drives(i)).all(|t| free(w, t))
+                        };
+                        let there = drives(through.len() - 1);
+                        if there <= END && through.iter().enumerate().all(is_free) {
+                            let exit = through[through.len() - 1];
+                            open[there as usize][exit.0 as usize] = Some(STEP);
+                        }
                     }
                 }
             }
@@ -257,7 +296,29 @@ mod tests {
         None
     }
 
-    fn busy(n: usize) -> impl Strategy<Value = Busy> {
+    /// All ways that begin so and lead on through vertices that are not covered to one that is.
+    fn crossings(
+        roadmap: &Roadmap,
+        covers: &dyn Fn(VertexId) -> bool,
+        begun: &[VertexId],
+    ) -> Vec<Vec<VertexId>> {
+        let here = begun[begun.len() - 1];
+        let new = roadmap
+            .neighbors(here)
+            .iter()
+            .filter(|w| !begun.contains(w));
+        let ways = new.map(|&w| {
+            let way = [begun, &[w]].concat();
+            match (covers(w), begun.len()) {
+                (true, 1) => Vec::new(),
+                (true, _) => vec![way],
+                (false, _) => crossings(roadmap, covers, &way),
+            }
+        });
+        ways.flatten().collect()
+    }
+
+    pub(super) fn busy(n: usize) -> impl Strategy<Value = Busy> {
         let spans = proptest::collection::vec((1u64..40, 0u64..30), 0..4);
         let disjoint = |spans: Vec<(u64, u64)>| {
             let mut at = 0;
@@ -284,10 +345,10 @@ mod tests {
             ground.expand(&mut labels, &open);
             let there = (0..).zip(&labels).filter(|(_, label)| label.vertex == v(goal));
             let best = there.min_by_key(|(_, label)| label.ready);
-            let expected = brute_force(&map, &busy, v(0), v(goal));
+            let expected = brute_force(&map, &busy, &|_| true, v(0), v(goal));
             prop_assert_eq!(best.map(|(_, label)| label.ready), expected);
             if let Some((at, label)) = best {
-                let way = way_to(&labels, at, label.ready);
+                let way = way_to(&labels, at, label.ready, |_| true);
                 prop_assert_eq!(way[0].vertex, v(0));
                 for pair in way.windows(2) {
                     prop_assert_eq!(pair[0].end, pair[1].start);
@@ -314,7 +375,7 @@ mod tests {
         let last = labels.iter().position(|l| l.vertex == v(3)).unwrap() as u32;
         let kept = prune(&mut labels, &[last]);
         assert_eq!(labels.len(), 3);
-        let way = way_to(&labels, kept[0], FOREVER);
+        let way = way_to(&labels, kept[0], FOREVER, |_| true);
         let places: Vec<_> = way
             .iter()
             .map(|visit| (visit.vertex.0, visit.start))

@@ -73,7 +73,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         (sheet.posts())
         (sheet.arrows(&rovers, &waits))
         @for seen in &rovers { (sheet.rover(seen, &waits)) }
-        (legend(SIDE + sheet.width + 24.0, TOP + 10.0))
+        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, !run.site.sensors.gaps().is_empty()))
     };
     Figure {
         file: "map.svg".to_owned(),
@@ -232,8 +232,12 @@ impl<'a> Sheet<'a> {
                     path class="road" d=(roads[node.0 as usize]) {}
                     @for v in sensors.owned(node) {
                         @let (x, y) = self.at(*v);
-                        circle class="vertex" cx=(Px(x)) cy=(Px(y)) r="3.2" {
-                            title { "vertex " (v.0) ", node " (node.0 + 1) }
+                        @let (class, says) = match sensors.covers(*v) {
+                            true => ("vertex", ""),
+                            false => ("vertex gap", ", in a gap"),
+                        };
+                        circle class=(class) cx=(Px(x)) cy=(Px(y)) r="3.2" {
+                            title { "vertex " (v.0) ", node " (node.0 + 1) (says) }
                         }
                     }
                 }
@@ -470,7 +474,7 @@ fn exit_mark((x, y): (f64, f64)) -> String {
     format!("{}Z", path((0..6).map(corner)))
 }
 
-fn legend(x: f64, y: f64) -> Markup {
+fn legend(x: f64, y: f64, has_gaps: bool) -> Markup {
     let at = |row: usize| y + 24.0 * row as f64;
     let text = |row: usize, says: &str| {
         debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
@@ -502,6 +506,10 @@ fn legend(x: f64, y: f64) -> Markup {
             path class="entry" d=(entry_mark((x + 12.0, at(9)))) {}
             (text(9, "entry; +3: three in its queue"))
             path class="exit" d=(exit_mark((x + 12.0, at(10)))) {} (text(10, "exit"))
+            @if has_gaps {
+                g class="n0" { circle class="vertex gap" cx=(Px(x + 12.0)) cy=(Px(at(11))) r="3.2" {} }
+                (text(11, "where no node reaches a rover"))
+            }
         }
     }
 }

@@ -1,10 +1,14 @@
 //! The scenarios that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 6] = [
+const BUILTIN: [(&str, &str); 7] = [
     (
         "network/crater-dense",
         include_str!("../../scenarios/network/crater-dense.toml"),
+    ),
+    (
+        "network/crater-gaps",
+        include_str!("../../scenarios/network/crater-gaps.toml"),
     ),
     (
         "network/crater-radio",

@@ -65,7 +65,7 @@ impl Settings for NetworkScenario {
         let roadmap = Arc::new(roadmap);
         let sensors = place(&self.world, &roadmap, setup.seed)?;
         let (world, team, settings) = (&self.world, &self.team, &self.network);
-        let (map, posts) = (roadmap.clone(), Arc::new(sensors));
+        let (map, posts) = (world.open_part(&roadmap, &sensors), Arc::new(sensors));
         let links = &mut *setup.links;
         let connect: &mut network::Connect<'_> = &mut |sim, from, to| {
             links.connect(sim, from, to);
@@ -84,11 +84,20 @@ impl Settings for NetworkScenario {
             ),
             Some(grid) => {
                 let tasks = grid.tasks().to_vec();
-                network::assemble_standing(sim, roadmap, posts.clone(), tasks, settings, connect)
+                network::assemble_standing(
+                    sim,
+                    world,
+                    roadmap,
+                    posts.clone(),
+                    tasks,
+                    settings,
+                    connect,
+                )
             }
         };
         let system = system.map_err(|error| SetupError::value(key_of(&error), error))?;
         let system = Arc::new(system);
+        setup.notes.extend(gaps(&posts, &system));
         if setup.links.has_radios() {
             for (name, place_m) in system.places_m() {
                 setup.links.place(name, place_m);
@@ -136,12 +145,38 @@ fn place(world: &WorldConfig, roadmap: &Roadmap, seed: u64) -> Result<SensorNetw
         let key = match error {
             SensorError::NodeCount { .. } => "world.nodes",
             SensorError::Radius { .. } => "world.radius",
+            SensorError::Coverage { .. } => "world.coverage",
+            SensorError::NoPlacement {
+                radius_m,
+                coverage_m,
+                ..
+            } if coverage_m < radius_m => "world.coverage",
             // Which of the two to change is the user's choice; the message suggests a radius.
             _ if world.radius_m.is_some() => "world.radius",
             _ => "world.nodes",
         };
         SetupError::value(key, error)
     })
+}
+
+/// Where nobody hears a rover, and which rovers that leaves without a way.
+fn gaps(sensors: &SensorNetwork, system: &network::Network) -> Vec<String> {
+    if sensors.gaps().is_empty() {
+        return Vec::new();
+    }
+    let all: Vec<String> = sensors.gaps().iter().map(ToString::to_string).collect();
+    let (count, reach_m) = (all.len(), sensors.coverage_m());
+    let mut notes = vec![format!(
+        "gaps: with a coverage of {reach_m} m no node covers {count} vertices: {}",
+        all.join(", ")
+    )];
+    notes.extend(
+        system
+            .refused()
+            .iter()
+            .map(|refused| format!("  {refused}")),
+    );
+    notes
 }
 
 /// Whether the roadmap lies in the default crater, as the built-in ones do; of others the ground is
@@ -268,6 +303,9 @@ fn key_of(error: &network::NetworkError) -> &'static str {
         NetworkError::Endpoints { .. } => "world.endpoints",
         NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
         NetworkError::SlowEdge { .. } => "network.speed",
+        NetworkError::Uncovered { .. }
+        | NetworkError::CannotCross
+        | NetworkError::Refused { .. } => "world.gaps",
         NetworkError::UnknownSource { .. } => "network.roadmap_from",
         NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::Planned { key }) => KEYS
             .iter()
@@ -339,6 +377,9 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("the shortest", shortest.to_string());
     } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
         line("standstill", why.to_owned());
+    }
+    if metrics.refused > 0 {
+        line("rovers without a way", metrics.refused.to_string());
     }
     for replaced in &metrics.taken_over {
         line("taken over", replaced.clone());

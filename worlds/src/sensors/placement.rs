@@ -7,6 +7,7 @@
 use farside::random::{RandomKey, Stream};
 use nalgebra::Point2;
 
+use super::coverage::check_coverage;
 use super::{NodeId, SensorNetwork, check_request, nearest};
 use crate::error::SensorError;
 use crate::roadmap::Roadmap;
@@ -53,14 +54,34 @@ impl SensorNetwork {
         radius_m: f64,
         seed: u64,
     ) -> Result<SensorNetwork, SensorError> {
+        Self::place_covering(roadmap, nodes, radius_m, radius_m, seed)
+    }
+
+    /// The same with nodes that reach rovers as far as `coverage_m` \[m\] only, and placed so that this
+    /// leaves no gap.
+    ///
+    /// # Errors
+    /// The same; and when `coverage_m` is not a positive finite number.
+    pub fn place_covering(
+        roadmap: &Roadmap,
+        nodes: usize,
+        radius_m: f64,
+        coverage_m: f64,
+        seed: u64,
+    ) -> Result<SensorNetwork, SensorError> {
         check_request(roadmap, nodes, radius_m)?;
+        check_coverage(coverage_m)?;
         let key = RandomKey::new(seed)
             .text("sensor_placement")
             .number(nodes as u64);
         let attempts = (MOST_WORK / (nodes * roadmap.len())).clamp(2, ATTEMPTS);
         let mut last = None;
         for attempt in 0..attempts {
-            let mut search = Search::new(roadmap, radius_m, key.number(attempt as u64).stream());
+            let mut search = Search::new(
+                roadmap,
+                (radius_m, coverage_m),
+                key.number(attempt as u64).stream(),
+            );
             search.throw_all(nodes);
             match search.repaired() {
                 Ok(network) => return Ok(network),
@@ -72,6 +93,7 @@ impl SensorNetwork {
         Err(SensorError::NoPlacement {
             nodes,
             radius_m,
+            coverage_m,
             attempts,
             last,
             suggested_m,
@@ -108,15 +130,18 @@ fn extent_m(roadmap: &Roadmap) -> (Point2<f64>, Point2<f64>) {
 struct Search<'a> {
     roadmap: &'a Roadmap,
     radius_m: f64,
+    /// How far a node reaches rovers.
+    coverage_m: f64,
     stream: Stream,
     positions_m: Vec<Point2<f64>>,
 }
 
 impl<'a> Search<'a> {
-    fn new(roadmap: &'a Roadmap, radius_m: f64, stream: Stream) -> Self {
+    fn new(roadmap: &'a Roadmap, (radius_m, coverage_m): (f64, f64), stream: Stream) -> Self {
         Search {
             roadmap,
             radius_m,
+            coverage_m,
             stream,
             positions_m: Vec::new(),
         }
@@ -154,12 +179,11 @@ impl<'a> Search<'a> {
     fn repaired(&mut self) -> Result<SensorNetwork, SensorError> {
         let mut repairs = 0;
         loop {
-            let broken =
-                match SensorNetwork::new(self.roadmap, self.positions_m.clone(), self.radius_m) {
-                    Ok(network) => return Ok(network),
-                    Err(error) if repairs == REPAIRS => return Err(error),
-                    Err(error) => error,
-                };
+            let broken = match self.network() {
+                Ok(network) => return Ok(network),
+                Err(error) if repairs == REPAIRS => return Err(error),
+                Err(error) => error,
+            };
             repairs += 1;
             match broken {
                 SensorError::Idle { node } => self.settle(node),
@@ -180,6 +204,19 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// The network as it stands.
+    fn network(&self) -> Result<SensorNetwork, SensorError> {
+        let network = SensorNetwork::new(self.roadmap, self.positions_m.clone(), self.radius_m)?;
+        let network = network.with_coverage(self.roadmap, self.coverage_m)?;
+        if network.gaps.is_empty() {
+            return Ok(network);
+        }
+        Err(SensorError::Uncovered {
+            vertices: network.gaps,
+            radius_m: self.coverage_m,
+        })
+    }
+
     /// Moves an idle node to a vertex at random: it is then the nearest to that one, unless
     /// another stands there.
     fn settle(&mut self, node: NodeId) {
@@ -187,11 +224,11 @@ impl<'a> Search<'a> {
         self.positions_m[node.0 as usize] = self.roadmap.position_m(vertex);
     }
 
-    /// Moves the node nearest to `place` until it is just within the radius of it.
+    /// Moves the node nearest to `place` until it just reaches it.
     fn pull_to(&mut self, place: Point2<f64>) {
         let node = nearest(&self.positions_m, place).0 as usize;
         let way = place - self.positions_m[node];
-        let excess_m = way.norm() - 0.99 * self.radius_m;
+        let excess_m = way.norm() - 0.99 * self.radius_m.min(self.coverage_m);
         if excess_m > 0.0 {
             self.positions_m[node] += way * (excess_m / way.norm());
         }

@@ -170,7 +170,7 @@ impl Registry {
     /// Enters what was planned before the start.
     fn preload(&mut self, desk: &Desk<'_>) {
         let schedule = desk.site.schedule.iter().flat_map(|s| &s.visits);
-        for (rover, way) in (0..).map(RoverId).zip(schedule) {
+        for &(rover, ref way) in schedule {
             let walk = Walk {
                 rover,
                 attempt: 0,
@@ -256,7 +256,7 @@ impl Registry {
             }
             Origin::Stand { vertex, step, .. } => {
                 if let Aim::Aside(path) = &applicant.aim {
-                    goal = making_way::aside(&desk.site.roadmap, vertex, path, in_vain);
+                    goal = making_way::aside(desk.site, vertex, path, in_vain);
                 }
                 let step_time = desk.site.longest_step.as_nanos();
                 let came = self
@@ -317,6 +317,7 @@ impl Registry {
             gap: self.gap(),
             travel: &|u, v| desk.site.planned_step(u, v).as_nanos(),
             busy,
+            covers: &|v| desk.site.sensors.covers(v),
         };
         with(&ground)
     }

@@ -32,7 +32,7 @@ pub(super) fn site(
     };
     let sensors = place(world, &roadmap, seed)?;
     Ok(Site {
-        roadmap: Arc::new(roadmap),
+        roadmap: world.open_part(&Arc::new(roadmap), &sensors),
         sensors: Arc::new(sensors),
         ground: drawn,
         // Left to the links it is a second, or longer over slow ones, which are not looked at here:

@@ -1,8 +1,9 @@
 //! Local resolution on maps where rovers stay: who stands in another's way steps aside for a while.
 
-use farside_worlds::{Roadmap, VertexId};
+use farside_worlds::VertexId;
 
 use super::{Aim, Applicant, Desk, Origin, Registry};
+use crate::network::assemble::Site;
 use crate::network::reservation::messages::{Item, Settle, Verdict, Walk, Yield};
 
 impl Registry {
@@ -85,15 +86,14 @@ impl Registry {
     }
 }
 
-/// Where to step aside to from `from`: the nearest vertex off `path`, or after failures the next
-/// nearest.
-pub(super) fn aside(
-    roadmap: &Roadmap,
-    from: VertexId,
-    path: &[VertexId],
-    failures: u32,
-) -> VertexId {
-    let off = |v: &VertexId| *v != from && !path.contains(v);
+/// Where to step aside to from `from`: the nearest vertex off `path` at which a rover is heard, or
+/// after failures the next nearest.
+pub(super) fn aside(site: &Site, from: VertexId, path: &[VertexId], failures: u32) -> VertexId {
+    let roadmap = &site.roadmap;
+    let off = |v: &VertexId| {
+        let is_place = site.sensors.covers(*v) && roadmap.is_reachable(from, *v);
+        is_place && *v != from && !path.contains(v)
+    };
     let mut places: Vec<VertexId> = roadmap.vertices().filter(off).collect();
     places.sort_by_key(|&v| (roadmap.distance(from, v), v));
     let at = failures as usize % places.len().clamp(1, 64);

@@ -34,7 +34,8 @@ impl Registry {
             site.sensors.owner(label.vertex) == desk.home
                 && onward.iter().any(|&v| site.sensors.owner(v) == next)
         };
-        let frontier = frontier(&labels, borders);
+        let has_gaps = !site.sensors.gaps().is_empty();
+        let frontier = frontier(&labels, has_gaps, borders);
         probe.frontier = prune(&mut labels, &frontier);
         probe.labels = labels;
         probe.at += 1;
@@ -83,7 +84,8 @@ impl Registry {
         {
             let leaves = label.ready.saturating_add(gap).min(label.until);
             let end = if stays { FOREVER } else { leaves };
-            offers.best = Some((label.ready, way_to(labels, at, end)));
+            let covers = |v| desk.site.sensors.covers(v);
+            offers.best = Some((label.ready, way_to(labels, at, end, covers)));
         }
         if offers.heard >= offers.probes {
             self.decide(desk, rover);
@@ -332,8 +334,9 @@ impl Registry {
 }
 
 /// The labels from which to go on: the earliest of each vertex and interval, not too many, and always
-/// one of those that can be kept up for ever.
-fn frontier(labels: &[Label], borders: impl Fn(&Label) -> bool) -> Vec<u32> {
+/// one of those that can be kept up for ever; with gaps all of these, since what lies within one need
+/// not lead out of it.
+fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) -> Vec<u32> {
     let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
     for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
         let found = best
@@ -343,6 +346,13 @@ fn frontier(labels: &[Label], borders: impl Fn(&Label) -> bool) -> Vec<u32> {
     }
     let mut all: Vec<(u64, u32)> = best.into_values().collect();
     all.sort_unstable();
+    if has_gaps {
+        let ends = |&(_, at): &(u64, u32)| labels[at as usize].until != FOREVER;
+        let lasting = all.iter().filter(|found| !ends(found)).count();
+        all.sort_by_key(ends);
+        all.truncate(lasting.max(MAX_FRONTIER));
+        return all.into_iter().map(|(_, at)| at).collect();
+    }
     let last = all
         .iter()
         .position(|&(_, at)| labels[at as usize].until == FOREVER);
