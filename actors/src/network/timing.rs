@@ -126,10 +126,13 @@ impl NetworkConfig {
             cycle: SimDuration::ZERO,
             exchange: self.exchange.unwrap_or(at_least(50, exchange)),
             optimisation: self.optimisation.unwrap_or(at_least(500, iteration * 10)),
-            iteration_timeout: self.iteration_timeout.unwrap_or(at_least(20, iteration * 2)),
+            iteration_timeout: self
+                .iteration_timeout
+                .unwrap_or(at_least(20, iteration * 2)),
             rate_bit_per_s,
         };
-        let after = self.traverse + (latency + sending(GRANT_BYTES)) * 5 + SimDuration::from_millis(50);
+        let after =
+            self.traverse + (latency + sending(GRANT_BYTES)) * 5 + SimDuration::from_millis(50);
         let cycle = timing.decided_after() + after;
         timing.cycle = self.cycle.unwrap_or(at_least(1000, cycle));
         if timing.decided_after() >= timing.cycle {

@@ -16,7 +16,7 @@ use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::NodeId;
 
-use super::{pacing, IterationOverdue, Node, Phase, ProcessorDone};
+use super::{IterationOverdue, Node, Phase, ProcessorDone, pacing};
 use crate::network::candidates::CandidatePath;
 use crate::network::max_plus::{MaxPlus as Problem, Rules};
 use crate::network::messages::{CandidatePaths, Choice, MaxPlus, RoverId};
@@ -174,16 +174,18 @@ impl Node {
             return;
         }
         let cycle = self.cycle;
-        let begins = optimiser.payoffs_done.max(optimiser.sent);
-        if begins > ctx.now() {
+        let takes = config.processor.time_for(problem.pairs());
+        let left = |until: SimTime| until.since(until.min(ctx.now()));
+        // Its messages are to go out when the last are on the air, and not to be older than that.
+        let idle = left(optimiser.sent).saturating_sub(takes);
+        let left = left(optimiser.payoffs_done).max(idle);
+        if !left.is_zero() {
             optimiser.task = Some(Task::Payoffs);
-            let left = begins.since(ctx.now());
             ctx.timer(left, ProcessorDone { cycle });
             return;
         }
         optimiser.dirty = false;
         let settled = !problem.compute();
-        let takes = config.processor.time_for(problem.pairs());
         if takes.is_zero() {
             self.complete(ctx, settled);
         } else {
