@@ -18,8 +18,8 @@ use crate::units::parse_duration;
 /// | part | lasts | because |
 /// |---|---|---|
 /// | `exchange` | 1.5 L + S(700) + 20 ms, at least 50 ms | one message, and some jitter |
-/// | `iteration_timeout` | 2 (L + S(150)), at least 20 ms | one message each way |
-/// | `optimisation` | 10 (L + S(150)), at least 500 ms | max-plus needs about ten iterations, each L + S |
+/// | `iteration_timeout` | 2 (L + S(600)), at least 20 ms | one message each way |
+/// | `optimisation` | 10 (L + S(600)), at least 500 ms | max-plus needs about ten iterations, each L + S |
 /// | `cycle` | 4 `exchange` + `optimisation` + `traverse` + 5 (L + S(64)) + 50 ms, at least 1 s | grant, LEAVING, its report, the follower's grant and its drive come after the decision |
 ///
 /// The sizes are those of common messages of 50 rovers and 28 nodes: candidate paths, vectors, grants. Larger
@@ -39,7 +39,7 @@ use crate::units::parse_duration;
 /// assert_eq!(slow.cycle, SimDuration::from_millis(21_330));
 /// let narrow = network.timing(SimDuration::ZERO, Some(2_000))?;
 /// assert_eq!(narrow.exchange, SimDuration::from_millis(2820));
-/// assert_eq!(narrow.optimisation, SimDuration::from_secs(6));
+/// assert_eq!(narrow.optimisation, SimDuration::from_secs(24));
 /// # Ok::<(), farside_actors::network::ConfigError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +58,8 @@ pub struct Timing {
 
 /// The size of a common message \[B\] with candidate paths.
 const PATHS_BYTES: u64 = 700;
-/// The same with vectors of one iteration.
-const VECTORS_BYTES: u64 = 150;
+/// The same with vectors of one of the first iterations, in which most of them change.
+const VECTORS_BYTES: u64 = 600;
 /// The same of a grant, a beacon, a departure.
 const GRANT_BYTES: u64 = 64;
 /// The same of a walk of the `complete` policy.

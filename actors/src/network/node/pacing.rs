@@ -38,3 +38,116 @@ fn takes<M: Serialize>(timing: &Timing, schema: &Known, message: &M) -> SimDurat
     let _ = schema.encode(message, &mut bytes);
     timing.sending(bytes.len() as u64)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use farside::prelude::*;
+    use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+
+    use crate::link::{Link, LinkParams};
+    use crate::network::testing::grid;
+    use crate::network::{
+        NetworkConfig, NetworkMetrics, TeamConfig, Timing, WorldConfig, assemble,
+    };
+
+    const LATENCY: SimDuration = SimDuration::from_millis(5);
+
+    /// Of each message with vectors that came: when it was on the air, and how long it had waited.
+    #[derive(Clone, Default)]
+    struct Vectors(Arc<Mutex<Vec<(SimTime, SimDuration)>>>);
+
+    impl Observer for Vectors {
+        fn wants(&self) -> Wants {
+            Wants::default()
+        }
+
+        fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+            let is_vectors = record.kind.is_some_and(|kind| kind.name() == "MaxPlus");
+            if let Some(carriage) = record.carriage.filter(|_| is_vectors) {
+                assert_eq!(record.class, RecordClass::Delivered);
+                let on_air = SimTime::ZERO + (record.time().since(SimTime::ZERO) - LATENCY);
+                self.0.lock().unwrap().push((on_air, carriage.queue));
+            }
+            Ok(Flow::Continue)
+        }
+    }
+
+    /// Eight rovers of four nodes over links with this rate.
+    fn run(rate: &str, network: &NetworkConfig) -> (NetworkMetrics, Timing, Vectors) {
+        let map = grid(5, 4, &[(6, 7), (12, 13)]);
+        let world = WorldConfig {
+            nodes: 4,
+            radius_m: Some(60.0),
+            ..WorldConfig::default()
+        };
+        let sensors = Arc::new(world.place(&map, 1).unwrap());
+        let mut sim = Simulation::new(1);
+        let vectors = Vectors::default();
+        sim.observe(vectors.clone());
+        let params: LinkParams =
+            toml::from_str(&format!("latency = '5ms'\nrate = '{rate}'")).unwrap();
+        let mut connect =
+            |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
+                let name = format!("{from}-{to}");
+                sim.link(a, b, &name, Link::new(params.clone()));
+            };
+        let (map, team) = (Arc::new(map), TeamConfig { rovers: 8 });
+        let system = assemble(
+            &mut sim,
+            &world,
+            map,
+            sensors,
+            &team,
+            network,
+            1,
+            &mut connect,
+        );
+        let system = system.unwrap();
+        let report = sim.run(Executor::Inline).unwrap();
+        assert!(report.fault().is_none(), "{:?}", report.fault());
+        (system.metrics(), system.timing(), vectors)
+    }
+
+    #[test]
+    fn vectors_neither_queue_nor_come_too_late() {
+        // So short that not all of them can come in time.
+        let network = NetworkConfig {
+            optimisation: Some(SimDuration::from_secs(1)),
+            ..NetworkConfig::default()
+        };
+        let (metrics, timing, vectors) = run("4kbit/s", &network);
+        assert_eq!((metrics.arrived, metrics.collisions), (8, 0));
+        let vectors = vectors.0.lock().unwrap();
+        assert!(vectors.len() > 50, "{}", vectors.len());
+        let cycle = timing.cycle.as_nanos();
+        let ends = timing.decided_after() - timing.exchange;
+        for (on_air, queued) in &*vectors {
+            let at = SimDuration::from_nanos(on_air.as_nanos() % cycle);
+            assert!(at <= ends, "{at} of a cycle, after {ends}");
+            // A report of a rover's departure may be on the air.
+            assert!(*queued <= timing.sending(64), "{queued} in a queue");
+        }
+    }
+
+    #[test]
+    fn slow_links_make_cycles_longer_and_teams_arrive() {
+        let network = NetworkConfig::default();
+        let (fast, _, _) = run("10Mbit/s", &network);
+        let (slow, timing, _) = run("2kbit/s", &network);
+        assert_eq!((slow.arrived, slow.collisions), (8, 0));
+        assert!(
+            timing.cycle > SimDuration::from_secs(20),
+            "{}",
+            timing.cycle
+        );
+        // Not many more of them, though each is so much longer.
+        assert!(
+            slow.cycles <= 2 * fast.cycles,
+            "{} and {}",
+            slow.cycles,
+            fast.cycles
+        );
+    }
+}
