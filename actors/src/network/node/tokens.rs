@@ -28,8 +28,8 @@
 //! into the one that it came from, need tokens too. A slot reserved beyond the exit does not help, as
 //! that slot is the junction, and who holds it stands there until the next corridor opens. It would have to be
 //! granted together with the next corridor and its exit, and so on to the goal: which is the
-//! reservation walk of the `complete` policy. With `entry_gates`, which keep junctions free, no team came to a
-//! standstill.
+//! reservation walk of the `complete` policy. With `entry_gates` no team comes to a
+//! standstill, and tokens beside them only cost time (time ratio 4.77 against 3.98, 16 seeds).
 //!
 //! **What was tried and is worse still**: to forbid moves against the flow inside, which takes from rovers
 //! the way back; to keep an exit free of rovers that wait there for the same corridor in the
