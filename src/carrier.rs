@@ -27,6 +27,13 @@ pub trait Carrier: Send + 'static {
     /// may run ahead of each other; delivering sooner is a fault. Read once, before the start.
     fn min_delay(&self) -> SimDuration;
 
+    /// The highest bit rate that this link will ever have \[bit/s\]; none, the default, if messages
+    /// of any size take no longer than short ones, or if nothing can be said. Read once, before the
+    /// start, for protocols that have to reckon with it; it decides nothing in the kernel.
+    fn rate_bit_per_s(&self) -> Option<u64> {
+        None
+    }
+
     /// Decides the fate of `parcel`: at least one verdict, one for each copy. A copy that was held
     /// ([`Verdicts::hold`]) is shown again, with its token, and gets one verdict more.
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
@@ -320,6 +327,7 @@ impl Verdicts {
 /// A carrier whose type the engine does not know.
 pub(crate) trait AnyCarrier: Send {
     fn min_delay(&self) -> SimDuration;
+    fn rate_bit_per_s(&self) -> Option<u64>;
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
     fn change(&mut self, change: Box<dyn Any + Send>, now: SimTime);
 }
@@ -327,6 +335,10 @@ pub(crate) trait AnyCarrier: Send {
 impl<C: Carrier> AnyCarrier for C {
     fn min_delay(&self) -> SimDuration {
         Carrier::min_delay(self)
+    }
+
+    fn rate_bit_per_s(&self) -> Option<u64> {
+        Carrier::rate_bit_per_s(self)
     }
 
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {

@@ -281,6 +281,21 @@ impl Simulation {
         delays.max().unwrap_or(SimDuration::ZERO)
     }
 
+    /// The least [`Carrier::rate_bit_per_s`] of all links declared so far \[bit/s\]; none if no link
+    /// has a rate.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// sim.link(a, b, "a-b", FixedDelay::new(SimDuration::from_millis(5)));
+    /// assert_eq!(sim.slowest_rate_bit_per_s(), None);
+    /// ```
+    pub fn slowest_rate_bit_per_s(&self) -> Option<u64> {
+        let rates = self.links.iter().map(|link| link.carrier.rate_bit_per_s());
+        rates.flatten().min()
+    }
+
     /// [`Simulation::crash_at`] for the actor of this name, as scenarios give it.
     ///
     /// # Errors

@@ -249,6 +249,10 @@ impl Carrier for Link {
         self.transmitter.min_delay()
     }
 
+    fn rate_bit_per_s(&self) -> Option<u64> {
+        self.transmitter.timeline().fastest_bit_per_s()
+    }
+
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
         let now = parcel.now();
         if now >= self.until {

@@ -248,6 +248,15 @@ impl LinkParams {
     /// It is the least latency, of contacts too, less what the jitter can take, plus the time to
     /// send an empty message. A given `min_delay` stands in for the first two.
     pub fn min_delay(&self) -> SimDuration {
+        let sending = self.fastest_bit_per_s().map_or(SimDuration::ZERO, |rate| {
+            super::transmission_time(self.overhead, rate)
+        });
+        self.least_way_of_all() + sending
+    }
+
+    /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace says
+    /// when to transmit.
+    pub(super) fn fastest_bit_per_s(&self) -> Option<u64> {
         let windows = self.contacts.iter().flat_map(Contacts::windows);
         let fastest = windows
             .map(|window| window.rate.or(self.rate))
@@ -256,11 +265,7 @@ impl LinkParams {
                 Some(a?.max(b?))
             });
         let rate = fastest.unwrap_or(self.rate);
-        let sending = match (rate, &self.trace) {
-            (Some(rate), None) => super::transmission_time(self.overhead, rate),
-            _ => SimDuration::ZERO,
-        };
-        self.least_way_of_all() + sending
+        rate.filter(|_| self.trace.is_none())
     }
 
     /// What is said here and has no effect without something else that is not said.

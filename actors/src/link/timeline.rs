@@ -164,6 +164,14 @@ impl Timeline {
         delays(false).or(delays(true)).unwrap_or_default()
     }
 
+    /// The highest bit rate over all parameters \[bit/s\], outages left out as above; none if there is
+    /// no bound.
+    pub(super) fn fastest_bit_per_s(&self) -> Option<u64> {
+        let rates = self.spans.iter().filter(|span| !span.params.outage);
+        let rates = rates.map(|span| span.params.fastest_bit_per_s());
+        rates.reduce(|a, b| Some(a?.max(b?))).flatten()
+    }
+
     /// Whether transmissions take time, whatever parameters hold.
     pub(crate) fn takes_time(&self) -> bool {
         let timed = |params: &LinkParams| {

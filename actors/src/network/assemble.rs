@@ -205,6 +205,11 @@ impl Site {
         }
     }
 
+    /// When a planning cycle begins.
+    pub(crate) fn cycle_start(&self, cycle: u32) -> SimTime {
+        SimTime::ZERO + self.timing.cycle * u64::from(cycle)
+    }
+
     /// From `now` to the start of the next cycle; never zero.
     pub(crate) fn until_next_cycle(&self, now: SimTime) -> SimDuration {
         let cycle = self.timing.cycle.as_nanos();
@@ -321,7 +326,8 @@ fn assemble_missions(
     let rover_names = names("rover", missions.len());
     gaps::check_refused(&refused, &rover_names, stays)?;
     declare_links(sim, &sensors, (&node_names, &rover_names), connect);
-    let timing = timing(&roadmap, network, sim.slowest_link())?;
+    let links = (sim.slowest_link(), sim.slowest_rate_bit_per_s());
+    let timing = timing(&roadmap, network, links)?;
     let longest_step = longest_step(&roadmap, network, &timing)?;
     let planned: Vec<_> = (0..)
         .map(RoverId)
@@ -341,7 +347,7 @@ fn assemble_missions(
             false => Corridors::default(),
         },
         schedule: schedule.map_err(NetworkError::NoPlan)?,
-        patience: network.patience(sim.slowest_link(), &timing),
+        patience: network.patience(links.0, &timing),
         timing,
         roadmap_from: source(network, &node_names)?,
         node_names,
@@ -386,7 +392,7 @@ fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, Ne
 fn timing(
     roadmap: &Roadmap,
     config: &NetworkConfig,
-    latency: SimDuration,
+    (latency, rate_bit_per_s): (SimDuration, Option<u64>),
 ) -> Result<Timing, ConfigError> {
     let mut config = config.clone();
     if config.policy == Policy::Paper && config.motion == Motion::Continuous {
@@ -397,7 +403,7 @@ fn timing(
         .longest();
         config.traverse = longest.map_or(config.traverse, |(_, time)| time);
     }
-    config.timing(latency)
+    config.timing(latency, rate_bit_per_s)
 }
 
 /// The longest that a step is planned to take.

@@ -627,7 +627,7 @@ mod tests {
             optimisation: Some(SimDuration::from_millis(800)),
             ..NetworkConfig::default()
         };
-        let timing = network.timing(SimDuration::from_millis(5));
+        let timing = network.timing(SimDuration::from_millis(5), None);
         assert!(matches!(timing, Err(ConfigError::Schedule { .. })));
     }
 

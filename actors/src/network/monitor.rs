@@ -124,7 +124,8 @@ impl Observer for Monitor {
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
         let mut score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
         let cycle = self.site.cycle_at(record.time());
-        if cycle > score.cycle {
+        // What is on its way at the end is recorded with the time that it would have come at.
+        if cycle > score.cycle && record.class != RecordClass::InFlight {
             score.cycle = cycle;
             if let Some(reason) = score.verdict(&self.site) {
                 return Ok(Flow::Stop(reason));

@@ -7,6 +7,7 @@ mod admit;
 mod cycle;
 mod gates;
 mod optimise;
+mod pacing;
 mod probes;
 mod resolution;
 mod takeover;

@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 12] = [
+const BUILTIN: [(&str, &str); 13] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),
@@ -25,6 +25,10 @@ const BUILTIN: [(&str, &str); 12] = [
     (
         "network/ablation",
         include_str!("../../studies/network/ablation.toml"),
+    ),
+    (
+        "network/bandwidth",
+        include_str!("../../studies/network/bandwidth.toml"),
     ),
     (
         "network/coverage",

@@ -141,6 +141,7 @@ impl Node {
                 cycle: self.cycle,
                 rovers: rovers.iter().map(paths).collect(),
             };
+            self.charge_sending(ctx.now(), &message);
             for neighbor in &self.neighbors {
                 ctx.send_keyed(
                     neighbor.address,

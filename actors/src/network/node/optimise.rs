@@ -4,6 +4,9 @@
 //! when they are overdue; vectors that did not come stay as they were last heard, at first zero. A
 //! node whose vectors no longer change says so once and falls silent until something new comes in.
 //!
+//! Over links with a bit rate it sends nothing before the last is on the air, and nothing that comes
+//! too late: see [`pacing`].
+//!
 //! With a finite `network.processor` all this takes time. A node compares candidate paths as they
 //! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
 //! as it begins, and its messages go out when it is done. What is not done when the optimisation
@@ -13,7 +16,7 @@ use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::NodeId;
 
-use super::{IterationOverdue, Node, Phase, ProcessorDone};
+use super::{IterationOverdue, Node, Phase, ProcessorDone, pacing};
 use crate::network::candidates::CandidatePath;
 use crate::network::max_plus::{MaxPlus as Problem, Rules};
 use crate::network::messages::{CandidatePaths, Choice, MaxPlus, RoverId};
@@ -36,6 +39,10 @@ pub(super) struct Optimiser {
     task: Option<Task>,
     /// When the payoffs of all candidate paths that came in are made.
     payoffs_done: SimTime,
+    /// When what this node has sent to its neighbours in this cycle is on the air.
+    sent: SimTime,
+    /// When the optimisation is over.
+    ends: SimTime,
     /// What neighbours were told that the own rovers would do.
     announced: Vec<Choice>,
 }
@@ -43,7 +50,7 @@ pub(super) struct Optimiser {
 /// What a processor that takes time does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// It makes payoffs; the next iteration waits for them.
+    /// It makes payoffs, or waits until what it sent is on the air; then comes the next iteration.
     Payoffs,
     /// It computes an iteration, after which nothing changed, or something did.
     Iteration { settled: bool },
@@ -113,6 +120,11 @@ impl Node {
         self.charge_payoffs(ctx);
     }
 
+    /// Candidate paths are being sent to all neighbours.
+    pub(super) fn charge_sending(&mut self, now: SimTime, message: &CandidatePaths) {
+        self.optimiser.sent = now + pacing::paths_take(&self.site.timing, message);
+    }
+
     /// The processor has more candidate paths to compare.
     fn charge_payoffs(&mut self, ctx: &Context<'_, Self>) {
         let optimiser = &mut self.optimiser;
@@ -125,6 +137,8 @@ impl Node {
     pub(super) fn optimise(&mut self, ctx: &mut Context<'_, Self>) {
         if self.optimiser.rovers() > 0 {
             self.optimiser.running = true;
+            let left = self.site.timing.decided_after() - self.site.timing.exchange;
+            self.optimiser.ends = self.site.cycle_start(self.cycle) + left;
             self.iterate(ctx);
             self.advance(ctx);
         }
@@ -160,15 +174,18 @@ impl Node {
             return;
         }
         let cycle = self.cycle;
-        if optimiser.payoffs_done > ctx.now() {
+        let takes = config.processor.time_for(problem.pairs());
+        let left = |until: SimTime| until.since(until.min(ctx.now()));
+        // Its messages are to go out when the last are on the air, and not to be older than that.
+        let idle = left(optimiser.sent).saturating_sub(takes);
+        let left = left(optimiser.payoffs_done).max(idle);
+        if !left.is_zero() {
             optimiser.task = Some(Task::Payoffs);
-            let left = optimiser.payoffs_done.since(ctx.now());
             ctx.timer(left, ProcessorDone { cycle });
             return;
         }
         optimiser.dirty = false;
         let settled = !problem.compute();
-        let takes = config.processor.time_for(problem.pairs());
         if takes.is_zero() {
             self.complete(ctx, settled);
         } else {
@@ -179,7 +196,7 @@ impl Node {
 
     /// An iteration is computed: its messages go out.
     fn complete(&mut self, ctx: &mut Context<'_, Self>, settled: bool) {
-        let optimiser = &mut self.optimiser;
+        let (optimiser, timing) = (&mut self.optimiser, self.site.timing);
         let Some(problem) = &mut optimiser.problem else {
             return;
         };
@@ -196,9 +213,6 @@ impl Node {
             if vectors.is_empty() && told && !awaited {
                 continue;
             }
-            peer.told_settled = optimiser.settled;
-            // New vectors wake it: an answer is to be expected.
-            peer.settled &= vectors.is_empty();
             let at = self.neighbors.binary_search_by_key(&peer.node, |n| n.id);
             let Ok(at) = at else { continue };
             let key = MatchKey::new(self.cycle, optimiser.iteration);
@@ -210,6 +224,14 @@ impl Node {
                 vectors,
                 choices: choices.clone(),
             };
+            let sent = ctx.now() + pacing::vectors_take(&timing, &message);
+            if timing.rate_bit_per_s.is_some() && sent >= optimiser.ends {
+                continue;
+            }
+            optimiser.sent = optimiser.sent.max(sent);
+            peer.told_settled = optimiser.settled;
+            // New vectors wake it: an answer is to be expected.
+            peer.settled &= message.vectors.is_empty();
             ctx.send_keyed(self.neighbors[at].address, key, message);
         }
         optimiser.announced = choices;
