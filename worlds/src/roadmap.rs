@@ -5,18 +5,21 @@
 //! [`crate::sensors`].
 
 mod check;
+mod distances;
 mod endpoints;
 mod file;
 mod well_formed;
 
-use std::collections::VecDeque;
 use std::fmt;
+use std::sync::Arc;
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RoadmapError;
 pub(crate) use check::segments_meet;
+use distances::Distances;
+pub use distances::DistancesTo;
 pub use endpoints::Endpoints;
 pub use file::RoadmapTable;
 pub use well_formed::{Blocked, well_formed};
@@ -39,9 +42,9 @@ impl fmt::Display for VertexId {
     }
 }
 
-/// The most vertices a roadmap may have: a full grid of 64 by 64. Its distance table, two bytes for
-/// each pair, then takes 32 MiB.
-pub const MAX_VERTICES: usize = 4096;
+/// The most vertices a roadmap may have: twice a full grid of 256 by 256, and more than the largest
+/// map of the benchmark of multi-agent path-finding, `orz900d`, has.
+pub const MAX_VERTICES: usize = 131_072;
 
 /// The largest magnitude of a coordinate or height \[m\].
 pub const MAX_COORDINATE_M: f64 = 1.0e6;
@@ -70,9 +73,8 @@ pub struct Roadmap {
     boundary: Vec<VertexId>,
     /// Sorted neighbours of each vertex.
     neighbors: Vec<Vec<VertexId>>,
-    /// Hops between all pairs, row by row.
-    hops: Vec<u16>,
-    diameter: u32,
+    /// Shared by copies.
+    distances: Arc<Distances>,
 }
 
 impl Roadmap {
@@ -92,19 +94,41 @@ impl Roadmap {
     /// # Errors
     /// When there is no vertex or no boundary, an index is out of range, an edge or boundary vertex
     /// is given twice, an edge joins a vertex to itself, the graph falls apart, two vertices
-    /// coincide, or two edges meet elsewhere than at a common end.
+    /// coincide, two edges meet elsewhere than at a common end, or two vertices may be more than
+    /// 65,534 edges apart.
     pub fn new(
+        name: &str,
+        positions_m: Vec<Point2<f64>>,
+        edges: Vec<(VertexId, VertexId)>,
+        boundary: Vec<VertexId>,
+    ) -> Result<Roadmap, RoadmapError> {
+        Self::build(name, positions_m, edges, boundary, check::embedding)
+    }
+
+    /// The same for vertices on the points of a lattice, each edge between two beside each other:
+    /// these cannot meet elsewhere, and need no search for those that do.
+    pub(crate) fn on_lattice(
+        name: &str,
+        positions_m: Vec<Point2<f64>>,
+        edges: Vec<(VertexId, VertexId)>,
+        boundary: Vec<VertexId>,
+    ) -> Result<Roadmap, RoadmapError> {
+        Self::build(name, positions_m, edges, boundary, |_, _| Ok(()))
+    }
+
+    fn build(
         name: &str,
         positions_m: Vec<Point2<f64>>,
         mut edges: Vec<(VertexId, VertexId)>,
         mut boundary: Vec<VertexId>,
+        embedding: fn(&[Point2<f64>], &[(VertexId, VertexId)]) -> Result<(), RoadmapError>,
     ) -> Result<Roadmap, RoadmapError> {
         for edge in &mut edges {
             *edge = (edge.0.min(edge.1), edge.0.max(edge.1));
         }
         edges.sort_unstable();
         check::graph(&positions_m, &edges, &boundary)?;
-        check::embedding(&positions_m, &edges)?;
+        embedding(&positions_m, &edges)?;
         let mut neighbors = vec![Vec::new(); positions_m.len()];
         for &(u, v) in &edges {
             neighbors[u.0 as usize].push(v);
@@ -113,8 +137,7 @@ impl Roadmap {
         for list in &mut neighbors {
             list.sort_unstable();
         }
-        let hops = all_hops(&neighbors)?;
-        let diameter = hops.iter().copied().max().map_or(0, u32::from);
+        let distances = Arc::new(Distances::new(&neighbors)?);
         sort_round_the_rim(&positions_m, &mut boundary);
         let heights_m = vec![0.0; positions_m.len()];
         let name = name.to_owned();
@@ -125,8 +148,7 @@ impl Roadmap {
             edges,
             boundary,
             neighbors,
-            hops,
-            diameter,
+            distances,
         })
     }
 
@@ -195,7 +217,8 @@ impl Roadmap {
         &self.boundary
     }
 
-    /// The fewest edges between `u` and `v`.
+    /// The fewest edges between `u` and `v`. Of many vertices to one goal, [`Roadmap::distances_to`]
+    /// tells them faster.
     pub fn distance(&self, u: VertexId, v: VertexId) -> u32 {
         assert!(
             (v.0 as usize) < self.len(),
@@ -203,57 +226,37 @@ impl Roadmap {
             v.0,
             self.len()
         );
-        u32::from(self.hops[u.0 as usize * self.len() + v.0 as usize])
+        self.distances.between(&self.neighbors, u, v)
     }
 
-    /// The largest distance between two vertices.
+    /// The fewest edges to `goal` from every vertex.
+    pub fn distances_to(&self, goal: VertexId) -> DistancesTo<'_> {
+        self.distances.to(&self.neighbors, goal)
+    }
+
+    /// The largest distance between two vertices. On roadmaps of more than 4,096 vertices it is
+    /// worked out when it is first asked for.
     pub fn diameter(&self) -> u32 {
-        self.diameter
+        self.distances.diameter(&self.neighbors)
     }
 
     /// A path of fewest edges from `u` to `v`, both included; of several, the one whose vertices
     /// come first in order (each step goes to the lowest vertex that is nearer to `v`).
     pub fn shortest_path(&self, u: VertexId, v: VertexId) -> Vec<VertexId> {
-        let mut path = Vec::with_capacity(self.distance(u, v) as usize + 1);
+        let left = self.distances_to(v);
+        let mut path = Vec::with_capacity(left.from(u) as usize + 1);
         let mut here = u;
         path.push(here);
         while here != v {
-            let left = self.distance(here, v);
             let next = self
                 .neighbors(here)
                 .iter()
-                .find(|&&w| self.distance(w, v) + 1 == left);
+                .find(|&&w| left.from(w) + 1 == left.from(here));
             here = *next.expect("in a connected graph some neighbour is nearer");
             path.push(here);
         }
         path
     }
-}
-
-/// Hops between all pairs, row by row, by a breadth-first search from each vertex.
-fn all_hops(neighbors: &[Vec<VertexId>]) -> Result<Vec<u16>, RoadmapError> {
-    let n = neighbors.len();
-    let mut hops = vec![u16::MAX; n * n];
-    let mut queue = VecDeque::new();
-    for (source, row) in hops.chunks_exact_mut(n).enumerate() {
-        row[source] = 0;
-        queue.push_back(source);
-        while let Some(u) = queue.pop_front() {
-            for v in &neighbors[u] {
-                let v = v.0 as usize;
-                if row[v] == u16::MAX {
-                    row[v] = row[u] + 1;
-                    queue.push_back(v);
-                }
-            }
-        }
-        if let Some(unreachable) = row.iter().position(|&hop| hop == u16::MAX) {
-            return Err(RoadmapError::Disconnected {
-                unreachable: VertexId(unreachable as u32),
-            });
-        }
-    }
-    Ok(hops)
 }
 
 /// Sorts the boundary by angle round the mean of all positions, equal angles by vertex.
