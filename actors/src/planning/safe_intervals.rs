@@ -12,7 +12,7 @@
 //! visit after the other one has ended.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 
 use farside_worlds::{Roadmap, VertexId};
 use serde::{Deserialize, Serialize};
@@ -105,15 +105,15 @@ impl Ground<'_> {
     /// [`Ground::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
         let mut queue = BinaryHeap::new();
-        let mut best = BTreeMap::<(VertexId, u64), u64>::new();
+        let mut best = Earliest::new(self.roadmap.len());
         for &at in open {
             let label = labels[at as usize];
-            best.insert((label.vertex, label.until), label.ready);
+            *best.of(label.vertex, label.until) = label.ready;
             queue.push(Reverse((label.ready, at)));
         }
         while let Some(Reverse((ready, at))) = queue.pop() {
             let from = labels[at as usize];
-            if best.get(&(from.vertex, from.until)) != Some(&ready) {
+            if *best.of(from.vertex, from.until) != ready {
                 continue;
             }
             for &to in self.roadmap.neighbors(from.vertex) {
@@ -129,7 +129,7 @@ impl Ground<'_> {
                     let Some(there) = start.checked_add(travel).filter(|&t| t <= until) else {
                         continue;
                     };
-                    let known = best.entry((to, until)).or_insert(FOREVER);
+                    let known = best.of(to, until);
                     if there >= *known {
                         continue;
                     }
@@ -145,6 +145,40 @@ impl Ground<'_> {
                 }
             }
         }
+    }
+}
+
+/// The earliest time known for each vertex and safe interval, by the interval's end.
+struct Earliest {
+    /// By vertex, the place in `known` of its last interval met; [`Earliest::NONE`] if none was.
+    last: Vec<u32>,
+    /// (end of the interval, earliest time, place of the vertex's interval met before).
+    known: Vec<(u64, u64, u32)>,
+}
+
+impl Earliest {
+    const NONE: u32 = u32::MAX;
+
+    fn new(vertices: usize) -> Self {
+        Earliest {
+            last: vec![Self::NONE; vertices],
+            known: Vec::new(),
+        }
+    }
+
+    /// [`FOREVER`] at first.
+    fn of(&mut self, vertex: VertexId, until: u64) -> &mut u64 {
+        let last = &mut self.last[vertex.0 as usize];
+        let mut at = *last;
+        while at != Self::NONE && self.known[at as usize].0 != until {
+            at = self.known[at as usize].2;
+        }
+        if at == Self::NONE {
+            at = self.known.len() as u32;
+            self.known.push((until, FOREVER, *last));
+            *last = at;
+        }
+        &mut self.known[at as usize].1
     }
 }
 
