@@ -96,7 +96,7 @@ pub use config::{
     ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
     WorldConfig,
 };
-pub use metrics::{Deadlock, NetworkMetrics};
+pub use metrics::{Costs, Deadlock, NetworkMetrics};
 pub use node::Node;
 pub use processor::Processor;
 pub use rover::Rover;
