@@ -30,7 +30,7 @@ pub enum Deadlock {
 pub struct NetworkMetrics {
     /// Rovers in the team.
     pub rovers: u32,
-    /// Rovers that reached their goals.
+    /// Rovers that reached their goals; where they stay there: that stand there at the end.
     pub arrived: u32,
     /// Every rover reached its goal.
     pub completed: bool,

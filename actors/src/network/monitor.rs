@@ -203,6 +203,9 @@ impl Score {
         if vertex == Some(state.goal) && track.arrived.is_none() {
             track.arrived = Some(cycle);
             track.arrived_at = Some(now);
+        } else if site.stays && track.cost.is_some() {
+            // It makes way for another, and has to come back.
+            (track.arrived, track.arrived_at) = (None, None);
         }
         track.cost = match place {
             Place::At(here) if here == state.goal => {

@@ -91,13 +91,6 @@ impl Book {
         self.enter(v, visit);
     }
 
-    /// The same without those who stand there for ever.
-    pub(super) fn busy_for_now(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
-        let mut busy = self.busy(v)?;
-        busy.retain(|&(_, end)| end != FOREVER);
-        Some(busy)
-    }
-
     /// Who stands, or will stand, at `v` for ever, as far as is known.
     pub(super) fn standing(&self, v: VertexId) -> Option<&Visit> {
         let last = self.pages[self.page(v)?].1.last()?;

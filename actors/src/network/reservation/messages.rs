@@ -46,6 +46,8 @@ pub enum Item {
     Yield(Yield),
     /// To all: a part of the roadmap, for nodes that are given it over the network.
     Roadmap(RoadmapPart),
+    /// Forward: where and when the rover could be if others made way.
+    Wish(Wish),
 }
 
 /// A part of the roadmap.
@@ -85,6 +87,9 @@ pub struct Yield {
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
+    /// When the first attempt of the walk began for which way is made \[ns\]: this one's, or, where
+    /// this one is to make way itself, that of the walk it makes way for.
+    pub elder: u64,
 }
 
 /// One attempt to reserve a way for a rover.
@@ -128,6 +133,15 @@ pub struct Probe {
     pub labels: Vec<Label>,
     /// Those of them, by place, from which the next node goes on.
     pub frontier: Vec<u32>,
+}
+
+/// A probe that only asks what the way would be if nobody stood still for ever.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wish {
+    /// The probe.
+    pub probe: Probe,
+    /// As in [`Yield`].
+    pub elder: u64,
 }
 
 /// The backward half: the way is entered in the books of all that own a part of it.

@@ -13,6 +13,7 @@ use super::book::{Book, Visit};
 use super::messages::{Item, Probe, Reserve, Walk};
 use super::relay::Line;
 use super::routes::routes;
+use making_way::{Aside, Claims};
 use crate::network::assemble::Site;
 use crate::network::messages::RoverId;
 use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
@@ -35,8 +36,8 @@ struct Applicant {
 enum Aim {
     /// To the rover's goal.
     Goal,
-    /// Off this path, out of another's way.
-    Aside(Vec<VertexId>),
+    /// Out of another's way.
+    Aside(Aside),
 }
 
 /// Where a way begins.
@@ -68,6 +69,7 @@ struct Offers {
     probes: u32,
     first_step: u32,
     wishful: bool,
+    elder: u64,
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -84,6 +86,8 @@ pub(crate) struct Registry {
     pub(super) atlas: Atlas,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
+    /// What is kept free for those who asked others to make way.
+    claims: Claims,
     /// Ways that wait for younger walks to be settled.
     parked: Vec<Reserve>,
     /// How long a walk takes from its first probe to its confirmation, smoothed [ns].
@@ -226,9 +230,6 @@ impl Registry {
                 (labels, entry, 1)
             }
             Origin::Stand { vertex, step, .. } => {
-                if let Aim::Aside(path) = &applicant.aim {
-                    goal = making_way::aside(&desk.site.roadmap, vertex, path, in_vain);
-                }
                 let step_time = desk.site.longest_step.as_nanos();
                 let came = self
                     .book
@@ -241,6 +242,12 @@ impl Registry {
                     until: FOREVER,
                     parent: None,
                 };
+                if let Some(elsewhere) = self.step_aside(desk, at, walk, label) {
+                    match elsewhere {
+                        Some(place) => goal = place,
+                        None => return,
+                    }
+                }
                 (vec![label], vertex, step)
             }
             Origin::Done => return,
@@ -255,6 +262,10 @@ impl Registry {
             (entry, goal),
             site.config.routes,
         );
+        let elder = match &self.applicants[at].aim {
+            Aim::Aside(aside) => aside.elder,
+            Aim::Goal => walk.since,
+        };
         let probes = routes.len() as u32;
         for route in routes {
             let probe = Probe {
@@ -269,7 +280,7 @@ impl Registry {
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
-            self.probe(desk, probe);
+            self.probe(desk, probe, elder);
         }
     }
 
@@ -294,7 +305,11 @@ impl Registry {
 
     pub(super) fn take(&mut self, desk: &Desk<'_>, item: Item) {
         match item {
-            Item::Probe(probe) => self.probe(desk, probe),
+            Item::Probe(probe) => {
+                let elder = probe.walk.since;
+                self.probe(desk, probe, elder);
+            }
+            Item::Wish(wish) => self.probe(desk, wish.probe, wish.elder),
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Yield(request) => self.make_way(desk, request),
