@@ -87,9 +87,9 @@ pub struct Yield {
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
-    /// When the first attempt of the walk began for which way is made \[ns\]: this one's, or, where
-    /// this one is to make way itself, that of the walk it makes way for.
-    pub elder: u64,
+    /// For whom way is made: when the first attempt of its walk began \[ns\], and the rover. This one,
+    /// or, where this one is to make way itself, the one it makes way for.
+    pub elder: (u64, RoverId),
 }
 
 /// One attempt to reserve a way for a rover.
@@ -106,7 +106,12 @@ pub struct Walk {
 impl Walk {
     /// Whether this walk goes before `other`.
     pub fn is_older_than(&self, other: &Walk) -> bool {
-        (self.since, self.rover) < (other.since, other.rover)
+        self.age() < other.age()
+    }
+
+    /// When its first attempt began \[ns\], and the rover: whose is less goes before.
+    pub fn age(&self) -> (u64, RoverId) {
+        (self.since, self.rover)
     }
 }
 
@@ -141,7 +146,7 @@ pub struct Wish {
     /// The probe.
     pub probe: Probe,
     /// As in [`Yield`].
-    pub elder: u64,
+    pub elder: (u64, RoverId),
 }
 
 /// The backward half: the way is entered in the books of all that own a part of it.

@@ -69,7 +69,7 @@ struct Offers {
     probes: u32,
     first_step: u32,
     wishful: bool,
-    elder: u64,
+    elder: (u64, RoverId),
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -264,7 +264,7 @@ impl Registry {
         );
         let elder = match &self.applicants[at].aim {
             Aim::Aside(aside) => aside.elder,
-            Aim::Goal => walk.since,
+            Aim::Goal => walk.age(),
         };
         let probes = routes.len() as u32;
         for route in routes {
@@ -306,7 +306,7 @@ impl Registry {
     pub(super) fn take(&mut self, desk: &Desk<'_>, item: Item) {
         match item {
             Item::Probe(probe) => {
-                let elder = probe.walk.since;
+                let elder = probe.walk.age();
                 self.probe(desk, probe, elder);
             }
             Item::Wish(wish) => self.probe(desk, wish.probe, wish.elder),

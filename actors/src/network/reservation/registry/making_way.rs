@@ -25,8 +25,8 @@ use crate::planning::safe_intervals::{FOREVER, Label, way_to};
 pub(super) struct Aside {
     /// What is to be left free.
     path: BTreeSet<VertexId>,
-    /// When the walk began for which way is made [ns].
-    pub(super) elder: u64,
+    /// The age of the walk for which way is made.
+    pub(super) elder: (u64, RoverId),
     /// Then it is no longer asked for [ns].
     until: u64,
 }
@@ -78,7 +78,7 @@ impl Registry {
 
     /// Asks those of this node's rovers that stand on a path to step aside, and passes that on.
     pub(super) fn make_way(&mut self, desk: &Desk<'_>, request: Yield) {
-        let asked = (request.elder, request.walk.rover);
+        let asked = request.elder;
         let until = desk.now + CLAIMED_FOR * desk.site.timing.cycle.as_nanos();
         let aside = Aside {
             path: request.path.iter().copied().collect(),
@@ -163,11 +163,10 @@ impl Registry {
         self.search(desk, |ground| ground.expand(&mut labels, &[0]));
         let may_stay = |label: &Label| {
             let place = label.vertex;
-            let asked = (aside.elder, walk.rover);
             label.until == FOREVER
                 && place != vertex
                 && !aside.path.contains(&place)
-                && !self.claims.is_claimed(place, asked, desk.now)
+                && !self.claims.is_claimed(place, aside.elder, desk.now)
         };
         let places = (0..).zip(&labels).filter(|(_, label)| may_stay(label));
         if let Some((last, _)) = places.min_by_key(|(at, label)| (label.ready, *at)) {
@@ -234,8 +233,8 @@ impl Applicant {
     fn goes_before(&self, asked: (u64, RoverId)) -> bool {
         let walk = self.walk.or(self.again).map(|(walk, _)| walk);
         match &self.aim {
-            Aim::Goal => walk.is_some_and(|walk| (walk.since, walk.rover) < asked),
-            Aim::Aside(aside) => aside.elder < asked.0,
+            Aim::Goal => walk.is_some_and(|walk| walk.age() < asked),
+            Aim::Aside(aside) => aside.elder < asked,
         }
     }
 }

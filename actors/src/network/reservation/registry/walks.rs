@@ -18,11 +18,10 @@ impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     ///
     /// A wish is in the name of a walk that began with `elder`.
-    pub(super) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: u64) {
+    pub(super) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: (u64, RoverId)) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
-            let asked = (elder, probe.walk.rover);
-            let busy = |v| self.busy_for_elders(v, asked);
+            let busy = |v| self.busy_for_elders(v, elder);
             self.search_in(desk, &busy, |ground| ground.expand(&mut labels, open));
         } else {
             self.search(desk, |ground| ground.expand(&mut labels, open));
@@ -54,7 +53,7 @@ impl Registry {
         desk: &Desk<'_>,
         probe: &Probe,
         mut labels: &[Label],
-        elder: u64,
+        elder: (u64, RoverId),
     ) {
         let rover = probe.walk.rover;
         // Of a rover's walks, and of their attempts, only the last counts.
@@ -86,8 +85,7 @@ impl Registry {
         offers.heard += 1;
         // Who stays needs the goal for ever, and leaves it to who has asked for it before.
         let stays = desk.site.stays;
-        let asked = (offers.elder, rover);
-        if !offers.wishful && self.claims.is_claimed(probe.goal, asked, desk.now) {
+        if !offers.wishful && self.claims.is_claimed(probe.goal, offers.elder, desk.now) {
             labels = &[];
         }
         let arrivals = (0..)
