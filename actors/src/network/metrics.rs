@@ -107,7 +107,8 @@ pub struct NetworkMetrics {
 ///
 /// A rover's cost is the step at which it comes to its goal for the last time; 0 if it never leaves
 /// it. Each move is a step at least, also one that was granted ahead of its time. Time that messages
-/// take counts: a solver that knows everything has none to spend.
+/// take counts. Rovers that wait need not wait for whole steps: only with `network.grants_ahead = 0`
+/// is none ever ahead of the steps of its plan.
 ///
 /// ```
 /// use farside_actors::network::Costs;
