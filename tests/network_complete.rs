@@ -9,8 +9,8 @@ use std::sync::Arc;
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside_actors::network::{
-    Deadlock, Network, NetworkConfig, NetworkError, NetworkMetrics, Policy, TeamConfig, WorldConfig, assemble,
-    assemble_standing, missions,
+    Deadlock, Network, NetworkConfig, NetworkError, NetworkMetrics, Policy, TeamConfig,
+    WorldConfig, assemble, assemble_standing, missions,
 };
 use farside_actors::planning::{Mission, Order, Problem, Rules, reference};
 use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};

@@ -102,7 +102,10 @@ impl Roadmap {
         edges: Vec<(VertexId, VertexId)>,
         boundary: Vec<VertexId>,
     ) -> Result<Roadmap, RoadmapError> {
-        Self::build(name, positions_m, edges, boundary, check::embedding)
+        let edges = in_order(edges);
+        check::graph(&positions_m, &edges, &boundary)?;
+        check::embedding(&positions_m, &edges)?;
+        Self::checked(name, positions_m, edges, boundary)
     }
 
     /// The same for vertices on the points of a lattice, each edge between two beside each other:
@@ -113,22 +116,17 @@ impl Roadmap {
         edges: Vec<(VertexId, VertexId)>,
         boundary: Vec<VertexId>,
     ) -> Result<Roadmap, RoadmapError> {
-        Self::build(name, positions_m, edges, boundary, |_, _| Ok(()))
+        let edges = in_order(edges);
+        check::graph(&positions_m, &edges, &boundary)?;
+        Self::checked(name, positions_m, edges, boundary)
     }
 
-    fn build(
+    fn checked(
         name: &str,
         positions_m: Vec<Point2<f64>>,
-        mut edges: Vec<(VertexId, VertexId)>,
+        edges: Vec<(VertexId, VertexId)>,
         mut boundary: Vec<VertexId>,
-        embedding: fn(&[Point2<f64>], &[(VertexId, VertexId)]) -> Result<(), RoadmapError>,
     ) -> Result<Roadmap, RoadmapError> {
-        for edge in &mut edges {
-            *edge = (edge.0.min(edge.1), edge.0.max(edge.1));
-        }
-        edges.sort_unstable();
-        check::graph(&positions_m, &edges, &boundary)?;
-        embedding(&positions_m, &edges)?;
         let mut neighbors = vec![Vec::new(); positions_m.len()];
         for &(u, v) in &edges {
             neighbors[u.0 as usize].push(v);
@@ -257,6 +255,15 @@ impl Roadmap {
         }
         path
     }
+}
+
+/// Each edge as (lower, higher), sorted.
+fn in_order(mut edges: Vec<(VertexId, VertexId)>) -> Vec<(VertexId, VertexId)> {
+    for edge in &mut edges {
+        *edge = (edge.0.min(edge.1), edge.0.max(edge.1));
+    }
+    edges.sort_unstable();
+    edges
 }
 
 /// Sorts the boundary by angle round the mean of all positions, equal angles by vertex.

@@ -105,10 +105,10 @@ pub struct NetworkMetrics {
 /// The costs of a solution as the literature on multi-agent path-finding has them (Stern et al.,
 /// *Multi-agent pathfinding*, SoCS 2019), in time steps, each a planning cycle.
 ///
-/// A rover's cost is the step at which it comes to its goal for the last time; 0 if it never leaves
-/// it. Each move is a step at least, also one that was granted ahead of its time. Time that messages
-/// take counts. Rovers that wait need not wait for whole steps: only with `network.grants_ahead = 0`
-/// is none ever ahead of the steps of its plan.
+/// A rover's cost is the step at which it comes to its goal for the last time, to the nearest, so that
+/// the milliseconds a message takes are no step; 0 if it never leaves it. Each move is a step at least,
+/// also one that was granted ahead of its time. Rovers that wait need not wait for whole steps: only
+/// with `network.grants_ahead = 0` is none ever ahead of the steps of its plan.
 ///
 /// ```
 /// use farside_actors::network::Costs;
@@ -140,7 +140,9 @@ impl Costs {
         let shortest = rovers.iter().map(|&(_, edges)| edges);
         let sum_of_costs_bound: u64 = shortest.clone().map(u64::from).sum();
         let all: Option<Vec<u32>> = rovers.iter().map(|&(cost, _)| cost).collect();
-        let sum_of_costs = all.as_ref().map(|all| all.iter().copied().map(u64::from).sum());
+        let sum_of_costs = all
+            .as_ref()
+            .map(|all| all.iter().copied().map(u64::from).sum());
         let moves = sum_of_costs.filter(|_| sum_of_costs_bound > 0);
         Costs {
             sum_of_costs,

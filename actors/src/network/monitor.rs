@@ -209,7 +209,8 @@ impl Score {
         }
         track.cost = match place {
             Place::At(here) if here == state.goal => {
-                let steps = now.as_nanos().div_ceil(site.timing.cycle.as_nanos());
+                let step = site.timing.cycle.as_nanos();
+                let steps = (now.as_nanos() + step / 2) / step;
                 Some(track.moves.max(u32::try_from(steps).unwrap_or(u32::MAX)))
             }
             _ => None,

@@ -354,7 +354,10 @@ fn results(metrics: &NetworkMetrics) -> Results {
         && let (Some(sum), Some(makespan)) = (costs.sum_of_costs, costs.makespan)
     {
         let (least, ratio) = (costs.sum_of_costs_bound, costs.suboptimality.unwrap_or(1.0));
-        line("sum of costs", format!("{sum}, at least {least} ({ratio:.2})"));
+        line(
+            "sum of costs",
+            format!("{sum}, at least {least} ({ratio:.2})"),
+        );
         let least = costs.makespan_bound;
         line("makespan", format!("{makespan}, at least {least}"));
     }

@@ -291,7 +291,11 @@ mod tests {
             assert!(matches!(table, Distances::Table { .. }));
             // So few that they are given up again and again.
             let fields = fields_of(&graph, 3);
-            assert_eq!(table.diameter(&graph), fields.diameter(&graph), "seed {seed}");
+            assert_eq!(
+                table.diameter(&graph),
+                fields.diameter(&graph),
+                "seed {seed}"
+            );
             let mut draws = RandomKey::new(seed).stream();
             let mut draw = || VertexId(draws.below(graph.len() as u64) as u32);
             for _ in 0..400 {

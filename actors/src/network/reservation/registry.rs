@@ -13,10 +13,10 @@ use super::book::{Book, Visit};
 use super::messages::{Item, Probe, Reserve, Walk};
 use super::relay::Line;
 use super::routes::routes;
-use making_way::{Aside, Claims};
 use crate::network::assemble::Site;
 use crate::network::messages::RoverId;
 use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
+use making_way::{Aside, Claims};
 
 /// A rover, or a queue of rovers, for which a way is sought.
 #[derive(Debug)]

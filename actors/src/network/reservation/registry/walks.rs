@@ -8,7 +8,9 @@ use farside_worlds::VertexId;
 use super::{Applicant, Desk, Offers, Registry, owners};
 use crate::network::messages::RoverId;
 use crate::network::reservation::book::{Clash, Visit};
-use crate::network::reservation::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Wish, Yield};
+use crate::network::reservation::messages::{
+    Item, Probe, Reserve, Settle, Verdict, Walk, Wish, Yield,
+};
 use crate::planning::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
 
 /// The most labels that a probe hands on from one node to the next, so that messages stay small.
