@@ -277,12 +277,12 @@ fn a_rover_at_its_goal_makes_way() {
     }
 }
 
-/// Far from well-formed: one cell in five has a rover, and most must make way for some other.
+/// Far from well-formed: almost one cell in three has a rover, and most must make way for some other.
 #[test]
 fn crowded_maps_are_sorted_out() {
     let map = GridMap::random(16, 16, 0.1, 4).unwrap();
     for seed in 1..4 {
-        let tasks = TaskList::random("x.map", &map, 45, seed).unwrap();
+        let tasks = TaskList::random("x.map", &map, 65, seed).unwrap();
         let grid = GridWorld::new("x.map", &map, 10.0, tasks.tasks()).unwrap();
         assert!(grid.blocked().len() > 5, "{}", grid.blocked().len());
         let radio = Radio {
@@ -292,7 +292,7 @@ fn crowded_maps_are_sorted_out() {
         let metrics = standing(grid.roadmap().clone(), 6, grid.tasks().to_vec(), radio, 1);
         all_arrive(&metrics);
         let costs = metrics.costs.unwrap();
-        assert!(costs.suboptimality.unwrap() < 3.0, "{costs:?}");
+        assert!(costs.suboptimality.unwrap() < 12.0, "{costs:?}");
     }
 }
 
