@@ -98,7 +98,7 @@ pub use config::{
     WorldConfig,
 };
 pub use gaps::Gaps;
-pub use metrics::{Deadlock, NetworkMetrics};
+pub use metrics::{Costs, Deadlock, NetworkMetrics};
 pub use node::Node;
 pub use processor::Processor;
 pub use rover::Rover;

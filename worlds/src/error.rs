@@ -135,13 +135,21 @@ pub enum RoadmapError {
     /// It has no vertices.
     #[error("a roadmap needs at least one vertex; this one has none")]
     Empty,
-    /// It has more vertices than the dense distance table is meant for.
+    /// It has more vertices than a roadmap may have.
     #[error("a roadmap may have {limit} vertices; this one has {actual}")]
     TooManyVertices {
         /// The most vertices a roadmap may have.
         limit: usize,
         /// The vertices found.
         actual: usize,
+    },
+    /// Two vertices may be farther apart than distances can tell.
+    #[error(
+        "two vertices of a roadmap may be {limit} edges apart; some of this one's may be farther"
+    )]
+    TooLong {
+        /// The largest distance.
+        limit: u16,
     },
     /// It has more edges than a planar graph on its vertices can have.
     #[error(

@@ -32,7 +32,7 @@ pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, Cont
 pub use crater::{Crater, CraterSettings, Hazard};
 pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
 pub use movingai::{GridError, GridMap, GridTask, GridWorld, TaskList};
-pub use roadmap::{Blocked, Endpoints, Roadmap, RoadmapTable, VertexId, well_formed};
+pub use roadmap::{Blocked, DistancesTo, Endpoints, Roadmap, RoadmapTable, VertexId, well_formed};
 pub use rocks::{Rock, RockAbundance};
 pub use sensors::{NodeId, SensorNetwork};
 pub use terrain::HeightField;

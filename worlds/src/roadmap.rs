@@ -6,18 +6,21 @@
 
 mod check;
 mod closed;
+mod distances;
 mod endpoints;
 mod file;
 mod well_formed;
 
-use std::collections::VecDeque;
 use std::fmt;
+use std::sync::Arc;
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 use crate::error::RoadmapError;
 pub(crate) use check::segments_meet;
+use distances::Distances;
+pub use distances::DistancesTo;
 pub use endpoints::Endpoints;
 pub use file::RoadmapTable;
 pub use well_formed::{Blocked, well_formed};
@@ -40,9 +43,9 @@ impl fmt::Display for VertexId {
     }
 }
 
-/// The most vertices a roadmap may have: a full grid of 64 by 64. Its distance table, two bytes for
-/// each pair, then takes 32 MiB.
-pub const MAX_VERTICES: usize = 4096;
+/// The most vertices a roadmap may have: twice a full grid of 256 by 256, and more than the largest
+/// map of the benchmark of multi-agent path-finding, `orz900d`, has.
+pub const MAX_VERTICES: usize = 131_072;
 
 /// The largest magnitude of a coordinate or height \[m\].
 pub const MAX_COORDINATE_M: f64 = 1.0e6;
@@ -71,9 +74,8 @@ pub struct Roadmap {
     boundary: Vec<VertexId>,
     /// Sorted neighbours of each vertex.
     neighbors: Vec<Vec<VertexId>>,
-    /// Hops between all pairs, row by row.
-    hops: Vec<u16>,
-    diameter: u32,
+    /// Shared by copies.
+    distances: Arc<Distances>,
 }
 
 impl Roadmap {
@@ -93,19 +95,39 @@ impl Roadmap {
     /// # Errors
     /// When there is no vertex or no boundary, an index is out of range, an edge or boundary vertex
     /// is given twice, an edge joins a vertex to itself, the graph falls apart, two vertices
-    /// coincide, or two edges meet elsewhere than at a common end.
+    /// coincide, two edges meet elsewhere than at a common end, or two vertices may be more than
+    /// 65,534 edges apart.
     pub fn new(
         name: &str,
         positions_m: Vec<Point2<f64>>,
-        mut edges: Vec<(VertexId, VertexId)>,
-        mut boundary: Vec<VertexId>,
+        edges: Vec<(VertexId, VertexId)>,
+        boundary: Vec<VertexId>,
     ) -> Result<Roadmap, RoadmapError> {
-        for edge in &mut edges {
-            *edge = (edge.0.min(edge.1), edge.0.max(edge.1));
-        }
-        edges.sort_unstable();
+        let edges = in_order(edges);
         check::graph(&positions_m, &edges, &boundary)?;
         check::embedding(&positions_m, &edges)?;
+        Self::checked(name, positions_m, edges, boundary)
+    }
+
+    /// The same for vertices on the points of a lattice, each edge between two beside each other:
+    /// these cannot meet elsewhere, and need no search for those that do.
+    pub(crate) fn on_lattice(
+        name: &str,
+        positions_m: Vec<Point2<f64>>,
+        edges: Vec<(VertexId, VertexId)>,
+        boundary: Vec<VertexId>,
+    ) -> Result<Roadmap, RoadmapError> {
+        let edges = in_order(edges);
+        check::graph(&positions_m, &edges, &boundary)?;
+        Self::checked(name, positions_m, edges, boundary)
+    }
+
+    fn checked(
+        name: &str,
+        positions_m: Vec<Point2<f64>>,
+        edges: Vec<(VertexId, VertexId)>,
+        mut boundary: Vec<VertexId>,
+    ) -> Result<Roadmap, RoadmapError> {
         let mut neighbors = vec![Vec::new(); positions_m.len()];
         for &(u, v) in &edges {
             neighbors[u.0 as usize].push(v);
@@ -114,12 +136,7 @@ impl Roadmap {
         for list in &mut neighbors {
             list.sort_unstable();
         }
-        let hops = all_hops(&neighbors);
-        if let Some(at) = hops.iter().position(|&hop| hop == NO_WAY) {
-            let unreachable = VertexId((at % positions_m.len()) as u32);
-            return Err(RoadmapError::Disconnected { unreachable });
-        }
-        let diameter = hops.iter().copied().max().map_or(0, u32::from);
+        let distances = Arc::new(Distances::new(&neighbors)?);
         sort_round_the_rim(&positions_m, &mut boundary);
         let heights_m = vec![0.0; positions_m.len()];
         let name = name.to_owned();
@@ -130,8 +147,7 @@ impl Roadmap {
             edges,
             boundary,
             neighbors,
-            hops,
-            diameter,
+            distances,
         })
     }
 
@@ -201,7 +217,8 @@ impl Roadmap {
     }
 
     /// The fewest edges between `u` and `v`; [`Roadmap::UNREACHABLE`] if none lead there, which only
-    /// happens where vertices are closed ([`Roadmap::without`]).
+    /// happens where vertices are closed ([`Roadmap::without`]). Of many vertices to one goal,
+    /// [`Roadmap::distances_to`] tells them faster.
     pub fn distance(&self, u: VertexId, v: VertexId) -> u32 {
         assert!(
             (v.0 as usize) < self.len(),
@@ -209,12 +226,18 @@ impl Roadmap {
             v.0,
             self.len()
         );
-        u32::from(self.hops[u.0 as usize * self.len() + v.0 as usize])
+        self.distances.between(&self.neighbors, u, v)
     }
 
-    /// The largest distance between two vertices, of those that have one.
+    /// The fewest edges to `goal` from every vertex.
+    pub fn distances_to(&self, goal: VertexId) -> DistancesTo<'_> {
+        self.distances.to(&self.neighbors, goal)
+    }
+
+    /// The largest distance between two vertices, of those that have one. On roadmaps of more than
+    /// 4,096 vertices it is worked out when it is first asked for.
     pub fn diameter(&self) -> u32 {
-        self.diameter
+        self.distances.diameter(&self.neighbors)
     }
 
     /// A path of fewest edges from `u` to `v`, both included; of several, the one whose vertices
@@ -223,15 +246,15 @@ impl Roadmap {
     /// # Panics
     /// Also when none leads there.
     pub fn shortest_path(&self, u: VertexId, v: VertexId) -> Vec<VertexId> {
-        let mut path = Vec::with_capacity(self.distance(u, v) as usize + 1);
+        let left = self.distances_to(v);
+        let mut path = Vec::with_capacity(left.from(u) as usize + 1);
         let mut here = u;
         path.push(here);
         while here != v {
-            let left = self.distance(here, v);
             let next = self
                 .neighbors(here)
                 .iter()
-                .find(|&&w| self.distance(w, v) + 1 == left);
+                .find(|&&w| left.from(w) + 1 == left.from(here));
             here = *next.expect("where a path leads there some neighbour is nearer");
             path.push(here);
         }
@@ -239,28 +262,13 @@ impl Roadmap {
     }
 }
 
-/// Marks a pair without a path.
-const NO_WAY: u16 = u16::MAX;
-
-/// Hops between all pairs, row by row, by a breadth-first search from each vertex.
-fn all_hops(neighbors: &[Vec<VertexId>]) -> Vec<u16> {
-    let n = neighbors.len();
-    let mut hops = vec![NO_WAY; n * n];
-    let mut queue = VecDeque::new();
-    for (source, row) in hops.chunks_exact_mut(n).enumerate() {
-        row[source] = 0;
-        queue.push_back(source);
-        while let Some(u) = queue.pop_front() {
-            for v in &neighbors[u] {
-                let v = v.0 as usize;
-                if row[v] == NO_WAY {
-                    row[v] = row[u] + 1;
-                    queue.push_back(v);
-                }
-            }
-        }
+/// Each edge as (lower, higher), sorted.
+fn in_order(mut edges: Vec<(VertexId, VertexId)>) -> Vec<(VertexId, VertexId)> {
+    for edge in &mut edges {
+        *edge = (edge.0.min(edge.1), edge.0.max(edge.1));
     }
-    hops
+    edges.sort_unstable();
+    edges
 }
 
 /// Sorts the boundary by angle round the mean of all positions, equal angles by vertex.

@@ -3,10 +3,13 @@
 //!
 //! Static: built once, from the roadmap and the network. Who stands where is no affair of this file.
 
+use std::collections::VecDeque;
+use std::sync::OnceLock;
+
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 
 /// Marks a vertex outside the graph, and an unreachable one.
-const NONE: u16 = u16::MAX;
+const NONE: u32 = u32::MAX;
 
 /// `LNG(n)`: the union of the node's own subgraph and its neighbours', with all roadmap edges
 /// between them.
@@ -15,12 +18,15 @@ pub(crate) struct LocalGraph {
     /// Sorted; a local index is a place in this list.
     vertices: Vec<VertexId>,
     /// Local index of each vertex of the roadmap.
-    local: Vec<u16>,
-    neighbors: Vec<Vec<u16>>,
-    /// Hops inside the graph between all pairs, row by row.
-    hops: Vec<u16>,
+    local: Vec<u32>,
+    neighbors: Vec<Vec<u32>>,
+    /// Hops inside the graph to each vertex that was ever a destination, worked out then: on large
+    /// roadmaps a table of all pairs would not fit, and only leaves and goals are destinations.
+    hops: Vec<OnceLock<Box<[u32]>>>,
+    /// The connected component of each vertex, by its lowest local index.
+    component: Vec<u32>,
     /// The leaves, ascending: see [`LocalGraph::leaves`].
-    leaves: Vec<u16>,
+    leaves: Vec<u32>,
 }
 
 impl LocalGraph {
@@ -37,10 +43,10 @@ impl LocalGraph {
         vertices.sort_unstable();
         let mut local = vec![NONE; roadmap.len()];
         for (index, v) in vertices.iter().enumerate() {
-            local[v.0 as usize] = index as u16;
+            local[v.0 as usize] = index as u32;
         }
         let inside = |v: &VertexId| Some(local[v.0 as usize]).filter(|&index| index != NONE);
-        let neighbors: Vec<Vec<u16>> = vertices
+        let neighbors: Vec<Vec<u32>> = vertices
             .iter()
             .map(|&v| roadmap.neighbors(v).iter().filter_map(inside).collect())
             .collect();
@@ -49,14 +55,14 @@ impl LocalGraph {
             .filter(|&i| {
                 neighbors[i].len() <= 1 || neighbors[i].len() < roadmap.neighbors(vertices[i]).len()
             })
-            .map(|i| i as u16)
+            .map(|i| i as u32)
             .collect();
-        let hops = hops(&neighbors);
         LocalGraph {
+            hops: vec![OnceLock::new(); vertices.len()],
+            component: components(&neighbors),
             vertices,
             local,
             neighbors,
-            hops,
             leaves,
         }
     }
@@ -69,66 +75,85 @@ impl LocalGraph {
     /// The neighbours of `v` inside the graph, ascending; none if `v` is outside.
     pub(crate) fn neighbors(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
         let index = Some(self.local[v.0 as usize]).filter(|&index| index != NONE);
-        let list = index.map_or(&[][..], |index| &self.neighbors[usize::from(index)]);
-        list.iter().map(|&n| self.vertices[usize::from(n)])
+        let list = index.map_or(&[][..], |index| &self.neighbors[index as usize]);
+        list.iter().map(|&n| self.vertices[n as usize])
     }
 
-    /// The fewest edges between two vertices of the graph on a path inside it; `None` if one is
-    /// outside, or no such path exists.
-    pub(crate) fn distance(&self, u: VertexId, v: VertexId) -> Option<u32> {
+    /// The local indices of two vertices that are joined inside the graph.
+    fn joined(&self, u: VertexId, v: VertexId) -> Option<(u32, u32)> {
         let (u, v) = (self.local[u.0 as usize], self.local[v.0 as usize]);
-        if u == NONE || v == NONE {
-            return None;
-        }
-        let hops = self.hops[usize::from(u) * self.vertices.len() + usize::from(v)];
-        (hops != NONE).then_some(u32::from(hops))
+        let inside = u != NONE && v != NONE;
+        let joined = inside && self.component[u as usize] == self.component[v as usize];
+        joined.then_some((u, v))
+    }
+
+    /// Hops to a vertex, by local indices.
+    fn hops_to(&self, to: u32) -> &[u32] {
+        self.hops[to as usize].get_or_init(|| hops(&self.neighbors, to).into())
     }
 
     /// The leaves in the connected component of `from`, ascending: vertices with at most one
     /// neighbour inside the graph, or with an edge that leaves it. `from` itself may be one.
     pub(crate) fn leaves(&self, from: VertexId) -> impl Iterator<Item = VertexId> + '_ {
-        let all = self.leaves.iter().map(|&l| self.vertices[usize::from(l)]);
-        all.filter(move |&leaf| self.distance(from, leaf).is_some())
+        let all = self.leaves.iter().map(|&l| self.vertices[l as usize]);
+        all.filter(move |&leaf| self.joined(from, leaf).is_some())
     }
 
     /// A shortest path inside the graph, both ends included; of several, each step goes to the
-    /// lowest vertex. `None` where [`LocalGraph::distance`] is.
+    /// lowest vertex. `None` where an end is outside, or there is no path.
     pub(crate) fn path(&self, from: VertexId, to: VertexId) -> Option<Vec<VertexId>> {
-        let mut left = self.distance(from, to)? as u16;
-        let to_row = usize::from(self.local[to.0 as usize]) * self.vertices.len();
-        let mut here = self.local[from.0 as usize];
-        let mut path = Vec::with_capacity(usize::from(left) + 2);
+        let (mut here, to) = self.joined(from, to)?;
+        let hops = self.hops_to(to);
+        let mut left = hops[here as usize];
+        let mut path = Vec::with_capacity(left as usize + 2);
         path.push(from);
         while left > 0 {
             left -= 1;
-            let nearer = |&&n: &&u16| self.hops[to_row + usize::from(n)] == left;
-            let next = self.neighbors[usize::from(here)].iter().find(nearer);
+            let nearer = |&&n: &&u32| hops[n as usize] == left;
+            let next = self.neighbors[here as usize].iter().find(nearer);
             here = *next.expect("a vertex at finite distance has a nearer neighbour");
-            path.push(self.vertices[usize::from(here)]);
+            path.push(self.vertices[here as usize]);
         }
         Some(path)
     }
 }
 
-/// Hops between all pairs, row by row, [`NONE`] where there is no path.
-fn hops(neighbors: &[Vec<u16>]) -> Vec<u16> {
-    let n = neighbors.len();
-    let mut hops = vec![NONE; n * n];
-    let mut queue = std::collections::VecDeque::new();
-    for (source, row) in hops.chunks_exact_mut(n.max(1)).enumerate() {
-        row[source] = 0;
-        queue.push_back(source);
-        while let Some(u) = queue.pop_front() {
-            for &v in &neighbors[u] {
-                let v = usize::from(v);
-                if row[v] == NONE {
-                    row[v] = row[u] + 1;
-                    queue.push_back(v);
+/// Hops to `source`, [`NONE`] where there is no path.
+fn hops(neighbors: &[Vec<u32>], source: u32) -> Vec<u32> {
+    let mut row = vec![NONE; neighbors.len()];
+    row[source as usize] = 0;
+    let mut queue = VecDeque::from([source]);
+    while let Some(u) = queue.pop_front() {
+        for &v in &neighbors[u as usize] {
+            if row[v as usize] == NONE {
+                row[v as usize] = row[u as usize] + 1;
+                queue.push_back(v);
+            }
+        }
+    }
+    row
+}
+
+/// The lowest vertex that each is joined with.
+fn components(neighbors: &[Vec<u32>]) -> Vec<u32> {
+    let mut component = vec![NONE; neighbors.len()];
+    let mut stack = Vec::new();
+    for first in 0..neighbors.len() as u32 {
+        if component[first as usize] != NONE {
+            continue;
+        }
+        component[first as usize] = first;
+        stack.push(first);
+        while let Some(u) = stack.pop() {
+            for &v in &neighbors[u as usize] {
+                if component[v as usize] == NONE {
+                    component[v as usize] = first;
+                    stack.push(v);
                 }
             }
         }
     }
-    hops
+    component
 }
 
 #[cfg(test)]
@@ -151,7 +176,7 @@ mod tests {
         let map = grid(4, 2, &[]);
         let part = LocalGraph::over(&map, vec![v(0), v(4), v(5), v(6), v(3)]);
         assert_eq!(part.path(v(0), v(6)).unwrap(), [v(0), v(4), v(5), v(6)]);
-        assert_eq!(part.distance(v(0), v(3)), None);
+        assert_eq!(part.path(v(0), v(3)), None);
         assert_eq!(part.path(v(0), v(7)), None);
         assert!(part.leaves(v(0)).all(|leaf| leaf != v(3)));
     }
@@ -162,10 +187,8 @@ mod tests {
         let whole = LocalGraph::over(&map, map.vertices().collect());
         for u in map.vertices().step_by(7) {
             for w in map.vertices() {
-                assert_eq!(whole.distance(u, w), Some(map.distance(u, w)));
+                assert_eq!(whole.path(u, w), Some(map.shortest_path(u, w)));
             }
-            let path = whole.path(u, v(0)).unwrap();
-            assert_eq!(path, map.shortest_path(u, v(0)));
         }
     }
 }

@@ -30,7 +30,7 @@ pub enum Deadlock {
 pub struct NetworkMetrics {
     /// Rovers in the team.
     pub rovers: u32,
-    /// Rovers that reached their goals.
+    /// Rovers that reached their goals; where they stay there: that stand there at the end.
     pub arrived: u32,
     /// Rovers that gaps in the coverage leave without a way; they never enter.
     pub refused: u32,
@@ -98,7 +98,63 @@ pub struct NetworkMetrics {
     /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
     /// move in vain.
     pub standstill: Option<String>,
-    /// The circles of rovers that wait for each other when a team of the `paper` policy came to a
-    /// standstill: each for the one on the next vertex of its shortest way. The shortest first.
+    /// The circles of rovers that wait for each other when a team of the `paper` policy, or one of
+    /// `complete` that stays on the map, came to a standstill: each for the one on the next vertex
+    /// of its shortest way. The shortest first.
     pub wait_cycles: Vec<WaitCycle<VertexId>>,
+    /// What published solvers are compared by; only where rovers stay at their goals.
+    #[serde(flatten)]
+    pub costs: Option<Costs>,
+}
+
+/// The costs of a solution as the literature on multi-agent path-finding has them (Stern et al.,
+/// *Multi-agent pathfinding*, SoCS 2019), in time steps, each a planning cycle.
+///
+/// A rover's cost is the step at which it comes to its goal for the last time, to the nearest, so that
+/// the milliseconds a message takes are no step; 0 if it never leaves it. Each move is a step at least,
+/// also one that was granted ahead of its time. Rovers that wait need not wait for whole steps: only
+/// with `network.grants_ahead = 0` is none ever ahead of the steps of its plan.
+///
+/// ```
+/// use farside_actors::network::Costs;
+/// let costs = Costs::new(&[(Some(3), 3), (Some(6), 5)]);
+/// assert_eq!((costs.sum_of_costs, costs.sum_of_costs_bound), (Some(9), 8));
+/// assert_eq!((costs.makespan, costs.makespan_bound), (Some(6), 5));
+/// assert_eq!(costs.suboptimality, Some(1.125));
+/// assert_eq!(Costs::new(&[(None, 3)]).sum_of_costs, None);
+/// ```
+#[derive(Serialize, Clone, Copy, Debug, Default, PartialEq)]
+pub struct Costs {
+    /// The sum of all rovers' costs; none unless all stand at their goals at the end.
+    pub sum_of_costs: Option<u64>,
+    /// No solution's sum is less: the edges of all rovers' shortest paths. A `.scen` file's lengths
+    /// are others, because they have diagonal steps.
+    pub sum_of_costs_bound: u64,
+    /// The largest cost; none unless all stand at their goals at the end.
+    pub makespan: Option<u32>,
+    /// No solution's makespan is less: the edges of the longest of the shortest paths.
+    pub makespan_bound: u32,
+    /// The sum over its bound, which is at least the sum over the best one: what papers print. None
+    /// where there is no sum, or nobody has anywhere to go.
+    pub suboptimality: Option<f64>,
+}
+
+impl Costs {
+    /// Of rovers' costs, none for those that do not stand at their goals, and shortest paths' edges.
+    pub fn new(rovers: &[(Option<u32>, u32)]) -> Costs {
+        let shortest = rovers.iter().map(|&(_, edges)| edges);
+        let sum_of_costs_bound: u64 = shortest.clone().map(u64::from).sum();
+        let all: Option<Vec<u32>> = rovers.iter().map(|&(cost, _)| cost).collect();
+        let sum_of_costs = all
+            .as_ref()
+            .map(|all| all.iter().copied().map(u64::from).sum());
+        let moves = sum_of_costs.filter(|_| sum_of_costs_bound > 0);
+        Costs {
+            sum_of_costs,
+            sum_of_costs_bound,
+            makespan: all.map(|all| all.into_iter().max().unwrap_or(0)),
+            makespan_bound: shortest.max().unwrap_or(0),
+            suboptimality: moves.map(|sum: u64| sum as f64 / sum_of_costs_bound as f64),
+        }
+    }
 }

@@ -6,7 +6,10 @@
 //! **Who waits for whom**, at a standstill of the `paper` policy: a rover for the one that claims the
 //! next vertex of its shortest way ([`Roadmap::shortest_path`](farside_worlds::Roadmap)) to its goal;
 //! one in a queue for the one at its entry. Nobody waits for two, so that the circles are all there
-//! are. With `complete`, rovers go their reserved ways and not the shortest: there is no such graph.
+//! are. With `complete`, rovers that queue go their reserved ways and not the shortest: there is no
+//! such graph. Where they stay on the map, those that have no way are looked at in the same manner; and
+//! one that is at its goal with all vertices beside it taken cannot make way, and waits for those
+//! who stand there.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,7 +20,7 @@ use farside_worlds::{NodeId, VertexId};
 use super::assemble::Site;
 use super::config::Policy;
 use super::messages::{NodeState, RoverId, RoverState, TakenOver};
-use super::metrics::{Deadlock, NetworkMetrics};
+use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use crate::invariants::{Collisions, Place, WaitCycle, WaitGraph};
 
 /// What the monitor keeps of a rover, beside where it is.
@@ -37,6 +40,8 @@ struct Track {
     remaining: u32,
     /// The same when the team was nearest to its goals.
     remaining_then: u32,
+    /// While it stands at its goal: the time step at which it came there, see [`Costs`].
+    cost: Option<u32>,
 }
 
 #[derive(Debug, Default)]
@@ -202,7 +207,18 @@ impl Score {
         if vertex == Some(state.goal) && track.arrived.is_none() {
             track.arrived = Some(cycle);
             track.arrived_at = Some(now);
+        } else if site.stays && track.cost.is_some() {
+            // It makes way for another, and has to come back.
+            (track.arrived, track.arrived_at) = (None, None);
         }
+        track.cost = match place {
+            Place::At(here) if here == state.goal => {
+                let step = site.timing.cycle.as_nanos();
+                let steps = (now.as_nanos() + step / 2) / step;
+                Some(track.moves.max(u32::try_from(steps).unwrap_or(u32::MAX)))
+            }
+            _ => None,
+        };
         if let Some(claim) = place.claim() {
             track.remaining = site.roadmap.distance(claim, state.goal);
         }
@@ -248,7 +264,8 @@ impl Score {
         self.ended = true;
         // Why the run stopped is part of its digest, and stays as short as it was.
         let reason = format!("{reason}: {}", self.remaining(site));
-        if self.deadlock != Deadlock::None && config.policy == Policy::Paper {
+        let looks = config.policy == Policy::Paper || site.stays;
+        if self.deadlock != Deadlock::None && looks {
             self.wait_cycles = self.circles(site);
         }
         self.standstill = Some(format!("{reason}{}", self.why()));
@@ -289,13 +306,23 @@ impl Score {
         let mut waits = WaitGraph::new(self.tracks.len());
         for (rover, &(entry, goal)) in site.missions.iter().enumerate() {
             let next = match self.collisions.place(rover) {
-                Place::At(here) if here != goal => site.roadmap.shortest_path(here, goal)[1],
+                Place::At(here) if here != goal => {
+                    vec![site.roadmap.shortest_path(here, goal)[1]]
+                }
+                Place::At(here) if site.config.policy == Policy::Complete => {
+                    let beside = site.roadmap.neighbors(here);
+                    let is_free = |v: &VertexId| self.collisions.holders(*v).is_empty();
+                    match beside.iter().any(is_free) {
+                        true => continue,
+                        false => beside.to_vec(),
+                    }
+                }
                 Place::Away if self.tracks[rover].entered.is_none() && self.is_out(site, rover) => {
-                    entry
+                    vec![entry]
                 }
                 _ => continue,
             };
-            for &holder in self.collisions.holders(next) {
+            for &holder in next.iter().flat_map(|&v| self.collisions.holders(v)) {
                 waits.add(rover, holder);
             }
         }
@@ -373,6 +400,13 @@ impl Score {
         let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
         metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
         metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;
+        let rovers = self.tracks.iter().zip(&site.missions);
+        let cost = |(track, &(start, goal)): (&Track, &(VertexId, VertexId))| {
+            (track.cost, site.roadmap.distance(start, goal))
+        };
+        metrics.costs = site
+            .stays
+            .then(|| Costs::new(&rovers.map(cost).collect::<Vec<_>>()));
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
             let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
                 continue;

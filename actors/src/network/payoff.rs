@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use farside_worlds::{Roadmap, VertexId};
 
 use super::candidates::{CandidatePath, Destination};
-use super::config::NetworkConfig;
+use super::config::{NetworkConfig, Policy};
 
 /// The constants of the payoff functions for one roadmap.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,12 @@ static DIVISORS: LazyLock<[f32; FAR + 1]> =
 
 impl Payoffs {
     pub(crate) fn new(config: &NetworkConfig, roadmap: &Roadmap) -> Self {
-        let longest = config.longest_path_factor * f64::from(roadmap.diameter().max(1));
+        // On a large roadmap the diameter takes a while, and other policies have no payoffs.
+        let diameter = match config.policy {
+            Policy::Paper => roadmap.diameter(),
+            _ => 0,
+        };
+        let longest = config.longest_path_factor * f64::from(diameter.max(1));
         Payoffs {
             longest,
             backtrack: config.backtrack_penalty,

@@ -328,8 +328,10 @@ impl Handler<Inquiry> for Rover {
         let site = self.site.clone();
         let is_higher = rank > ctx.durable::<Fences>().rank(home);
         let of_home = |v: VertexId| site.sensors.owner(v) == home;
-        let memory = ctx.durable::<RoverMemory>();
-        if is_higher && memory.granted_beyond().is_some_and(of_home) && self.speed > 0.0 {
+        let beyond = ctx
+            .durable::<RoverMemory>()
+            .granted_beyond(|v| site.sensors.covers(v));
+        if is_higher && beyond.is_some_and(of_home) && self.speed > 0.0 {
             // It cannot stop before a vertex that it is about to roll on to. It answers when it is there.
             return Ok(());
         }

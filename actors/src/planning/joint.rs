@@ -18,13 +18,13 @@ use super::plan::Trip;
 use super::problem::{Problem, Rules};
 
 /// Not yet on the roadmap. Vertices are below [`farside_worlds::roadmap::MAX_VERTICES`].
-const QUEUED: u16 = u16::MAX;
+const QUEUED: u32 = u32::MAX;
 /// At the goal for good, or gone from there.
-const DONE: u16 = u16::MAX - 1;
+const DONE: u32 = u32::MAX - 1;
 
 /// A node: the state of all members in one cycle, followed by that of some in the next.
 struct Node {
-    symbols: Rc<[u16]>,
+    symbols: Rc<[u32]>,
     /// Steps so far, of all rovers or of the whole team.
     cost: u32,
     parent: usize,
@@ -38,7 +38,7 @@ struct Search<'a> {
     objective: Objective,
     nodes: Vec<Node>,
     /// The nodes that are whole states.
-    states: BTreeMap<Rc<[u16]>, usize>,
+    states: BTreeMap<Rc<[u32]>, usize>,
     open: BinaryHeap<(Reverse<u32>, u32, usize, Reverse<usize>)>,
 }
 
@@ -90,7 +90,7 @@ pub(crate) fn search(
 
 impl Search<'_> {
     /// Gives the next member, in all ways there are, its next place.
-    fn expand(&mut self, at: usize, symbols: &[u16]) {
+    fn expand(&mut self, at: usize, symbols: &[u32]) {
         let count = self.members.len();
         let place = symbols.len() - count;
         let cost = self.nodes[at].cost;
@@ -113,10 +113,10 @@ impl Search<'_> {
     }
 
     /// Notes a node, unless it is a state that was reached as cheaply before.
-    fn reach(&mut self, symbols: Vec<u16>, cost: u32, parent: usize) {
+    fn reach(&mut self, symbols: Vec<u32>, cost: u32, parent: usize) {
         let bound = self.bound(&symbols, cost);
         let assigned = symbols.len() - self.members.len();
-        let symbols: Rc<[u16]> = symbols.into();
+        let symbols: Rc<[u32]> = symbols.into();
         let at = match self.states.get(&symbols) {
             Some(&at) if self.nodes[at].cost <= cost => return,
             // Bounds never fall along a way, so that what is expanded is never improved, and a
@@ -143,7 +143,7 @@ impl Search<'_> {
 
     /// What the cheapest plan by way of this node costs at least: each rover drives its shortest
     /// way, after those that are before it in its queue have entered, a cycle each.
-    fn bound(&self, symbols: &[u16], cost: u32) -> u32 {
+    fn bound(&self, symbols: &[u32], cost: u32) -> u32 {
         let count = self.members.len();
         let assigned = symbols.len() - count;
         // Each member by its latest symbol.
@@ -190,7 +190,7 @@ impl Search<'_> {
     }
 
     /// Where the member may be in the next cycle, for all that it knows alone.
-    fn moves(&self, symbols: &[u16], place: usize) -> Vec<u16> {
+    fn moves(&self, symbols: &[u32], place: usize) -> Vec<u32> {
         let mission = self.problem.missions()[self.members[place]];
         let stays = self.problem.rules() == Rules::OnMap;
         let mut moves = Vec::new();
@@ -199,7 +199,7 @@ impl Search<'_> {
                 moves.push(DONE);
             }
             if vertex != mission.goal || stays {
-                moves.push(vertex.0 as u16);
+                moves.push(vertex.0);
             }
         };
         match symbols_of(symbols[place]) {
@@ -207,7 +207,7 @@ impl Search<'_> {
             Symbol::At(here) => {
                 let neighbors = self.problem.roadmap().neighbors(here);
                 neighbors.iter().copied().for_each(&mut arrive);
-                moves.push(here.0 as u16);
+                moves.push(here.0);
             }
             Symbol::Queued => {
                 let waits_for = |other: usize| symbols[other] == QUEUED;
@@ -223,7 +223,7 @@ impl Search<'_> {
     }
 
     /// Whether the member can do that together with what those before it do.
-    fn is_free(&self, symbols: &[u16], place: usize, next: u16) -> bool {
+    fn is_free(&self, symbols: &[u32], place: usize, next: u32) -> bool {
         let count = self.members.len();
         let goal = |place: usize| self.problem.missions()[self.members[place]].goal;
         let stays = self.problem.rules() == Rules::OnMap;
@@ -233,7 +233,7 @@ impl Search<'_> {
             Symbol::Done => stays.then(|| goal(place)),
         };
         // Whoever is done in this very step is at its goal once more before it is gone.
-        let after = |place: usize, next: u16| match symbols_of(next) {
+        let after = |place: usize, next: u32| match symbols_of(next) {
             Symbol::Queued => None,
             Symbol::At(vertex) => Some(vertex),
             Symbol::Done => (stays || symbols[place] != DONE).then(|| goal(place)),
@@ -313,10 +313,10 @@ enum Symbol {
     Done,
 }
 
-fn symbols_of(symbol: u16) -> Symbol {
+fn symbols_of(symbol: u32) -> Symbol {
     match symbol {
         QUEUED => Symbol::Queued,
         DONE => Symbol::Done,
-        vertex => Symbol::At(VertexId(u32::from(vertex))),
+        vertex => Symbol::At(VertexId(vertex)),
     }
 }

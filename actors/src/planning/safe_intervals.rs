@@ -115,7 +115,7 @@ impl Ground<'_> {
     /// [`Ground::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
         let mut queue = BinaryHeap::new();
-        let mut best = Best::new(self.covers);
+        let mut best = Best::new(self.roadmap.len(), self.covers);
         for &at in open {
             let label = labels[at as usize];
             best.insert(&label);

@@ -79,6 +79,7 @@ pub(crate) fn search(
     ready: u32,
 ) -> Option<Trip> {
     let gaps = Gaps::new(roadmap, table);
+    let left = roadmap.distances_to(goal);
     let mut reached: Vec<Option<Reached>> = vec![None; gaps.count()];
     let mut open = BinaryHeap::new();
     let reach =
@@ -86,7 +87,7 @@ pub(crate) fn search(
             let id = gaps.id(new.vertex, gap);
             if reached[id].is_none_or(|old| new.cycle < old.cycle) {
                 reached[id] = Some(new);
-                let bound = new.cycle + roadmap.distance(new.vertex, goal);
+                let bound = new.cycle + left.from(new.vertex);
                 // Equal bounds: whoever has come furthest, then by number.
                 open.push((Reverse(bound), new.cycle, Reverse((id, gap))));
             }

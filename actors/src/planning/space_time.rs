@@ -78,7 +78,8 @@ pub(crate) fn search(
     let id = |v: VertexId, cycle: u32| (cycle.min(settled) - entered) * roadmap.len() as u32 + v.0;
     let vertex = |state: u32| VertexId(state % roadmap.len() as u32);
     let mut open = BinaryHeap::new();
-    let left = |v: VertexId| roadmap.distance(v, goal);
+    let to_goal = roadmap.distances_to(goal);
+    let left = |v: VertexId| to_goal.from(v);
     let first = id(start, entered);
     search.cycles[first as usize] = entered;
     // Of states with equal bounds the latest goes first: it is nearer to the goal.

@@ -8,6 +8,7 @@ use farside::SimDuration;
 use farside_worlds::{NodeId, VertexId};
 use maud::{Markup, PreEscaped, html};
 
+use super::Site;
 use super::colouring;
 use super::relief::contours;
 use super::tracks::{Place, Seen};
@@ -73,7 +74,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         (sheet.posts())
         (sheet.arrows(&rovers, &waits))
         @for seen in &rovers { (sheet.rover(seen, &waits)) }
-        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, !run.site.sensors.gaps().is_empty()))
+        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, &run.site))
     };
     Figure {
         file: "map.svg".to_owned(),
@@ -253,14 +254,15 @@ impl<'a> Sheet<'a> {
         for seen in rovers.iter().filter(|seen| seen.place == Place::Queue) {
             *queues.entry(seen.entry).or_default() += 1;
         }
+        let (from, to) = ends_of(&self.run.site.ground);
         html! {
             @for v in &entries {
                 @let at = self.at(*v);
-                path class="entry" d=(entry_mark(at)) { title { "entry " (v.0) } }
+                path class="entry" d=(entry_mark(at)) { title { (from) " " (v.0) } }
             }
             @for v in &exits {
                 @let at = self.at(*v);
-                path class="exit" d=(exit_mark(at)) { title { "exit " (v.0) } }
+                path class="exit" d=(exit_mark(at)) { title { (to) " " (v.0) } }
             }
             @for (v, queue) in &queues {
                 @let (x, y) = self.at(*v);
@@ -340,9 +342,10 @@ impl<'a> Sheet<'a> {
         };
         let number = (seen.rover + 1).to_string();
         let r = self.rover;
+        let to = ends_of(&self.run.site.ground).1;
         html! {
             g {
-                title { "rover " (number) " to exit " (seen.goal.0) (says) }
+                title { "rover " (number) " to " (to) " " (seen.goal.0) (says) }
                 @if let Some(next) = next {
                     path class={ "rover" (state) } d=(nose((x, y), self.at(next), r)) {}
                 }
@@ -474,7 +477,21 @@ fn exit_mark((x, y): (f64, f64)) -> String {
     format!("{}Z", path((0..6).map(corner)))
 }
 
-fn legend(x: f64, y: f64, has_gaps: bool) -> Markup {
+/// What the ends of a rover's way are called: on a map of cells it stands at the one from the start,
+/// and stays at the other.
+fn ends_of(ground: &Ground) -> (&'static str, &'static str) {
+    match ground {
+        Ground::Walls { .. } => ("start", "goal"),
+        Ground::Heights(_) | Ground::Unknown => ("entry", "exit"),
+    }
+}
+
+fn legend(x: f64, y: f64, site: &Site) -> Markup {
+    let has_gaps = !site.sensors.gaps().is_empty();
+    let (from, to) = match ends_of(&site.ground) {
+        ("entry", to) => ("entry; +3: three in its queue", to),
+        ends => ends,
+    };
     let at = |row: usize| y + 24.0 * row as f64;
     let text = |row: usize, says: &str| {
         debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
@@ -504,8 +521,8 @@ fn legend(x: f64, y: f64, has_gaps: bool) -> Markup {
             (text(7, "node"))
             path class="radio" d=(line(8)) {} (text(8, "nodes that hear each other"))
             path class="entry" d=(entry_mark((x + 12.0, at(9)))) {}
-            (text(9, "entry; +3: three in its queue"))
-            path class="exit" d=(exit_mark((x + 12.0, at(10)))) {} (text(10, "exit"))
+            (text(9, from))
+            path class="exit" d=(exit_mark((x + 12.0, at(10)))) {} (text(10, to))
             @if has_gaps {
                 g class="n0" { circle class="vertex gap" cx=(Px(x + 12.0)) cy=(Px(at(11))) r="3.2" {} }
                 (text(11, "where no node reaches a rover"))

@@ -18,7 +18,7 @@ const KERNEL: [&str; 8] = [
 ];
 
 /// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 26] = [
+const KNOWN: [(&str, &str, &str); 31] = [
     ("arrival_s", "time to the goal", "s"),
     ("arrived", "rovers at their goals", "rovers"),
     ("collisions", "collisions", ""),
@@ -29,6 +29,8 @@ const KNOWN: [(&str, &str, &str); 26] = [
     ("events", "events", "events"),
     ("intervention_rate", "cycles with an intervention", ""),
     ("interventions", "interventions", "cycles"),
+    ("makespan", "makespan", "steps"),
+    ("makespan_bound", "longest shortest path", "steps"),
     ("max_plus_iterations", "max-plus iterations per cycle", ""),
     ("mean_backtracks", "moves back per rover", ""),
     ("mean_steps", "steps per rover", ""),
@@ -53,6 +55,9 @@ const KNOWN: [(&str, &str, &str); 26] = [
     ),
     ("rovers", "rovers", "rovers"),
     ("sim_time_s", "virtual time", "s"),
+    ("suboptimality", "sum of costs over its bound", ""),
+    ("sum_of_costs", "sum of costs", "steps"),
+    ("sum_of_costs_bound", "sum of shortest paths", "steps"),
     (
         "time_ratio",
         "time of those that arrived over the shortest path",

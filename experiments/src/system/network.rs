@@ -390,6 +390,17 @@ fn results(metrics: &NetworkMetrics) -> Results {
         line("path ratio", format!("{:.2}", metrics.path_ratio));
         line("stops per rover", format!("{:.1}", metrics.mean_stops));
     }
+    if let Some(costs) = &metrics.costs
+        && let (Some(sum), Some(makespan)) = (costs.sum_of_costs, costs.makespan)
+    {
+        let (least, ratio) = (costs.sum_of_costs_bound, costs.suboptimality.unwrap_or(1.0));
+        line(
+            "sum of costs",
+            format!("{sum}, at least {least} ({ratio:.2})"),
+        );
+        let least = costs.makespan_bound;
+        line("makespan", format!("{makespan}, at least {least}"));
+    }
     if metrics.collisions > 0 {
         results.violations.push(violation(metrics));
     }

@@ -324,14 +324,14 @@ fn what_makes_no_roadmap() {
     let walls = map(&format!("{HEADER}@@@\nTWO\n"));
     let error = world(&walls, &[]).unwrap_err();
     assert_eq!(error, GridError::NoPassable { cells: 6 });
-    let open = GridMap::random(65, 64, 0.0, 0).unwrap();
+    let open = GridMap::random(512, 257, 0.0, 0).unwrap();
     assert_eq!(
         world_error(&open, &[]),
-        "the map's largest region has 4160 passable cells; a roadmap may have 4096 vertices"
+        "the map's largest region has 131584 passable cells; a roadmap may have 131072 vertices"
     );
     assert_eq!(
         world_error(&open, &[[0, 0, 9, 9]]),
-        "the region of line 2's task has 4160 passable cells; a roadmap may have 4096 vertices"
+        "the region of line 2's task has 131584 passable cells; a roadmap may have 131072 vertices"
     );
     for cell_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 3.4e5] {
         let error = GridWorld::new("x.map", &map(&format!("{HEADER}...\n...\n")), cell_m, &[]);
@@ -340,16 +340,16 @@ fn what_makes_no_roadmap() {
 }
 
 #[test]
-fn the_largest_roadmap_is_a_full_grid_of_64_by_64() {
-    let open = GridMap::random(64, 64, 0.0, 0).unwrap();
+fn the_largest_roadmap_is_a_full_grid_of_512_by_256() {
+    let open = GridMap::random(512, 256, 0.0, 0).unwrap();
     let world = world(&open, &[]).unwrap();
     let roadmap = world.roadmap();
     assert_eq!(
         (roadmap.len(), roadmap.edge_count()),
-        (MAX_VERTICES, 2 * 64 * 63)
+        (MAX_VERTICES, 511 * 256 + 512 * 255)
     );
-    assert_eq!(roadmap.diameter(), 126);
-    assert_eq!(roadmap.boundary().len(), 4 * 63);
+    assert_eq!(roadmap.diameter(), 511 + 255);
+    assert_eq!(roadmap.boundary().len(), 2 * (511 + 255));
     let one_more = (0..=MAX_VERTICES)
         .map(|x| nalgebra::Point2::new(x as f64, 0.0))
         .collect();
@@ -357,8 +357,8 @@ fn the_largest_roadmap_is_a_full_grid_of_64_by_64() {
     assert!(matches!(
         error,
         RoadmapError::TooManyVertices {
-            limit: 4096,
-            actual: 4097
+            limit: 131_072,
+            actual: 131_073
         }
     ));
 }

@@ -321,7 +321,7 @@ fn roadmap_of(
         .map(|(_, vertex)| vertex)
         .collect();
     let positions_m = cells.iter().map(centre).collect();
-    Ok(Roadmap::new(name, positions_m, edges, boundary)?)
+    Ok(Roadmap::on_lattice(name, positions_m, edges, boundary)?)
 }
 
 /// What comes after the last folder.

@@ -1,6 +1,9 @@
 //! A roadmap of which some vertices are closed.
 
-use super::{NO_WAY, Roadmap, VertexId, all_hops};
+use std::sync::Arc;
+
+use super::distances::{Distances, NO_WAY};
+use super::{Roadmap, VertexId};
 
 impl Roadmap {
     /// What [`Roadmap::distance`] says of two vertices between which no path leads.
@@ -35,9 +38,7 @@ impl Roadmap {
         for (u, list) in map.neighbors.iter_mut().enumerate() {
             list.retain(|v| !is_closed[u] && is_open(v));
         }
-        map.hops = all_hops(&map.neighbors);
-        let finite = map.hops.iter().copied().filter(|&hop| hop != NO_WAY);
-        map.diameter = finite.max().map_or(0, u32::from);
+        map.distances = Arc::new(Distances::of(&map.neighbors));
         map
     }
 

@@ -36,18 +36,29 @@ pub(super) enum Clash {
 pub(super) struct Book {
     /// The vertices, ascending, each with its visits in order.
     pages: Vec<(VertexId, Vec<Visit>)>,
+    /// From the first vertex to the last: the page of each, [`NO_PAGE`] for those of others.
+    places: Vec<u32>,
 }
+
+const NO_PAGE: u32 = u32::MAX;
 
 impl Book {
     /// An empty page for each vertex; a book that has pages stays as it is.
     pub(super) fn open(&mut self, owned: &[VertexId]) {
         if self.pages.is_empty() {
             self.pages = owned.iter().map(|&v| (v, Vec::new())).collect();
+            let first = owned.first().map_or(0, |v| v.0);
+            for (page, v) in (0..).zip(owned) {
+                self.places.resize((v.0 - first) as usize, NO_PAGE);
+                self.places.push(page);
+            }
         }
     }
 
     fn page(&self, v: VertexId) -> Option<usize> {
-        self.pages.binary_search_by_key(&v, |page| page.0).ok()
+        let first = self.pages.first()?.0;
+        let place = self.places.get(v.0.checked_sub(first.0)? as usize)?;
+        (*place != NO_PAGE).then_some(*place as usize)
     }
 
     /// The visits at `v` as (start, end); none if it is not in the book.
@@ -78,13 +89,6 @@ impl Book {
             granted: true,
         };
         self.enter(v, visit);
-    }
-
-    /// The same without those who stand there for ever.
-    pub(super) fn busy_for_now(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
-        let mut busy = self.busy(v)?;
-        busy.retain(|&(_, end)| end != FOREVER);
-        Some(busy)
     }
 
     /// Who stands, or will stand, at `v` for ever, as far as is known.

@@ -96,6 +96,8 @@ pub enum Item {
     Yield(Yield),
     /// To all: a part of the roadmap, for nodes that are given it over the network.
     Roadmap(RoadmapPart),
+    /// Forward: where and when the rover could be if others made way.
+    Wish(Wish),
 }
 
 /// A part of the roadmap.
@@ -135,6 +137,9 @@ pub struct Yield {
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
+    /// For whom way is made: when the first attempt of its walk began \[ns\], and the rover. This one,
+    /// or, where this one is to make way itself, the one it makes way for.
+    pub elder: (u64, RoverId),
 }
 
 /// One attempt to reserve a way for a rover.
@@ -156,7 +161,12 @@ impl Walk {
 
     /// Whether this walk goes before `other`.
     pub fn is_older_than(&self, other: &Walk) -> bool {
-        (self.since, self.rover) < (other.since, other.rover)
+        self.age() < other.age()
+    }
+
+    /// When its first attempt began \[ns\], and the rover: whose is less goes before.
+    pub fn age(&self) -> (u64, RoverId) {
+        (self.since, self.rover)
     }
 }
 
@@ -183,6 +193,15 @@ pub struct Probe {
     pub labels: Vec<Label>,
     /// Those of them, by place, from which the next node goes on.
     pub frontier: Vec<u32>,
+}
+
+/// A probe that only asks what the way would be if nobody stood still for ever.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wish {
+    /// The probe.
+    pub probe: Probe,
+    /// As in [`Yield`].
+    pub elder: (u64, RoverId),
 }
 
 /// The backward half: the way is entered in the books of all that own a part of it.

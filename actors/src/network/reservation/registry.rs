@@ -18,6 +18,7 @@ use super::routes::routes;
 use crate::network::assemble::Site;
 use crate::network::messages::{Replacement, RoverId};
 use crate::planning::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
+use making_way::{Aside, Claims};
 use succession::Succession;
 
 /// A rover, or a queue of rovers, for which a way is sought.
@@ -44,8 +45,8 @@ impl Applicant {
 enum Aim {
     /// To the rover's goal.
     Goal,
-    /// Off this path, out of another's way.
-    Aside(Vec<VertexId>),
+    /// Out of another's way.
+    Aside(Aside),
 }
 
 /// Where a way begins.
@@ -77,6 +78,7 @@ struct Offers {
     probes: u32,
     first_step: u32,
     wishful: bool,
+    elder: (u64, RoverId),
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -92,6 +94,8 @@ pub(crate) struct Registry {
     pub(super) lines: BTreeMap<NodeId, Line>,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
+    /// What is kept free for those who asked others to make way.
+    claims: Claims,
     /// Ways that wait for younger walks to be settled.
     parked: Vec<Reserve>,
     /// How long a walk takes from its first probe to its confirmation, smoothed [ns].
@@ -255,9 +259,6 @@ impl Registry {
                 (labels, entry, 1)
             }
             Origin::Stand { vertex, step, .. } => {
-                if let Aim::Aside(path) = &applicant.aim {
-                    goal = making_way::aside(desk.site, vertex, path, in_vain);
-                }
                 let step_time = desk.site.longest_step.as_nanos();
                 let came = self
                     .book
@@ -270,6 +271,12 @@ impl Registry {
                     until: FOREVER,
                     parent: None,
                 };
+                if let Some(elsewhere) = self.step_aside(desk, at, walk, label) {
+                    match elsewhere {
+                        Some(place) => goal = place,
+                        None => return,
+                    }
+                }
                 (vec![label], vertex, step)
             }
             Origin::Done => return,
@@ -284,6 +291,10 @@ impl Registry {
             (entry, goal),
             site.config.routes,
         );
+        let elder = match &self.applicants[at].aim {
+            Aim::Aside(aside) => aside.elder,
+            Aim::Goal => walk.age(),
+        };
         let probes = routes.len() as u32;
         for route in routes {
             let probe = Probe {
@@ -298,7 +309,7 @@ impl Registry {
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
-            self.probe(desk, probe);
+            self.probe(desk, probe, elder);
         }
     }
 
@@ -324,7 +335,11 @@ impl Registry {
 
     pub(super) fn take(&mut self, desk: &Desk<'_>, item: Item) {
         match item {
-            Item::Probe(probe) => self.probe(desk, probe),
+            Item::Probe(probe) => {
+                let elder = probe.walk.age();
+                self.probe(desk, probe, elder);
+            }
+            Item::Wish(wish) => self.probe(desk, wish.probe, wish.elder),
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Yield(request) => self.make_way(desk, request),

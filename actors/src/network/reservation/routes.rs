@@ -4,7 +4,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+use farside_worlds::{DistancesTo, NodeId, Roadmap, SensorNetwork, VertexId};
 
 /// Up to `count` different sequences of owners, each of which has a way from `from` to `to` through
 /// its vertices in that order; the shortest way first. Each further one is a shortest way where edges
@@ -17,8 +17,11 @@ pub(super) fn routes(
 ) -> Vec<Vec<NodeId>> {
     let mut found = Vec::<Vec<NodeId>>::new();
     let mut cost = vec![PLAIN; roadmap.len()];
+    let left = roadmap.distances_to(to);
+    let mut ways = Vec::<Vec<VertexId>>::new();
+    let mut most = PLAIN * left.from(from);
     for _ in 0..count.saturating_mul(3) {
-        let way = cheapest(roadmap, &cost, from, to);
+        let way = cheapest(roadmap, &cost, (from, to), &left, most);
         for v in &way {
             cost[v.0 as usize] += PLAIN / 2;
         }
@@ -30,6 +33,10 @@ pub(super) fn routes(
         if found.len() >= count as usize {
             break;
         }
+        // The next way costs no more than any of those that are known.
+        ways.push(way);
+        let price = |way: &Vec<VertexId>| way[1..].iter().map(|v| cost[v.0 as usize]).sum();
+        most = ways.iter().map(price).min().unwrap_or(u32::MAX);
     }
     found
 }
@@ -37,8 +44,18 @@ pub(super) fn routes(
 /// What a vertex costs that no way uses yet.
 const PLAIN: u32 = 16;
 
-/// A cheapest path, both ends included. The roadmap is connected.
-fn cheapest(roadmap: &Roadmap, cost: &[u32], from: VertexId, to: VertexId) -> Vec<VertexId> {
+/// A cheapest path, both ends included, which costs at most `most`. The roadmap is connected.
+///
+/// What cannot be on such a path, because it is too far from its end, is passed over. That changes
+/// nothing about which path is found: whoever comes first to a vertex of a cheapest path is on one
+/// too.
+fn cheapest(
+    roadmap: &Roadmap,
+    cost: &[u32],
+    (from, to): (VertexId, VertexId),
+    left: &DistancesTo<'_>,
+    most: u32,
+) -> Vec<VertexId> {
     let mut best = vec![u32::MAX; roadmap.len()];
     let mut before = vec![from; roadmap.len()];
     let mut queue = BinaryHeap::from([Reverse((0, from))]);
@@ -52,7 +69,7 @@ fn cheapest(roadmap: &Roadmap, cost: &[u32], from: VertexId, to: VertexId) -> Ve
         }
         for &v in roadmap.neighbors(u) {
             let total = spent + cost[v.0 as usize];
-            if total < best[v.0 as usize] {
+            if total < best[v.0 as usize] && total + PLAIN * left.from(v) <= most {
                 best[v.0 as usize] = total;
                 before[v.0 as usize] = u;
                 queue.push(Reverse((total, v)));
@@ -84,6 +101,24 @@ mod tests {
             assert_eq!(route.last(), Some(&sensors.owner(v(80))));
             assert!(route.windows(2).all(|w| sensors.are_neighbors(w[0], w[1])));
             assert!(!all[..i].contains(route));
+        }
+    }
+
+    #[test]
+    fn passing_over_what_is_too_far_changes_no_way() {
+        let map = grid(9, 7, &[(10, 11), (20, 29), (31, 40), (41, 42)]);
+        let mut draws = farside::random::RandomKey::new(3).stream();
+        for round in 0..200 {
+            let mut draw = |below: u64| draws.below(below) as u32;
+            let cost: Vec<u32> = (0..63).map(|_| PLAIN + PLAIN / 2 * draw(4)).collect();
+            let ends = (v(draw(63)), v(draw(63)));
+            let left = map.distances_to(ends.1);
+            let way = cheapest(&map, &cost, ends, &left, u32::MAX / 2);
+            let price: u32 = way[1..].iter().map(|v| cost[v.0 as usize]).sum();
+            for slack in [0, 7] {
+                let found = cheapest(&map, &cost, ends, &left, price + slack);
+                assert_eq!(found, way, "round {round}");
+            }
         }
     }
 

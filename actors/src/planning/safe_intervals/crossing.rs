@@ -92,17 +92,17 @@ pub(super) fn passes(
 /// The labels that are worth going on from.
 pub(super) struct Best<'a> {
     covers: &'a dyn Fn(VertexId) -> bool,
-    /// Where a rover may wait: when it is there first, by vertex and interval.
-    waiting: BTreeMap<(VertexId, u64), u64>,
+    /// Where a rover may wait: when it is there first.
+    waiting: Earliest,
     /// Where it may not: those of which none is as good as another.
     passing: BTreeMap<VertexId, Vec<Label>>,
 }
 
 impl<'a> Best<'a> {
-    pub(super) fn new(covers: &'a dyn Fn(VertexId) -> bool) -> Self {
+    pub(super) fn new(vertices: usize, covers: &'a dyn Fn(VertexId) -> bool) -> Self {
         Best {
             covers,
-            waiting: BTreeMap::new(),
+            waiting: Earliest::new(vertices),
             passing: BTreeMap::new(),
         }
     }
@@ -110,18 +110,16 @@ impl<'a> Best<'a> {
     /// Takes a label to begin with.
     pub(super) fn insert(&mut self, label: &Label) {
         if (self.covers)(label.vertex) {
-            let place = (label.vertex, label.until);
-            self.waiting.insert(place, label.ready);
+            *self.waiting.of(label.vertex, label.until) = label.ready;
         } else {
             self.improves(label);
         }
     }
 
     /// Whether nothing better was found in the meantime.
-    pub(super) fn has(&self, label: &Label) -> bool {
+    pub(super) fn has(&mut self, label: &Label) -> bool {
         if (self.covers)(label.vertex) {
-            let place = (label.vertex, label.until);
-            return self.waiting.get(&place) == Some(&label.ready);
+            return *self.waiting.of(label.vertex, label.until) == label.ready;
         }
         let known = self.passing.get(&label.vertex);
         known.is_some_and(|known| known.contains(label))
@@ -130,8 +128,7 @@ impl<'a> Best<'a> {
     /// Takes a label, if nothing known is as good.
     pub(super) fn improves(&mut self, label: &Label) -> bool {
         if (self.covers)(label.vertex) {
-            let place = (label.vertex, label.until);
-            let known = self.waiting.entry(place).or_insert(FOREVER);
+            let known = self.waiting.of(label.vertex, label.until);
             let is_better = label.ready < *known;
             *known = label.ready.min(*known);
             return is_better;
@@ -143,6 +140,40 @@ impl<'a> Best<'a> {
         known.retain(|other| !is_as_good(label, other));
         known.push(*label);
         true
+    }
+}
+
+/// The earliest time known for each vertex and safe interval, by the interval's end.
+struct Earliest {
+    /// By vertex, the place in `known` of its last interval met; [`Earliest::NONE`] if none was.
+    last: Vec<u32>,
+    /// (end of the interval, earliest time, place of the vertex's interval met before).
+    known: Vec<(u64, u64, u32)>,
+}
+
+impl Earliest {
+    const NONE: u32 = u32::MAX;
+
+    fn new(vertices: usize) -> Self {
+        Earliest {
+            last: vec![Self::NONE; vertices],
+            known: Vec::new(),
+        }
+    }
+
+    /// [`FOREVER`] at first.
+    fn of(&mut self, vertex: VertexId, until: u64) -> &mut u64 {
+        let last = &mut self.last[vertex.0 as usize];
+        let mut at = *last;
+        while at != Self::NONE && self.known[at as usize].0 != until {
+            at = self.known[at as usize].2;
+        }
+        if at == Self::NONE {
+            at = self.known.len() as u32;
+            self.known.push((until, FOREVER, *last));
+            *last = at;
+        }
+        &mut self.known[at as usize].1
     }
 }
 
@@ -241,7 +272,7 @@ mod tests {
                 let open: Vec<u32> = (0..labels.len() as u32).collect();
                 ground.expand(&mut labels, &open);
                 // Repetitions would double the labels each time.
-                let mut first = Best::new(&covers);
+                let mut first = Best::new(map.len(), &covers);
                 let wanted: Vec<u32> = (0..).zip(&labels).filter(|(_, label)| first.improves(label)).map(|(at, _)| at).collect();
                 prune(&mut labels, &wanted);
             }

@@ -8,7 +8,9 @@ use farside_worlds::VertexId;
 use super::{Desk, Offers, Registry, owners};
 use crate::network::messages::RoverId;
 use crate::network::reservation::book::{Clash, Visit};
-use crate::network::reservation::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Yield};
+use crate::network::reservation::messages::{
+    Item, Probe, Reserve, Settle, Verdict, Walk, Wish, Yield,
+};
 use crate::planning::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
 
 /// The most labels that a probe hands on from one node to the next, so that messages stay small.
@@ -16,16 +18,18 @@ const MAX_FRONTIER: usize = 24;
 
 impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
-    pub(super) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe) {
+    ///
+    /// A wish is in the name of a walk that began with `elder`.
+    pub(super) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: (u64, RoverId)) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
-            let busy = |v| self.book.busy_for_now(v);
+            let busy = |v| self.busy_for_elders(v, elder);
             self.search_in(desk, &busy, |ground| ground.expand(&mut labels, open));
         } else {
             self.search(desk, |ground| ground.expand(&mut labels, open));
         }
         let Some(&next) = probe.route.get(probe.at as usize + 1) else {
-            self.offer(desk, &probe, &labels);
+            self.offer(desk, &probe, &labels, elder);
             return;
         };
         let site = desk.site;
@@ -39,11 +43,21 @@ impl Registry {
         probe.frontier = prune(&mut labels, &frontier);
         probe.labels = labels;
         probe.at += 1;
-        self.post(next, Item::Probe(probe));
+        let item = match probe.wishful {
+            true => Item::Wish(Wish { probe, elder }),
+            false => Item::Probe(probe),
+        };
+        self.post(next, item);
     }
 
     /// A probe has come to the owner of its goal.
-    pub(super) fn offer(&mut self, desk: &Desk<'_>, probe: &Probe, labels: &[Label]) {
+    pub(super) fn offer(
+        &mut self,
+        desk: &Desk<'_>,
+        probe: &Probe,
+        mut labels: &[Label],
+        elder: (u64, RoverId),
+    ) {
         let rover = probe.walk.rover;
         // Of a rover's walks, and of their attempts, only the last counts.
         let age = |walk: &Walk| Some((walk.since, walk.attempt));
@@ -58,6 +72,7 @@ impl Registry {
                 probes: probe.probes,
                 first_step: probe.first_step,
                 wishful: probe.wishful,
+                elder,
                 route: probe.route.clone(),
                 best: None,
                 decided: false,
@@ -71,8 +86,11 @@ impl Registry {
             return;
         };
         offers.heard += 1;
-        // Who stays needs the goal for ever.
+        // Who stays needs the goal for ever, and leaves it to who has asked for it before.
         let stays = desk.site.stays;
+        if !offers.wishful && self.claims.is_claimed(probe.goal, offers.elder, desk.now) {
+            labels = &[];
+        }
         let arrivals = (0..)
             .zip(labels)
             .filter(|(_, label)| label.vertex == probe.goal && (!stays || label.until == FOREVER));
@@ -110,12 +128,13 @@ impl Registry {
             return;
         };
         offers.decided = true;
-        let (walk, first_step) = (offers.walk, offers.first_step);
+        let (walk, first_step, elder) = (offers.walk, offers.first_step, offers.elder);
         match offers.best.take() {
             Some((_, way)) if offers.wishful => {
                 let route = owners(desk, &way);
                 let request = Yield {
                     walk,
+                    elder,
                     path: way.iter().map(|visit| visit.vertex).collect(),
                     at: route.len() as u32 - 1,
                     route,
@@ -153,6 +172,7 @@ impl Registry {
         }
         self.book.strike_earlier(&reserve.walk);
         self.succession.close(|open| open.is_before(&reserve.walk));
+        self.claims.give_up(reserve.walk.rover);
         let hi = reserve.at as usize;
         let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.home;
         let part = reserve.way[..=hi]
@@ -300,7 +320,9 @@ impl Registry {
         };
         let attempt = walk.attempt + 1;
         let next = Walk { attempt, ..walk };
-        if settle.verdict == Verdict::Failed {
+        // Where it failed at once, at this node, it would fail in the same way again.
+        let began = self.applicants[at].walk.map(|(_, began)| began);
+        if settle.verdict == Verdict::Failed && began != Some(desk.now) {
             self.begin(desk, at, next);
             return;
         }
