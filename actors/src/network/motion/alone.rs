@@ -85,6 +85,9 @@ mod tests {
     use super::*;
     use crate::network::config::{Motion, NetworkConfig};
     use crate::network::testing::{grid, v};
+    use farside_worlds::Roadmap;
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
 
     fn config() -> NetworkConfig {
         NetworkConfig {
@@ -119,43 +122,48 @@ mod tests {
         assert_eq!(time(&lost, 0, 2), 2 * (7_000_000_000 + 3_000_000_000));
     }
 
-    /// Every simple way, driven as a rover drives that always holds the next grant.
-    #[test]
-    fn no_way_is_faster() {
-        fn walk(ways: &Ways<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
-            let here = path[path.len() - 1];
-            if here == to {
-                let (mut speed, mut time) = (0.0, SimDuration::ZERO);
-                for at in 1..path.len() {
-                    let edge = (path[at - 1], path[at]);
-                    let drive = ways.drive(edge, path.get(at + 1).copied(), speed);
-                    (speed, time) = (drive.end, time + drive.time);
-                }
-                *best = time.min(*best);
-                return;
+    /// Tries every simple way, driven as a rover drives that always holds the next grant.
+    fn walk(ways: &Ways<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
+        let here = path[path.len() - 1];
+        if here == to {
+            let (mut speed, mut time) = (0.0, SimDuration::ZERO);
+            for at in 1..path.len() {
+                let edge = (path[at - 1], path[at]);
+                let drive = ways.drive(edge, path.get(at + 1).copied(), speed);
+                (speed, time) = (drive.end, time + drive.time);
             }
-            for &next in ways.roadmap.neighbors(here) {
-                if !path.contains(&next) {
-                    path.push(next);
-                    walk(ways, path, to, best);
-                    path.pop();
-                }
+            *best = time.min(*best);
+            return;
+        }
+        for &next in ways.roadmap.neighbors(here) {
+            if !path.contains(&next) {
+                path.push(next);
+                walk(ways, path, to, best);
+                path.pop();
             }
         }
-        let text = "name = 'bends'\nboundary = [0, 5]\npositions_m = [[0, 0], [9, 4], [20, 1], \
-                    [12, 14], [25, 9], [33, 6]]\nedges = [[0, 1], [1, 2], [1, 3], [2, 4], [3, 4], \
-                    [2, 5], [4, 5], [0, 3]]";
-        let roadmap = farside_worlds::Roadmap::from_toml(text).unwrap();
-        let config = config();
-        let ways = Ways {
-            roadmap: &roadmap,
-            config: &config,
-        };
-        for from in roadmap.vertices() {
-            for to in roadmap.vertices().filter(|to| *to != from) {
-                let mut best = SimDuration::from_secs(1_000_000);
-                walk(&ways, &mut vec![from], to, &mut best);
-                assert_eq!(ways.alone(from, to), best, "{from:?} to {to:?}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+        /// On grids that were shaken, so that ways turn by all angles: the way that comes to an edge
+        /// first need not be the one that comes to its end first.
+        #[test]
+        fn no_way_is_faster(shifts_m in prop::collection::vec((-4.0..4.0f64, -4.0..4.0f64), 9)) {
+            let even = grid(3, 3, &[]);
+            let place = |(v, (x, y)): (VertexId, &(f64, f64))| even.position_m(v) + Vector2::new(*x, *y);
+            let places = even.vertices().zip(&shifts_m).map(place).collect();
+            let edges = even.edges().to_vec();
+            let roadmap = Roadmap::new("shaken", places, edges, even.boundary().to_vec()).unwrap();
+            let config = config();
+            let ways = Ways { roadmap: &roadmap, config: &config };
+            for from in roadmap.vertices() {
+                for to in roadmap.vertices().filter(|to| *to != from) {
+                    let mut best = SimDuration::from_secs(1_000_000);
+                    walk(&ways, &mut vec![from], to, &mut best);
+                    prop_assert_eq!(ways.alone(from, to), best, "{:?} to {:?}", from, to);
+                }
             }
         }
     }
