@@ -1,6 +1,6 @@
 //! Planning on roadmaps in space and time, without messages: the baselines that the network-guided
-//! system is held against, centralised and in whole cycles. [`safe_intervals`] is apart: a search in
-//! continuous time that nodes can share among them.
+//! system is held against, centralised, in whole cycles or by what each edge takes ([`Pace`]). They plan
+//! one rover after the other with the search that nodes share among them, too: [`safe_intervals`].
 //!
 //! | planner | what it is |
 //! |---|---|
@@ -24,7 +24,7 @@
 //!
 //! # The model
 //!
-//! Time is counted in cycles, from 0; *in cycle t* a rover is at one vertex, and from one cycle to
+//! In time a plan is a list of [visits](safe_intervals). Else time is counted in cycles, from 0; *in cycle t* a rover is at one vertex, and from one cycle to
 //! the next it moves along one edge or waits. That is the distributed system's model with the
 //! instants at which its cycles begin: what a rover does during a cycle of the simulator lies
 //! between two cycles here, so that a lone rover needs as many cycles as its path has edges in both.
@@ -51,18 +51,19 @@ mod prioritised;
 mod problem;
 mod reference;
 pub mod safe_intervals;
-mod sipp;
-mod space_time;
+mod single;
 mod table;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
 mod tests;
+mod timetable;
 
 pub use check::Conflict;
 pub use coupled::{Coupled, CoupledConfig, CoupledError, Objective, coupled};
 pub use order::Order;
-pub use plan::{Failure, Outcome, Plan, PlanMetrics, Trip, Visit};
-pub use prioritised::prioritised;
+pub use plan::{Failure, Outcome, Plan, PlanMetrics, Trip};
+pub use prioritised::{prioritised, prioritised_in_time};
 pub use problem::{Mission, Problem, ProblemError, Rules};
-pub use reference::reference;
+pub use reference::{reference, reference_in_time};
+pub use timetable::{Pace, Timetable, TimetableError};

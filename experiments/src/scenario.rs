@@ -355,7 +355,8 @@ impl Scenario {
         let conclude = conclude.map_err(wrong)?;
         self.check_places(&sim)?;
         let remarks = links.remarks().into_iter();
-        let remarks = remarks.map(|remark| format!("links: {remark}")).collect();
+        let remarks = remarks.map(|remark| format!("links: {remark}"));
+        let remarks = remarks.chain(self.too_late()).collect();
         links
             .finish(&mut sim)
             .map_err(|error| wrong(error.into()))?;
@@ -380,6 +381,22 @@ impl Scenario {
             notes,
             remarks,
         })
+    }
+
+    /// What is planned for when the run is over.
+    fn too_late(&self) -> impl Iterator<Item = String> {
+        let degrade = self.shared.degrade.iter().map(|entry| Some(entry.at));
+        let crash = self.shared.crash.iter().map(|entry| entry.at);
+        let degrade = (0..).zip(degrade).map(|(index, at)| ("degrade", index, at));
+        let crash = (0..).zip(crash).map(|(index, at)| ("crash", index, at));
+        let until = self.shared.until;
+        degrade
+            .chain(crash)
+            .filter_map(move |(what, index, at): (_, u32, _)| {
+                let (at, until) = (at?, until?);
+                let late = at >= until;
+                late.then(|| format!("{what}.{index}: begins at {at}, but the run ends at {until}"))
+            })
     }
 
     /// Where a run with this seed takes place, if on a roadmap: what pictures are drawn on.
@@ -481,6 +498,8 @@ pub(crate) fn read(
         Ok(metadata) if metadata.is_dir() => {
             return Err(io(std::io::ErrorKind::IsADirectory.into()));
         }
+        // A pipe that nobody writes to would be waited for without end.
+        Ok(metadata) if !metadata.is_file() => return Err(io(no_file())),
         Ok(metadata) => metadata.len(),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             return Err(missing());
@@ -494,7 +513,7 @@ pub(crate) fn read(
             limit_bytes: MAX_BYTES,
         });
     }
-    // A device or pipe has no size beforehand.
+    // It may have grown.
     use std::io::Read as _;
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(io)?;
@@ -503,6 +522,12 @@ pub(crate) fn read(
         path: path.to_owned(),
         at_byte: error.utf8_error().valid_up_to(),
     })
+}
+
+/// Why something that is there is not read.
+pub(crate) fn no_file() -> std::io::Error {
+    let kind = std::io::ErrorKind::InvalidInput;
+    std::io::Error::new(kind, "it is no regular file")
 }
 
 /// The value of `system`, which decides who reads the rest.

@@ -4,10 +4,12 @@
 //! for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something else
 //! decides when the channel is free, for one transmission at a time ([`Transmitter::attempt`]).
 
+mod outcome;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use farside::carrier::{Carriage, Parcel, Verdicts};
+use farside::carrier::{Carriage, Parcel};
 use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
@@ -17,102 +19,8 @@ use super::timeline::Timeline;
 use super::trace::{self, Opportunity, Trace};
 use super::{BURST, CORRUPT, LOSS, LinkChange, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
 
-/// What the world between two antennas adds to the parameters of a link. The default adds nothing.
-///
-/// ```
-/// use farside::SimDuration;
-/// use farside_actors::link::Path;
-/// // 300 km apart, and a tenth lost for want of signal.
-/// let path = Path { propagation: SimDuration::from_millis(1), loss: 0.1, ..Path::default() };
-/// assert_eq!(path.reason, "range");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Path {
-    /// The time on the way beside the latency: the distance over the speed of light.
-    pub propagation: SimDuration,
-    /// The probability that a transmission is lost on this path, beside all other losses.
-    pub loss: f64,
-    /// Why it is lost then.
-    pub reason: &'static str,
-    /// The most bits per second that it carries, if that is less than the link's rate.
-    pub rate: Option<u64>,
-}
-
-impl Default for Path {
-    fn default() -> Self {
-        Path {
-            propagation: SimDuration::ZERO,
-            loss: 0.0,
-            reason: "range",
-            rate: None,
-        }
-    }
-}
-
-/// One transmission, and what became of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Attempt {
-    /// When it begins.
-    pub start: SimTime,
-    /// When the channel is free again: its last bit has left, or it was cut.
-    pub end: SimTime,
-    /// When it arrives, or when its loss shows.
-    pub at: SimTime,
-    /// The time on the way without jitter; none if it did not get so far.
-    pub propagation: SimDuration,
-    /// Why it failed, if it did.
-    pub failed: Option<&'static str>,
-    /// Whether anything went on the air.
-    pub sent: bool,
-    /// What it took from the sender.
-    pub energy_j: f64,
-    /// The time that an answer takes to come back.
-    answer: SimDuration,
-}
-
-impl Attempt {
-    /// When the sender has an answer, if it waits for one: the answer takes the propagation back,
-    /// has no jitter, and is never lost.
-    pub fn answered(&self) -> SimTime {
-        self.end + self.answer + self.answer
-    }
-
-    /// How it was carried, from its start on: what came before, a caller adds.
-    pub fn parts(&self) -> Carriage {
-        let way = self.at.since(self.end);
-        Carriage {
-            serialization: self.end.since(self.start),
-            propagation: self.propagation,
-            jitter_ns: difference(way, self.propagation),
-            attempts: u32::from(self.sent),
-            energy_j: self.energy_j,
-            ..Carriage::default()
-        }
-    }
-}
-
-/// What became of a message: when, why not, and how it was carried.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sent {
-    /// When it arrives, or when it is lost.
-    pub at: SimTime,
-    /// Why it is lost, if it is.
-    pub lost: Option<&'static str>,
-    /// The parts of its delay; their sum is `at` less the instant it was sent.
-    pub carriage: Carriage,
-}
-
-impl Sent {
-    /// Tells the kernel, at `now`, and charges the sender.
-    pub fn tell(&self, now: SimTime, verdicts: &mut Verdicts) {
-        let after = self.at.since(now);
-        match self.lost {
-            None => verdicts.deliver_as(after, self.carriage),
-            Some(reason) => verdicts.lose_as(after, reason, self.carriage),
-        }
-        verdicts.charge(self.carriage.energy_j);
-    }
-}
+pub(crate) use outcome::difference;
+pub use outcome::{Attempt, Path, Sent};
 
 /// The sending end of a link: a [`Timeline`] of parameters, and what it was asked to send so far.
 ///
@@ -624,10 +532,4 @@ fn is_corrupt(params: &LinkParams, parcel: &Parcel<'_>, draws: Draws) -> bool {
 /// The bytes on the air.
 fn bytes(params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
     parcel.size_bytes().saturating_add(params.overhead)
-}
-
-/// `a - b` in nanoseconds.
-pub(crate) fn difference(a: SimDuration, b: SimDuration) -> i64 {
-    let (a, b) = (a.as_nanos() as i64, b.as_nanos() as i64);
-    a.wrapping_sub(b)
 }

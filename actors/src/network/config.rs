@@ -215,7 +215,7 @@ pub enum Policy {
     /// ([`crate::planning::prioritised`]). A rover without a way never enters.
     Prioritised,
     /// A baseline that knows everything: the best plan of all, by a search over all rovers at once
-    /// ([`crate::planning::coupled`]). For small teams.
+    /// ([`crate::planning::coupled`]). For small teams, and only in cycles.
     Coupled,
 }
 

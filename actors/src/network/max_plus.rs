@@ -6,6 +6,7 @@
 
 mod anytime;
 mod edge;
+mod meetings;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,15 +17,20 @@ use super::candidates::CandidatePath;
 use super::messages::{Choice, RoverId, Vector};
 use super::payoff::Payoffs;
 use anytime::Anytime;
-use edge::{Edge, Mask};
+use edge::Edge;
+use meetings::Paths;
 
 /// A rover of the coordination graph, as one node sees it.
 #[derive(Debug)]
 struct Agent {
     rover: RoverId,
-    paths: Vec<CandidatePath>,
-    /// A hash of each path's vertices: paths whose hashes share no bit share no vertex.
-    masks: Vec<Mask>,
+    paths: Paths,
+}
+
+impl Agent {
+    fn paths(&self) -> &[CandidatePath] {
+        &self.paths.list
+    }
 }
 
 /// How messages are made of what came in.
@@ -59,8 +65,19 @@ pub(crate) struct MaxPlus {
     anytime: Option<Anytime>,
     /// Pairs of candidate paths compared so far.
     compared: u64,
-    /// The next message, while it is made.
-    scratch: Vec<f32>,
+    room: Room,
+}
+
+/// Room to work in, so that nothing is allocated for each edge.
+#[derive(Debug, Default)]
+struct Room {
+    /// When paths collide.
+    cycles: Vec<u32>,
+    /// What an own rover's paths are worth by all messages, and by all but one.
+    total: Vec<f32>,
+    base: Vec<f32>,
+    /// The next message.
+    fresh: Vec<f32>,
 }
 
 /// Where the edge to agent `j` is in the list of own agent `i`.
@@ -87,7 +104,7 @@ impl MaxPlus {
             moved: vec![true; own],
             anytime: None,
             compared: 0,
-            scratch: Vec::new(),
+            room: Room::default(),
         };
         for (rover, paths) in rovers {
             problem.push(rover, paths);
@@ -105,19 +122,15 @@ impl MaxPlus {
         }
         if rules.anytime {
             let agents = problem.agents.iter();
-            problem.anytime = Some(Anytime::new(agents.map(|a| &*a.paths), own));
+            problem.anytime = Some(Anytime::new(agents.map(Agent::paths), own));
         }
         problem
     }
 
     fn push(&mut self, rover: RoverId, paths: Vec<CandidatePath>) {
         self.places.insert(rover, self.agents.len());
-        let masks = paths.iter().map(edge::mask).collect();
-        self.agents.push(Agent {
-            rover,
-            paths,
-            masks,
-        });
+        let paths = Paths::new(paths);
+        self.agents.push(Agent { rover, paths });
     }
 
     /// Adds a neighbour's rovers. Those known already are left as they are.
@@ -142,8 +155,8 @@ impl MaxPlus {
 
     fn edge(&mut self, i: usize, j: usize) -> Edge {
         let (a, b) = (&self.agents[i], &self.agents[j]);
-        self.compared += (a.paths.len() * b.paths.len()) as u64;
-        Edge::between((&a.paths, &a.masks), (&b.paths, &b.masks), &self.payoffs)
+        self.compared += (a.paths().len() * b.paths().len()) as u64;
+        Edge::between(&a.paths, &b.paths, &self.payoffs, &mut self.room.cycles)
     }
 
     /// Pairs of candidate paths that were compared, to make payoffs, since this was last asked.
@@ -180,7 +193,7 @@ impl MaxPlus {
         let place = self.places.get(&choice.rover).copied();
         if let (Some(anytime), Some(j)) = (&mut self.anytime, place)
             && j >= self.own
-            && (choice.path as usize) < self.agents[j].paths.len()
+            && (choice.path as usize) < self.agents[j].paths().len()
         {
             anytime.announced(j, choice.path as usize);
         }
@@ -195,15 +208,13 @@ impl MaxPlus {
             self.anytime = Some(anytime);
         }
         let mut changed = false;
-        let mut base = Vec::new();
+        let mut room = std::mem::take(&mut self.room);
         for i in 0..self.own {
             let moved = std::mem::take(&mut self.moved[i]);
             let damped = self.rules.damping > 0.0;
-            let total = if moved || damped {
-                self.total(i)
-            } else {
-                Vec::new()
-            };
+            if moved || damped {
+                self.add_up(i, &mut room.total);
+            }
             for edge in &mut self.edges[i] {
                 // A damped message goes on to approach what it was made of.
                 let same = !(moved || damped && edge.changed);
@@ -211,9 +222,10 @@ impl MaxPlus {
                     edge.changed = false;
                     continue;
                 }
-                changed |= edge.refresh(&total, &self.rules, &mut base, &mut self.scratch);
+                changed |= edge.refresh(&self.rules, &mut room);
             }
         }
+        self.room = room;
         changed
     }
 
@@ -267,13 +279,19 @@ impl MaxPlus {
 
     /// g_i: the unary payoffs and all incoming messages of an own rover, a value for each path.
     fn total(&self, i: usize) -> Vec<f32> {
-        let mut total: Vec<f32> = self.agents[i].paths.iter().map(|p| p.payoff).collect();
+        let mut total = Vec::new();
+        self.add_up(i, &mut total);
+        total
+    }
+
+    fn add_up(&self, i: usize, total: &mut Vec<f32>) {
+        total.clear();
+        total.extend(self.agents[i].paths().iter().map(|path| path.payoff));
         for edge in &self.edges[i] {
             for (t, m) in total.iter_mut().zip(&edge.incoming) {
                 *t += m;
             }
         }
-        total
     }
 
     /// The path of each own rover as things stand: the best by all messages, the first of equals.
@@ -287,7 +305,7 @@ impl MaxPlus {
         };
         let path = |(agent, at): (_, usize)| {
             let agent: &Agent = agent;
-            (agent.rover, &agent.paths[at])
+            (agent.rover, &agent.paths()[at])
         };
         self.agents.iter().zip(chosen).map(path).collect()
     }

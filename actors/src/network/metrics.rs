@@ -60,7 +60,9 @@ pub struct NetworkMetrics {
     /// Steps from entry to goal over the shortest path's length (the paper's path ratio; stops are
     /// steps). Gamed by whatever holds rovers back before they enter: see `time_ratio`.
     pub path_ratio: f64,
-    /// Cycles from the start of the run to the goal over the shortest path's length.
+    /// Cycles from the start of the run to the goal over the shortest path's length. In continuous
+    /// motion: the time of the arrival over the least time from entry to goal for a rover that is
+    /// alone, stands at both, and never stops between. At least 1 either way.
     pub time_ratio: f64,
     /// Cycles from entry to goal.
     pub mean_steps: f64,

@@ -18,7 +18,7 @@ use farside::{RunInfo, SimTime};
 use farside_worlds::{NodeId, VertexId};
 
 use super::assemble::Site;
-use super::config::Policy;
+use super::config::{Motion, Policy};
 use super::messages::{NodeState, RoverId, RoverState, TakenOver};
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use crate::invariants::{Collisions, Place, WaitCycle, WaitGraph};
@@ -416,7 +416,12 @@ impl Score {
             let steps = arrived + 1 - entered;
             metrics.arrived += 1;
             metrics.path_ratio += f64::from(steps) / shortest;
-            metrics.time_ratio += f64::from(arrived + 1) / shortest;
+            metrics.time_ratio += match (site.config.motion, track.arrived_at) {
+                (Motion::Continuous, Some(at)) if entry != goal => {
+                    at.as_secs_f64() / site.ways().alone(entry, goal).as_secs_f64()
+                }
+                _ => f64::from(arrived + 1) / shortest,
+            };
             metrics.mean_steps += f64::from(steps);
             metrics.total_steps += u64::from(steps);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));

@@ -9,6 +9,8 @@
 //! Plans reckon with a stop at each vertex. Order drives execution, so a rover that is ahead of its plan
 //! does no harm.
 
+mod alone;
+
 use farside::SimDuration;
 use farside_worlds::{Roadmap, VertexId};
 use nalgebra::{Point3, Vector3};

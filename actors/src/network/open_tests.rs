@@ -8,8 +8,10 @@ use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+use nalgebra::Point2;
 
-use super::messages::{Beacon, RoverState};
+use super::messages::{Beacon, RoverId, RoverState};
+use super::schedule::Schedule;
 use super::testing::grid;
 use super::*;
 
@@ -253,6 +255,90 @@ mod motion {
         (network.cycle, network.passive_window) = (Some(SimDuration::from_secs(1)), 7);
         let text = Case::new(network).run().err().unwrap().to_string();
         assert!(text.contains("network.passive_window is 7s"), "{text}");
+    }
+
+    /// Vertices at these places [m], and nothing but the first and the last to drive between.
+    fn alone(policy: Policy, places_m: &[(f64, f64)], edges: &[(u32, u32)]) -> Case {
+        let places = places_m.iter().map(|&(x, y)| Point2::new(x, y)).collect();
+        let edges = edges.iter().map(|&(a, b)| (VertexId(a), VertexId(b)));
+        let boundary = vec![VertexId(0), VertexId(places_m.len() as u32 - 1)];
+        let map = Roadmap::new("alone", places, edges.collect(), boundary).unwrap();
+        Case {
+            map,
+            rovers: 1,
+            ..Case::new(continuous(policy))
+        }
+    }
+
+    #[test]
+    fn the_time_ratio_is_of_times() {
+        let line = [(0.0, 0.0), (10.0, 0.0), (20.0, 0.0), (30.0, 0.0)];
+        let case = alone(Policy::Reference, &line, &[(0, 1), (1, 2), (2, 3)]);
+        let (metrics, _) = case.arrives();
+        // A cycle of 8 s at the entry, and 17 s on the way, without a stop; 17 s is the least. The
+        // rest is the grant for the entry.
+        let over = metrics.time_ratio * 17.0 - 25.0;
+        assert!((0.0..0.1).contains(&over), "{over} s");
+        // In cycles it comes in, and takes three steps.
+        let mut case = case;
+        case.network.motion = Motion::Cycles;
+        assert_eq!(case.arrives().0.time_ratio, 4.0 / 3.0);
+    }
+
+    #[test]
+    fn baselines_plan_by_what_edges_take() {
+        // Three short edges, or two long ones by way of vertex 3.
+        let places = [
+            (0.0, 0.0),
+            (10.0, 0.0),
+            (20.0, 0.0),
+            (15.0, 80.0),
+            (30.0, 0.0),
+        ];
+        let edges = [(0, 1), (1, 2), (2, 4), (0, 3), (3, 4)];
+        for policy in [Policy::Reference, Policy::Prioritised] {
+            let mut case = alone(policy, &places, &edges);
+            let (_, seen) = case.arrives();
+            assert_eq!(moves(&seen).len(), 3, "{policy:?}");
+            case.network.motion = Motion::Cycles;
+            let (_, seen) = case.arrives();
+            assert_eq!(moves(&seen).len(), 2, "{policy:?}");
+        }
+    }
+
+    /// Rovers that roll are ahead of their plan; what keeps one behind it is the way of messages only.
+    #[test]
+    fn the_references_plan_in_time_is_driven() {
+        for seed in 1..=3 {
+            let mut case = Case::new(continuous(Policy::Reference));
+            (case.rovers, case.seed) = (10, seed);
+            let (driven, _) = case.arrives();
+            let (rovers, network) = (case.rovers, &case.network);
+            let missions =
+                missions(&case.world().0, &case.map, &TeamConfig { rovers }, seed).unwrap();
+            let timing = network.timing(SimDuration::from_millis(5), None).unwrap();
+            let missions: Vec<_> = (0..).map(RoverId).zip(missions).collect();
+            let plan = Schedule::of(network, &timing, &case.map, &missions, false);
+            for ((_, way), arrival_s) in plan.unwrap().unwrap().visits.iter().zip(&driven.arrival_s)
+            {
+                let planned_s = way[way.len() - 1].end as f64 * 1e-9;
+                let late_s = arrival_s.unwrap() - planned_s;
+                assert!((-30.0..0.2).contains(&late_s), "{late_s} s");
+            }
+        }
+    }
+
+    #[test]
+    fn the_coupled_search_says_that_it_knows_cycles_only() {
+        let mut case = Case::new(continuous(Policy::Coupled));
+        case.rovers = 2;
+        let text = case.run().err().unwrap().to_string();
+        assert!(
+            text.contains("cannot plan for network.motion \"continuous\""),
+            "{text}"
+        );
+        case.network.motion = Motion::Cycles;
+        case.arrives();
     }
 }
 

@@ -85,28 +85,40 @@ pub(crate) fn divisor(t: u32) -> f64 {
     libm::exp((10.0 - f64::from(t)).max(1.0))
 }
 
-/// The first cycle, from 1, in which two paths collide: both at one vertex, or swapping along an
-/// edge. A path of length 0 (the zero path, and the wait on a leaf) holds its vertex for ever; any
-/// other claims nothing after its end.
-pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
+/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where it
+/// is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero path, and
+/// the wait on a leaf) holds its vertex for ever; any other claims nothing after its end.
+pub(crate) fn collision_from(a: &CandidatePath, b: &CandidatePath, first: u32) -> Option<u32> {
     let stays = |path: &CandidatePath| path.length() == 0;
-    let (mut from_a, mut from_b) = (a.vertices[0], b.vertices[0]);
     let cycles = match (stays(a), stays(b)) {
         (true, true) => 1,
         (true, false) => b.length(),
         (false, true) => a.length(),
         (false, false) => a.length().min(b.length()),
     };
-    for t in 1..=cycles {
-        let at = t as usize;
-        let to_a = a.vertices.get(at).copied().unwrap_or(from_a);
-        let to_b = b.vertices.get(at).copied().unwrap_or(from_b);
+    let place = |path: &CandidatePath, t: u32| {
+        // Only a path that stays ends before.
+        let at = (t as usize).min(path.vertices.len() - 1);
+        path.vertices[at]
+    };
+    if first > cycles {
+        return None;
+    }
+    let (mut from_a, mut from_b) = (place(a, first - 1), place(b, first - 1));
+    for t in first..=cycles {
+        let (to_a, to_b) = (place(a, t), place(b, t));
         if to_a == to_b || (to_a == from_b && to_b == from_a) {
             return Some(t);
         }
         (from_a, from_b) = (to_a, to_b);
     }
     None
+}
+
+/// The first cycle of all in which two paths collide.
+#[cfg(test)]
+pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
+    collision_from(a, b, 1)
 }
 
 #[cfg(test)]

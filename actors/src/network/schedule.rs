@@ -3,15 +3,17 @@
 
 use farside_worlds::{Roadmap, VertexId};
 
-use super::config::{NetworkConfig, Policy};
+use super::config::{Motion, NetworkConfig, Policy};
 use super::messages::RoverId;
+use super::motion::Ways;
 use super::timing::Timing;
 use crate::planning::safe_intervals::{FOREVER, TimedVisit};
 use crate::planning::{
-    CoupledConfig, Mission, Order, Plan, Problem, Rules, coupled, prioritised, reference,
+    CoupledConfig, Mission, Order, Pace, Problem, Rules, coupled, prioritised_in_time,
+    reference_in_time,
 };
 
-/// Each rover's visits; and what it took to find them.
+/// Each rover's visits \[ns\], none for one that has no way; and what it took to find them.
 #[derive(Debug, Default)]
 pub(crate) struct Schedule {
     pub(crate) visits: Vec<(RoverId, Vec<TimedVisit>)>,
@@ -23,7 +25,8 @@ impl Schedule {
     /// a way.
     ///
     /// # Errors
-    /// When there is no plan, or it would take too long to find.
+    /// When there is no plan, or it would take too long to find, or the policy cannot plan for this
+    /// motion.
     pub(crate) fn of(
         config: &NetworkConfig,
         timing: &Timing,
@@ -35,44 +38,75 @@ impl Schedule {
             return Ok(None);
         }
         let rules = if stays { Rules::OnMap } else { Rules::Queues };
-        let all = missions
-            .iter()
-            .map(|&(_, (entry, goal))| Mission::new(entry, goal));
-        let problem = Problem::new(roadmap, all.collect(), rules);
-        let problem = problem.map_err(|error| error.to_string())?;
-        let (plan, expansions) = match config.policy {
-            Policy::Prioritised => (prioritised(&problem, &Order::QueuePosition).plan, 0),
-            Policy::Coupled => {
-                let limits = CoupledConfig {
-                    max_expansions: config.max_expansions,
-                    // The growth is what this baseline is there to show.
-                    independence: false,
-                    ..CoupledConfig::default()
+        let (rovers, missions): (Vec<RoverId>, Vec<_>) = missions.iter().copied().unzip();
+        let of_rover = |visits: Vec<Vec<TimedVisit>>| rovers.into_iter().zip(visits).collect();
+        let missions = missions.into_iter().map(Mission::from).collect();
+        let problem = Problem::new(roadmap, missions, rules).map_err(|error| error.to_string())?;
+        if config.policy == Policy::Coupled {
+            let (visits, expansions) = Schedule::coupled(config, timing, &problem)?;
+            let visits = of_rover(visits);
+            return Ok(Some(Schedule { visits, expansions }));
+        }
+        let ways = Ways { roadmap, config };
+        let cycle_ns = timing.cycle.as_nanos();
+        let travel = |u, v| ways.planned(u, v).as_nanos();
+        let (pace, tick_ns) = match config.motion {
+            Motion::Cycles => (Pace::CYCLES, cycle_ns),
+            Motion::Continuous => {
+                let pace = Pace {
+                    travel: &travel,
+                    // What a rover stands for at its entry.
+                    enter: if stays { 0 } else { cycle_ns },
+                    // What leaves a vertex says so, and what comes next is told.
+                    gap: timing.iteration_timeout.as_nanos().max(1),
                 };
-                let best = coupled(&problem, &limits).map_err(|error| error.to_string())?;
-                (best.plan, best.expansions)
+                (pace, 1)
             }
-            _ => (reference(&problem, &Order::QueuePosition).plan, 0),
         };
-        let rovers = missions.iter().map(|(rover, _)| *rover);
-        let visits = timed(&plan, &problem, timing.cycle.as_nanos());
+        let plan = match config.policy {
+            Policy::Prioritised => prioritised_in_time,
+            _ => reference_in_time,
+        };
+        let table = plan(&problem, &pace, &Order::QueuePosition);
         Ok(Some(Schedule {
-            visits: rovers.zip(visits).collect(),
-            expansions,
+            visits: of_rover(in_ns(table.ways, tick_ns)),
+            expansions: 0,
         }))
+    }
+
+    /// The visits of the joint search's plan, and what it took to find it.
+    fn coupled(
+        config: &NetworkConfig,
+        timing: &Timing,
+        problem: &Problem<'_>,
+    ) -> Result<(Vec<Vec<TimedVisit>>, u64), String> {
+        if config.motion == Motion::Continuous {
+            let why = "network.policy \"coupled\" searches in whole cycles, and so cannot plan for \
+                       network.motion \"continuous\"; \"reference\" can";
+            return Err(why.to_owned());
+        }
+        let limits = CoupledConfig {
+            max_expansions: config.max_expansions,
+            // The growth is what this baseline is there to show.
+            independence: false,
+            ..CoupledConfig::default()
+        };
+        let best = coupled(problem, &limits).map_err(|error| error.to_string())?;
+        let visits = in_ns(best.plan.visits(problem), timing.cycle.as_nanos());
+        Ok((visits, best.expansions))
     }
 }
 
-/// A plan in cycles as visits in time: a rover that is at a vertex from cycle c on sets out towards it
-/// at the start of that cycle.
-fn timed(plan: &Plan, problem: &Problem<'_>, cycle_ns: u64) -> Vec<Vec<TimedVisit>> {
-    let rover = |stays: Vec<crate::planning::Visit>| {
-        let visit = |stay: crate::planning::Visit| TimedVisit {
-            vertex: stay.vertex,
-            start: u64::from(stay.entered) * cycle_ns,
-            end: stay.left.map_or(FOREVER, |left| u64::from(left) * cycle_ns),
-        };
-        stays.into_iter().map(visit).collect()
+/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards it
+/// at that instant.
+fn in_ns(mut ways: Vec<Vec<TimedVisit>>, tick_ns: u64) -> Vec<Vec<TimedVisit>> {
+    let scale = |tick: u64| match tick {
+        FOREVER => FOREVER,
+        tick => tick * tick_ns,
     };
-    plan.visits(problem).into_iter().map(rover).collect()
+    for visit in ways.iter_mut().flatten() {
+        visit.start = scale(visit.start);
+        visit.end = scale(visit.end);
+    }
+    ways
 }

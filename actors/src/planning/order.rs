@@ -3,8 +3,8 @@
 
 use farside::random::RandomKey;
 
-use super::plan::Outcome;
 use super::problem::{Problem, Rules};
+use super::timetable::{Pace, Timetable};
 
 /// Who is planned before whom.
 ///
@@ -57,17 +57,18 @@ impl Order {
     pub(crate) fn best(
         self,
         problem: &Problem<'_>,
-        enough: impl Fn(&Outcome) -> bool,
-        mut plan: impl FnMut(&[usize]) -> Outcome,
-    ) -> Outcome {
-        let mut best: Option<Outcome> = None;
+        pace: &Pace<'_>,
+        enough: impl Fn(&Timetable) -> bool,
+        mut plan: impl FnMut(&[usize]) -> Timetable,
+    ) -> Timetable {
+        let mut best: Option<Timetable> = None;
         let mut tries = 0;
         for order in self.orders(problem) {
             let outcome = plan(&order);
             tries += 1;
             if best
                 .as_ref()
-                .is_none_or(|best| outcome.is_better_than(best, problem))
+                .is_none_or(|best| outcome.is_better_than(best, pace))
             {
                 best = Some(outcome);
             }

@@ -4,6 +4,7 @@ use farside_worlds::VertexId;
 use serde::Serialize;
 
 use super::problem::{Problem, Rules};
+use super::safe_intervals::{FOREVER, TimedVisit};
 
 /// One rover's way through space and time.
 ///
@@ -41,24 +42,6 @@ impl Trip {
     }
 }
 
-/// A stay at a vertex, for whoever drives by a timetable.
-///
-/// ```
-/// use farside_actors::planning::Visit;
-/// use farside_worlds::VertexId;
-/// let visit = Visit { vertex: VertexId(4), entered: 2, left: Some(3) };
-/// assert_eq!(visit.left.map(|left| left - visit.entered), Some(1));
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Visit {
-    /// Where.
-    pub vertex: VertexId,
-    /// The first cycle in which the rover is there.
-    pub entered: u32,
-    /// The first cycle in which it is there no longer; none for a stay without end.
-    pub left: Option<u32>,
-}
-
 /// A plan for a team: a trip for each rover, or none for a rover that found no way. Such a rover is
 /// not on the roadmap at all, as far as the plan goes.
 ///
@@ -72,7 +55,7 @@ pub struct Visit {
 /// let plan = Plan { trips: vec![Some(Trip { entered: 0, vertices: way })] };
 /// assert_eq!(plan.conflicts(&problem), []);
 /// assert_eq!(plan.metrics(&problem).time_ratio, 1.0);
-/// assert_eq!(plan.visits(&problem)[0][1].entered, 1);
+/// assert_eq!(plan.visits(&problem)[0][1].start, 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -106,8 +89,8 @@ pub struct PlanMetrics {
 ///
 /// ```
 /// use farside_actors::planning::Failure;
-/// let failure = Failure { rover: 3, blockers: vec![1], cycle: 17 };
-/// assert_eq!(failure.to_string(), "rover 3 finds no way: rover 1 bars it in cycle 17");
+/// let failure = Failure { rover: 3, blockers: vec![1], at: 17 };
+/// assert_eq!(failure.to_string(), "rover 3 finds no way: rover 1 bars it at 17");
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Failure {
@@ -115,9 +98,9 @@ pub struct Failure {
     pub rover: usize,
     /// Who stands or drives in its way when nothing is left to it, sorted.
     pub blockers: Vec<usize>,
-    /// When that is: the last cycle for which its search found anything to refuse. Once nobody
-    /// moves any more, all cycles are one.
-    pub cycle: u32,
+    /// When that is, in ticks of the plan (cycles, if it is in cycles): the last instant at which it
+    /// could still be anywhere; or at which somebody moves, if that is before.
+    pub at: u64,
 }
 
 impl std::fmt::Display for Failure {
@@ -127,10 +110,10 @@ impl std::fmt::Display for Failure {
             1 => ("rover", "bars"),
             _ => ("rovers", "bar"),
         };
-        let (rover, cycle, list) = (self.rover, self.cycle, list.join(", "));
+        let (rover, at, list) = (self.rover, self.at, list.join(", "));
         write!(
             f,
-            "rover {rover} finds no way: {noun} {list} {verb} it in cycle {cycle}"
+            "rover {rover} finds no way: {noun} {list} {verb} it at {at}"
         )
     }
 }
@@ -151,17 +134,6 @@ pub struct Outcome {
     pub tries: u32,
 }
 
-impl Outcome {
-    /// Whether it is better than another: fewer failures, then a smaller sum of costs.
-    pub(crate) fn is_better_than(&self, other: &Outcome, problem: &Problem<'_>) -> bool {
-        let rank = |outcome: &Outcome| {
-            let sum = outcome.plan.metrics(problem).sum_of_costs;
-            (outcome.failures.len(), sum)
-        };
-        rank(self) < rank(other)
-    }
-}
-
 impl Plan {
     /// Whether `rover` reaches its goal.
     pub fn arrives(&self, problem: &Problem<'_>, rover: usize) -> bool {
@@ -171,10 +143,10 @@ impl Plan {
             .is_some_and(|trip| trip.end() == goal)
     }
 
-    /// The plan as a timetable: each rover's stays, one after the other; empty for a rover
+    /// The plan as a timetable in cycles: each rover's stays, one after the other; empty for a rover
     /// without a trip. The last stay has no end with [`Rules::OnMap`], and one cycle with
     /// [`Rules::Queues`].
-    pub fn visits(&self, problem: &Problem<'_>) -> Vec<Vec<Visit>> {
+    pub fn visits(&self, problem: &Problem<'_>) -> Vec<Vec<TimedVisit>> {
         let visits = |trip: &Option<Trip>| {
             let trip = trip.as_ref();
             trip.map_or_else(Vec::new, |trip| visits(trip, problem.rules()))
@@ -205,22 +177,22 @@ impl Plan {
 }
 
 /// The stays of a trip.
-pub(crate) fn visits(trip: &Trip, rules: Rules) -> Vec<Visit> {
-    let mut visits = Vec::<Visit>::new();
-    for (cycle, &vertex) in (trip.entered..).zip(&trip.vertices) {
+pub(crate) fn visits(trip: &Trip, rules: Rules) -> Vec<TimedVisit> {
+    let mut visits = Vec::<TimedVisit>::new();
+    for (cycle, &vertex) in (u64::from(trip.entered)..).zip(&trip.vertices) {
         match visits.last_mut() {
-            Some(last) if last.vertex == vertex => last.left = Some(cycle + 1),
-            _ => visits.push(Visit {
+            Some(last) if last.vertex == vertex => last.end = cycle + 1,
+            _ => visits.push(TimedVisit {
                 vertex,
-                entered: cycle,
-                left: Some(cycle + 1),
+                start: cycle,
+                end: cycle + 1,
             }),
         }
     }
     if rules == Rules::OnMap
         && let Some(last) = visits.last_mut()
     {
-        last.left = None;
+        last.end = FOREVER;
     }
     visits
 }
@@ -248,17 +220,12 @@ mod tests {
             assert!(visits[1].is_empty());
             visits[0]
                 .iter()
-                .map(|s| (s.vertex.0, s.entered, s.left))
+                .map(|s| (s.vertex.0, s.start, s.end))
                 .collect::<Vec<_>>()
         };
-        let mut expected = vec![
-            (0, 2, Some(4)),
-            (1, 4, Some(5)),
-            (2, 5, Some(8)),
-            (1, 8, Some(9)),
-        ];
+        let mut expected = vec![(0, 2, 4), (1, 4, 5), (2, 5, 8), (1, 8, 9)];
         assert_eq!(stays(Rules::Queues), expected);
-        expected[3].2 = None;
+        expected[3].2 = FOREVER;
         assert_eq!(stays(Rules::OnMap), expected);
     }
 

@@ -4,17 +4,18 @@
 //! 2002). It is incomplete: a rover starts when its turn comes, whoever may come its way.
 
 use super::order::Order;
-use super::plan::{Failure, Outcome, Plan, Trip};
-use super::problem::{Problem, Rules};
-use super::space_time;
+use super::plan::Outcome;
+use super::problem::Problem;
+use super::single::{self, Entry};
 use super::table::Table;
+use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it. With several orders to try it stops
 /// at the first in which all find a way.
 ///
-/// With [`Rules::Queues`] a rover enters in the first cycle in which nobody planned before it is at
+/// With [`Rules::Queues`](super::Rules::Queues) a rover enters in the first cycle in which nobody planned before it is at
 /// its entry, its predecessors among them; it may not wait outside for a clear way. With
-/// [`Rules::OnMap`] it starts in cycle 0, where somebody planned before it may already be driving
+/// [`Rules::OnMap`](super::Rules::OnMap) it starts in cycle 0, where somebody planned before it may already be driving
 /// through. A rover that finds no way is named as a failure, has no trip, and is in nobody's way:
 /// the others are planned as if it were not there.
 ///
@@ -33,52 +34,46 @@ use super::table::Table;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn prioritised(problem: &Problem<'_>, order: &Order) -> Outcome {
-    let enough = |outcome: &Outcome| outcome.failures.is_empty();
-    order.best(problem, enough, |order| in_order(problem, order))
+    prioritised_in_time(problem, &Pace::CYCLES, order).in_cycles()
 }
 
-fn in_order(problem: &Problem<'_>, order: &[usize]) -> Outcome {
-    let rovers = problem.missions().len();
-    let mut table = Table::new(problem.roadmap(), rovers, problem.rules());
+/// The same for rovers that take their time, see [`Pace`].
+///
+/// ```
+/// use farside_actors::planning::{Mission, Order, Pace, Problem, Rules, prioritised_in_time};
+/// use farside_worlds::{Roadmap, VertexId as V};
+/// let text = "name = 'line'\nboundary = [0, 2]\npositions_m = [[0, 0], [5, 0], [9, 0]]\n\
+///             edges = [[0, 1], [1, 2]]";
+/// let map = Roadmap::from_toml(text)?;
+/// let missions = [(0, 2), (0, 2)].map(|(a, b)| Mission::new(V(a), V(b)));
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+/// let pace = Pace { travel: &|_, _| 9, enter: 2, gap: 1 };
+/// let table = prioritised_in_time(&problem, &pace, &Order::QueuePosition);
+/// // The first leaves the entry at 2; the second comes in as soon as that is known.
+/// assert_eq!(table.ways[1][0].start, 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn prioritised_in_time(problem: &Problem<'_>, pace: &Pace<'_>, order: &Order) -> Timetable {
+    let enough = |table: &Timetable| table.failures.is_empty();
+    order.best(problem, pace, enough, |order| {
+        in_order(problem, pace, order)
+    })
+}
+
+fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetable {
+    let mut table = Table::new(problem.roadmap(), problem.missions().len());
     let mut failures = Vec::new();
     for &rover in order {
-        match plan_one(problem, &table, rover) {
-            Ok(trip) => table.insert(rover, trip),
+        // A predecessor has taken the first interval in which it found the entry free, so that the
+        // next one comes after it.
+        match single::search(problem, pace, &table, rover, Entry::AtOnce) {
+            Ok(way) => table.insert(rover, way),
             Err(failure) => failures.push(failure),
         }
     }
-    Outcome {
-        plan: Plan {
-            trips: table.into_trips(),
-        },
+    Timetable {
+        ways: table.into_ways(),
         failures,
         tries: 1,
     }
-}
-
-fn plan_one(problem: &Problem<'_>, table: &Table, rover: usize) -> Result<Trip, Failure> {
-    let mission = problem.missions()[rover];
-    // A predecessor has taken the first cycle in which it found the entry free, so that the next one
-    // comes after it.
-    let mut start = 0;
-    while let Some(stay) = table.stay_at(mission.entry, start) {
-        if problem.rules() == Rules::OnMap {
-            let (blockers, cycle) = (vec![stay.rover], start);
-            return Err(Failure {
-                rover,
-                blockers,
-                cycle,
-            });
-        }
-        start = stay.until;
-    }
-    let (map, rules) = (problem.roadmap(), problem.rules());
-    space_time::search(
-        map,
-        table,
-        rules,
-        rover,
-        (mission.entry, start),
-        mission.goal,
-    )
 }

@@ -3,10 +3,12 @@
 //! infrastructures*, 2015, and arXiv 1409.2399), each rover by safe intervals.
 
 use super::order::Order;
-use super::plan::{Outcome, Plan, Trip};
+use super::plan::Outcome;
 use super::problem::{Problem, Rules};
+use super::safe_intervals::{FOREVER, TimedVisit};
+use super::single::{self, Entry};
 use super::table::Table;
-use super::{sipp, space_time};
+use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it, so that it is sure of a way.
 ///
@@ -35,19 +37,48 @@ use super::{sipp, space_time};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn reference(problem: &Problem<'_>, order: &Order) -> Outcome {
-    // Every order counts: a better sum of costs may be yet to come.
-    order.best(problem, |_| false, |order| in_order(problem, order))
+    reference_in_time(problem, &Pace::CYCLES, order).in_cycles()
 }
 
-fn in_order(problem: &Problem<'_>, order: &[usize]) -> Outcome {
-    let (map, rules) = (problem.roadmap(), problem.rules());
+/// The same for rovers that take their time, see [`Pace`].
+///
+/// ```
+/// use farside_actors::planning::{Mission, Order, Pace, Problem, Rules, reference_in_time};
+/// use farside_worlds::{Roadmap, VertexId as V};
+/// let text = "name = 'line'\nboundary = [0, 2]\npositions_m = [[0, 0], [5, 0], [9, 0]]\n\
+///             edges = [[0, 1], [1, 2]]";
+/// let map = Roadmap::from_toml(text)?;
+/// let missions = [(0, 2), (2, 0)].map(|(a, b)| Mission::new(V(a), V(b)));
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+/// let pace = Pace { travel: &|a, b| if a.0 + b.0 == 1 { 5 } else { 4 }, enter: 2, gap: 1 };
+/// let table = reference_in_time(&problem, &pace, &Order::QueuePosition);
+/// assert_eq!(table.errors(&problem, &pace), []);
+/// // The first is at its goal at 2 + 5 + 4, gone at 12, and known to be gone at 13.
+/// assert_eq!(table.ways[0][2].end, 12);
+/// assert_eq!(table.ways[1][0].start, 13);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn reference_in_time(problem: &Problem<'_>, pace: &Pace<'_>, order: &Order) -> Timetable {
+    // Every order counts: a better sum of costs may be yet to come.
+    order.best(
+        problem,
+        pace,
+        |_| false,
+        |order| in_order(problem, pace, order),
+    )
+}
+
+fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetable {
     let missions = problem.missions();
-    let mut table = Table::new(map, missions.len(), rules);
-    let stand = |rover: usize| Trip {
-        entered: 0,
-        vertices: vec![missions[rover].entry],
+    let mut table = Table::new(problem.roadmap(), missions.len());
+    let stand = |rover: usize| {
+        vec![TimedVisit {
+            vertex: missions[rover].entry,
+            start: 0,
+            end: FOREVER,
+        }]
     };
-    if rules == Rules::OnMap {
+    if problem.rules() == Rules::OnMap {
         for rover in 0..missions.len() {
             table.insert(rover, stand(rover));
         }
@@ -55,24 +86,20 @@ fn in_order(problem: &Problem<'_>, order: &[usize]) -> Outcome {
     let mut failures = Vec::new();
     for &rover in order {
         table.remove(rover);
-        let mission = missions[rover];
-        let predecessor = problem.predecessor(rover).and_then(|p| table.trip(p));
-        let ready = predecessor.map_or(0, |trip| trip.entered + 1);
-        match sipp::search(map, &table, rules, mission, ready) {
-            Some(trip) => table.insert(rover, trip),
-            None => {
-                // The same question again, of the search that can say who is in the way.
-                let start = (mission.entry, 0);
-                let again = space_time::search(map, &table, rules, rover, start, mission.goal);
-                failures.push(again.expect_err("both searches are exact"));
+        let predecessor = problem
+            .predecessor(rover)
+            .and_then(|p| table.way(p).first());
+        let ready = predecessor.map_or(0, |visit| visit.start + 1);
+        match single::search(problem, pace, &table, rover, Entry::From(ready)) {
+            Ok(way) => table.insert(rover, way),
+            Err(failure) => {
+                failures.push(failure);
                 table.insert(rover, stand(rover));
             }
         }
     }
-    Outcome {
-        plan: Plan {
-            trips: table.into_trips(),
-        },
+    Timetable {
+        ways: table.into_ways(),
         failures,
         tries: 1,
     }

@@ -9,7 +9,8 @@
 //! Of two ways into the same safe interval the one that is there first is as good as the other in all
 //! that follows, since it may wait. So a search keeps one [`Label`] for each vertex and interval.
 //! Swapping along an edge needs no rule of its own: each of the two rovers would have to begin its
-//! visit after the other one has ended.
+//! visit after the other one has ended. Only where there is no gap at all, as in whole cycles, can both
+//! happen at one instant.
 //!
 //! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up to
 //! that of the covered vertex beyond, begin when it sets out into it. How that is searched: `crossing`.
@@ -69,6 +70,19 @@ pub struct Ground<'a> {
     pub covers: &'a dyn Fn(VertexId) -> bool,
 }
 
+/// What a search for one place looks for; [`Ground::expand`] looks for nothing and finds all.
+pub(super) struct Aim<'a> {
+    /// No less than this long is left from a vertex on \[ns\], and no more than an edge's time and
+    /// what is left at its end.
+    pub(super) left: &'a dyn Fn(VertexId) -> u64,
+    /// Whether a label is the end of the search.
+    pub(super) is_end: &'a dyn Fn(&Label) -> bool,
+    /// Whether there is no setting out from the first vertex to the second at this instant, the only
+    /// one at which one safe interval is left for the other. Without a gap rovers can change places,
+    /// in twos and in rings, at such an instant and at no other.
+    pub(super) is_barred: &'a dyn Fn(VertexId, VertexId, u64) -> bool,
+}
+
 /// The safe intervals left by visits `busy`, as (first begin, last end).
 ///
 /// ```
@@ -114,17 +128,41 @@ impl Ground<'_> {
     /// appends what is found to `labels`. Labels lead on from any vertex, but only to vertices that
     /// [`Ground::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
+        let all = Aim {
+            left: &|_| 0,
+            is_end: &|_| false,
+            is_barred: &|_, _, _| false,
+        };
+        self.search(labels, open, &all);
+    }
+
+    /// As [`Ground::expand`], but the most promising label first (A*), and only until one is the end:
+    /// its place. No other end is ready sooner.
+    pub(super) fn search(
+        &self,
+        labels: &mut Vec<Label>,
+        open: &[u32],
+        aim: &Aim<'_>,
+    ) -> Option<u32> {
+        // Of equals the one that has come furthest, then the one that was found first.
+        let rank = |label: &Label, at: u32| {
+            let bound = label.ready.saturating_add((aim.left)(label.vertex));
+            (Reverse(bound), label.ready, Reverse(at))
+        };
         let mut queue = BinaryHeap::new();
         let mut best = Best::new(self.roadmap.len(), self.covers);
         for &at in open {
             let label = labels[at as usize];
             best.insert(&label);
-            queue.push(Reverse((label.ready, at)));
+            queue.push(rank(&label, at));
         }
-        while let Some(Reverse((_, at))) = queue.pop() {
+        while let Some((_, _, Reverse(at))) = queue.pop() {
             let from = labels[at as usize];
             if !best.has(&from) {
                 continue;
+            }
+            if (aim.is_end)(&from) {
+                return Some(at);
             }
             let in_gap = !(self.covers)(from.vertex);
             let course = Course::of(&from, !in_gap);
@@ -140,14 +178,19 @@ impl Ground<'_> {
                 for safe in safe_intervals(&busy, self.gap).take_while(in_time) {
                     let parent = Some(at);
                     let label = course.label(to, travel, safe, (self.covers)(to));
-                    let label = label.map(|label| Label { parent, ..label });
-                    if let Some(label) = label.filter(|label| best.improves(label)) {
-                        queue.push(Reverse((label.ready, labels.len() as u32)));
+                    let Some(label) = label.map(|label| Label { parent, ..label }) else {
+                        continue;
+                    };
+                    let is_only = label.start == safe.0 && label.start == from.until;
+                    let barred = is_only && (aim.is_barred)(from.vertex, to, label.start);
+                    if !barred && best.improves(&label) {
+                        queue.push(rank(&label, labels.len() as u32));
                         labels.push(label);
                     }
                 }
             }
         }
+        None
     }
 }
 

@@ -3,17 +3,13 @@
 
 use farside_worlds::{Roadmap, VertexId};
 
-use super::plan::{Trip, visits};
-use super::problem::Rules;
+use super::safe_intervals::{FOREVER, TimedVisit};
 
-/// The end of a stay without end.
-pub(crate) const FOREVER: u32 = u32::MAX;
-
-/// A reservation of one vertex, for the cycles from `from` to before `until`.
+/// A reservation of one vertex, for the ticks from `from` to before `until`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Stay {
-    pub(crate) from: u32,
-    pub(crate) until: u32,
+    pub(crate) from: u64,
+    pub(crate) until: u64,
     pub(crate) rover: usize,
 }
 
@@ -21,25 +17,23 @@ pub(crate) struct Stay {
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     stays: Vec<Vec<Stay>>,
-    trips: Vec<Option<Trip>>,
-    rules: Rules,
+    ways: Vec<Vec<TimedVisit>>,
 }
 
 impl Table {
-    pub(crate) fn new(roadmap: &Roadmap, rovers: usize, rules: Rules) -> Table {
+    pub(crate) fn new(roadmap: &Roadmap, rovers: usize) -> Table {
         Table {
             stays: vec![Vec::new(); roadmap.len()],
-            trips: vec![None; rovers],
-            rules,
+            ways: vec![Vec::new(); rovers],
         }
     }
 
-    /// Reserves what a trip needs, which must be free.
-    pub(crate) fn insert(&mut self, rover: usize, trip: Trip) {
-        for visit in visits(&trip, self.rules) {
+    /// Reserves what a way needs, which must be free.
+    pub(crate) fn insert(&mut self, rover: usize, way: Vec<TimedVisit>) {
+        for visit in &way {
             let stay = Stay {
-                from: visit.entered,
-                until: visit.left.unwrap_or(FOREVER),
+                from: visit.start,
+                until: visit.end,
                 rover,
             };
             let stays = &mut self.stays[visit.vertex.0 as usize];
@@ -51,17 +45,13 @@ impl Table {
             );
             stays.insert(at, stay);
         }
-        self.trips[rover] = Some(trip);
+        self.ways[rover] = way;
     }
 
     /// Gives up what a rover has reserved.
     pub(crate) fn remove(&mut self, rover: usize) {
-        for vertex in self.trips[rover]
-            .take()
-            .into_iter()
-            .flat_map(|t| t.vertices)
-        {
-            self.stays[vertex.0 as usize].retain(|stay| stay.rover != rover);
+        for visit in std::mem::take(&mut self.ways[rover]) {
+            self.stays[visit.vertex.0 as usize].retain(|stay| stay.rover != rover);
         }
     }
 
@@ -70,58 +60,59 @@ impl Table {
         &self.stays[vertex.0 as usize]
     }
 
-    pub(crate) fn trip(&self, rover: usize) -> Option<&Trip> {
-        self.trips[rover].as_ref()
+    /// The same as (from, until), as searches ask for it.
+    pub(crate) fn busy(&self, vertex: VertexId) -> Vec<(u64, u64)> {
+        let stays = self.stays(vertex).iter();
+        stays.map(|stay| (stay.from, stay.until)).collect()
     }
 
-    pub(crate) fn into_trips(self) -> Vec<Option<Trip>> {
-        self.trips
+    /// A rover's way; empty if it has none.
+    pub(crate) fn way(&self, rover: usize) -> &[TimedVisit] {
+        &self.ways[rover]
     }
 
-    /// The stay that covers a cycle.
-    pub(crate) fn stay_at(&self, vertex: VertexId, cycle: u32) -> Option<Stay> {
+    pub(crate) fn into_ways(self) -> Vec<Vec<TimedVisit>> {
+        self.ways
+    }
+
+    /// Who is at `vertex` at `tick`.
+    pub(crate) fn occupant(&self, vertex: VertexId, tick: u64) -> Option<usize> {
         let stays = self.stays(vertex);
-        let next = stays.partition_point(|stay| stay.from <= cycle);
-        let stay = *stays[..next].last()?;
-        (cycle < stay.until).then_some(stay)
+        let next = stays.partition_point(|stay| stay.from <= tick);
+        let stay = stays[..next].last()?;
+        (tick < stay.until).then_some(stay.rover)
     }
 
-    /// Who is at `vertex` in `cycle`.
-    pub(crate) fn occupant(&self, vertex: VertexId, cycle: u32) -> Option<usize> {
-        self.stay_at(vertex, cycle).map(|stay| stay.rover)
-    }
-
-    /// From this cycle on nobody moves any more.
-    pub(crate) fn settled(&self) -> u32 {
-        let ends = self
-            .trips
-            .iter()
-            .flatten()
-            .map(|trip| trip.last_cycle() + 1);
+    /// From this tick on nobody moves any more.
+    pub(crate) fn settled(&self) -> u64 {
+        let lasts = self.ways.iter().filter_map(|way| way.last());
+        let ends = lasts.map(|visit| match visit.end {
+            FOREVER => visit.start + 1,
+            end => end,
+        });
         ends.max().unwrap_or(0)
     }
 
-    /// Who keeps a rover at `from` from moving to `to` (not the same), so that it is there in
-    /// `cycle`: the one that is there then, or with which it would swap, or the one ahead of it in a
-    /// rotation.
-    pub(crate) fn bars(&self, from: VertexId, to: VertexId, cycle: u32) -> Option<usize> {
-        if let Some(rover) = self.occupant(to, cycle) {
-            return Some(rover);
-        }
-        self.closes_ring(from, to, cycle)
+    /// Where a rover is at `tick`.
+    fn place(&self, rover: usize, tick: u64) -> Option<VertexId> {
+        let way = &self.ways[rover];
+        let next = way.partition_point(|visit| visit.start <= tick);
+        let visit = way[..next].last()?;
+        (tick < visit.end).then_some(visit.vertex)
     }
 
-    /// Who leaves `to` for `cycle`, if a chain of rovers that follow one another leads from there
-    /// back to `from`. A chain of one is a swap.
-    pub(crate) fn closes_ring(&self, from: VertexId, to: VertexId, cycle: u32) -> Option<usize> {
-        let last = self.occupant(from, cycle)?;
-        let ahead = self.occupant(to, cycle.checked_sub(1)?)?;
+    /// Who leaves `to` at `tick`, if a chain of rovers that follow one another at that instant leads
+    /// from there back to `from`. A chain of one is a swap. Rovers can only do so without a gap between
+    /// them. Nobody may be at `to` then.
+    pub(crate) fn closes_ring(&self, from: VertexId, to: VertexId, tick: u64) -> Option<usize> {
+        let last = self.occupant(from, tick)?;
+        let ahead = self.occupant(to, tick.checked_sub(1)?)?;
         // Each rover of the chain has left its vertex to the one behind it, so that the chain turns
         // back on itself nowhere but here, and ends.
         let mut rover = ahead;
         while rover != last {
-            let at = self.trips[rover].as_ref()?.at(cycle)?;
-            rover = self.occupant(at, cycle - 1)?;
+            let at = self.place(rover, tick)?;
+            rover = self.occupant(at, tick - 1)?;
         }
         Some(ahead)
     }
@@ -131,18 +122,20 @@ impl Table {
 mod tests {
     use super::*;
     use crate::network::testing::{grid, v};
+    use crate::planning::plan::{Trip, visits};
+    use crate::planning::problem::Rules;
 
-    fn trip(entered: u32, way: &[u32]) -> Trip {
-        let vertices = way.iter().copied().map(v).collect();
-        Trip { entered, vertices }
+    fn trip(entered: u32, vertices: &[u32], rules: Rules) -> Vec<TimedVisit> {
+        let vertices = vertices.iter().copied().map(v).collect();
+        visits(&Trip { entered, vertices }, rules)
     }
 
     #[test]
     fn stays_are_found_and_given_up() {
-        let mut table = Table::new(&grid(3, 2, &[]), 2, Rules::OnMap);
-        table.insert(0, trip(0, &[0, 1, 1, 2]));
-        table.insert(1, trip(0, &[3, 4, 4, 1, 0]));
-        let at = |table: &Table, vertex, cycle| table.occupant(v(vertex), cycle);
+        let mut table = Table::new(&grid(3, 2, &[]), 2);
+        table.insert(0, trip(0, &[0, 1, 1, 2], Rules::OnMap));
+        table.insert(1, trip(0, &[3, 4, 4, 1, 0], Rules::OnMap));
+        let at = |table: &Table, vertex, tick| table.occupant(v(vertex), tick);
         assert_eq!((at(&table, 1, 0), at(&table, 1, 2)), (None, Some(0)));
         assert_eq!((at(&table, 1, 3), at(&table, 1, 4)), (Some(1), None));
         assert_eq!(at(&table, 2, 1_000_000), Some(0), "it stays");
@@ -156,16 +149,15 @@ mod tests {
     fn rings_are_seen_whoever_closes_them() {
         // 0 1 2
         // 3 4 5
-        let mut table = Table::new(&grid(3, 2, &[]), 4, Rules::Queues);
-        table.insert(0, trip(4, &[0, 1]));
-        table.insert(1, trip(4, &[1, 4]));
-        table.insert(2, trip(4, &[4, 3]));
-        assert_eq!(table.bars(v(3), v(0), 5), Some(0), "it would rotate");
-        assert_eq!(table.bars(v(2), v(1), 5), Some(0), "it is taken");
-        assert_eq!(table.bars(v(1), v(0), 5), Some(0), "a swap");
+        let mut table = Table::new(&grid(3, 2, &[]), 4);
+        table.insert(0, trip(4, &[0, 1], Rules::Queues));
+        table.insert(1, trip(4, &[1, 4], Rules::Queues));
+        table.insert(2, trip(4, &[4, 3], Rules::Queues));
+        assert_eq!(table.closes_ring(v(3), v(0), 5), Some(0), "it would rotate");
+        assert_eq!(table.closes_ring(v(1), v(0), 5), Some(0), "a swap");
         table.remove(2);
-        assert_eq!(table.bars(v(3), v(0), 5), None, "4 stays free");
-        table.insert(2, trip(5, &[3, 4]));
+        assert_eq!(table.closes_ring(v(3), v(0), 5), None, "4 stays free");
+        table.insert(2, trip(5, &[3, 4], Rules::Queues));
         assert_eq!(table.closes_ring(v(3), v(0), 5), None, "out of its queue");
     }
 }

@@ -1,8 +1,11 @@
 //! All planners against the checker, the brute-force oracles, and one another.
 
+use farside_worlds::VertexId;
 use proptest::prelude::*;
 
-use super::plan::Trip;
+use super::plan::{Trip, visits};
+use super::safe_intervals::TimedVisit;
+use super::single::{self, Entry};
 use super::table::Table;
 use super::testing::{brute_force, case, first_arrival, walks};
 use super::*;
@@ -17,12 +20,30 @@ fn orders(seed: u64) -> [Order; 3] {
     ]
 }
 
-fn table(map: &farside_worlds::Roadmap, trips: &[Trip], rules: Rules) -> Table {
-    let mut table = Table::new(map, trips.len() + 1, rules);
-    for (rover, trip) in trips.iter().enumerate() {
-        table.insert(rover, trip.clone());
+/// A problem in which `mission` comes after `others`, and the table of what these reserve.
+fn amid<'a>(
+    map: &'a farside_worlds::Roadmap,
+    rules: Rules,
+    others: &[Trip],
+    mission: Mission,
+) -> (Problem<'a>, Table) {
+    let ends = |trip: &Trip| Mission::new(trip.vertices[0], trip.end());
+    let missions = others.iter().map(ends).chain([mission]).collect();
+    let problem = Problem::new(map, missions, rules).unwrap();
+    let mut table = Table::new(map, others.len() + 1);
+    for (rover, trip) in others.iter().enumerate() {
+        table.insert(rover, visits(trip, rules));
     }
-    table
+    (problem, table)
+}
+
+/// A way in cycles as a trip.
+fn as_trip(way: Vec<TimedVisit>) -> Trip {
+    let table = Timetable {
+        ways: vec![way],
+        ..Timetable::default()
+    };
+    table.in_cycles().plan.trips.remove(0).unwrap()
 }
 
 /// A trip among others, as a plan, must pass the checker.
@@ -69,10 +90,12 @@ proptest! {
             others.retain(|trip| trip.vertices[0] != mission.entry && trip.end() != mission.goal);
         }
         let ready = if rules == Rules::Queues { ready } else { 0 };
-        let table = table(&map, &others, rules);
+        let (problem, table) = amid(&map, rules, &others, mission);
         let may_wait = rules == Rules::Queues;
         let expected = first_arrival(&map, &others, rules, mission, ready, may_wait);
-        let found = sipp::search(&map, &table, rules, mission, ready);
+        let entry = Entry::From(u64::from(ready));
+        let found = single::search(&problem, &Pace::CYCLES, &table, others.len(), entry);
+        let found = found.ok().map(as_trip);
         prop_assert_eq!(found.as_ref().map(Trip::last_cycle), expected);
         if let Some(trip) = found {
             prop_assert!(trip.entered >= ready);
@@ -81,10 +104,9 @@ proptest! {
     }
 
     #[test]
-    fn space_time_search_is_as_fast_as_can_be(
+    fn who_may_not_wait_outside_is_as_fast_as_can_be(
         case in case(5, 4, 1),
         seeds in prop::collection::vec(any::<u64>(), 0..8),
-        ready in 0..4u32,
     ) {
         let (map, rules) = (case.roadmap(), case.rules);
         let mission = case.missions()[0];
@@ -92,13 +114,17 @@ proptest! {
         if rules == Rules::OnMap {
             others.retain(|trip| trip.vertices[0] != mission.entry && trip.end() != mission.goal);
         }
-        let ready = if rules == Rules::Queues { ready } else { 0 };
-        let table = table(&map, &others, rules);
-        prop_assume!(table.occupant(mission.entry, ready).is_none());
+        let (problem, table) = amid(&map, rules, &others, mission);
+        let occupied = |cycle: &u32| table.occupant(mission.entry, u64::from(*cycle)).is_some();
+        let ready = match rules {
+            Rules::Queues => (0..).find(|cycle| !occupied(cycle)).unwrap(),
+            Rules::OnMap => 0,
+        };
         let expected = first_arrival(&map, &others, rules, mission, ready, false);
-        let start = (mission.entry, ready);
-        match space_time::search(&map, &table, rules, others.len(), start, mission.goal) {
-            Ok(trip) => {
+        let rover = others.len();
+        match single::search(&problem, &Pace::CYCLES, &table, rover, Entry::AtOnce) {
+            Ok(way) => {
+                let trip = as_trip(way);
                 prop_assert_eq!(Some(trip.last_cycle()), expected);
                 prop_assert_eq!(trip.entered, ready);
                 check(rules, &map, mission, &trip, &others)?;
@@ -109,6 +135,33 @@ proptest! {
                 // Without those who are named in the end, somebody else may yet be in the way; but
                 // without anybody there is a way.
                 prop_assert!(failure.blockers.iter().all(|&rover| rover < others.len()));
+            }
+        }
+    }
+
+    /// With edges of all lengths: what is planned can be driven, and where rovers leave all arrive.
+    #[test]
+    fn plans_in_time_can_be_driven(
+        case in case(6, 5, 12),
+        seed in any::<u64>(),
+        lengths in prop::collection::vec(1u64..40, 16),
+        (enter, gap) in (0u64..20, 1u64..6),
+    ) {
+        let map = case.roadmap();
+        let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
+        let travel = |a: VertexId, b: VertexId| lengths[(a.0 + b.0) as usize % lengths.len()];
+        let pace = Pace { travel: &travel, enter, gap };
+        for order in orders(seed) {
+            let table = reference_in_time(&problem, &pace, &order);
+            if problem.ill_formed().is_empty() {
+                prop_assert_eq!(&table.failures, &vec![]);
+            }
+            prop_assert_eq!(table.errors(&problem, &pace), vec![]);
+            let table = prioritised_in_time(&problem, &pace, &order);
+            prop_assert_eq!(table.errors(&problem, &pace), vec![]);
+            for failure in &table.failures {
+                prop_assert!(table.ways[failure.rover].is_empty());
+                prop_assert!(!failure.blockers.is_empty());
             }
         }
     }

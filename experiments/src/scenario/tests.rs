@@ -332,3 +332,51 @@ fn any_text_gives_a_scenario_or_an_error() {
         );
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_not_waited_for() {
+    // One of those that never end; from a pipe nothing may ever come.
+    let error = Scenario::open("/dev/zero", &[], &Registry::builtin()).err();
+    let text = error.unwrap().to_string();
+    assert!(text.contains("it is no regular file"), "{text}");
+    let text = Files::on_disk(PathBuf::new())
+        .read("/dev/zero", 10)
+        .unwrap_err();
+    assert!(text.contains("it is no regular file"), "{text}");
+}
+
+#[test]
+fn a_flow_that_would_fill_the_memory_is_refused() {
+    let text = |period: &str, stop: &str| {
+        format!(
+            "system = 'traffic'\nuntil = '1h'\ntraffic.hosts = ['a', 'b']\n[[traffic.flow]]\n\
+             from = 'a'\nto = 'b'\nstart = '59m'\nperiod = '{period}'\n{stop}"
+        )
+    };
+    let message = refused(&text("1ns", ""), &[]);
+    assert!(
+        message.starts_with("x.toml:8:10: traffic.flow.0.period: 1ns: "),
+        "{message}"
+    );
+    assert!(message.contains("60000000000 in"), "{message}");
+    for (period, stop) in [("1us", ""), ("1ns", "stop = '3540000001us'")] {
+        parse(&text(period, stop), &[]).unwrap().assemble().unwrap();
+    }
+}
+
+#[test]
+fn what_begins_when_the_run_is_over_is_remarked_on() {
+    let text = "system = 'network'\nuntil = '60s'\n\
+                [[degrade]]\nat = '59s'\nlinks = '*'\nloss = 1\n\
+                [[degrade]]\nat = '60s'\nlinks = '*'\nloss = 1\n\
+                [[crash]]\nactor = 'node_03'\nat = '2h'\n";
+    let remarks = parse(text, &[]).unwrap().assemble().unwrap().remarks;
+    let expected = [
+        "degrade.1: begins at 60s, but the run ends at 60s",
+        "crash.0: begins at 2h, but the run ends at 60s",
+    ];
+    assert_eq!(remarks, expected);
+    let endless = parse(&text.replace("until = '60s'", ""), &[]).unwrap();
+    assert!(endless.assemble().unwrap().remarks.is_empty());
+}

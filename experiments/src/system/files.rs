@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::PathBuf;
 
+use crate::scenario::no_file;
+
 /// Reads files by the names that a scenario gives them, and keeps what was read.
 ///
 /// ```
@@ -49,6 +51,9 @@ impl Files {
         };
         let path = folder.join(name);
         let failed = |error| format!("{}: cannot read it: {error}", path.display());
+        if !std::fs::metadata(&path).map_err(failed)?.is_file() {
+            return Err(failed(no_file()));
+        }
         let file = std::fs::File::open(&path).map_err(failed)?;
         let mut bytes = Vec::new();
         let reading = file.take(limit_bytes + 1).read_to_end(&mut bytes);

@@ -1,6 +1,7 @@
 //! Open-loop traffic, as scenarios see it: `[traffic]`.
 
-use farside_actors::traffic::{self, TrafficConfig, TrafficError, TrafficMetrics};
+use farside::SimDuration;
+use farside_actors::traffic::{self, FlowConfig, TrafficConfig, TrafficError, TrafficMetrics};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -46,6 +47,9 @@ impl Settings for TrafficScenario {
             let message = "neither stop nor the scenario's until is given: it would never end";
             return Err(SetupError::value(&format!("traffic.flow.{index}"), message));
         }
+        for (index, flow) in self.traffic.flows.iter().enumerate() {
+            check_period(index, flow, setup.until)?;
+        }
         let links = &mut *setup.links;
         let mut connect = |sim: &mut farside::Simulation, from: Host<'_>, to: Host<'_>| {
             links.connect(sim, from, to);
@@ -56,6 +60,32 @@ impl Settings for TrafficScenario {
             results(&traffic.metrics(report.end_time))
         }))
     }
+}
+
+/// The most messages that a flow may be planned to send between two hosts.
+const MAX_MESSAGES: f64 = 1e8;
+
+/// Refuses a flow that would fill the memory before it ends.
+fn check_period(
+    index: usize,
+    flow: &FlowConfig,
+    until: Option<SimDuration>,
+) -> Result<(), SetupError> {
+    let end = flow.stop.into_iter().chain(until).min();
+    let lasts = end.map_or(SimDuration::ZERO, |end| end.saturating_sub(flow.start));
+    let burst = f64::from(flow.burst.unwrap_or(1));
+    let period = flow.period;
+    let messages = burst * lasts.as_secs_f64() / period.as_secs_f64();
+    // A period of 0 is refused with the rest of the flow.
+    if !period.is_zero() && messages > MAX_MESSAGES {
+        let key = format!("traffic.flow.{index}.period");
+        let message = format!(
+            "{period}: expected at most {MAX_MESSAGES:.0} messages, and these are {messages:.0} in \
+             {lasts}"
+        );
+        return Err(SetupError::value(&key, message));
+    }
+    Ok(())
 }
 
 type Host<'a> = (farside::HostId, &'a str);

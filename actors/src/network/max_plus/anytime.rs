@@ -98,7 +98,7 @@ impl Anytime {
     fn worth(&self, own: &[usize], agents: &[Agent], edges: &[Vec<Edge>]) -> f64 {
         let mut worth = 0.0;
         for (i, &path) in own.iter().enumerate() {
-            worth += f64::from(agents[i].paths[path].payoff);
+            worth += f64::from(agents[i].paths()[path].payoff);
             // A pair of own rovers counts once.
             for j in (0..agents.len()).filter(|&j| j > i) {
                 let other = own.get(j).copied().unwrap_or(self.paths[j]);

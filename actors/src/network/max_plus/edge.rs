@@ -1,17 +1,15 @@
 //! An edge of the coordination graph: what two rovers' paths are worth together, and the messages
 //! along it. Nearly all the time that planning takes is spent here.
 
-use super::Rules;
-use crate::network::candidates::CandidatePath;
-use crate::network::payoff::{Payoffs, collision};
+use super::meetings::Paths;
+use super::{Room, Rules};
+use crate::network::payoff::Payoffs;
 
 /// How many columns of payoffs are worked on at once.
 const LANES: usize = 8;
 
 /// Payoffs of one path of i with the next few of j.
 type Lanes = [f32; LANES];
-
-pub(super) type Mask = [u64; 4];
 
 /// An edge (i, j) of the coordination graph at an own rover i.
 #[derive(Debug)]
@@ -30,31 +28,17 @@ pub(super) struct Edge {
     pub(super) changed: bool,
 }
 
-/// A hash of a path's vertices.
-pub(super) fn mask(path: &CandidatePath) -> Mask {
-    let mut mask = Mask::default();
-    for v in &path.vertices {
-        mask[(v.0 / 64 % 4) as usize] |= 1 << (v.0 % 64);
-    }
-    mask
-}
-
 impl Edge {
-    /// The edge between two rovers with these paths and their masks.
-    pub(super) fn between(
-        a: (&[CandidatePath], &[Mask]),
-        b: (&[CandidatePath], &[Mask]),
-        payoffs: &Payoffs,
-    ) -> Edge {
-        Edge::new((a.0.len(), b.0.len()), |at_a, at_b| {
-            let (path_a, path_b) = (&a.0[at_a], &b.0[at_b]);
-            let meet = a.1[at_a].iter().zip(&b.1[at_b]).any(|(x, y)| x & y != 0);
-            let collision = if meet {
-                collision(path_a, path_b)
-            } else {
-                None
-            };
-            payoffs.pairwise(path_a.payoff + path_b.payoff, collision)
+    /// The edge between two rovers with these paths. `cycles` is room to work in.
+    pub(super) fn between(a: &Paths, b: &Paths, payoffs: &Payoffs, cycles: &mut Vec<u32>) -> Edge {
+        let size = (a.list.len(), b.list.len());
+        let sum = |at_a: usize, at_b: usize| a.list[at_a].payoff + b.list[at_b].payoff;
+        if !a.meet(b, cycles) {
+            return Edge::new(size, |at_a, at_b| payoffs.pairwise(sum(at_a, at_b), None));
+        }
+        Edge::new(size, |at_a, at_b| {
+            let cycle = Some(cycles[at_a * size.1 + at_b]).filter(|cycle| *cycle > 0);
+            payoffs.pairwise(sum(at_a, at_b), cycle)
         })
     }
 
@@ -102,29 +86,24 @@ impl Edge {
         true
     }
 
-    /// The message to j: the best that i can do for each path of j, where `total` is what i's
-    /// paths are worth by all messages, and j's own is left out; its mean is subtracted (on cyclic
-    /// graphs messages would grow without bound). `base` and `fresh` are room to work in.
-    pub(super) fn refresh(
-        &mut self,
-        total: &[f32],
-        rules: &Rules,
-        base: &mut Vec<f32>,
-        fresh: &mut Vec<f32>,
-    ) -> bool {
+    /// The message to j: the best that i can do for each path of j by what i's paths are worth in all
+    /// (`room.total`), with j's own message left out; its mean is subtracted (on cyclic graphs
+    /// messages would grow without bound). True if it changed.
+    pub(super) fn refresh(&mut self, rules: &Rules, room: &mut Room) -> bool {
+        let Room {
+            total, base, fresh, ..
+        } = room;
         base.clear();
         base.extend(total.iter().zip(&self.incoming).map(|(t, m)| t - m));
         fresh.clear();
-        for rows in self.payoffs.chunks_exact(self.size.0.max(1)) {
-            let mut best = [f32::NEG_INFINITY; LANES];
-            for (worth, row) in base.iter().zip(rows) {
-                for (best, payoff) in best.iter_mut().zip(row) {
-                    let value = worth + payoff;
-                    // Unlike `f32::max`, this compiles to one vector instruction: nothing is NaN.
-                    *best = if value > *best { value } else { *best };
-                }
-            }
-            fresh.extend_from_slice(&best);
+        // Two blocks at a time: while one waits for the result of its last row, the other goes on.
+        let rows = self.size.0.max(1);
+        let mut pairs = self.payoffs.chunks_exact(2 * rows);
+        for pair in &mut pairs {
+            fresh.extend(best_of::<2>(base, pair).as_flattened());
+        }
+        if !pairs.remainder().is_empty() {
+            fresh.extend(best_of::<1>(base, pairs.remainder()).as_flattened());
         }
         fresh.truncate(self.size.1);
         let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
@@ -142,4 +121,23 @@ impl Edge {
         self.changed = changed;
         changed
     }
+}
+
+/// The most that a path of i and each of so many blocks of paths of j are worth together; `base` is
+/// what i's paths are worth.
+#[inline(always)]
+fn best_of<const BLOCKS: usize>(base: &[f32], payoffs: &[Lanes]) -> [Lanes; BLOCKS] {
+    let rows = base.len();
+    let blocks: [&[Lanes]; BLOCKS] = std::array::from_fn(|at| &payoffs[at * rows..][..rows]);
+    let mut best = [[f32::NEG_INFINITY; LANES]; BLOCKS];
+    for (row, worth) in base.iter().enumerate() {
+        for (best, block) in best.iter_mut().zip(&blocks) {
+            for (best, payoff) in best.iter_mut().zip(&block[row]) {
+                let value = worth + payoff;
+                // Unlike `f32::max`, this compiles to one vector instruction: nothing is NaN.
+                *best = if value > *best { value } else { *best };
+            }
+        }
+    }
+    best
 }
