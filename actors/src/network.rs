@@ -71,6 +71,7 @@ mod candidates;
 mod config;
 mod corridors;
 mod lng;
+mod loads;
 mod max_plus;
 pub mod messages;
 mod metrics;

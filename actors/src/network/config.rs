@@ -5,7 +5,9 @@
 use farside::SimDuration;
 use std::fmt;
 
-use farside_worlds::{Endpoints, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork};
+use farside_worlds::{
+    Endpoints, Ownership, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork,
+};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -45,6 +47,9 @@ pub struct WorldConfig {
     pub radius_m: Option<f64>,
     /// Which boundary vertices are entries, and which exits.
     pub endpoints: Endpoints,
+    /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally many for
+    /// each as radio range allows; or `traffic`, as much traffic for each.
+    pub ownership: Ownership,
     /// The seed of the nodes' places; by default the run's seed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placement_seed: Option<u64>,
@@ -59,6 +64,7 @@ impl Default for WorldConfig {
             nodes: 28,
             radius_m: None,
             endpoints: Endpoints::default(),
+            ownership: Ownership::default(),
             placement_seed: None,
         }
     }
@@ -153,7 +159,8 @@ impl WorldConfig {
         let default = || SensorNetwork::default_radius_m(roadmap, nodes.max(1));
         let radius_m = self.radius_m.unwrap_or_else(default);
         let seed = self.placement_seed.unwrap_or(run_seed);
-        SensorNetwork::place(roadmap, nodes, radius_m, seed)
+        let network = SensorNetwork::place(roadmap, nodes, radius_m, seed)?;
+        Ok(network.owned_by(roadmap, self.ownership))
     }
 }
 
@@ -269,6 +276,16 @@ pub struct NetworkConfig {
     /// beside their vectors. After Vlassis, Elhorst and Kok (2004), who judge along a spanning
     /// tree of the whole network.
     pub anytime: bool,
+    /// Outsourcing: a node with more to compute than its processor can do in the time has radio
+    /// neighbours with less of it compute for it: they make max-plus vectors to their own rovers from what
+    /// it sends instead of them. The paper's open question (section 5, iii).
+    pub outsourcing: bool,
+    /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that leads into
+    /// a node's part of the roadmap with one rover more on each vertex; in [0, 1e9], 0 is the paper's.
+    pub congestion_weight: f64,
+    /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in what it says of
+    /// its crowding. With 0 what its own rovers are is all, which neighbours know anyway.
+    pub congestion_spread: f64,
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
     #[serde(with = "timing::auto")]
     pub iteration_timeout: Option<SimDuration>,
@@ -377,6 +394,9 @@ impl Default for NetworkConfig {
             processor: Processor::PAPER,
             damping: 0.0,
             anytime: false,
+            outsourcing: false,
+            congestion_weight: 0.0,
+            congestion_spread: 0.0,
             iteration_timeout: None,
             traverse: SimDuration::from_millis(200),
             motion: Motion::default(),
@@ -514,6 +534,7 @@ impl NetworkConfig {
             ("collision_penalty_factor", self.collision_penalty_factor),
             ("noise", self.noise),
             ("convergence", self.convergence),
+            ("congestion_weight", self.congestion_weight),
         ] {
             // Payoffs travel in single precision: what would overflow there is refused here.
             let fits = (0.0..=1e9).contains(&weight);
@@ -522,8 +543,13 @@ impl NetworkConfig {
         let share = self.entry_gate_occupancy;
         let fits = (0.0..=1.0).contains(&share);
         check("entry_gate_occupancy", fits, share.to_string(), "in [0, 1]")?;
-        let damps = (0.0..1.0).contains(&self.damping);
-        check("damping", damps, self.damping.to_string(), "in [0, 1)")?;
+        for (key, share) in [
+            ("damping", self.damping),
+            ("congestion_spread", self.congestion_spread),
+        ] {
+            let fits = (0.0..1.0).contains(&share);
+            check(key, fits, share.to_string(), "in [0, 1)")?;
+        }
         let computes = self.processor != Processor::PairsPerS(0);
         let actual = self.processor.to_string();
         check("processor", computes, actual, "more than 0/s")?;

@@ -38,6 +38,10 @@ pub(super) struct Optimiser {
     payoffs_done: SimTime,
     /// What neighbours were told that the own rovers would do.
     announced: Vec<Choice>,
+    /// How many pairs of candidate paths each neighbour may be handed over.
+    quotas: Vec<(NodeId, u64)>,
+    /// Pairs of candidate paths that the processor was given in this cycle.
+    pub(super) pairs: u64,
 }
 
 /// What a processor that takes time does.
@@ -68,6 +72,17 @@ impl Optimiser {
     /// How many rovers the node plans for.
     pub(super) fn rovers(&self) -> u32 {
         self.problem.as_ref().map_or(0, Problem::rovers) as u32
+    }
+
+    /// Pairs of candidate paths in an iteration, if nothing is handed over; and those that are.
+    pub(super) fn load(&self) -> (u64, u64) {
+        let of = |problem: &Problem| (problem.pairs_of_its_own(), problem.handed());
+        self.problem.as_ref().map_or((0, 0), of)
+    }
+
+    /// What the processor is at will not be done in time.
+    pub(super) fn is_at_work(&self) -> bool {
+        self.task.is_some()
     }
 
     /// The path of each own rover as things stand.
@@ -109,6 +124,7 @@ impl Node {
             anytime: config.anytime,
         };
         let payoffs: Payoffs = self.site.payoffs;
+        self.optimiser.quotas = self.quotas(&rovers);
         self.optimiser.problem = Some(Problem::new(payoffs, rules, rovers));
         self.charge_payoffs(ctx);
     }
@@ -117,6 +133,7 @@ impl Node {
     fn charge_payoffs(&mut self, ctx: &Context<'_, Self>) {
         let optimiser = &mut self.optimiser;
         let pairs = optimiser.problem.as_mut().map_or(0, Problem::take_compared);
+        optimiser.pairs += pairs;
         let begins = optimiser.payoffs_done.max(ctx.now());
         optimiser.payoffs_done = begins + self.site.config.processor.time_for(pairs);
     }
@@ -168,7 +185,9 @@ impl Node {
         }
         optimiser.dirty = false;
         let settled = !problem.compute();
-        let takes = config.processor.time_for(problem.pairs());
+        let pairs = problem.pairs();
+        optimiser.pairs += pairs;
+        let takes = config.processor.time_for(pairs);
         if takes.is_zero() {
             self.complete(ctx, settled);
         } else {
@@ -190,15 +209,16 @@ impl Node {
         optimiser.iteration += 1;
         optimiser.settled = settled;
         for peer in &mut optimiser.peers {
-            let vectors = problem.changed_for(peer.node);
+            let (vectors, bases) = problem.changed_for(peer.node);
+            let is_silent = vectors.is_empty() && bases.is_empty();
             let awaited = !optimiser.settled && !peer.settled;
             let told = peer.told_settled == optimiser.settled && !rethought;
-            if vectors.is_empty() && told && !awaited {
+            if is_silent && told && !awaited {
                 continue;
             }
             peer.told_settled = optimiser.settled;
             // New vectors wake it: an answer is to be expected.
-            peer.settled &= vectors.is_empty();
+            peer.settled &= is_silent;
             let at = self.neighbors.binary_search_by_key(&peer.node, |n| n.id);
             let Ok(at) = at else { continue };
             let key = MatchKey::new(self.cycle, optimiser.iteration);
@@ -208,6 +228,7 @@ impl Node {
                 iteration: optimiser.iteration,
                 settled: optimiser.settled,
                 vectors,
+                bases,
                 choices: choices.clone(),
             };
             ctx.send_keyed(self.neighbors[at].address, key, message);
@@ -227,7 +248,9 @@ impl Handler<CandidatePaths> for Node {
             return Ok(());
         }
         let rovers = message.rovers.into_iter().map(|r| (r.rover, r.paths));
-        problem.add(message.node, rovers.collect());
+        let quotas = optimiser.quotas.iter();
+        let quota = quotas.filter(|quota| quota.0 == message.node).map(|q| q.1);
+        problem.add(message.node, rovers.collect(), quota.sum());
         optimiser.peers.push(Peer {
             node: message.node,
             heard: 0,
@@ -266,10 +289,13 @@ impl Handler<MaxPlus> for Node {
         peer.heard = iteration;
         peer.settled = message.settled;
         // It expects an answer to new vectors.
-        peer.told_settled &= message.vectors.is_empty();
+        peer.told_settled &= message.vectors.is_empty() && message.bases.is_empty();
         if let Some(problem) = &mut optimiser.problem {
             for vector in &message.vectors {
                 optimiser.dirty |= problem.receive(vector);
+            }
+            for base in &message.bases {
+                optimiser.dirty |= problem.take(base);
             }
             for choice in &message.choices {
                 problem.note(choice);
