@@ -35,6 +35,10 @@ const BUILTIN: [(&str, &str); 11] = [
         include_str!("../../studies/network/growth.toml"),
     ),
     (
+        "network/load-balancing",
+        include_str!("../../studies/network/load-balancing.toml"),
+    ),
+    (
         "network/robust",
         include_str!("../../studies/network/robust.toml"),
     ),

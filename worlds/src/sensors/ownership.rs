@@ -289,9 +289,6 @@ mod tests {
         assert_eq!(sizes(&even), [3, 3, 3]);
         assert_eq!(even.check(&map), Ok(()));
         assert_eq!(nearest.clone().owned_by(&map, Ownership::Nearest), nearest);
-        // Out of range nothing goes.
-        let short = SensorNetwork::new(&map, places.to_vec(), 50.0).unwrap();
-        assert_eq!(sizes(&short.owned_by(&map, Ownership::Balanced)), [3, 3, 3]);
     }
 
     #[test]
