@@ -57,10 +57,18 @@
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
 //!
+//! # Spreading the load
+//!
+//! Section 5 (iii) of the paper asks what could be done where rovers gather and few nodes have all the
+//! computing. Three answers can be switched on. A node with more than it can compute has neighbours
+//! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
+//! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
+//! ([`ownership`](WorldConfig::ownership)). @@FINDINGS@@
+//!
 //! # Where what is
 //!
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
-//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`; how long an edge takes: `motion`.
+//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long an edge takes: `motion`.
 //! The protocol: [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet),
 //! `takeover` (who answers for a node that has fallen silent), `node` and `rover` (the actors).
 //! Outside both: `monitor`.

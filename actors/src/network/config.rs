@@ -278,7 +278,7 @@ pub struct NetworkConfig {
     pub anytime: bool,
     /// Outsourcing: a node with more to compute than its processor can do in the time has radio
     /// neighbours with less of it compute for it: they make max-plus vectors to their own rovers from what
-    /// it sends instead of them. The paper's open question (section 5, iii).
+    /// it sends instead of them. Does nothing where processors take no time.
     pub outsourcing: bool,
     /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that leads into
     /// a node's part of the roadmap with one rover more on each vertex; in [0, 1e9], 0 is the paper's.

@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 11] = [
+const BUILTIN: [(&str, &str); 12] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),

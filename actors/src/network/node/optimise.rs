@@ -7,7 +7,7 @@
 //! With a finite `network.processor` all this takes time. A node compares candidate paths as they
 //! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
 //! as it begins, and its messages go out when it is done. What is not done when the optimisation
-//! is over was in vain.
+//! is over was in vain. A node may have neighbours make vectors for it: see `balance`.
 
 use farside::MatchKey;
 use farside::prelude::*;
