@@ -90,19 +90,19 @@ mod tests {
         let mut loads = Loads::default();
         for (node, cycle, pairs, late) in [
             (7, 0, 40, false),
-            (9, 0, 0, false),
+            (9, 0, 10, false),
             (7, 1, 0, false),
-            (9, 1, 80, true),
+            (9, 1, 70, true),
         ] {
             loads.add(node, &state(cycle, pairs, late));
         }
         let mut metrics = NetworkMetrics::default();
         loads.write(2, &mut metrics);
-        assert_eq!((metrics.pairs_per_cycle, metrics.peak_load), (30.0, 60.0));
-        assert_eq!(metrics.load_imbalance, 2.0);
+        assert_eq!((metrics.pairs_per_cycle, metrics.peak_load), (30.0, 55.0));
+        assert_eq!(metrics.load_imbalance, 55.0 / 30.0);
         assert_eq!(metrics.busiest_share, 80.0 / 120.0);
-        assert_eq!(metrics.late_optimisations, 0.5);
-        assert_eq!(metrics.outsourced, 0.25);
+        assert_eq!(metrics.late_optimisations, 1.0 / 3.0);
+        assert_eq!(metrics.outsourced, 29.0 / 120.0);
     }
 
     #[test]

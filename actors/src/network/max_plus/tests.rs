@@ -440,3 +440,29 @@ fn what_was_handed_over_is_not_taken_in_return() {
     assert!(!nodes[0].take(&unfit(vec![1.0; 40])));
     assert!(!nodes[0].take(&unfit(vec![f32::NAN; rovers[4].len()])));
 }
+
+/// Two nodes with a rover each: what the vector is made of never changes, and the vector does.
+#[test]
+fn a_damped_vector_goes_on_where_it_was_handed_to() {
+    let mut stream = RandomKey::new(16).text("handed damped").stream();
+    let rules = Rules {
+        damping: 0.75,
+        ..PLAIN
+    };
+    let rovers = team(&mut stream, 2);
+    let mut plain = nodes(rules, &rovers, &[(0, 1)]);
+    let mut handing = nodes(rules, &rovers, &[]);
+    for (a, b, quota) in [(0, 1, u64::MAX), (1, 0, 0)] {
+        let rover = (RoverId(b as u32), rovers[b].clone());
+        handing[a].add(NodeId(b as u32), vec![rover], quota);
+    }
+    for _ in 0..8 {
+        for (plain, handing) in plain.iter_mut().zip(&mut handing) {
+            plain.compute();
+            handing.compute();
+            assert_eq!(plain.total(0), handing.total(0));
+        }
+        exchange(&mut plain);
+        exchange(&mut handing);
+    }
+}
