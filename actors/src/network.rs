@@ -63,7 +63,12 @@
 //! computing. Three answers can be switched on. A node with more than it can compute has neighbours
 //! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
 //! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
-//! ([`ownership`](WorldConfig::ownership)). @@FINDINGS@@
+//! ([`ownership`](WorldConfig::ownership)). With 75 rovers and 21 nodes 31 % of 16 teams came to a
+//! standstill without them; with outsourcing none did, with a weight of 30 none, with vertices
+//! divided evenly 6 %, by expected traffic 25 %. With 100 rovers and 28 nodes it was 50 %, and 12, 31
+//! and 12 % with the first three. A weight of 100 is too much (25 %): rovers wander about. With 100 rovers
+//! and 14 nodes every node has more than it can do, and there is nobody to hand work to. Study
+//! `network/load-balancing`.
 //!
 //! # Where what is
 //!
