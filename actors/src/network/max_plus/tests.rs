@@ -460,7 +460,13 @@ fn a_damped_vector_goes_on_where_it_was_handed_to() {
         for (plain, handing) in plain.iter_mut().zip(&mut handing) {
             plain.compute();
             handing.compute();
-            assert_eq!(plain.total(0), handing.total(0));
+            // What changes by less than the tolerance is not sent again: by rounding, here.
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() < 2e-3;
+            let (plain, handing) = (plain.total(0), handing.total(0));
+            assert!(
+                plain.iter().zip(&handing).all(close),
+                "{plain:?}, {handing:?}"
+            );
         }
         exchange(&mut plain);
         exchange(&mut handing);
