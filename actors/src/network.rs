@@ -63,11 +63,20 @@
 //! computing. Three answers can be switched on. A node with more than it can compute has neighbours
 //! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
 //! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
-//! ([`ownership`](WorldConfig::ownership)). With 75 rovers and 21 nodes 31 % of 16 teams came to a
-//! standstill without them; with outsourcing none did, with a weight of 30 none, with vertices
-//! divided evenly 6 %, by expected traffic 25 %. With 100 rovers and 28 nodes it was 50 %, and 12, 31
-//! and 12 % with the first three. A weight of 100 is too much (25 %): rovers wander about. With 100 rovers
-//! and 14 nodes every node has more than it can do, and there is nobody to hand work to. Study
+//! ([`ownership`](WorldConfig::ownership)). Standstills in 16 teams each, in per cent; dense roadmap,
+//! links of 5 ms, `active_window = 150`:
+//!
+//! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
+//! |---|---|---|---|---|---|---|---|---|
+//! | 75, 21 | 31 | 0 | 0 | 0 | 0 | 6 | 0 | |
+//! | 100, 28 | 50 | 12 | 31 | 19 | 0 | 12 | 0 | |
+//! | 100, 21 | 94 | 81 | | 75 | 50 | 88 | 0 | 0 |
+//! | 75, 14 | 100 | 94 | | 100 | 75 | 94 | 25 | 0 |
+//!
+//! Each helps where some nodes have too much to do and others have not. Where all have, nobody is there to
+//! hand work to, and what helps is to let fewer rovers in: [`entry_gates`](NetworkConfig::entry_gates).
+//! With them loads are uneven again, and outsourcing does the rest. A weight of 100 is too much: detours
+//! of a third. To divide vertices by expected traffic (`traffic`) does less than to count them. Study
 //! `network/load-balancing`.
 //!
 //! # Where what is
