@@ -1,12 +1,12 @@
 //! What planning costs in virtual time and in messages: processors that take time, phases that
 //! stretch with latency, and the count of what was said.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside_actors::network::messages::{CandidatePaths, MaxPlus};
+use farside_actors::network::messages::{CandidatePaths, Locations, MaxPlus, RoverId};
 use farside_actors::network::{
     ConfigError, NetworkConfig, NetworkError, NetworkMetrics, Processor, TeamConfig, WorldConfig,
     assemble,
@@ -21,6 +21,12 @@ struct Heard {
     /// When each node sent its first vectors.
     first: BTreeMap<NodeId, SimTime>,
     choices: usize,
+    /// Which node plans for each rover.
+    planners: BTreeMap<RoverId, NodeId>,
+    /// How much each node said that it has to compute.
+    loads: BTreeMap<NodeId, u64>,
+    /// Between which rovers a vector was left to the second one's node to make.
+    handed: BTreeSet<(RoverId, RoverId)>,
 }
 
 #[derive(Default)]
@@ -55,12 +61,21 @@ impl Observer for Ear {
             let sizes = message.rovers.iter().map(|rover| rover.paths.len() as u64);
             let heard = book.cycles.entry(message.cycle).or_default();
             heard.paths.insert(message.node, sizes.collect());
+            let planners = message.rovers.iter().map(|r| (r.rover, message.node));
+            heard.planners.extend(planners);
+        } else if kind.name() == "Locations" {
+            let message: Locations = kind.schema().decode(record.body).unwrap();
+            let heard = book.cycles.entry(message.cycle).or_default();
+            let load = message.load.map(|load| (message.node, load.pairs));
+            heard.loads.extend(load);
         } else if kind.name() == "MaxPlus" {
             let message: MaxPlus = kind.schema().decode(record.body).unwrap();
             let heard = book.cycles.entry(message.cycle).or_default();
             let first = heard.first.entry(message.node).or_insert(record.sent);
             *first = record.sent.min(*first);
             heard.choices += message.choices.len();
+            let pairs = message.bases.iter().map(|base| (base.from, base.to));
+            heard.handed.extend(pairs);
         }
         Ok(Flow::Continue)
     }
@@ -242,5 +257,43 @@ fn choices_are_announced_for_anytime_only() {
         let book = book.lock().unwrap();
         let choices: usize = book.cycles.values().map(|heard| heard.choices).sum();
         assert_eq!(choices > 0, anytime);
+    }
+}
+
+#[test]
+fn work_goes_from_the_busier_node_to_the_other_one_only() {
+    let slow = NetworkConfig {
+        processor: Processor::PairsPerS(100_000),
+        cycle_limit: 40,
+        ..NetworkConfig::default()
+    };
+    let outsourcing = NetworkConfig {
+        outsourcing: true,
+        ..slow.clone()
+    };
+    let Run { metrics, book, .. } = run(40, LATENCY, &outsourcing).unwrap();
+    assert_eq!(metrics.collisions, 0);
+    let mut handed = 0;
+    for heard in book.lock().unwrap().cycles.values() {
+        for (from, to) in &heard.handed {
+            let load = |rover| heard.loads[&heard.planners[rover]];
+            assert!(load(from) > load(to), "{from:?} to {to:?}");
+            handed += 1;
+        }
+    }
+    assert!(handed > 100, "{handed}");
+    assert!(metrics.outsourced > 0.05, "{}", metrics.outsourced);
+
+    // Nobody says a word about it unless told to, or where processors are fast enough.
+    let fast = NetworkConfig {
+        processor: Processor::Unlimited,
+        ..outsourcing
+    };
+    for network in [slow, fast] {
+        let Run { metrics, book, .. } = run(40, LATENCY, &network).unwrap();
+        assert_eq!(metrics.outsourced, 0.0);
+        let book = book.lock().unwrap();
+        let silent = |heard: &Heard| heard.loads.is_empty() && heard.handed.is_empty();
+        assert!(book.cycles.values().all(silent));
     }
 }

@@ -10,11 +10,12 @@ use farside::prelude::*;
 use farside_actors::invariants::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
 use farside_actors::invariants::{Case, Downtime};
 use farside_actors::network::{
-    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
+    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Processor, Sabotage, TeamConfig,
+    WorldConfig,
 };
 use farside_experiments::scenario::Scenario;
 use farside_experiments::system::{Files, Registry, Results};
-use farside_worlds::VertexId;
+use farside_worlds::{Ownership, VertexId};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
@@ -166,6 +167,25 @@ proptest! {
         let done = metrics.arrived + metrics.refused;
         prop_assert_eq!(done, metrics.rovers, "{}", report.end.detail());
         prop_assert_eq!(metrics.collisions, 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(config(64))]
+
+    /// Work that is handed over may be lost, late, or with a node that crashes.
+    #[test]
+    fn rovers_do_not_collide_where_loads_are_evened_out(
+        case in any_policy(),
+        ownership in prop_oneof![Just(Ownership::Balanced), Just(Ownership::Traffic)],
+        weight in prop_oneof![Just(0.0), Just(30.0)],
+    ) {
+        let mut case = with_policy(case, Policy::Paper);
+        case.world.ownership = ownership;
+        case.network.outsourcing = true;
+        case.network.processor = Processor::PairsPerS(500);
+        (case.network.congestion_weight, case.network.congestion_spread) = (weight, 0.5);
+        no_collision(&case)?;
     }
 }
 

@@ -6,8 +6,8 @@
 //!
 //! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
 //! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
-//! `2M/s`), `damping`, `anytime`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
+//! `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight), `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
+//! west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
 //! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
 //! `leaf_wait`, `noise`. Aids: `gates`, `tokens`, `probes`, `resolution` (true, false), `gate` (occupancy),
 //! `probe_after`, `hold` (cycles).
@@ -21,7 +21,7 @@ use farside_actors::network::{
     assemble,
 };
 use farside_actors::units::parse_duration;
-use farside_worlds::{Endpoints, Roadmap};
+use farside_worlds::{Endpoints, Ownership, Roadmap};
 
 /// A link with uniform jitter and independent loss.
 #[derive(Clone)]
@@ -58,6 +58,7 @@ struct Options {
     radio: Radio,
     digest: bool,
     endpoints: Endpoints,
+    ownership: Ownership,
     network: NetworkConfig,
 }
 
@@ -75,6 +76,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
         },
         digest: false,
         endpoints: Endpoints::default(),
+        ownership: Ownership::default(),
         network: NetworkConfig::default(),
     };
     let numbers = |text: &str| {
@@ -120,6 +122,9 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "digest" => options.digest = value.parse()?,
             "processor" => network.processor = value.parse()?,
             "damping" => network.damping = value.parse()?,
+            "outsourcing" => network.outsourcing = value.parse()?,
+            "congestion" => network.congestion_weight = value.parse()?,
+            "spread" => network.congestion_spread = value.parse()?,
             "anytime" => network.anytime = value.parse()?,
             "cycle" => network.cycle = Some(parse_duration(value)?),
             "optimisation" => network.optimisation = Some(parse_duration(value)?),
@@ -142,6 +147,13 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "noise" => network.noise = value.parse()?,
             "priority" if value == "lowest_id" => network.priority = Priority::LowestId,
             "priority" => network.priority = Priority::LongestWait,
+            "ownership" => {
+                options.ownership = match value {
+                    "balanced" => Ownership::Balanced,
+                    "traffic" => Ownership::Traffic,
+                    _ => Ownership::Nearest,
+                }
+            }
             "endpoints" => {
                 options.endpoints = match value {
                     "any-to-any" => Endpoints::AnyToAny,
@@ -166,6 +178,7 @@ fn run(
         roadmap: map.into(),
         nodes,
         endpoints: options.endpoints,
+        ownership: options.ownership,
         ..WorldConfig::default()
     };
     let roadmap = Arc::new(Roadmap::builtin(map)?);
@@ -198,7 +211,7 @@ fn run(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = options()?;
     println!(
-        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  B/rover  total  coll  confirmed",
+        "{:13} nodes rovers  dead%  pass  act  lim  arrived  path  time  steps  stops  back  forced%  iter  cycles  msgs/cycle  B/rover  total  coll  confirmed  late%  uneven  out%",
         "map"
     );
     for map in &options.maps {
@@ -234,7 +247,7 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         results.iter().map(value).sum::<f64>() / n
     };
     println!(
-        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}",
+        "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}  {:5.1}  {:6.2}  {:4.1}",
         percent(&|m| m.deadlock != Deadlock::None),
         percent(&|m| m.deadlock == Deadlock::Passive),
         percent(&|m| m.deadlock == Deadlock::Active),
@@ -253,5 +266,8 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         mean(&|m| m.total_steps as f64),
         all(&|(m, _)| f64::from(m.collisions)),
         all(&|(m, _)| f64::from(m.confirmed_deadlocks)),
+        all(&|(m, _)| 100.0 * m.late_optimisations),
+        all(&|(m, _)| m.load_imbalance),
+        all(&|(m, _)| 100.0 * m.outsourced),
     );
 }

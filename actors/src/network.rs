@@ -57,10 +57,32 @@
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
 //!
+//! # Spreading the load
+//!
+//! Section 5 (iii) of the paper asks what could be done where rovers gather and few nodes have all the
+//! computing. Three answers can be switched on. A node with more than it can compute has neighbours
+//! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
+//! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
+//! ([`ownership`](WorldConfig::ownership)). Standstills in 16 teams each, in per cent; dense roadmap,
+//! links of 5 ms, `active_window = 150`:
+//!
+//! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
+//! |---|---|---|---|---|---|---|---|---|
+//! | 75, 21 | 31 | 0 | 0 | 0 | 0 | 6 | 0 | |
+//! | 100, 28 | 50 | 12 | 31 | 19 | 0 | 12 | 0 | |
+//! | 100, 21 | 94 | 81 | | 75 | 50 | 88 | 0 | 0 |
+//! | 75, 14 | 100 | 94 | | 100 | 75 | 94 | 25 | 0 |
+//!
+//! Each helps where some nodes have too much to do and others have not. Where all have, nobody is there to
+//! hand work to, and what helps is to let fewer rovers in: [`entry_gates`](NetworkConfig::entry_gates).
+//! With them loads are uneven again, and outsourcing does the rest. A weight of 100 is too much: detours
+//! of a third. To divide vertices by expected traffic (`traffic`) does less than to count them. Study
+//! `network/load-balancing`.
+//!
 //! # Where what is
 //!
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
-//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`; how long an edge takes: `motion`.
+//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long an edge takes: `motion`.
 //! The protocol: [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet),
 //! `takeover` (who answers for a node that has fallen silent), `gaps` (where nobody hears a rover), `node` and `rover` (the actors).
 //! Outside both: `monitor`.
@@ -72,6 +94,7 @@ mod config;
 mod corridors;
 mod gaps;
 mod lng;
+mod loads;
 mod max_plus;
 pub mod messages;
 mod metrics;

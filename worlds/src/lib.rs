@@ -34,5 +34,5 @@ pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
 pub use movingai::{GridError, GridMap, GridTask, GridWorld, TaskList};
 pub use roadmap::{Blocked, DistancesTo, Endpoints, Roadmap, RoadmapTable, VertexId, well_formed};
 pub use rocks::{Rock, RockAbundance};
-pub use sensors::{NodeId, SensorNetwork};
+pub use sensors::{NodeId, Ownership, SensorNetwork};
 pub use terrain::HeightField;

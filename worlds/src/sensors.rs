@@ -1,11 +1,15 @@
 //! Sensor networks: static radio nodes that divide a roadmap among themselves.
 //!
 //! This file holds a network, its checks and who owns what; the search for a random one is in
-//! `placement`, how far nodes reach rovers in `coverage`. What the nodes compute and send is no affair of this crate, and neither is the
-//! radio: here two nodes are neighbours when they are within one radius of each other.
+//! `placement`, how far nodes reach rovers in `coverage`, another division of the vertices in
+//! `ownership`. What the nodes compute and send is no affair of this crate, and neither is the radio:
+//! here two nodes are neighbours when they are within one radius of each other.
 
 mod coverage;
+mod ownership;
 mod placement;
+
+pub use ownership::Ownership;
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -191,7 +195,8 @@ impl SensorNetwork {
         self.neighbors(a).binary_search(&b).is_ok()
     }
 
-    /// The node nearest to the vertex, of equally near ones the lowest.
+    /// The node that the vertex belongs to: the nearest, of equally near ones the lowest, unless
+    /// [`SensorNetwork::owned_by`] said otherwise.
     pub fn owner(&self, v: VertexId) -> NodeId {
         self.owners[v.0 as usize]
     }

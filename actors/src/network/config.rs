@@ -5,7 +5,9 @@
 use farside::SimDuration;
 use std::fmt;
 
-use farside_worlds::{Endpoints, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork};
+use farside_worlds::{
+    Endpoints, Ownership, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork,
+};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -57,6 +59,9 @@ pub struct WorldConfig {
     pub gaps: Gaps,
     /// Which boundary vertices are entries, and which exits.
     pub endpoints: Endpoints,
+    /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally many for
+    /// each as radio range allows; or `traffic`, as much traffic for each.
+    pub ownership: Ownership,
     /// The seed of the nodes' places; by default the run's seed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placement_seed: Option<u64>,
@@ -73,6 +78,7 @@ impl Default for WorldConfig {
             coverage_m: None,
             gaps: Gaps::default(),
             endpoints: Endpoints::default(),
+            ownership: Ownership::default(),
             placement_seed: None,
         }
     }
@@ -171,9 +177,13 @@ impl WorldConfig {
         let coverage_m = self.coverage_m.unwrap_or(radius_m);
         match self.gaps {
             Gaps::Refuse => {
-                SensorNetwork::place_covering(roadmap, nodes, radius_m, coverage_m, seed)
+                let all = SensorNetwork::place_covering(roadmap, nodes, radius_m, coverage_m, seed);
+                Ok(all?.owned_by(roadmap, self.ownership))
             }
+            // Who owns what decides where gaps are, and who reaches what decides who may own it.
             Gaps::Close | Gaps::Cross => SensorNetwork::place(roadmap, nodes, radius_m, seed)?
+                .with_coverage(roadmap, coverage_m)?
+                .owned_by(roadmap, self.ownership)
                 .with_coverage(roadmap, coverage_m),
         }
     }
@@ -291,6 +301,16 @@ pub struct NetworkConfig {
     /// beside their vectors. After Vlassis, Elhorst and Kok (2004), who judge along a spanning
     /// tree of the whole network.
     pub anytime: bool,
+    /// Outsourcing: a node with more to compute than its processor can do in the time has radio
+    /// neighbours with less of it compute for it: they make max-plus vectors to their own rovers from what
+    /// it sends instead of them. Does nothing where processors take no time.
+    pub outsourcing: bool,
+    /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that leads into
+    /// a node's part of the roadmap with one rover more on each vertex; in [0, 1e9], 0 is the paper's.
+    pub congestion_weight: f64,
+    /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in what it says of
+    /// its crowding. With 0 what its own rovers are is all, which neighbours know anyway.
+    pub congestion_spread: f64,
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
     #[serde(with = "timing::auto")]
     pub iteration_timeout: Option<SimDuration>,
@@ -400,6 +420,9 @@ impl Default for NetworkConfig {
             processor: Processor::PAPER,
             damping: 0.0,
             anytime: false,
+            outsourcing: false,
+            congestion_weight: 0.0,
+            congestion_spread: 0.0,
             iteration_timeout: None,
             traverse: SimDuration::from_millis(200),
             motion: Motion::default(),
@@ -537,6 +560,7 @@ impl NetworkConfig {
             ("collision_penalty_factor", self.collision_penalty_factor),
             ("noise", self.noise),
             ("convergence", self.convergence),
+            ("congestion_weight", self.congestion_weight),
         ] {
             // Payoffs travel in single precision: what would overflow there is refused here.
             let fits = (0.0..=1e9).contains(&weight);
@@ -545,8 +569,13 @@ impl NetworkConfig {
         let share = self.entry_gate_occupancy;
         let fits = (0.0..=1.0).contains(&share);
         check("entry_gate_occupancy", fits, share.to_string(), "in [0, 1]")?;
-        let damps = (0.0..1.0).contains(&self.damping);
-        check("damping", damps, self.damping.to_string(), "in [0, 1)")?;
+        for (key, share) in [
+            ("damping", self.damping),
+            ("congestion_spread", self.congestion_spread),
+        ] {
+            let fits = (0.0..1.0).contains(&share);
+            check(key, fits, share.to_string(), "in [0, 1)")?;
+        }
         let computes = self.processor != Processor::PairsPerS(0);
         let actual = self.processor.to_string();
         check("processor", computes, actual, "more than 0/s")?;

@@ -133,8 +133,14 @@ impl MaxPlus {
         self.agents.push(Agent { rover, paths });
     }
 
-    /// Adds a neighbour's rovers. Those known already are left as they are.
-    pub(crate) fn add(&mut self, node: NodeId, rovers: Vec<(RoverId, Vec<CandidatePath>)>) {
+    /// Adds a neighbour's rovers. Those known already are left as they are. Messages to them are
+    /// handed over to that neighbour to make, up to `handed` pairs of candidate paths.
+    pub(crate) fn add(
+        &mut self,
+        node: NodeId,
+        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
+        mut handed: u64,
+    ) {
         let first = self.agents.len();
         for (rover, paths) in rovers {
             if paths.is_empty() || self.places.contains_key(&rover) {
@@ -144,8 +150,15 @@ impl MaxPlus {
                 anytime.expect(&paths);
             }
             self.push(rover, paths);
+            let j = self.agents.len() - 1;
             for i in 0..self.own {
-                let edge = self.edge(i, self.agents.len() - 1);
+                let pairs = self.pairs_between(i, j);
+                let edge = if pairs <= handed {
+                    handed -= pairs;
+                    self.handed_edge(i, j)
+                } else {
+                    self.edge(i, j)
+                };
                 self.edges[i].push(edge);
             }
         }
@@ -153,10 +166,29 @@ impl MaxPlus {
         self.moved.fill(true);
     }
 
+    fn pairs_between(&self, i: usize, j: usize) -> u64 {
+        (self.agents[i].paths().len() * self.agents[j].paths().len()) as u64
+    }
+
     fn edge(&mut self, i: usize, j: usize) -> Edge {
+        self.compared += self.pairs_between(i, j);
+        self.edge_for_free(i, j)
+    }
+
+    fn edge_for_free(&mut self, i: usize, j: usize) -> Edge {
         let (a, b) = (&self.agents[i], &self.agents[j]);
-        self.compared += (a.paths().len() * b.paths().len()) as u64;
         Edge::between(&a.paths, &b.paths, &self.payoffs, &mut self.room.cycles)
+    }
+
+    fn handed_edge(&mut self, i: usize, j: usize) -> Edge {
+        if self.anytime.is_none() {
+            return Edge::handed_over((self.agents[i].paths().len(), self.agents[j].paths().len()));
+        }
+        // Who judges assignments looks at one pair of it now and then. That all of them are made for
+        // that is a short cut, like others.
+        let mut edge = self.edge_for_free(i, j);
+        edge.hand_over();
+        edge
     }
 
     /// Pairs of candidate paths that were compared, to make payoffs, since this was last asked.
@@ -166,7 +198,19 @@ impl MaxPlus {
 
     /// Pairs of candidate paths that an iteration looks at.
     pub(crate) fn pairs(&self) -> u64 {
+        self.edges.iter().flatten().map(Edge::work).sum()
+    }
+
+    /// The same if nothing were handed over, neither by this node nor to it.
+    pub(crate) fn pairs_of_its_own(&self) -> u64 {
         self.edges.iter().flatten().map(Edge::pairs).sum()
+    }
+
+    /// Pairs of candidate paths of the messages that are handed over.
+    pub(crate) fn handed(&self) -> u64 {
+        let handed = |edge: &&Edge| edge.handed;
+        let edges = self.edges.iter().flatten().filter(handed);
+        edges.map(Edge::pairs).sum()
     }
 
     /// True if no own rover interacts with another: there is nothing to pass on.
@@ -188,6 +232,29 @@ impl MaxPlus {
         true
     }
 
+    /// Takes what a message to an own rover is to be made of here. False if it fits no edge, or
+    /// changes nothing.
+    pub(crate) fn take(&mut self, base: &Vector) -> bool {
+        let place = |rover| self.places.get(rover).copied();
+        let (Some(i), Some(j)) = (place(&base.to), place(&base.from)) else {
+            return false;
+        };
+        i < self.own && i != j && self.edges[i][place_of(i, j)].take(&base.values)
+    }
+
+    /// Makes the messages to own rovers that others handed over. True if one of them changed.
+    fn make_incoming(&mut self) -> bool {
+        let mut changed = false;
+        for (edges, moved) in self.edges.iter_mut().zip(&mut self.moved) {
+            for edge in edges {
+                let is_new = edge.make_incoming(&self.rules, &mut self.room.fresh);
+                *moved |= is_new;
+                changed |= is_new;
+            }
+        }
+        changed
+    }
+
     /// Takes the path that a neighbour's rover has as things stand there.
     pub(crate) fn note(&mut self, choice: &Choice) {
         let place = self.places.get(&choice.rover).copied();
@@ -202,12 +269,12 @@ impl MaxPlus {
     /// The first half of an iteration: every own rover's messages from what came in before it. True
     /// if one of them changed by more than the tolerance.
     pub(crate) fn compute(&mut self) -> bool {
+        let mut changed = self.make_incoming() && self.rules.damping > 0.0;
         if let Some(mut anytime) = self.anytime.take() {
             anytime.judge(&self.agents, &self.edges);
             anytime.choose((0..self.own).map(|i| first_best(&self.total(i))));
             self.anytime = Some(anytime);
         }
-        let mut changed = false;
         let mut room = std::mem::take(&mut self.room);
         for i in 0..self.own {
             let moved = std::mem::take(&mut self.moved[i]);
@@ -247,15 +314,21 @@ impl MaxPlus {
         }
     }
 
-    /// The vectors for the rovers of `node` that changed in the last iteration.
-    pub(crate) fn changed_for(&self, node: NodeId) -> Vec<Vector> {
-        let mut vectors = Vec::new();
+    /// The vectors for the rovers of `node` that changed in the last iteration; and of those that it
+    /// makes itself, the bases that did.
+    pub(crate) fn changed_for(&self, node: NodeId) -> (Vec<Vector>, Vec<Vector>) {
+        let (mut vectors, mut bases) = (Vec::new(), Vec::new());
         let brought = || self.brought.iter().filter(|(by, _)| *by == node);
         for (i, edges) in self.edges.iter().enumerate() {
             for j in brought().flat_map(|(_, agents)| agents.clone()) {
                 let edge = &edges[place_of(i, j)];
                 if edge.changed {
-                    vectors.push(Vector {
+                    let list = if edge.handed {
+                        &mut bases
+                    } else {
+                        &mut vectors
+                    };
+                    list.push(Vector {
                         from: self.agents[i].rover,
                         to: self.agents[j].rover,
                         values: edge.outgoing.clone(),
@@ -263,7 +336,7 @@ impl MaxPlus {
                 }
             }
         }
-        vectors
+        (vectors, bases)
     }
 
     /// The own rovers' paths in the iteration just computed, for neighbours to judge theirs by;

@@ -156,6 +156,21 @@ pub struct Locations {
     pub cycle: u32,
     /// One for each of the node's vertices that is not free.
     pub holdings: Vec<Holding>,
+    /// With `network.outsourcing`: how much the node has to compute.
+    pub load: Option<Load>,
+    /// With `network.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
+    pub crowding: Option<f64>,
+}
+
+/// What a node has to compute in an iteration of max-plus, in pairs of candidate paths, as it was in the
+/// cycle before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Load {
+    /// Its own part, nothing handed over.
+    pub pairs: u64,
+    /// By how much its neighbours' parts, as it heard of them, are more than their processors can do:
+    /// they all may want to hand over.
+    pub claims: u64,
 }
 
 /// A vertex that is not free.
@@ -204,6 +219,10 @@ pub struct MaxPlus {
     pub settled: bool,
     /// The vectors.
     pub vectors: Vec<Vector>,
+    /// With `network.outsourcing`: what the receiver is to make vectors of, from and to the same rovers.
+    /// The values are of the speaker's paths: what each is worth to it, the receiver's vector to it
+    /// left out.
+    pub bases: Vec<Vector>,
     /// With `network.anytime`: what the node's rovers would do as things stood before this iteration.
     pub choices: Vec<Choice>,
 }
@@ -392,6 +411,14 @@ pub struct NodeState {
     pub confirmed_deadlocks: u32,
     /// The last deadlock that it confirmed: each rover waits for the next, the last for the first.
     pub deadlock: Vec<RoverId>,
+    /// Pairs of candidate paths that its processor was given to look at in this cycle.
+    pub pairs: u64,
+    /// Pairs of candidate paths in an iteration of max-plus, if it handed nothing over.
+    pub load: u64,
+    /// How many of these it handed over.
+    pub handed: u64,
+    /// The processor was still at work when the optimisation was over.
+    pub late: bool,
 }
 
 /// What a deputy records when it begins to answer for another node's vertices.

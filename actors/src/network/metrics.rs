@@ -82,6 +82,22 @@ pub struct NetworkMetrics {
     pub bytes_per_rover_cycle: f64,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
+    /// Pairs of candidate paths that a node's processor was given to look at in a cycle, in the mean of
+    /// all nodes, also of those that had no rovers.
+    pub pairs_per_cycle: f64,
+    /// The same of the node that was given most in each cycle, in the mean of the cycles.
+    pub peak_load: f64,
+    /// How uneven loads were: `peak_load` over `pairs_per_cycle`, 1 if all nodes were given the same; 0
+    /// if nothing was computed.
+    pub load_imbalance: f64,
+    /// The share of all pairs that the busiest node of the run was given.
+    pub busiest_share: f64,
+    /// Of the optimisations in which a node had rovers to plan for, the share in which its processor was
+    /// still at work when the time was over.
+    pub late_optimisations: f64,
+    /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
+    /// neighbours; 0 without `network.outsourcing`.
+    pub outsourced: f64,
     /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.

@@ -19,6 +19,7 @@ use farside_worlds::{NodeId, VertexId};
 
 use super::assemble::Site;
 use super::config::{Motion, Policy};
+use super::loads::Loads;
 use super::messages::{NodeState, RoverId, RoverState, TakenOver};
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use crate::invariants::{Collisions, Place, WaitCycle, WaitGraph};
@@ -53,6 +54,7 @@ pub(crate) struct Score {
     last_intervention: Option<u32>,
     iterations: u64,
     planned_cycles: u64,
+    loads: Loads,
     /// When nodes that were given the roadmap knew all of it.
     informed: Vec<SimTime>,
     messages: u64,
@@ -149,7 +151,9 @@ impl Observer for Monitor {
                 let state: RoverState = kind.schema().decode(record.body).map_err(failed)?;
                 return Ok(score.follow(&self.site, rover, &state, record.time()));
             } else if kind.name() == "NodeState" {
-                score.count(&kind.schema().decode(record.body).map_err(failed)?);
+                let state = kind.schema().decode(record.body).map_err(failed)?;
+                score.loads.add(record.sender.index(), &state);
+                score.count(&state);
             } else if kind.name() == "RoadmapKnown" {
                 score.informed.push(record.time());
             } else if kind.name() == "TakenOver" {
@@ -397,6 +401,7 @@ impl Score {
         metrics.transmit_energy_j = energies_j.sum();
         metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
         metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
+        self.loads.write(site.sensors.len(), &mut metrics);
         let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
         metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
         metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;

@@ -1,9 +1,11 @@
 //! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
 //! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
 //! [`optimise`], admission in [`admit`]. What helps the paper's policy out of standstills, each behind
-//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`].
+//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`]; what evens out loads:
+//! [`balance`].
 
 mod admit;
+mod balance;
 mod cycle;
 mod gates;
 mod optimise;
@@ -27,7 +29,7 @@ use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
     Account, Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck,
-    Holding, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
+    Holding, Load, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
 };
 use super::reservation::messages::{ItineraryAnswer, Relay};
 use super::reservation::{Atlas, RegistryDue};
@@ -52,6 +54,8 @@ pub struct Node {
     pub(super) cycle: u32,
     phase: Phase,
     optimiser: Optimiser,
+    /// Pairs of candidate paths in an iteration of the last cycle, if nothing was handed over.
+    load: u64,
     /// Requests for this node's vertices in this cycle.
     requests: Vec<Request>,
     /// Own rovers that leave their vertex in this cycle without accelerating.
@@ -74,6 +78,9 @@ pub(super) struct Neighbor {
     /// The latest cycle in which it told its locations, and what it told.
     located: Option<u32>,
     holdings: Vec<Holding>,
+    /// What else it told with its locations.
+    load: Option<Load>,
+    crowding: Option<f64>,
 }
 
 /// The parts of a planning cycle, in order. A timer begins each.
@@ -124,6 +131,7 @@ impl Node {
             // A node that starts in the middle of a cycle waits for the next.
             phase: Phase::Admit,
             optimiser: Optimiser::default(),
+            load: 0,
             requests: Vec::new(),
             leaving: Vec::new(),
             forced_stops: 0,
@@ -187,6 +195,8 @@ impl Actor for Node {
                 address: ctx.lookup::<Node>(&self.site.node_names[id.0 as usize])?,
                 located: None,
                 holdings: Vec::new(),
+                load: None,
+                crowding: None,
             });
         }
         for name in &self.site.rover_names {
@@ -245,6 +255,8 @@ impl Handler<Locations> for Node {
             if neighbor.located.is_none_or(|cycle| cycle < message.cycle) {
                 neighbor.located = Some(message.cycle);
                 neighbor.holdings = message.holdings;
+                neighbor.load = message.load;
+                neighbor.crowding = message.crowding;
             }
         } else {
             self.located_afar(message);

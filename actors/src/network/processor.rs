@@ -41,6 +41,15 @@ impl Processor {
     /// 500k/s about as well, and at 800k/s nothing deadlocks at 28 nodes. The paper gave each node a core of 2.6 GHz and does not say what its program did with it.
     pub const PAPER: Processor = Processor::PairsPerS(400_000);
 
+    /// How many pairs it can look at in `time`; none if it can look at any number.
+    pub fn pairs_in(self, time: SimDuration) -> Option<u64> {
+        let Processor::PairsPerS(speed) = self else {
+            return None;
+        };
+        let pairs = u128::from(time.as_nanos()) * u128::from(speed.max(1)) / 1_000_000_000;
+        Some(u64::try_from(pairs).unwrap_or(u64::MAX))
+    }
+
     /// How long `pairs` take, rounded up to nanoseconds. A speed of 0 counts as 1.
     pub fn time_for(self, pairs: u64) -> SimDuration {
         match self {
@@ -114,6 +123,11 @@ mod tests {
             let asked = u128::from(pairs) * 1_000_000_000;
             prop_assert!(done >= asked && done < asked + u128::from(speed));
             prop_assert!(processor.time_for(pairs + 1) >= time);
+            prop_assert!(processor.pairs_in(time).unwrap() >= pairs);
+            if pairs > 0 {
+                let less = SimDuration::from_nanos(time.as_nanos() - 1);
+                prop_assert!(processor.pairs_in(less).unwrap() < pairs);
+            }
         }
 
         #[test]

@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 13] = [
+const BUILTIN: [(&str, &str); 14] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),
@@ -41,6 +41,10 @@ const BUILTIN: [(&str, &str); 13] = [
     (
         "network/growth",
         include_str!("../../studies/network/growth.toml"),
+    ),
+    (
+        "network/load-balancing",
+        include_str!("../../studies/network/load-balancing.toml"),
     ),
     (
         "network/robust",

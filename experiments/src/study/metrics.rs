@@ -18,9 +18,14 @@ const KERNEL: [&str; 8] = [
 ];
 
 /// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 31] = [
+const KNOWN: [(&str, &str, &str); 37] = [
     ("arrival_s", "time to the goal", "s"),
     ("arrived", "rovers at their goals", "rovers"),
+    (
+        "busiest_share",
+        "share of the busiest node in what all computed",
+        "",
+    ),
     ("collisions", "collisions", ""),
     ("completed", "all rovers at their goals", ""),
     ("confirmed_deadlocks", "deadlocks confirmed by probes", ""),
@@ -29,6 +34,12 @@ const KNOWN: [(&str, &str, &str); 31] = [
     ("events", "events", "events"),
     ("intervention_rate", "cycles with an intervention", ""),
     ("interventions", "interventions", "cycles"),
+    (
+        "late_optimisations",
+        "optimisations that were not done in time",
+        "",
+    ),
+    ("load_imbalance", "busiest node's load over the mean", ""),
     ("makespan", "makespan", "steps"),
     ("makespan_bound", "longest shortest path", "steps"),
     ("max_plus_iterations", "max-plus iterations per cycle", ""),
@@ -48,10 +59,21 @@ const KNOWN: [(&str, &str, &str); 31] = [
     ),
     ("messages.lost", "message copies lost", "messages"),
     ("messages.sent", "messages sent", "messages"),
+    ("outsourced", "share of the work that was handed over", ""),
+    (
+        "pairs_per_cycle",
+        "pairs of paths per node and cycle",
+        "pairs",
+    ),
     (
         "path_ratio",
         "steps of those that arrived over the shortest path",
         "",
+    ),
+    (
+        "peak_load",
+        "pairs of paths per cycle at the busiest node",
+        "pairs",
     ),
     ("rovers", "rovers", "rovers"),
     ("sim_time_s", "virtual time", "s"),

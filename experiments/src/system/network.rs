@@ -319,7 +319,7 @@ fn key_of(error: &network::NetworkError) -> &'static str {
 const NAMED_IN_A_LINE: usize = 3;
 
 /// The keys of `[network]` that have ranges.
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 23] = [
     "network.cycle",
     "network.exchange",
     "network.iteration_timeout",
@@ -334,6 +334,8 @@ const KEYS: [&str; 21] = [
     "network.collision_penalty_factor",
     "network.noise",
     "network.convergence",
+    "network.congestion_weight",
+    "network.congestion_spread",
     "network.damping",
     "network.processor",
     "network.takeover_after",

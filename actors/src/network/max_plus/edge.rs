@@ -22,10 +22,24 @@ pub(super) struct Edge {
     payoffs: Vec<Lanes>,
     /// The message from j: a value for each path of i.
     pub(super) incoming: Vec<f32>,
-    /// The last message to j: a value for each path of j.
+    /// The last message to j: a value for each path of j. Of an edge that is handed over its base:
+    /// a value for each path of i, none before the first.
     pub(super) outgoing: Vec<f32>,
     /// The outgoing message changed in the last iteration.
     pub(super) changed: bool,
+    /// The message to j is made by j's node, from its base.
+    pub(super) handed: bool,
+    /// What the message from j is made of here, if its node handed that over.
+    taken: Option<Taken>,
+}
+
+/// What j's node sent to have its message made here.
+#[derive(Debug)]
+struct Taken {
+    /// What each path of j is worth without i's message, a block of payoffs' columns together.
+    base: Vec<Lanes>,
+    /// The message is still to be made from it, or on its way to it.
+    due: bool,
 }
 
 impl Edge {
@@ -58,6 +72,28 @@ impl Edge {
             incoming: vec![0.0; size.0],
             outgoing: vec![0.0; size.1],
             changed: false,
+            handed: false,
+            taken: None,
+        }
+    }
+
+    /// Hands the message to j over to j's node. What that needs of the payoffs it makes itself;
+    /// they are here only if they are asked for one by one.
+    pub(super) fn hand_over(&mut self) {
+        self.handed = true;
+        self.outgoing.clear();
+    }
+
+    /// An edge that is handed over, and has no payoffs.
+    pub(super) fn handed_over(size: (usize, usize)) -> Edge {
+        Edge {
+            size,
+            payoffs: Vec::new(),
+            incoming: vec![0.0; size.0],
+            outgoing: Vec::new(),
+            changed: false,
+            handed: true,
+            taken: None,
         }
     }
 
@@ -74,6 +110,58 @@ impl Edge {
     /// How many pairs of paths it has.
     pub(super) fn pairs(&self) -> u64 {
         (self.size.0 * self.size.1) as u64
+    }
+
+    /// How many pairs of paths an iteration looks at: for the message to j, and for the one from j.
+    pub(super) fn work(&self) -> u64 {
+        self.pairs() * (u64::from(!self.handed) + u64::from(self.taken.is_some()))
+    }
+
+    /// Takes what j's node has its message made of. False if it does not fit, or is no news. Who
+    /// handed an edge over does not take it in return: a message is never passed on twice.
+    pub(super) fn take(&mut self, base: &[f32]) -> bool {
+        let fits = base.len() == self.size.1 && base.iter().all(|v| v.is_finite());
+        if !fits || self.handed {
+            return false;
+        }
+        let block = |values: &[f32]| {
+            // What fills the last block meets payoffs of minus infinity.
+            let mut lanes = [0.0; LANES];
+            lanes[..values.len()].copy_from_slice(values);
+            lanes
+        };
+        let base: Vec<Lanes> = base.chunks(LANES).map(block).collect();
+        if self.taken.as_ref().is_some_and(|taken| taken.base == base) {
+            return false;
+        }
+        self.taken = Some(Taken { base, due: true });
+        true
+    }
+
+    /// Makes the message from j, as [`refresh`](Edge::refresh) would at j's node. True if it changed.
+    pub(super) fn make_incoming(&mut self, rules: &Rules, fresh: &mut Vec<f32>) -> bool {
+        let Some(taken) = self.taken.as_mut().filter(|taken| taken.due) else {
+            return false;
+        };
+        fresh.clear();
+        for a in 0..self.size.0 {
+            let mut best = [f32::NEG_INFINITY; LANES];
+            let rows = self.payoffs[a..].iter().step_by(self.size.0);
+            for (base, row) in taken.base.iter().zip(rows) {
+                for ((best, worth), payoff) in best.iter_mut().zip(base).zip(row) {
+                    let value = worth + payoff;
+                    *best = if value > *best { value } else { *best };
+                }
+            }
+            fresh.push(best.into_iter().fold(f32::NEG_INFINITY, f32::max));
+        }
+        let changed = settle(fresh, &self.incoming, rules);
+        if changed {
+            self.incoming.copy_from_slice(fresh);
+        }
+        // A damped message goes on to approach what it was made of.
+        taken.due = changed && rules.damping > 0.0;
+        changed
     }
 
     /// Takes a message from j. False if it does not fit, or is no news.
@@ -95,6 +183,15 @@ impl Edge {
         } = room;
         base.clear();
         base.extend(total.iter().zip(&self.incoming).map(|(t, m)| t - m));
+        if self.handed {
+            let moved = |(new, old): (&f32, &f32)| (new - old).abs() > rules.tolerance;
+            let is_first = self.outgoing.len() != base.len();
+            self.changed = is_first || base.iter().zip(&self.outgoing).any(moved);
+            if self.changed {
+                self.outgoing.clone_from(base);
+            }
+            return self.changed;
+        }
         fresh.clear();
         // Two blocks at a time: while one waits for the result of its last row, the other goes on.
         let rows = self.size.0.max(1);
@@ -106,15 +203,7 @@ impl Edge {
             fresh.extend(best_of::<1>(base, pairs.remainder()).as_flattened());
         }
         fresh.truncate(self.size.1);
-        let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
-        let mut changed = false;
-        for (new, old) in fresh.iter_mut().zip(&self.outgoing) {
-            *new -= mean;
-            if rules.damping > 0.0 {
-                *new = rules.damping * old + (1.0 - rules.damping) * *new;
-            }
-            changed |= (*new - old).abs() > rules.tolerance;
-        }
+        let changed = settle(fresh, &self.outgoing, rules);
         if changed {
             self.outgoing.copy_from_slice(fresh);
         }
@@ -140,4 +229,19 @@ fn best_of<const BLOCKS: usize>(base: &[f32], payoffs: &[Lanes]) -> [Lanes; BLOC
         }
     }
     best
+}
+
+/// Makes a message of what each path is worth at best: the mean subtracted, damped by the `old` one.
+/// True if it changed.
+fn settle(fresh: &mut [f32], old: &[f32], rules: &Rules) -> bool {
+    let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
+    let mut changed = false;
+    for (new, old) in fresh.iter_mut().zip(old) {
+        *new -= mean;
+        if rules.damping > 0.0 {
+            *new = rules.damping * old + (1.0 - rules.damping) * *new;
+        }
+        changed |= (*new - old).abs() > rules.tolerance;
+    }
+    changed
 }

@@ -93,7 +93,7 @@ fn nodes(rules: Rules, rovers: &Team, pairs: &[(usize, usize)]) -> Vec<MaxPlus> 
     for &(a, b) in pairs {
         for (a, b) in [(a, b), (b, a)] {
             let rover = (RoverId(b as u32), rovers[b].clone());
-            nodes[a].add(NodeId(b as u32), vec![rover]);
+            nodes[a].add(NodeId(b as u32), vec![rover], 0);
         }
     }
     nodes
@@ -105,18 +105,27 @@ fn iterate_all(nodes: &mut [MaxPlus]) -> bool {
     for node in nodes.iter_mut() {
         changed |= iterate(node);
     }
+    exchange(nodes);
+    changed
+}
+
+/// All nodes' messages arrive.
+fn exchange(nodes: &mut [MaxPlus]) {
     for from in 0..nodes.len() {
         let choices = nodes[from].choices();
         for to in 0..nodes.len() {
-            for vector in nodes[from].changed_for(NodeId(to as u32)) {
-                nodes[to].receive(&vector);
+            let (vectors, bases) = nodes[from].changed_for(NodeId(to as u32));
+            for vector in &vectors {
+                nodes[to].receive(vector);
+            }
+            for base in &bases {
+                nodes[to].take(base);
             }
             for choice in &choices {
                 nodes[to].note(choice);
             }
         }
     }
-    changed
 }
 
 /// What all nodes choose, as places in each rover's list.
@@ -227,9 +236,9 @@ fn damping_mixes_the_old_vector_in() {
         let rules = Rules { damping, ..PLAIN };
         let mut node = nodes(rules, &rovers, &[(0, 1)]).swap_remove(0);
         iterate(&mut node);
-        let once = node.changed_for(NodeId(1)).remove(0).values;
+        let once = node.changed_for(NodeId(1)).0.remove(0).values;
         iterate(&mut node);
-        let twice = node.changed_for(NodeId(1));
+        let twice = node.changed_for(NodeId(1)).0;
         (once, twice)
     };
     let (plain, nothing_new) = first(0.0);
@@ -306,7 +315,7 @@ fn work_is_counted_by_pairs_of_paths() {
     // Both directions of the pair within the node are computed here.
     assert_eq!(one.pairs(), 2 * sizes[0] * sizes[1]);
     let others = (2..).map(RoverId).zip(rovers[2..].iter().cloned());
-    one.add(NodeId(1), others.collect());
+    one.add(NodeId(1), others.collect(), 0);
     let more = (sizes[0] + sizes[1]) * (sizes[2] + sizes[3]);
     assert_eq!(one.take_compared(), more);
     assert_eq!(one.pairs(), 2 * sizes[0] * sizes[1] + more);
@@ -321,6 +330,7 @@ fn vectors_that_fit_no_edge_are_refused() {
     one.add(
         NodeId(1),
         vec![(RoverId(1), rovers[1].clone()), (RoverId(1), vec![])],
+        0,
     );
     assert!(!one.is_trivial());
     let vector = |from, to, values| Vector {
@@ -336,4 +346,129 @@ fn vectors_that_fit_no_edge_are_refused() {
     assert!(!one.receive(&vector(1, 0, vec![1.0; 40])));
     assert!(one.receive(&vector(1, 0, fitting.clone())));
     assert!(!one.receive(&vector(1, 0, fitting)), "no news");
+}
+
+/// Three nodes with two rovers each, all of them neighbours, which hand over what `quotas` say: how
+/// many pairs each node hands the next one.
+fn three_nodes(rules: Rules, rovers: &Team, quotas: [u64; 3]) -> Vec<MaxPlus> {
+    let of =
+        |node: usize| (node * 2..node * 2 + 2).map(|at| (RoverId(at as u32), rovers[at].clone()));
+    let mut nodes: Vec<_> = (0..3)
+        .map(|node| MaxPlus::new(payoffs(), rules, of(node).collect()))
+        .collect();
+    for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+        let quota = if b == (a + 1) % 3 { quotas[a] } else { 0 };
+        if a != b {
+            nodes[a].add(NodeId(b as u32), of(b).collect(), quota);
+        }
+    }
+    nodes
+}
+
+#[test]
+fn vectors_that_others_make_are_the_same_bit_for_bit() {
+    let mut stream = RandomKey::new(13).text("handed").stream();
+    let mut handed = 0;
+    for round in 0..120 {
+        let rules = Rules {
+            tolerance: 0.0,
+            damping: [0.0, 0.5][round % 2],
+            anytime: round % 3 == 0,
+        };
+        let rovers = team(&mut stream, 6);
+        let quotas = std::array::from_fn(|_| stream.below(200));
+        let mut plain = three_nodes(rules, &rovers, [0; 3]);
+        let mut handing = three_nodes(rules, &rovers, quotas);
+        handed += handing.iter().map(MaxPlus::handed).sum::<u64>();
+        for _ in 0..12 {
+            for (plain, handing) in plain.iter_mut().zip(&mut handing) {
+                plain.compute();
+                handing.compute();
+                for i in 0..2 {
+                    assert_eq!(plain.total(i), handing.total(i), "round {round}");
+                }
+                assert_eq!(plain.best(false), handing.best(false));
+                plain.deliver();
+                handing.deliver();
+            }
+            exchange(&mut plain);
+            exchange(&mut handing);
+        }
+    }
+    assert!(handed > 1000, "{handed}");
+}
+
+#[test]
+fn what_is_handed_over_is_work_for_who_takes_it() {
+    let mut stream = RandomKey::new(14).text("handed work").stream();
+    let rovers = team(&mut stream, 6);
+    let sizes: Vec<u64> = rovers.iter().map(|paths| paths.len() as u64).collect();
+    let first = sizes[0] * sizes[2];
+    let mut plain = three_nodes(PLAIN, &rovers, [0; 3]);
+    let mut handing = three_nodes(PLAIN, &rovers, [first, 0, 0]);
+    let compared = |node: &mut MaxPlus| node.take_compared();
+    assert_eq!(handing[0].handed(), first);
+    assert_eq!(compared(&mut plain[0]) - compared(&mut handing[0]), first);
+    assert_eq!(compared(&mut plain[1]), compared(&mut handing[1]));
+    iterate_all(&mut handing);
+    assert_eq!(plain[0].pairs() - handing[0].pairs(), first);
+    assert_eq!(handing[1].pairs() - plain[1].pairs(), first);
+    assert_eq!(handing[2].pairs(), plain[2].pairs());
+    for (plain, handing) in plain.iter().zip(&handing) {
+        assert_eq!(handing.pairs_of_its_own(), plain.pairs());
+    }
+}
+
+#[test]
+fn what_was_handed_over_is_not_taken_in_return() {
+    let mut stream = RandomKey::new(15).text("to and fro").stream();
+    let rovers = team(&mut stream, 6);
+    let mut nodes = three_nodes(PLAIN, &rovers, [u64::MAX, 0, 0]);
+    let base = |from: u32, to: u32| Vector {
+        from: RoverId(from),
+        to: RoverId(to),
+        values: vec![1.0; rovers[from as usize].len()],
+    };
+    assert!(!nodes[0].take(&base(2, 0)), "handed to that node itself");
+    assert!(nodes[0].take(&base(4, 0)));
+    assert!(!nodes[0].take(&base(4, 0)), "no news");
+    assert!(!nodes[0].take(&base(4, 2)) && !nodes[0].take(&base(1, 1)));
+    let unfit = |values| Vector {
+        values,
+        ..base(4, 1)
+    };
+    assert!(!nodes[0].take(&unfit(vec![1.0; 40])));
+    assert!(!nodes[0].take(&unfit(vec![f32::NAN; rovers[4].len()])));
+}
+
+/// Two nodes with a rover each: what the vector is made of never changes, and the vector does.
+#[test]
+fn a_damped_vector_goes_on_where_it_was_handed_to() {
+    let mut stream = RandomKey::new(16).text("handed damped").stream();
+    let rules = Rules {
+        damping: 0.75,
+        ..PLAIN
+    };
+    let rovers = team(&mut stream, 2);
+    let mut plain = nodes(rules, &rovers, &[(0, 1)]);
+    let mut handing = nodes(rules, &rovers, &[]);
+    for (a, b, quota) in [(0, 1, u64::MAX), (1, 0, 0)] {
+        let rover = (RoverId(b as u32), rovers[b].clone());
+        handing[a].add(NodeId(b as u32), vec![rover], quota);
+    }
+    for _ in 0..8 {
+        for (plain, handing) in plain.iter_mut().zip(&mut handing) {
+            plain.compute();
+            handing.compute();
+            // What changes by less than the tolerance is not sent again: by rounding, here.
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() < 2e-3;
+            let (plain, handing) = (plain.total(0), handing.total(0));
+            assert!(
+                plain.iter().zip(&handing).all(close),
+                "{plain:?}, {handing:?}"
+            );
+        }
+        exchange(&mut plain);
+        exchange(&mut handing);
+    }
 }

@@ -32,6 +32,7 @@ impl Node {
                 self.admit_one(ctx, vertex, true);
             }
         }
+        let (load, handed) = self.optimiser.load();
         ctx.sample(&NodeState {
             cycle: self.cycle,
             rovers: self.optimiser.rovers(),
@@ -39,6 +40,10 @@ impl Node {
             forced_stops: self.forced_stops,
             confirmed_deadlocks: std::mem::take(&mut self.probes.confirmed),
             deadlock: self.probes.named.clone(),
+            pairs: self.optimiser.pairs,
+            load,
+            handed,
+            late: self.optimiser.is_at_work(),
         });
     }
 

@@ -47,6 +47,7 @@ impl Node {
         }
         self.requests.clear();
         self.leaving.clear();
+        self.load = self.optimiser.load().0;
         self.optimiser.reset();
         self.watch(ctx);
         self.repeat(ctx);
@@ -109,6 +110,8 @@ impl Node {
             node: self.id,
             cycle: self.cycle,
             holdings: ctx.durable::<Ledger>().holdings(),
+            load: self.told_load(),
+            crowding: self.told_crowding(ctx),
         };
         for neighbor in &self.neighbors {
             ctx.send_keyed(
@@ -201,11 +204,13 @@ impl Node {
         // Who was sent here goes back at no penalty.
         let previous = held.previous.filter(|_| !self.was_sent(held.rover, here));
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
+        let here_now = ctx.durable::<Ledger>().occupied().count();
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
             let noise = draws.uniform_in(0.0, self.site.config.noise);
             let (roadmap, payoffs) = (&self.site.roadmap, &self.site.payoffs);
             path.payoff = payoffs.unary(roadmap, path, goal, previous, noise);
+            path.payoff -= self.congestion(path, here_now) as f32;
         }
         paths
     }

@@ -10,7 +10,7 @@
 //! With a finite `network.processor` all this takes time. A node compares candidate paths as they
 //! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
 //! as it begins, and its messages go out when it is done. What is not done when the optimisation
-//! is over was in vain.
+//! is over was in vain. A node may have neighbours make vectors for it: see `balance`.
 
 use farside::MatchKey;
 use farside::prelude::*;
@@ -45,6 +45,10 @@ pub(super) struct Optimiser {
     ends: SimTime,
     /// What neighbours were told that the own rovers would do.
     announced: Vec<Choice>,
+    /// How many pairs of candidate paths each neighbour may be handed over.
+    quotas: Vec<(NodeId, u64)>,
+    /// Pairs of candidate paths that the processor was given in this cycle.
+    pub(super) pairs: u64,
 }
 
 /// What a processor that takes time does.
@@ -75,6 +79,17 @@ impl Optimiser {
     /// How many rovers the node plans for.
     pub(super) fn rovers(&self) -> u32 {
         self.problem.as_ref().map_or(0, Problem::rovers) as u32
+    }
+
+    /// Pairs of candidate paths in an iteration, if nothing is handed over; and those that are.
+    pub(super) fn load(&self) -> (u64, u64) {
+        let of = |problem: &Problem| (problem.pairs_of_its_own(), problem.handed());
+        self.problem.as_ref().map_or((0, 0), of)
+    }
+
+    /// What the processor is at will not be done in time.
+    pub(super) fn is_at_work(&self) -> bool {
+        self.task.is_some()
     }
 
     /// The path of each own rover as things stand.
@@ -116,6 +131,7 @@ impl Node {
             anytime: config.anytime,
         };
         let payoffs: Payoffs = self.site.payoffs;
+        self.optimiser.quotas = self.quotas(&rovers);
         self.optimiser.problem = Some(Problem::new(payoffs, rules, rovers));
         self.charge_payoffs(ctx);
     }
@@ -129,6 +145,7 @@ impl Node {
     fn charge_payoffs(&mut self, ctx: &Context<'_, Self>) {
         let optimiser = &mut self.optimiser;
         let pairs = optimiser.problem.as_mut().map_or(0, Problem::take_compared);
+        optimiser.pairs += pairs;
         let begins = optimiser.payoffs_done.max(ctx.now());
         optimiser.payoffs_done = begins + self.site.config.processor.time_for(pairs);
     }
@@ -174,7 +191,8 @@ impl Node {
             return;
         }
         let cycle = self.cycle;
-        let takes = config.processor.time_for(problem.pairs());
+        let pairs = problem.pairs();
+        let takes = config.processor.time_for(pairs);
         let left = |until: SimTime| until.since(until.min(ctx.now()));
         // Its messages are to go out when the last are on the air, and not to be older than that.
         let idle = left(optimiser.sent).saturating_sub(takes);
@@ -186,6 +204,7 @@ impl Node {
         }
         optimiser.dirty = false;
         let settled = !problem.compute();
+        optimiser.pairs += pairs;
         if takes.is_zero() {
             self.complete(ctx, settled);
         } else {
@@ -207,10 +226,11 @@ impl Node {
         optimiser.iteration += 1;
         optimiser.settled = settled;
         for peer in &mut optimiser.peers {
-            let vectors = problem.changed_for(peer.node);
+            let (vectors, bases) = problem.changed_for(peer.node);
+            let is_silent = vectors.is_empty() && bases.is_empty();
             let awaited = !optimiser.settled && !peer.settled;
             let told = peer.told_settled == optimiser.settled && !rethought;
-            if vectors.is_empty() && told && !awaited {
+            if is_silent && told && !awaited {
                 continue;
             }
             let at = self.neighbors.binary_search_by_key(&peer.node, |n| n.id);
@@ -222,6 +242,7 @@ impl Node {
                 iteration: optimiser.iteration,
                 settled: optimiser.settled,
                 vectors,
+                bases,
                 choices: choices.clone(),
             };
             let sent = ctx.now() + pacing::vectors_take(&timing, &message);
@@ -231,7 +252,7 @@ impl Node {
             optimiser.sent = optimiser.sent.max(sent);
             peer.told_settled = optimiser.settled;
             // New vectors wake it: an answer is to be expected.
-            peer.settled &= message.vectors.is_empty();
+            peer.settled &= is_silent;
             ctx.send_keyed(self.neighbors[at].address, key, message);
         }
         optimiser.announced = choices;
@@ -249,7 +270,9 @@ impl Handler<CandidatePaths> for Node {
             return Ok(());
         }
         let rovers = message.rovers.into_iter().map(|r| (r.rover, r.paths));
-        problem.add(message.node, rovers.collect());
+        let quotas = optimiser.quotas.iter();
+        let quota = quotas.filter(|quota| quota.0 == message.node).map(|q| q.1);
+        problem.add(message.node, rovers.collect(), quota.sum());
         optimiser.peers.push(Peer {
             node: message.node,
             heard: 0,
@@ -288,10 +311,13 @@ impl Handler<MaxPlus> for Node {
         peer.heard = iteration;
         peer.settled = message.settled;
         // It expects an answer to new vectors.
-        peer.told_settled &= message.vectors.is_empty();
+        peer.told_settled &= message.vectors.is_empty() && message.bases.is_empty();
         if let Some(problem) = &mut optimiser.problem {
             for vector in &message.vectors {
                 optimiser.dirty |= problem.receive(vector);
+            }
+            for base in &message.bases {
+                optimiser.dirty |= problem.take(base);
             }
             for choice in &message.choices {
                 problem.note(choice);
