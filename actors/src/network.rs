@@ -50,10 +50,10 @@
 //! # Starved processors
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
-//! asks for (`network.processor = "unlimited"`, the default here), max-plus converges, and hardly a
-//! team comes to a standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after
-//! 500 ms of a core of 2006. With one constant for all cells, `network.processor = "paper"`
-//! ([`Processor::PAPER`]), its pattern appears: teams come to a standstill sooner with fewer nodes,
+//! asks for (`network.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
+//! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
+//! 2006. With one constant for all cells, `network.processor = "paper"` ([`Processor::PAPER`], the
+//! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
 //!
@@ -82,10 +82,10 @@
 //! # Where what is
 //!
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
-//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long an edge takes: `motion`.
-//! The protocol: [`messages`], `safety` (what owners and rovers keep, and why no two rovers meet),
-//! `takeover` (who answers for a node that has fallen silent), `gaps` (where nobody hears a rover), `node` and `rover` (the actors).
-//! Outside both: `monitor`.
+//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long
+//! an edge takes: `motion`. The protocol: [`messages`], `safety` (what owners and rovers keep, and why
+//! no two rovers meet), `takeover` (who answers for a node that has fallen silent), `gaps` (where
+//! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
 mod assignment;

@@ -45,6 +45,9 @@
 //! is still a way to find: a shortest way through covered vertices and gaps, which a walk looks along
 //! first, has each crossing lead from one covered vertex to another, past no vertex twice.
 //!
+//! *Nor does the loss of a node.* Whoever takes over for it (`network.takeover_after`) has the same ways in
+//! its book, in the same order: see [`takeover`](super::NetworkConfig::takeover_after).
+//!
 //! Both need links that lose less than all, and nodes and rovers that come back: what they keep is
 //! durable.
 

@@ -26,7 +26,12 @@
 //! A second failure is the same case: when the deputy falls silent, the next in line goes on for the
 //! same home, with rovers' accounts anew; and the deputy's own vertices have a line of their own. When
 //! a line is at its end, or a rover never answers, nothing happens and the vertices stay closed. A node
-//! that was replaced stays out for the rest of the run; it passes messages on.
+//! that was replaced stays out for the rest of the run.
+//!
+//! **Reserved ways**, of the policy `complete`, are told with the accounts; what else becomes of them is
+//! in `reservation::registry::succession`. A deputy and the neighbours of its homes need not hear each
+//! other: what they say is passed on by others, one hop after the other, each of which may lose it. Over
+//! links that lose much that takes its time: with a fifth lost and four hops between them, minutes.
 
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 
