@@ -351,7 +351,7 @@ fn a_flow_that_would_fill_the_memory_is_refused() {
     let text = |period: &str, stop: &str| {
         format!(
             "system = 'traffic'\nuntil = '1h'\ntraffic.hosts = ['a', 'b']\n[[traffic.flow]]\n\
-             from = 'a'\nto = 'b'\nstart = '59m'\nperiod = '{period}'\n{stop}"
+             from = 'a'\nto = 'b'\nstart = '59min'\nperiod = '{period}'\n{stop}"
         )
     };
     let message = refused(&text("1ns", ""), &[]);
@@ -374,7 +374,7 @@ fn what_begins_when_the_run_is_over_is_remarked_on() {
     let remarks = parse(text, &[]).unwrap().assemble().unwrap().remarks;
     let expected = [
         "degrade.1: begins at 60s, but the run ends at 60s",
-        "crash.0: begins at 2h, but the run ends at 60s",
+        "crash.0: begins at 7200s, but the run ends at 60s",
     ];
     assert_eq!(remarks, expected);
     let endless = parse(&text.replace("until = '60s'", ""), &[]).unwrap();
