@@ -380,6 +380,11 @@ impl Network {
         self.site.timing
     }
 
+    /// Whether rovers are coordinated by max-plus, as those of the policy `paper` are.
+    pub fn coordinates(&self) -> bool {
+        self.site.config.policy == Policy::Paper
+    }
+
     /// The length of a planning cycle, stretched if links are slow.
     pub fn cycle(&self) -> SimDuration {
         self.site.timing.cycle

@@ -298,6 +298,9 @@ impl<'a> Sheet<'a> {
             .filter_map(|r| Some((r, self.place(r)?)))
             .collect();
         let mut data = String::new();
+        if !self.run.site.coordinates {
+            return data;
+        }
         for (at, (a, from)) in places.iter().enumerate() {
             for (b, to) in &places[at + 1..] {
                 if let (Some(u), Some(v)) = (a.holds(), b.holds())
@@ -492,7 +495,9 @@ fn legend(x: f64, y: f64, site: &Site) -> Markup {
         ("entry", to) => ("entry; +3: three in its queue", to),
         ends => ends,
     };
-    let at = |row: usize| y + 24.0 * row as f64;
+    // One row is for those who are coordinated.
+    let left_out = |row: usize| usize::from(row > 5 && !site.coordinates);
+    let at = |row: usize| y + 24.0 * (row - left_out(row)) as f64;
     let text = |row: usize, says: &str| {
         debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
         html! { text x=(Px(x + 34.0)) y=(Px(at(row) + 4.5)) { (says) } }
@@ -513,7 +518,9 @@ fn legend(x: f64, y: f64, site: &Site) -> Markup {
             (disc(2, " circle")) (text(2, "wait for each other in a circle"))
             (disc(3, " behind")) (text(3, "waits for one in a circle"))
             (arrow((x - 4.0, at(4) - 4.0), (x + 34.0, at(4) - 4.0), 8.0, "")) (text(4, "waits for"))
-            path class="coordination" d=(line(5)) {} (text(5, "coordinated by max-plus"))
+            @if site.coordinates {
+                path class="coordination" d=(line(5)) {} (text(5, "coordinated by max-plus"))
+            }
             g class="n0" { path class="road" d=(path([(x, at(6)), (x + 13.0, at(6))])) {} }
             g class="n3" { path class="road" d=(path([(x + 13.0, at(6)), (x + 26.0, at(6))])) {} }
             (text(6, "roadmap, in its nodes' colours"))

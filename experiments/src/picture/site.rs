@@ -25,6 +25,8 @@ pub struct Site {
     pub ground: Ground,
     /// The length of a planning cycle.
     pub cycle: SimDuration,
+    /// Rovers are coordinated by max-plus, and have a coordination graph.
+    pub coordinates: bool,
 }
 
 /// What lies around a roadmap.

@@ -1,7 +1,7 @@
 //! The studies that are built in.
 
 /// Names and texts, sorted by name.
-const BUILTIN: [(&str, &str); 14] = [
+const BUILTIN: [(&str, &str); 15] = [
     (
         "degradation/bursts",
         include_str!("../../studies/degradation/bursts.toml"),
@@ -45,6 +45,10 @@ const BUILTIN: [(&str, &str); 14] = [
     (
         "network/load-balancing",
         include_str!("../../studies/network/load-balancing.toml"),
+    ),
+    (
+        "network/node-loss",
+        include_str!("../../studies/network/node-loss.toml"),
     ),
     (
         "network/robust",

@@ -145,6 +145,9 @@ impl NetworkScene {
     /// The coordination graph (section 3.2) of the cycle that begins, if it is another than before:
     /// lines between all pairs of rovers whose owners are the same node or neighbours.
     fn coordinate(&mut self, out: &mut Vec<Drawing>) {
+        if !self.system.coordinates() {
+            return;
+        }
         let holds = self.rovers.iter().flatten().filter_map(|seen| seen.holds);
         let mut held: Vec<VertexId> = holds.collect();
         held.sort_unstable();

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use farside::SimDuration;
+use farside_actors::network::Policy;
 use farside_worlds::VertexId;
 use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
@@ -38,6 +39,7 @@ pub(super) fn site(
         // Left to the links it is a second, or longer over slow ones, which are not looked at here:
         // then the diagram counts seconds.
         cycle: scenario.network.cycle.unwrap_or(SimDuration::from_secs(1)),
+        coordinates: scenario.network.policy == Policy::Paper,
     })
 }
 
