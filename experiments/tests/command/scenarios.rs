@@ -72,7 +72,16 @@ fn scenarios_and_completions_are_listed() {
     let listed = farside(folder.path(), &["scenarios"]);
     assert!(text(&listed.stdout).contains("network/crater-dense   50 rovers"));
     let listed = json(&farside(folder.path(), &["scenarios", "--json"]));
-    assert_eq!(listed[1]["name"], "network/crater-radio");
+    let names: Vec<&str> = listed
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|s| s["name"].as_str())
+        .collect();
+    assert!(
+        names.is_sorted() && names.contains(&"network/crater-radio"),
+        "{names:?}"
+    );
     let script = farside(folder.path(), &["completions", "bash"]);
     assert!(text(&script.stdout).contains("_farside"));
 }
