@@ -198,7 +198,11 @@ impl Node {
                 let acting = charter.ranks[home.0 as usize] as usize;
                 let before = line.get(acting..rank).unwrap_or(&[]);
                 let asked = charter.inquests.iter().any(|i| i.home == home);
-                if !asked && !before.is_empty() && before.iter().all(|&id| self.is_silent(id)) {
+                // Who was replaced takes nothing over, heard or not.
+                let is_out = |&id: &NodeId| {
+                    self.is_silent(id) || id != line[acting] && self.acting(id) != id
+                };
+                if !asked && !before.is_empty() && before.iter().all(is_out) {
                     charter.inquests.push(Inquest {
                         home,
                         rank: rank as u32,

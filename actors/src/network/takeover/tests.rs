@@ -569,3 +569,24 @@ fn forgetting_accounts_is_noticed() {
             .all(|&policy| collides_with(policy, Sabotage::ForgetAccounts))
     );
 }
+
+/// A deputy that hears nobody for a while and is replaced does not keep the next in line from its turn.
+#[test]
+fn a_deputy_that_was_replaced_is_passed_over() {
+    let trial = Trial {
+        rovers: 15,
+        link: Bad {
+            loss: 0.099_974_423_990_566_64,
+            jitter_ms: 153,
+            ..GOOD
+        },
+        unheard: vec![(2, (2, 11))],
+        crashes: vec![(24, 9001, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 769)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 15, "{detail} {:?}", metrics.taken_over);
+}
