@@ -570,6 +570,27 @@ fn forgetting_accounts_is_noticed() {
     );
 }
 
+/// What a node that is replaced has chosen a way for, its deputy chooses none for again.
+#[test]
+fn no_attempt_gets_two_ways() {
+    let trial = Trial {
+        rovers: 35,
+        link: Bad {
+            loss: 0.065_873_696_702_832_34,
+            jitter_ms: 502,
+            ..GOOD
+        },
+        unheard: vec![(11, (12, 22)), (21, (2, 7))],
+        crashes: vec![(8, 1058, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 815)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 35, "{detail} {:?}", metrics.taken_over);
+}
+
 /// A deputy that hears nobody for a while and is replaced does not keep the next in line from its turn.
 #[test]
 fn a_deputy_that_was_replaced_is_passed_over() {

@@ -32,6 +32,8 @@ pub(super) struct Succession {
     open: Vec<Reserve>,
     /// Walks whose ways were taken.
     taken: Vec<Walk>,
+    /// When the home was taken over [ns]; 0 if it was not.
+    since: u64,
 }
 
 impl Succession {
@@ -54,6 +56,12 @@ impl Succession {
 
     pub(super) fn is_proposed(&self, walk: &Walk) -> bool {
         self.proposals.iter().any(|(r, _)| r.walk == *walk)
+    }
+
+    /// Whether who answered for the home before may have chosen a way for an attempt that began then. A
+    /// second one must not be: it would pass for the first. The attempt is begun anew, if it has to be.
+    pub(super) fn is_stale(&self, attempt_began: u64) -> bool {
+        attempt_began < self.since
     }
 
     pub(super) fn take(&mut self, walk: Walk) {
@@ -166,6 +174,7 @@ impl Registry {
     ) -> Registry {
         let mut registry = Registry::default();
         registry.open_empty(desk);
+        registry.succession.since = desk.now;
         for account in accounts {
             registry.enter_account(desk, account);
         }

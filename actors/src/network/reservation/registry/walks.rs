@@ -58,6 +58,9 @@ impl Registry {
         mut labels: &[Label],
         elder: (u64, RoverId),
     ) {
+        if self.succession.is_stale(probe.started) {
+            return;
+        }
         let rover = probe.walk.rover;
         // Of a rover's walks, and of their attempts, only the last counts.
         let age = |walk: &Walk| Some((walk.since, walk.attempt));
