@@ -160,6 +160,8 @@ pub struct Locations {
     pub load: Option<Load>,
     /// With `network.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
     pub crowding: Option<f64>,
+    /// With `network.takeover_after`: the nodes for whose vertices it answers.
+    pub answers: Vec<NodeId>,
 }
 
 /// What a node has to compute in an iteration of max-plus, in pairs of candidate paths, as it was in the

@@ -81,6 +81,7 @@ pub(super) struct Neighbor {
     /// What else it told with its locations.
     load: Option<Load>,
     crowding: Option<f64>,
+    answers: Vec<NodeId>,
 }
 
 /// The parts of a planning cycle, in order. A timer begins each.
@@ -197,6 +198,7 @@ impl Actor for Node {
                 holdings: Vec::new(),
                 load: None,
                 crowding: None,
+                answers: Vec::new(),
             });
         }
         for name in &self.site.rover_names {
@@ -257,6 +259,7 @@ impl Handler<Locations> for Node {
                 neighbor.holdings = message.holdings;
                 neighbor.load = message.load;
                 neighbor.crowding = message.crowding;
+                neighbor.answers = message.answers;
             }
         } else {
             self.located_afar(message);

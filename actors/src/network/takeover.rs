@@ -24,7 +24,9 @@
 //! obeyed.
 //!
 //! A second failure is the same case: when the deputy falls silent, the next in line goes on for the
-//! same home, with rovers' accounts anew; and the deputy's own vertices have a line of their own. When
+//! same home, with rovers' accounts anew; and the deputy's own vertices have a line of their own. Nodes
+//! say whom they answer for, so that a home is not left that was given up to a deputy that then
+//! failed. When
 //! a line is at its end, or a rover never answers, nothing happens and the vertices stay closed. A node
 //! that was replaced stays out for the rest of the run.
 //!

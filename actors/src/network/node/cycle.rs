@@ -112,6 +112,7 @@ impl Node {
             holdings: ctx.durable::<Ledger>().holdings(),
             load: self.told_load(),
             crowding: self.told_crowding(ctx),
+            answers: self.told_answers(),
         };
         for neighbor in &self.neighbors {
             ctx.send_keyed(

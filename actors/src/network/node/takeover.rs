@@ -34,6 +34,8 @@ pub(super) struct Wards {
     homes: Vec<NodeId>,
     /// Who answers for each home.
     acting: Vec<NodeId>,
+    /// For how many cycles each home's node, or who replaced it, was heard and did not answer for it.
+    vacant: Vec<u32>,
     /// Nodes to coordinate with that are no radio neighbours.
     partners: Vec<Partner>,
     /// The local neighbourhood graph over these homes, where it is not the node's own.
@@ -60,6 +62,7 @@ impl Node {
             since: self.site.cycle_at(ctx.now()),
             homes: Vec::new(),
             acting: Vec::new(),
+            vacant: vec![0; nodes],
             partners: Vec::new(),
             graph: None,
         });
@@ -111,6 +114,51 @@ impl Node {
     fn partner(&self, id: NodeId) -> Option<&Partner> {
         let partners = &self.wards.as_ref()?.partners;
         partners.iter().find(|partner| partner.id == id)
+    }
+
+    /// What neighbours are told of the homes that it answers for.
+    pub(super) fn told_answers(&self) -> Vec<NodeId> {
+        self.wards
+            .iter()
+            .flat_map(|wards| wards.homes.clone())
+            .collect()
+    }
+
+    /// Whether a neighbour was heard, and did not say that it answers for `home`.
+    fn denies(&self, id: NodeId, home: NodeId) -> bool {
+        let at = self.neighbor(id).map(|at| &self.neighbors[at]);
+        at.is_some_and(|n| n.located.is_some() && !n.answers.contains(&home))
+    }
+
+    /// A cycle begins: counts for how long homes have been vacant.
+    fn count_vacant(&mut self) {
+        let homes = self.site.sensors.neighbors(self.id);
+        let denied = |home: &&NodeId| self.denies(self.acting(**home), **home);
+        let denied: Vec<NodeId> = homes.iter().filter(denied).copied().collect();
+        for (home, vacant) in (0..)
+            .map(NodeId)
+            .zip(self.wards.iter_mut().flat_map(|w| &mut w.vacant))
+        {
+            *vacant = if denied.contains(&home) {
+                *vacant + 1
+            } else {
+                0
+            };
+        }
+    }
+
+    /// Whether somebody in the line of `home` can be reckoned with no more: it is silent; or it has given
+    /// the home up to somebody who does not take it; or, as a deputy, it was replaced itself.
+    fn is_out(&self, id: NodeId, home: NodeId) -> bool {
+        let Some(wards) = &self.wards else {
+            return false;
+        };
+        let is_acting = id == wards.acting[home.0 as usize];
+        let gave_up = match is_acting {
+            true => wards.vacant[home.0 as usize] > wards.after,
+            false => self.acting(id) != id || self.denies(id, id),
+        };
+        gave_up || self.is_silent(id)
     }
 
     /// Whether a neighbour, or a partner, was not heard for too long.
@@ -186,6 +234,7 @@ impl Node {
             return;
         }
         let site = self.site.clone();
+        self.count_vacant();
         // Who hears nobody cannot tell whose fault it is, and who was replaced stays out.
         let hears = |n: &Neighbor| n.located.is_some() && !self.is_silent(n.id);
         if self.answers_for(self.id) && self.neighbors.iter().any(hears) {
@@ -198,10 +247,7 @@ impl Node {
                 let acting = charter.ranks[home.0 as usize] as usize;
                 let before = line.get(acting..rank).unwrap_or(&[]);
                 let asked = charter.inquests.iter().any(|i| i.home == home);
-                // Who was replaced takes nothing over, heard or not.
-                let is_out = |&id: &NodeId| {
-                    self.is_silent(id) || id != line[acting] && self.acting(id) != id
-                };
+                let is_out = |&id: &NodeId| self.is_out(id, home);
                 if !asked && !before.is_empty() && before.iter().all(is_out) {
                     charter.inquests.push(Inquest {
                         home,

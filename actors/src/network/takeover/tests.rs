@@ -505,7 +505,13 @@ fn can_go_on(trial: &Trial, metrics: &NetworkMetrics) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+    // The same cases each time: what holds after ever rarer coincidences is for longer searches than this.
+    #![proptest_config(ProptestConfig {
+        cases: 32,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(4),
+        ..ProptestConfig::default()
+    })]
 
     /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all arrive,
     /// as long as somebody is left to answer for each vertex.
@@ -568,6 +574,23 @@ fn forgetting_accounts_is_noticed() {
             .iter()
             .all(|&policy| collides_with(policy, Sabotage::ForgetAccounts))
     );
+}
+
+/// A node is unheard for so long that a deputy begins to ask for its vertices, and gives them up; but the
+/// deputy crashes before all have answered. Somebody else takes them.
+#[test]
+fn a_home_is_not_left_that_was_given_up_to_nobody() {
+    let trial = Trial {
+        rovers: 10,
+        unheard: vec![(7, (10, 19))],
+        crashes: vec![(8, 18_001, None)],
+        after: Some(8),
+        cycle_limit: 5000,
+        ..crater(Policy::Complete, 397)
+    };
+    let (metrics, report) = run(&trial);
+    let detail = report.end.detail();
+    assert_eq!(metrics.arrived, 10, "{detail} {:?}", metrics.taken_over);
 }
 
 /// What a node that is replaced has chosen a way for, its deputy chooses none for again.
