@@ -112,6 +112,7 @@ impl Settings for NetworkScenario {
             posts,
             cycle,
             system.clone(),
+            in_crater(&self.world),
         )));
         let watched = system.clone();
         setup.goal = Some(Goal {

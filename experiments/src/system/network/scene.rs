@@ -14,8 +14,9 @@ use farside::{RunInfo, SimDuration};
 use farside_actors::network::Network;
 use farside_actors::network::messages::RoverState;
 use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
-use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
 
+use super::crater;
 use crate::picture::colouring;
 use crate::picture::coordinated;
 
@@ -25,6 +26,9 @@ const MAP: &str = "map";
 /// The entity of the coordination graph.
 const COORDINATION: &str = "coordination";
 const COORDINATED: [f64; 4] = [0.9, 0.9, 0.9, 0.25];
+const GROUND: [f64; 4] = [0.6, 0.5, 0.4, 0.35];
+/// How many points the ground is drawn by, each way.
+const GROUND_POINTS: usize = 25;
 const ROVERS: [f64; 4] = [0.95, 0.55, 0.1, 1.0];
 const NAMES: [f64; 4] = [1.0, 1.0, 1.0, 1.0];
 
@@ -32,6 +36,8 @@ pub(super) struct NetworkScene {
     roadmap: Arc<Roadmap>,
     sensors: Arc<SensorNetwork>,
     system: Arc<Network>,
+    /// The roadmap lies in the built-in crater.
+    in_crater: bool,
     /// The shortest edge \[m\]: what is drawn is as large as fits.
     scale_m: f64,
     /// By the number of the actor in the run; none for those that are no rovers.
@@ -67,6 +73,7 @@ impl NetworkScene {
         sensors: Arc<SensorNetwork>,
         cycle: SimDuration,
         system: Arc<Network>,
+        in_crater: bool,
     ) -> Self {
         let length = |&(u, v): &(VertexId, VertexId)| {
             let step = roadmap.position_m(v) - roadmap.position_m(u);
@@ -87,6 +94,7 @@ impl NetworkScene {
             roadmap,
             sensors,
             system,
+            in_crater,
             rovers: Vec::new(),
             collisions: 0,
         }
@@ -128,6 +136,49 @@ impl NetworkScene {
         }
     }
 
+    /// The ground that the roadmap lies on, as a net; for viewers that draw no entities, its knots.
+    fn ground(&self, terrain: &HeightField) -> [Drawing; 2] {
+        let last = GROUND_POINTS - 1;
+        let sample = |at: usize, of: usize| at * (of - 1) / last;
+        let knot = |row: usize, column: usize| {
+            let (column, row) = (
+                sample(column, terrain.columns()),
+                sample(row, terrain.rows()),
+            );
+            let at = terrain.sample_position_m(column, row);
+            [
+                at.x,
+                at.y,
+                terrain.heights_m()[row * terrain.columns() + column],
+            ]
+        };
+        let rows = 0..GROUND_POINTS;
+        let all = rows.flat_map(|row| (0..GROUND_POINTS).map(move |column| (row, column)));
+        let points_m: Vec<[f64; 3]> = all.clone().map(|(row, column)| knot(row, column)).collect();
+        let number = |row: usize, column: usize| (row * GROUND_POINTS + column) as u32;
+        let mut indices = Vec::new();
+        for (row, column) in all {
+            if column < last {
+                indices.extend([number(row, column), number(row, column + 1)]);
+            }
+            if row < last {
+                indices.extend([number(row, column), number(row + 1, column)]);
+            }
+        }
+        let knots = points_m.iter().copied().map(Pose::at).collect();
+        let lines = Form::Lines {
+            points_m,
+            indices,
+            thickness_m: 0.02 * self.scale_m,
+        };
+        let net = Drawing::Entity {
+            id: "crater".to_owned(),
+            frame: MAP.to_owned(),
+            shapes: vec![shape(lines, [0.0; 3], GROUND)],
+        };
+        [net, poses("crater", knots)]
+    }
+
     /// The vertices of each node, for viewers that draw no entities: a topic each, because they
     /// colour by topic.
     fn territories(&self) -> impl Iterator<Item = Drawing> {
@@ -160,6 +211,13 @@ impl NetworkScene {
             let joined = others.filter(|(_, v)| coordinated(&self.sensors, *u, **v));
             indices.extend(joined.flat_map(|(j, _)| [i, j]));
         }
+        // For viewers that draw no entities: the middle of each line.
+        let ends = indices.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
+        let middle = |pair: [u32; 2]| {
+            let [from, to] = pair.map(|at| self.place(held[at as usize]));
+            Pose::at([0, 1, 2].map(|axis| 0.5 * (from[axis] + to[axis])))
+        };
+        out.push(poses(COORDINATION, ends.map(middle).collect()));
         let id = COORDINATION.to_owned();
         out.push(if indices.is_empty() {
             Drawing::Remove { id }
@@ -285,6 +343,9 @@ impl Scene for NetworkScene {
             })
         };
         self.rovers = run.entities.iter().map(seen).collect();
+        if let Some(crater) = self.in_crater.then(crater).and_then(Result::ok) {
+            out.extend(self.ground(crater.terrain()));
+        }
         out.push(self.roads());
         let posts = self.posts();
         out.extend(self.territories());
@@ -417,7 +478,7 @@ mod tests {
         );
         let system = Arc::new(system.unwrap());
         let drawings = Arc::new(Mutex::new(Vec::new()));
-        let scene = NetworkScene::new(roadmap, sensors, system.cycle(), system.clone());
+        let scene = NetworkScene::new(roadmap, sensors, system.cycle(), system.clone(), true);
         sim.observe(Show(scene, None, drawings.clone()));
         sim.stop_at(SimTime::ZERO + SimDuration::from_secs(120), "enough");
         sim.run(Executor::Inline).unwrap();
@@ -427,6 +488,33 @@ mod tests {
 
     fn count(drawings: &[Drawing], counted: impl Fn(&Drawing) -> bool) -> usize {
         drawings.iter().filter(|drawing| counted(drawing)).count()
+    }
+
+    #[test]
+    fn the_ground_and_who_is_coordinated_are_drawn_without_entities_too() {
+        let (drawings, _) = drawn(20, Sabotage::None);
+        let points = |name: &str| {
+            let of = |d: &Drawing| match d {
+                Drawing::Poses { topic, poses, .. } if topic.ends_with(name) => Some(poses.clone()),
+                _ => None,
+            };
+            drawings.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        let ground = crater().unwrap();
+        let knots = points("/crater");
+        assert_eq!(
+            (knots.len(), knots[0].len()),
+            (1, GROUND_POINTS * GROUND_POINTS)
+        );
+        for knot in &knots[0] {
+            let [x, y, z] = knot.position_m;
+            assert!((ground.terrain().height_m(x, y) - z).abs() < 1e-9);
+        }
+        assert!(
+            points("/coordination")
+                .iter()
+                .any(|middles| !middles.is_empty())
+        );
     }
 
     #[test]
