@@ -7,8 +7,8 @@ use farside::encoding::Schema;
 use farside::record::RecordClass;
 use farside::{Executor, SimTime};
 use farside_actors::link::LinkChange;
+use farside_experiments::registry::Registry;
 use farside_experiments::scenario::Scenario;
-use farside_experiments::system::Registry;
 use farside_logs::{Log, LogOptions, LogWriter};
 use farside_worlds::contacts::ContactWindow;
 

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 
 use farside::record::{Flow, Observer, ObserverError, Record};
 use farside::{Executor, RunInfo};
+use farside_actors::system::Files;
+use farside_experiments::registry::Registry;
 use farside_experiments::scenario::Scenario;
-use farside_experiments::system::{Files, Registry};
 use proptest::prelude::*;
 
 /// Who sent which message of a flow to whom, over which link, and which copy.

@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
-use farside_actors::network::{
-    Deadlock, Gaps, Network, NetworkConfig, NetworkError, NetworkMetrics, Policy, TeamConfig,
-    WorldConfig, assemble, assemble_standing, missions,
+use farside_network::mapf::{Mission, Order, Problem, Rules, reference};
+use farside_network::{
+    Deadlock, Gaps, Missions, Network, NetworkConfig, NetworkError, NetworkMetrics, Parts, Policy,
+    TeamConfig, WorldConfig, assemble_over, missions,
 };
-use farside_actors::planning::{Mission, Order, Problem, Rules, reference};
 use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};
 use farside_worlds::{Endpoints, Roadmap, SensorNetwork, VertexId};
 
@@ -59,22 +59,10 @@ fn queued(
     config: &NetworkConfig,
 ) -> (Simulation, Network) {
     let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
-    let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
-    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-        sim.link(a, b, &format!("{from}-{to}"), radio);
-    };
-    let team = TeamConfig { rovers };
-    let network = assemble(
-        &mut sim,
-        world,
-        roadmap,
-        sensors,
-        &team,
-        config,
-        seed,
-        &mut connect,
-    );
+    let parts = Parts::placed(world, roadmap, config, seed).unwrap();
+    let missions = missions(world, &parts.roadmap, &TeamConfig { rovers }, seed).unwrap();
+    let network = assemble_over(&mut sim, &parts, &Missions::Queued(missions), |_, _| radio);
     (sim, network.unwrap())
 }
 
@@ -102,18 +90,14 @@ fn standing_with(
     let radius_m = SensorNetwork::default_radius_m(&roadmap, nodes);
     let sensors = SensorNetwork::place(&roadmap, nodes, radius_m, seed).unwrap();
     let mut sim = Simulation::new(seed);
-    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-        sim.link(a, b, &format!("{from}-{to}"), radio);
-    };
-    let network = assemble_standing(
-        &mut sim,
-        &WorldConfig::default(),
-        Arc::new(roadmap),
-        Arc::new(sensors),
-        tasks,
+    let parts = Parts {
+        world: &WorldConfig::default(),
+        roadmap: Arc::new(roadmap),
+        sensors: Arc::new(sensors),
         config,
-        &mut connect,
-    );
+        terrain: None,
+    };
+    let network = assemble_over(&mut sim, &parts, &Missions::Standing(tasks), |_, _| radio);
     let network = match network {
         Err(NetworkError::NoPlan(_)) => return None,
         network => network.unwrap(),

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside_actors::network::messages::{CandidatePaths, Locations, MaxPlus, RoverId};
-use farside_actors::network::{
-    ConfigError, NetworkConfig, NetworkError, NetworkMetrics, Processor, TeamConfig, WorldConfig,
-    assemble,
+use farside_network::messages::{CandidatePaths, Locations, MaxPlus, RoverId};
+use farside_network::{
+    ConfigError, Missions, NetworkConfig, NetworkError, NetworkMetrics, Parts, Processor,
+    TeamConfig, WorldConfig, assemble_over, missions,
 };
 use farside_worlds::{NodeId, Roadmap, SensorNetwork};
 
@@ -92,22 +92,12 @@ struct Run {
 fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run, NetworkError> {
     let (world, seed) = (WorldConfig::default(), 3);
     let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
-    let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
     let wire = FixedDelay::new(latency);
-    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-        sim.link(a, b, &format!("{from}-{to}"), wire.clone());
-    };
-    let system = assemble(
-        &mut sim,
-        &world,
-        roadmap,
-        sensors.clone(),
-        &TeamConfig { rovers },
-        network,
-        seed,
-        &mut connect,
-    )?;
+    let parts = Parts::placed(&world, roadmap, network, seed).unwrap();
+    let missions = missions(&world, &parts.roadmap, &TeamConfig { rovers }, seed)?;
+    let missions = Missions::Queued(missions);
+    let system = assemble_over(&mut sim, &parts, &missions, |_, _| wire.clone())?;
     let book = Arc::new(Mutex::new(Book::default()));
     sim.observe(Ear(book.clone()));
     let report = sim.run(Executor::Inline).unwrap();
@@ -115,7 +105,7 @@ fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run
         metrics: system.metrics(),
         report,
         book,
-        sensors,
+        sensors: parts.sensors,
     })
 }
 

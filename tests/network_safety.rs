@@ -7,14 +7,15 @@
 use std::cell::Cell;
 
 use farside::prelude::*;
-use farside_actors::invariants::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
-use farside_actors::invariants::{Case, Downtime};
-use farside_actors::network::{
+use farside_actors::system::{Files, Results};
+use farside_experiments::registry::Registry;
+use farside_experiments::scenario::Scenario;
+use farside_network::cases::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
+use farside_network::cases::{Case, Downtime};
+use farside_network::{
     Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Processor, Sabotage, TeamConfig,
     WorldConfig,
 };
-use farside_experiments::scenario::Scenario;
-use farside_experiments::system::{Files, Registry, Results};
 use farside_worlds::{Ownership, VertexId};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
@@ -202,7 +203,7 @@ fn run_as_scenario(text: &str, sets: &[String]) -> (Results, Report) {
     let scenario = scenario.unwrap_or_else(|error| panic!("{error}\n{text}"));
     let assembled = scenario.assemble().expect("it makes sense");
     let report = assembled.sim.run(Executor::Inline).expect("it starts");
-    ((assembled.conclude)(&report), report)
+    ((assembled.system.conclude)(&report), report)
 }
 
 proptest! {
@@ -262,7 +263,7 @@ fn freeing_a_vertex_before_it_is_heard_free_is_found_and_shrinks() {
 /// The scenario in the documentation of `farside_actors::invariants`.
 #[test]
 fn the_scenario_in_the_docs_collides_because_of_the_broken_rule() {
-    let text = include_str!("../actors/src/invariants/freed-on-grant.toml");
+    let text = include_str!("../actors/network/src/cases/freed-on-grant.toml");
     let (results, _) = run_as_scenario(text, &[]);
     let violation = results.violations.join("\n");
     assert_eq!(

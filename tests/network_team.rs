@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
-use farside_actors::network::{
-    Deadlock, Network, NetworkConfig, NetworkError, TeamConfig, WorldConfig, assemble,
+use farside_network::{
+    Deadlock, Missions, Network, NetworkConfig, NetworkError, Parts, TeamConfig, WorldConfig,
+    assemble_over, missions,
 };
 use farside_worlds::Roadmap;
 
@@ -33,22 +34,11 @@ impl Carrier for Lossy {
 fn team(seed: u64, rovers: u32) -> Result<(Simulation, Network), NetworkError> {
     let world = WorldConfig::default();
     let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
-    let sensors = Arc::new(world.place(&roadmap, seed).unwrap());
     let mut sim = Simulation::new(seed);
-    let mut connect = |sim: &mut Simulation, (a, from): (HostId, &str), (b, to): (HostId, &str)| {
-        sim.link(a, b, &format!("{from}-{to}"), Lossy);
-    };
     let (team, network) = (TeamConfig { rovers }, NetworkConfig::default());
-    let network = assemble(
-        &mut sim,
-        &world,
-        roadmap,
-        sensors,
-        &team,
-        &network,
-        seed,
-        &mut connect,
-    )?;
+    let parts = Parts::placed(&world, roadmap, &network, seed).unwrap();
+    let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
+    let network = assemble_over(&mut sim, &parts, &missions, |_, _| Lossy)?;
     Ok((sim, network))
 }
 

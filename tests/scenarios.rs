@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::{Executor, Report};
-use farside_experiments::scenario::{Scenario, builtin_names};
-use farside_experiments::system::Registry;
+use farside_experiments::registry::Registry;
+use farside_experiments::scenario::Scenario;
 
 /// Counts delays, and those whose parts do not add up.
 #[derive(Clone, Default)]
@@ -38,7 +38,7 @@ fn run(name: &str, sets: &[&str], executor: Executor) -> (Report, (u64, u64)) {
 
 #[test]
 fn built_in_scenarios_have_one_result_and_explain_every_delay() {
-    for name in builtin_names() {
+    for name in Registry::builtin().scenario_names() {
         let sets: &[&str] = match name {
             "traffic/contact-plan" => &["until=6h"],
             _ if name.starts_with("network/") => &["until=8s", "team.rovers=12"],

@@ -1,9 +1,10 @@
-//! Links, rovers, sensor nodes, planners, plain traffic, and what watches over them, for Farside.
+//! What systems of actors share, for Farside: links, radios, units, invariants, figures, and what a
+//! system is.
 
+pub mod figure;
 pub mod invariants;
 pub mod link;
-pub mod network;
-pub mod planning;
 pub mod radio;
-pub mod traffic;
+pub mod suggest;
+pub mod system;
 pub mod units;

@@ -89,6 +89,7 @@ mod stage;
 mod timeline;
 mod trace;
 mod transmit;
+mod wiring;
 
 use std::sync::Arc;
 
@@ -111,6 +112,7 @@ pub use timeline::Timeline;
 pub use trace::Trace;
 pub(crate) use transmit::difference;
 pub use transmit::{Attempt, Path, Sent, Transmitter};
+pub use wiring::{Links, Wire, Wiring};
 
 /// Why a link loses a message by chance.
 pub const LOSS: &str = "loss";

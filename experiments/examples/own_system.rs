@@ -23,11 +23,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside_actors::link::Wiring;
+use farside_actors::system::{
+    Assembly, Goal, Results, Section, Settings, Setup, SetupError, System,
+};
 use farside_actors::units;
 use farside_experiments::cli;
-use farside_experiments::system::{
-    Conclude, Goal, Registry, Results, Settings, Setup, SetupError, System,
-};
+use farside_experiments::registry::Registry;
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
@@ -141,8 +143,12 @@ impl System for PingSystem {
         "ping"
     }
 
-    fn sections(&self) -> &[&str] {
-        &["ping"]
+    fn about(&self) -> &str {
+        "a base that pings a rover"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        vec![Section::named("ping")]
     }
 
     fn parse(
@@ -158,43 +164,47 @@ impl Settings for PingScenario {
         toml::Table::try_from(self)
     }
 
-    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError> {
+    fn check(&self) -> Result<(), SetupError> {
+        match self.ping.count {
+            0 => Err(SetupError::value("ping.count", "0: expected at least 1")),
+            _ => Ok(()),
+        }
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let settings = self.ping.clone();
         let count = settings.count;
-        if count == 0 {
-            return Err(SetupError::value("ping.count", "0: expected at least 1"));
-        }
-        let sim = &mut *setup.sim;
-        let (base, rover) = (sim.host("base"), sim.host("rover"));
-        sim.actor(base, "base", move |_| Base {
+        let (base, rover) = (setup.sim.host("base"), setup.sim.host("rover"));
+        setup.sim.actor(base, "base", move |_| Base {
             settings: settings.clone(),
             sent: 0,
         });
-        sim.actor(rover, "rover", |_| Rover);
-        setup.links.connect(sim, (base, "base"), (rover, "rover"));
-        setup.links.connect(sim, (rover, "rover"), (base, "base"));
+        setup.sim.actor(rover, "rover", |_| Rover);
+        let mut wiring = Wiring::default();
+        wiring.both_ways((base, "base"), (rover, "rover"));
+        setup.link(&wiring)?;
         let pongs = Arc::new(AtomicU32::new(0));
-        sim.observe(Pongs(pongs.clone()));
+        setup.sim.observe(Pongs(pongs.clone()));
         // What fills the progress bar; without it, the virtual time does.
         let watched = pongs.clone();
-        setup.goal = Some(Goal {
+        let goal = Goal {
             what: "pings answered",
             of: u64::from(count),
             done: Box::new(move || u64::from(watched.load(Ordering::Relaxed))),
-        });
-        Ok(Box::new(move |_report| {
+        };
+        let conclude = move |_: &Report| {
             let answered = pongs.load(Ordering::Relaxed);
             let mut results = Results::default();
             results
                 .metrics
                 .insert("answered".to_owned(), answered.into());
-            let line = format!("{answered} of {count}");
-            results.summary.push(("pings answered".to_owned(), line));
+            results.line("pings answered", format!("{answered} of {count}"));
             if answered == 0 {
                 results.violations.push("no ping was answered".to_owned());
             }
             results
-        }))
+        };
+        Ok(Assembly::new(conclude).with_goal(goal))
     }
 }
 

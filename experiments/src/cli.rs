@@ -10,7 +10,7 @@ use tracing_subscriber::prelude::*;
 use crate::commands::{
     CommandError, builtin, check, diff, draw, info, recover, report, reproduce, run, study, verify,
 };
-use crate::system::Registry;
+use crate::registry::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -57,7 +57,7 @@ enum Command {
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
     Diff(diff::Args),
-    /// Draw a run from its log: a map at an instant, or who was where along a corridor
+    /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
     Study(study::Args),
@@ -120,13 +120,13 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
     match command {
         Command::Run(args) => run::run(&args, registry),
         Command::Check(args) => check::run(&args, registry),
-        Command::Scenarios(args) => builtin::scenarios(&args),
+        Command::Scenarios(args) => builtin::scenarios(&args, registry),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
-        Command::Studies(args) => builtin::studies(&args),
+        Command::Studies(args) => builtin::studies(&args, registry),
         Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args),
         Command::Recover(args) => recover::run(&args),

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use farside_experiments::{cli, system::Registry};
+use farside_experiments::{cli, registry::Registry};
 
 fn main() -> ExitCode {
     cli::main(Registry::builtin())

@@ -3,27 +3,22 @@
 //! [`build`] makes of a study's results a page that needs nothing but itself, its figures one by
 //! one, and two tables. It reads no clock and draws no chance: the same results give the same bytes.
 
-mod colours;
 pub mod csv;
 mod layout;
 mod measure;
 mod numbers;
 mod page;
 mod plots;
-pub(crate) mod scale;
-pub(crate) mod svg;
 
 #[cfg(test)]
 mod tests;
 
-pub use svg::Figure;
+use farside_actors::figure::Figure;
 
 use crate::study::results::Results;
 use crate::study::summary::{Summary, summarise};
 use measure::Study;
 
-/// The style of figures, in light, dark and print.
-const FIGURE_STYLE: &str = include_str!("report/figure.css");
 /// The style of the page around them.
 const PAGE_STYLE: &str = include_str!("report/page.css");
 

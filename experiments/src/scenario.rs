@@ -1,10 +1,9 @@
 //! Scenarios: TOML files that say which system runs, in which world, over which links.
 //!
 //! The keys that every system shares are read here; `[world]`, `[team]` and whatever else a system
-//! has of its own are read by the system ([`crate::system::System`]). A mistake is one message
+//! has of its own are read by the system ([`farside_actors::system::System`]). A mistake is one message
 //! with its place, what was found, what was expected and the nearest valid name.
 
-mod builtin;
 pub mod contacts;
 mod crash;
 mod error;
@@ -14,22 +13,24 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::{End, SimDuration, SimTime, Simulation};
+use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::radio::RadioConfig;
+use farside_actors::suggest::nearest;
+use farside_actors::system::{
+    Assembly, Files, PictureError, PictureRequest, Recording, Settings, Setup, SetupError, System,
+    no_file,
+};
 use farside_actors::units;
-use farside_logs::Scene;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::picture::Site;
-use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
-pub use builtin::{builtin_names, builtin_text};
+use crate::registry::Registry;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
-pub(crate) use error::did_you_mean;
 pub use source::Place;
 pub(crate) use source::Source;
 
@@ -148,12 +149,8 @@ pub struct Scenario {
 pub struct Assembled {
     /// The simulation.
     pub sim: Simulation,
-    /// Says what came of the run.
-    pub conclude: Conclude,
-    /// What the run is to achieve, if the system says.
-    pub goal: Option<Goal>,
-    /// Draws the run for viewers, if the system can.
-    pub scene: Option<Box<dyn Scene>>,
+    /// What the system made: its results, its goal, its scene; its notes are in `notes`.
+    pub system: Assembly,
     /// The files that were read, for the log.
     pub files: Files,
     /// The contacts of its links, if the scenario has a plan.
@@ -168,7 +165,7 @@ impl Scenario {
     /// Reads a built-in scenario or a file, with `--set` arguments laid over it.
     ///
     /// ```
-    /// use farside_experiments::{scenario::Scenario, system::Registry};
+    /// use farside_experiments::{registry::Registry, scenario::Scenario};
     /// let sets = ["team.rovers=5".to_owned(), "links.default.loss=30%".to_owned()];
     /// let scenario = Scenario::open("network/crater-dense", &sets, &Registry::builtin())?;
     /// assert_eq!(scenario.shared().links.default.loss, 0.3);
@@ -182,13 +179,13 @@ impl Scenario {
         sets: &[String],
         registry: &Registry,
     ) -> Result<Scenario, ScenarioError> {
-        if let Some(text) = builtin_text(scenario) {
+        if let Some(text) = registry.scenario(scenario) {
             let files = Files::on_disk(PathBuf::new());
             return Self::parse(scenario, text.to_owned(), sets, registry, files);
         }
         let path = Path::new(scenario);
         let text = read(path, || {
-            let names = builtin_names();
+            let names = registry.scenario_names();
             ScenarioError::NotFound {
                 found: scenario.to_owned(),
                 nearest: nearest(scenario, names.iter().copied()),
@@ -221,7 +218,7 @@ impl Scenario {
                 nearest: unknown.nearest,
                 expected: unknown.expected,
             })?;
-            let (shared, own) = part(&source, document, system.sections())?;
+            let (shared, own) = part(&source, document, &roots(system))?;
             let shared = Shared::deserialize(toml::Deserializer::from(shared));
             let settings = system.parse(toml::Deserializer::from(own));
             (
@@ -230,7 +227,7 @@ impl Scenario {
             )
         };
         let scenario = Scenario {
-            name: if builtin_text(name).is_some() {
+            name: if registry.scenario(name).is_some() {
                 name.to_owned()
             } else {
                 stem(name)
@@ -240,6 +237,8 @@ impl Scenario {
             source,
             files,
         };
+        let checked = scenario.settings.check();
+        checked.map_err(|error| ScenarioError::from_setup(&scenario.source, error))?;
         scenario.check_crashes()?;
         Ok(scenario)
     }
@@ -339,27 +338,13 @@ impl Scenario {
             Ok(trace)
         });
         traces.map_err(|error| wrong(error.into()))?;
-        let mut setup = Setup {
-            seed,
-            until: self.shared.until,
-            sim: &mut sim,
-            links: &mut links,
-            files: &mut files,
-            goal: None,
-            scene: None,
-            notes: Vec::new(),
-        };
-        let conclude = self.settings.assemble(&mut setup);
-        let (goal, scene) = (setup.goal, setup.scene);
-        notes.extend(setup.notes);
-        let conclude = conclude.map_err(wrong)?;
+        let mut setup = Setup::new(seed, self.shared.until, &mut sim, &mut files, links);
+        let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
+        let remarks = setup.close().map_err(|error| wrong(error.into()))?;
+        notes.append(&mut system.notes);
         self.check_places(&sim)?;
-        let remarks = links.remarks().into_iter();
-        let remarks = remarks.map(|remark| format!("links: {remark}"));
+        let remarks = remarks.iter().map(|remark| format!("links: {remark}"));
         let remarks = remarks.chain(self.too_late()).collect();
-        links
-            .finish(&mut sim)
-            .map_err(|error| wrong(error.into()))?;
         if let Some(contacts) = &contacts {
             contacts.check_hosts(&sim).map_err(wrong)?;
             notes.extend(contacts.notes(&sim));
@@ -373,9 +358,7 @@ impl Scenario {
         }
         Ok(Assembled {
             sim,
-            conclude,
-            goal,
-            scene,
+            system,
             files,
             contacts,
             notes,
@@ -399,14 +382,18 @@ impl Scenario {
             })
     }
 
-    /// Where a run with this seed takes place, if on a roadmap: what pictures are drawn on.
+    /// Draws a picture that its system has, from what a run of it recorded.
     ///
     /// # Errors
-    /// When the settings cannot be.
-    pub fn site(&self, seed: u64) -> Result<Option<Site>, ScenarioError> {
+    /// When there is no such picture, or the recording has not what it shows.
+    pub(crate) fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+    ) -> Result<Figure, PictureError> {
         let mut files = self.files.clone();
-        let site = self.settings.site(seed, &mut files);
-        site.map_err(|error| ScenarioError::from_setup(&self.source, error))
+        self.settings.draw(picture, run, request, &mut files)
     }
 
     /// Whether a run ended because its time was over.
@@ -524,12 +511,6 @@ pub(crate) fn read(
     })
 }
 
-/// Why something that is there is not read.
-pub(crate) fn no_file() -> std::io::Error {
-    let kind = std::io::ErrorKind::InvalidInput;
-    std::io::Error::new(kind, "it is no regular file")
-}
-
 /// The value of `system`, which decides who reads the rest.
 fn system_name(source: &Source, root: &DeTable<'_>) -> Result<String, ScenarioError> {
     match root
@@ -585,12 +566,15 @@ fn part<'i>(
     Ok((Spanned::new(span.clone(), shared), Spanned::new(span, own)))
 }
 
-/// The name closest to `found` in spelling, if any comes near.
-pub(crate) fn nearest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
-    let scored = names.map(|name| (strsim::damerau_levenshtein(found, name), name));
-    let (distance, name) = scored.min_by_key(|(distance, _)| *distance)?;
-    let limit = found.chars().count().max(name.chars().count()) / 2 + 1;
-    (distance <= limit).then(|| name.to_owned())
+/// The top-level tables that a system reads.
+fn roots(system: &dyn System) -> Vec<&'static str> {
+    let mut roots = Vec::new();
+    for section in system.sections() {
+        if !roots.contains(&section.root()) {
+            roots.push(section.root());
+        }
+    }
+    roots
 }
 
 #[cfg(test)]

@@ -64,7 +64,6 @@
 //! figures of a table for one cell are refused. Results are kept when these tables change: a note on
 //! why ours differ may be written when the runs are done.
 
-mod builtin;
 mod design;
 mod error;
 mod execute;
@@ -83,7 +82,6 @@ mod stop;
 mod store;
 pub mod summary;
 
-pub use builtin::{builtin_names, builtin_text};
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
 pub use plan::{Plan, Study};

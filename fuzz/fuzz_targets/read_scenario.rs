@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 
 use farside_experiments::scenario::Scenario;
-use farside_experiments::system::{Files, Registry};
+use farside_actors::system::Files;
+use farside_experiments::registry::Registry;
 use libfuzzer_sys::fuzz_target;
 
 fn parse(text: &str) -> Result<String, String> {

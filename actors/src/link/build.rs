@@ -10,10 +10,11 @@ use globset::{Glob, GlobMatcher};
 use nalgebra::Point3;
 
 use super::{
-    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig,
-    Timeline, Trace,
+    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, Links,
+    LinksConfig, Timeline, Trace, Wiring,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
+use crate::suggest::{closest, did_you_mean};
 
 /// A pattern, and whether any link has matched it.
 struct Pattern {
@@ -52,18 +53,17 @@ impl Pattern {
 ///
 /// ```
 /// use farside::Simulation;
-/// use farside_actors::link::{LinkBuilder, LinksConfig};
-/// let links: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
+/// use farside_actors::link::{LinkBuilder, LinksConfig, Wiring};
+/// let config: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
 /// let mut sim = Simulation::new(1);
 /// let (base, rover) = (sim.host("base"), sim.host("rover_1"));
-/// let mut builder = LinkBuilder::new(&links, &[])?;
-/// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
-/// builder.finish(&mut sim)?;
+/// let mut wiring = Wiring::default();
+/// wiring.link((base, "base"), (rover, "rover_1"));
+/// let links = LinkBuilder::new(&config, &[])?.build(&mut sim, &wiring)?;
+/// assert_eq!(links.nominal("base", "rover_1").unwrap().loss, 0.5);
 ///
-/// let links: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
-/// let mut builder = LinkBuilder::new(&links, &[])?;
-/// builder.connect(&mut sim, (base, "base"), (rover, "rover_1"));
-/// let error = builder.finish(&mut sim).unwrap_err();
+/// let config: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
+/// let error = LinkBuilder::new(&config, &[])?.build(&mut Simulation::new(1), &wiring).unwrap_err();
 /// assert!(error.to_string().ends_with("matches no link; did you mean \"base-rover_*\"?"));
 /// # Ok::<(), farside_actors::link::LinkConfigError>(())
 /// ```
@@ -78,7 +78,6 @@ pub struct LinkBuilder {
     hosts: BTreeMap<HostId, String>,
     /// Where hosts stand at first.
     places_m: BTreeMap<String, Point3<f64>>,
-    terrain: Option<Arc<HeightField>>,
     /// How far ahead contacts that repeat are told to the log.
     until: Option<SimDuration>,
     /// The first mistake that a link met.
@@ -94,7 +93,7 @@ type Plan = dyn Fn(&str, &str) -> Option<Contacts>;
 
 /// The timeline of all links with one base and one set of degradations.
 struct Known {
-    base: LinkParams,
+    base: Arc<LinkParams>,
     /// Indices into the degradations.
     degrades: Vec<usize>,
     timeline: Arc<Timeline>,
@@ -127,7 +126,6 @@ impl LinkBuilder {
             radios: Vec::new(),
             hosts: BTreeMap::new(),
             places_m: BTreeMap::new(),
-            terrain: None,
             until: None,
             mistake: None,
             plan: None,
@@ -248,12 +246,8 @@ impl LinkBuilder {
         all
     }
 
-    /// The ground that radios look over.
-    pub fn terrain(&mut self, terrain: Arc<HeightField>) {
-        self.terrain = Some(terrain);
-    }
-
-    /// Where the host called `name` stands at first, in metres in the world's frame.
+    /// Where the host called `name` stands at first, in metres in the world's frame, unless the
+    /// wiring says.
     pub fn place(&mut self, name: &str, place_m: Point3<f64>) {
         self.places_m.insert(name.to_owned(), place_m);
     }
@@ -268,48 +262,71 @@ impl LinkBuilder {
         self.until = until;
     }
 
-    /// Declares the link `{from}-{to}`, and its changes. A link through a radio is declared with it,
-    /// by [`LinkBuilder::finish`].
-    pub fn connect(
+    /// Declares all links of a wiring, the radios that they go through, and their changes; checks
+    /// that every pattern has matched some link.
+    ///
+    /// # Errors
+    /// When one has not (the error has the nearest name), a link names a radio that there is not, or
+    /// a radio must know where a host is that has no place; when a trace was not read.
+    pub fn build(
+        mut self,
+        sim: &mut Simulation,
+        wiring: &Wiring,
+    ) -> Result<Links, LinkConfigError> {
+        for (name, place_m) in &wiring.places_m {
+            self.places_m.insert(name.clone(), *place_m);
+        }
+        self.hosts = wiring.hosts.iter().cloned().collect();
+        let mut links = Links::default();
+        for (from, to) in wiring.links() {
+            let nominal = self.connect(sim, from, to);
+            links.add(from.1, to.1, nominal);
+        }
+        self.finish(sim, wiring.terrain.as_ref())?;
+        Ok(links.with_remarks(self.remarks()))
+    }
+
+    /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations. A
+    /// link through a radio is declared with it, by [`LinkBuilder::finish`].
+    fn connect(
         &mut self,
         sim: &mut Simulation,
         (from_host, from): (HostId, &str),
         (to_host, to): (HostId, &str),
-    ) {
+    ) -> Arc<LinkParams> {
         let name = format!("{from}-{to}");
-        let timeline = self.resolve(from, to);
+        let known = self.resolve(from, to);
+        let (timeline, nominal) = (known.timeline.clone(), known.base.clone());
         let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
             changes.push((at, LinkChange::planned(before.1, params)));
         }
         changes.extend(timeline.contact_changes(self.until));
-        self.hosts.insert(from_host, from.to_owned());
-        self.hosts.insert(to_host, to.to_owned());
         let Some(wanted) = timeline.at(SimTime::ZERO).radio.clone() else {
             let id = sim.link(from_host, to_host, &name, Link::new(timeline));
             for (at, change) in changes {
                 sim.change_at(at, id, change);
             }
-            return;
+            return nominal;
         };
         match self.radios.iter_mut().find(|radio| radio.name() == wanted) {
             Some(radio) => radio.join(&name, (from_host, to_host), timeline, changes),
             None => self.no_such_radio(&name, &wanted),
         }
+        nominal
     }
 
     /// What the links declared so far are told that has no effect.
-    pub fn remarks(&self) -> BTreeSet<&'static str> {
+    fn remarks(&self) -> BTreeSet<&'static str> {
         let params = self.known.iter().flat_map(|known| known.timeline.iter());
         params.flat_map(|(_, params)| params.remarks()).collect()
     }
 
     fn no_such_radio(&mut self, link: &str, wanted: &str) {
         let names = || self.radios.iter().map(RadioBuilder::name);
-        let nearest = names().min_by_key(|name| strsim::damerau_levenshtein(name, wanted));
-        let hint = match nearest {
-            Some(nearest) => format!("; did you mean {nearest:?}?"),
+        let hint = match closest(wanted, names()) {
             None => format!("; there is no [radios.{wanted}]"),
+            nearest => did_you_mean(nearest),
         };
         let setter = self
             .overrides
@@ -324,9 +341,8 @@ impl LinkBuilder {
         });
     }
 
-    /// What the link `{from}-{to}` has, and when: for who builds a carrier of another kind around a
-    /// [`super::Transmitter`].
-    pub fn resolve(&mut self, from: &str, to: &str) -> Arc<Timeline> {
+    /// What the link `{from}-{to}` has, and when.
+    fn resolve(&mut self, from: &str, to: &str) -> &Known {
         let name = format!("{from}-{to}");
         let mut base = self.default.clone();
         if base.contacts.is_none() {
@@ -343,16 +359,15 @@ impl LinkBuilder {
                 degrades.push(index);
             }
         }
-        let timeline = self.timeline(base, degrades);
         self.names.push(name);
-        timeline
+        self.timeline(base, degrades)
     }
 
     /// What such a link has from each instant on at which a degradation begins or ends.
-    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> Arc<Timeline> {
-        let same = |known: &&Known| known.degrades == degrades && known.base == base;
-        if let Some(known) = self.known.iter().find(same) {
-            return known.timeline.clone();
+    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> &Known {
+        let same = |known: &Known| known.degrades == degrades && *known.base == base;
+        if let Some(at) = self.known.iter().position(same) {
+            return &self.known[at];
         }
         let mine = degrades.iter().map(|&index| &self.degrades[index].1);
         let mine: Vec<&Degrade> = mine.collect();
@@ -369,28 +384,28 @@ impl LinkBuilder {
         for at in instants {
             timeline = timeline.then(SimTime::ZERO + at, params_at(at));
         }
-        let timeline = Arc::new(timeline);
+        let at = self.known.len();
         self.known.push(Known {
-            base,
+            base: Arc::new(base),
             degrades,
-            timeline: timeline.clone(),
+            timeline: Arc::new(timeline),
         });
-        timeline
+        &self.known[at]
     }
 
     /// Declares the radios with the links through them, and checks that every pattern has matched
     /// some link.
-    ///
-    /// # Errors
-    /// When one has not (the error has the nearest name), a link names a radio that there is not, or
-    /// a radio must know where a host is that has no place; when a trace was not read.
-    pub fn finish(mut self, sim: &mut Simulation) -> Result<(), LinkConfigError> {
+    fn finish(
+        &mut self,
+        sim: &mut Simulation,
+        terrain: Option<&Arc<HeightField>>,
+    ) -> Result<(), LinkConfigError> {
         if let Some(mistake) = self.mistake.take() {
             return Err(mistake);
         }
         for radio in std::mem::take(&mut self.radios) {
             let key = vec!["radios".to_owned(), radio.name().to_owned()];
-            let terrain = self.terrain.clone();
+            let terrain = terrain.cloned();
             let declared = radio.declare(sim, &self.hosts, &self.places_m, terrain);
             declared.map_err(|message| LinkConfigError::Value { key, message })?;
         }
@@ -419,13 +434,14 @@ impl LinkBuilder {
     fn nearest(&self, pattern: &Pattern) -> Option<String> {
         let mut candidates: BTreeSet<String> = self.names.iter().map(|name| shape(name)).collect();
         candidates.extend(self.names.iter().cloned());
-        let distance = |name: &str| strsim::damerau_levenshtein(name, &pattern.text);
         // Link names are long and `default` is short, so that anything short is nearer to it: only
         // a slip of the keys counts.
-        if pattern.key[0] == "links" && distance("default") <= SLIP {
+        let slip = strsim::damerau_levenshtein("default", &pattern.text) <= SLIP;
+        if pattern.key[0] == "links" && slip {
             candidates.insert("default".to_owned());
         }
-        candidates.into_iter().min_by_key(|name| distance(name))
+        let candidates = candidates.iter().map(String::as_str);
+        closest(&pattern.text, candidates).map(str::to_owned)
     }
 }
 

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use super::params::{DEGRADE_KEYS, Key};
 use super::{LinkOverrides, LinkParams};
+use crate::suggest::did_you_mean;
 use crate::units;
 
 /// The `[links]` table: `default`, and by pattern what some links have instead. Of several patterns
@@ -185,7 +186,7 @@ pub enum LinkConfigError {
         error: String,
     },
     /// A pattern matches no link.
-    #[error("{pattern:?} matches no link{}", hint(.nearest.as_deref()))]
+    #[error("{pattern:?} matches no link{}", did_you_mean(.nearest.as_deref()))]
     NoSuchLink {
         /// Where in the scenario.
         key: Vec<String>,
@@ -228,10 +229,6 @@ pub enum LinkConfigError {
         /// Where in the scenario.
         key: Vec<String>,
     },
-}
-
-fn hint(nearest: Option<&str>) -> String {
-    nearest.map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
 }
 
 impl LinkConfigError {

@@ -164,11 +164,12 @@ fn scenario(seed: u64, sends: &[Send], to: &[&str], text: &str) -> Vec<Fate> {
     }
     let written: Written = toml::from_str(text).unwrap();
     run(seed, sends, to, |sim, a, hosts| {
-        let mut builder = LinkBuilder::new(&written.links, &written.degrade).unwrap();
+        let mut wiring = Wiring::default();
+        let builder = LinkBuilder::new(&written.links, &written.degrade).unwrap();
         for (host, name) in hosts.iter().zip(to) {
-            builder.connect(sim, (a, "a"), (*host, name));
+            wiring.link((a, "a"), (*host, name));
         }
-        builder.finish(sim).unwrap();
+        builder.build(sim, &wiring).unwrap();
     })
 }
 

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::{CommandError, print, print_json};
 use crate::cli::Exit;
-use crate::{scenario, study};
+use crate::registry::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -17,32 +17,32 @@ pub(crate) struct Args {
 }
 
 /// Files that are built in.
-struct Shelf {
-    names: Vec<&'static str>,
-    text: fn(&str) -> Option<&'static str>,
+struct Shelf<'a> {
+    names: Vec<&'a str>,
+    text: Box<dyn Fn(&str) -> Option<&'static str> + 'a>,
     /// The key whose value says what a file is for.
     about: &'static str,
 }
 
-pub(crate) fn scenarios(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn scenarios(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
-        names: scenario::builtin_names(),
-        text: scenario::builtin_text,
+        names: registry.scenario_names(),
+        text: Box::new(|name| registry.scenario(name)),
         about: "description",
     };
     shelf.list(args)
 }
 
-pub(crate) fn studies(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn studies(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
-        names: study::builtin_names(),
-        text: study::builtin_text,
+        names: registry.study_names(),
+        text: Box::new(|name| registry.study(name)),
         about: "question",
     };
     shelf.list(args)
 }
 
-impl Shelf {
+impl Shelf<'_> {
     fn list(&self, args: &Args) -> Result<Exit, CommandError> {
         if args.text {
             let texts = self.names.iter().map(|name| {

@@ -2,8 +2,8 @@
 
 use super::{CommandError, print};
 use crate::cli::Exit;
+use crate::registry::Registry;
 use crate::scenario::Scenario;
-use crate::system::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

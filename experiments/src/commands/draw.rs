@@ -1,36 +1,45 @@
-//! `farside draw`: pictures of a run, from its log.
+//! `farside draw`: pictures of a run, from its log. Which there are is for the scenario's system to
+//! say.
 
 use std::path::PathBuf;
 
 use farside::SimDuration;
+use farside_actors::figure::Figure;
+use farside_actors::suggest::{did_you_mean, nearest};
+use farside_actors::system::{
+    PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
+};
 use farside_actors::units;
-use farside_logs::Log;
-use farside_worlds::VertexId;
+use farside_logs::{Log, LogError};
 use serde::Serialize;
+use serde_json::json;
 
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
 use crate::cli::Exit;
-use crate::picture::tracks::Tracks;
-use crate::picture::{Drawn, Line, PictureError};
-use crate::report::Figure;
-use crate::system::Registry;
+use crate::registry::Registry;
+use crate::scenario::Scenario;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The log
     #[arg(value_name = "RUN.mcap")]
     log: PathBuf,
-    /// The time of the map, or the end of the diagram; the end of the run unless given
+    /// The picture, as --list has it; its first unless given
+    #[arg(value_name = "PICTURE")]
+    picture: Option<String>,
+    /// List the pictures that there are of this run, and what each takes
+    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "out"])]
+    list: bool,
+    /// The instant, or the end of a time span; the end of the run unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
     at: Option<SimDuration>,
-    /// Draw who was where along a line of vertices over time, in place of a map: auto is where rovers
-    /// stand in each other's way, V the corridor of a vertex, V1,V2,... the shortest ways between them
-    #[arg(long, value_name = "auto|V1,V2,...", value_parser = line)]
-    corridor: Option<Line>,
-    /// When the diagram begins
-    #[arg(long, value_name = "DUR", value_parser = units::parse_duration, requires = "corridor")]
+    /// The beginning of a time span; the start of the run unless given
+    #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
     from: Option<SimDuration>,
+    /// Along what it is drawn, as --list says
+    #[arg(long, value_name = "WHAT")]
+    along: Option<String>,
     /// Where to write the picture; beside the log unless given
     #[arg(long, value_name = "FILE.svg")]
     out: Option<PathBuf>,
@@ -47,27 +56,26 @@ struct Document<'a> {
     description: &'a str,
 }
 
-fn line(text: &str) -> Result<Line, String> {
-    if text == "auto" {
-        return Ok(Line::Auto);
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let path = &args.log;
+    let log = Log::open(path)?;
+    let summary = farside_logs::info(path)?.run.unwrap_or_default();
+    let scenario = scenario_of(path, &summary, registry)?;
+    // A scenario is read only if its system is known.
+    let name = &scenario.shared().system;
+    let pictures = registry.find(name).map(|system| system.pictures());
+    let pictures = pictures.unwrap_or_default();
+    if args.list {
+        return list(args, pictures);
     }
-    let vertex = |part: &str| {
-        let number = part.trim().parse::<u32>().map(VertexId);
-        number.map_err(|_| format!("{part:?}: expected auto, or vertices as in 12,40"))
-    };
-    text.split(',')
-        .map(vertex)
-        .collect::<Result<_, _>>()
-        .map(Line::Through)
+    let figure = draw(args, &log, &scenario, pictures).map_err(|error| CommandError::NotDrawn {
+        path: path.clone(),
+        reason: error.to_string(),
+    })?;
+    write(args, &figure)
 }
 
-pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let drawn = open(args, registry)?;
-    let figure = match &args.corridor {
-        None => drawn.map(args.at),
-        Some(line) => drawn.time_space(line, args.from, args.at),
-    };
-    let figure: Figure = figure.map_err(|error| picture_error(args, error))?;
+fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
     let out = args.out.clone().unwrap_or_else(|| {
         let stem = args
             .log
@@ -93,38 +101,120 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     Ok(Exit::Done)
 }
 
-/// The run that the log holds, as pictures need it.
-fn open(args: &Args, registry: &Registry) -> Result<Drawn, CommandError> {
-    let path = &args.log;
-    let log = Log::open(path)?;
-    let summary = farside_logs::info(path)?.run.unwrap_or_default();
-    let scenario = scenario_of(path, &summary, registry)?;
-    let not_drawn = |reason: String| CommandError::NotDrawn {
-        path: path.clone(),
-        reason,
-    };
-    let site = scenario.site(log.seed())?.ok_or_else(|| {
-        let system = &scenario.shared().system;
-        not_drawn(format!(
-            "its system is {system:?}, which has no roadmap: expected a run of \"network\""
-        ))
-    })?;
-    let tracks = Tracks::read(&log).map_err(|error| picture_error(args, error))?;
-    Ok(Drawn {
-        site,
-        tracks,
-        scenario: log.scenario_name().to_owned(),
-        seed: log.seed(),
-    })
+/// The names of a picture's options, as on the command line.
+fn options(picture: &PictureInfo) -> Vec<String> {
+    let takes = picture.takes.iter();
+    takes.map(|option| format!("--{}", option.name())).collect()
 }
 
-fn picture_error(args: &Args, error: PictureError) -> CommandError {
-    match error {
-        // It names the file itself.
-        PictureError::Log(error) => error.into(),
-        error => CommandError::NotDrawn {
-            path: args.log.clone(),
-            reason: error.to_string(),
-        },
+fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
+    if args.json {
+        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture) });
+        print_json(&pictures.iter().map(entry).collect::<Vec<_>>())?;
+        return Ok(Exit::Done);
+    }
+    if pictures.is_empty() {
+        print("its system has no pictures".to_owned())?;
+        return Ok(Exit::Done);
+    }
+    let width = pictures.iter().map(|picture| picture.name.len()).max();
+    let width = width.unwrap_or(0);
+    let line = |picture: &PictureInfo| {
+        let takes = options(picture).join(", ");
+        let indent = " ".repeat(width);
+        format!(
+            "{:width$}  {}\n{indent}  takes {takes}",
+            picture.name, picture.about
+        )
+    };
+    print(pictures.iter().map(line).collect::<Vec<_>>().join("\n"))?;
+    Ok(Exit::Done)
+}
+
+/// Draws what is asked for, if the picture takes it.
+fn draw(
+    args: &Args,
+    log: &Log,
+    scenario: &Scenario,
+    pictures: &[PictureInfo],
+) -> Result<Figure, PictureError> {
+    let Some(first) = pictures.first() else {
+        let system = &scenario.shared().system;
+        let message = format!("its system {system:?} has no pictures");
+        return Err(PictureError::NotDrawn(message));
+    };
+    let names = || pictures.iter().map(|picture| picture.name);
+    let picture = match &args.picture {
+        None => first,
+        Some(wanted) => pictures
+            .iter()
+            .find(|picture| picture.name == wanted)
+            .ok_or_else(|| {
+                let hint = did_you_mean(nearest(wanted, names()).as_deref());
+                let known = names().collect::<Vec<_>>().join(", ");
+                PictureError::NotDrawn(format!(
+                    "there is no picture {wanted:?}{hint}; expected one of {known}"
+                ))
+            })?,
+    };
+    let given = [
+        (PictureOption::At, args.at.is_some()),
+        (PictureOption::From, args.from.is_some()),
+        (PictureOption::Along, args.along.is_some()),
+    ];
+    for (option, given) in given {
+        if given && !picture.takes.contains(&option) {
+            let takes = options(picture).join(", ");
+            return Err(PictureError::NotDrawn(format!(
+                "the picture {:?} does not take --{}: it takes {takes}",
+                picture.name,
+                option.name()
+            )));
+        }
+    }
+    let request = PictureRequest {
+        at: args.at,
+        from: args.from,
+        along: args.along.clone(),
+    };
+    scenario.draw(picture.name, &Logged(log), &request)
+}
+
+/// A log as pictures read it.
+struct Logged<'a>(&'a Log);
+
+impl Recording for Logged<'_> {
+    fn seed(&self) -> u64 {
+        self.0.seed()
+    }
+
+    fn scenario(&self) -> &str {
+        self.0.scenario_name()
+    }
+
+    fn excluded(&self) -> &[String] {
+        self.0.exclude()
+    }
+
+    fn for_each(
+        &self,
+        visit: &mut dyn FnMut(&Recorded<'_>) -> Result<(), PictureError>,
+    ) -> Result<RecordingEnd, PictureError> {
+        let unreadable = |error: LogError| PictureError::Unreadable(error.to_string());
+        let mut records = self.0.records().map_err(unreadable)?;
+        while let Some((record, _)) = records.next_ref().map_err(unreadable)? {
+            visit(&Recorded {
+                time_ns: record.key.time_ns,
+                class: record.class,
+                kind: &record.kind,
+                body: record.body,
+            })?;
+        }
+        let ending = records.ending().end.as_ref();
+        let text = |key: &str| ending.and_then(|end| end.get(key));
+        Ok(RecordingEnd {
+            time_ns: text("end_time_ns").and_then(|text| text.parse().ok()),
+            detail: text("end_detail").cloned().unwrap_or_default(),
+        })
     }
 }

@@ -6,7 +6,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::{Report, SimDuration, Simulation};
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::system::Goal;
+use farside_actors::system::Goal;
 
 /// How many records pass between two looks at the bar: it must not cost the run anything.
 const STRIDE: u32 = 1024;

@@ -11,10 +11,10 @@ use serde_json::{Map, Value};
 use super::run::log_options;
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
+use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario};
 use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
 use crate::study::{Interrupts, Reproduction, find_run, reproduce};
-use crate::system::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -153,11 +153,11 @@ fn observe(
 ) -> Result<(), CommandError> {
     let mut options = log_options(scenario, assembled, Executor::Inline)?;
     let draws = scenario.shared().log.viewer;
-    options.scene = assembled.scene.take().filter(|_| draws);
+    options.scene = assembled.system.scene.take().filter(|_| draws);
     assembled
         .sim
         .observe(LogWriter::create(&args.out, options)?);
-    let goal = assembled.goal.take();
+    let goal = assembled.system.goal.take();
     progress::show(&mut assembled.sim, goal, scenario.shared().until);
     Ok(())
 }

@@ -15,7 +15,9 @@ use super::table::{self, Group};
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
 use crate::scenario::{Assembled, Scenario};
-use crate::system::{Registry, Results};
+use farside_actors::system::Results;
+
+use crate::registry::Registry;
 use crate::wall::timed;
 
 /// Attachments that are the scenario's files have names that start with this.
@@ -144,16 +146,16 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if let Some(path) = log {
         let mut options = log_options(&scenario, &assembled, executor)?;
         let draws = scenario.shared().log.viewer;
-        options.scene = assembled.scene.take().filter(|_| draws);
+        options.scene = assembled.system.scene.take().filter(|_| draws);
         tracing::info!("logging to {}", path.display());
         assembled.sim.observe(LogWriter::create(path, options)?);
     }
     let until = scenario.shared().until;
-    progress::show(&mut assembled.sim, assembled.goal, until);
+    progress::show(&mut assembled.sim, assembled.system.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;
-    let results = (assembled.conclude)(&report);
+    let results = (assembled.system.conclude)(&report);
     let outcome = Outcome {
         scenario: &scenario,
         executor,

@@ -9,12 +9,12 @@ use serde_json::{Map, Value};
 
 use super::{CommandError, interrupt, print, print_json};
 use crate::cli::Exit;
+use crate::registry::Registry;
 use crate::report::csv::results_csv;
 use crate::study::results::{Results, RunOutcome};
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
 use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
-use crate::system::Registry;
 
 /// Drawings a second; more is unreadable.
 const DRAWINGS_HZ: u8 = 10;
@@ -69,7 +69,7 @@ struct Document {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let study = Study::open(&args.study)?;
+    let study = Study::open(&args.study, registry)?;
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
     let plan = study.plan(&args.sets, args.seeds, registry)?;

@@ -11,7 +11,9 @@ use super::run::{ExecutorName, FILE_PREFIX};
 use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
 use crate::cli::Exit;
 use crate::scenario::{Scenario, ScenarioError};
-use crate::system::{Files, Registry};
+use farside_actors::system::Files;
+
+use crate::registry::Registry;
 use crate::wall::timed;
 
 /// The attachment that holds the resolved scenario.
@@ -67,7 +69,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let handle = verifier.handle();
     assembled.sim.observe(verifier);
     let until = scenario.shared().until;
-    progress::show(&mut assembled.sim, assembled.goal, until);
+    progress::show(&mut assembled.sim, assembled.system.goal, until);
     let interrupt = assembled.sim.interrupt();
     interrupt::raise_on_interrupt(interrupt);
     let executor = args.executor.executor(args.threads);

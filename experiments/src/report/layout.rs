@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::colours::SERIES;
 use crate::study::results::{Manifest, Scale};
+use farside_actors::figure::colours::SERIES;
 
 /// The most plots of one kind for one metric; with more, a choice of them is shown.
 pub(super) const PANELS: usize = 6;

@@ -1,11 +1,12 @@
 //! A metric of a study, as plots and tables show it.
 
 use super::layout::Layout;
-use super::numbers::{Style, plain};
+use super::numbers::Style;
 use crate::stats::{Estimate, rates};
 use crate::study::results::{Metric, Results};
 use crate::study::summary::values::{Kind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
+use farside_actors::figure::numbers::plain;
 
 /// All there is to say of a study.
 pub(super) struct Study<'a> {

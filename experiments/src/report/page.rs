@@ -10,9 +10,9 @@ use std::collections::BTreeSet;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::measure::{Measure, Study};
-use super::numbers::plain;
 use super::plots::{self, Plots};
-use super::svg::Figure;
+use farside_actors::figure::numbers::plain;
+use farside_actors::figure::svg::Figure;
 
 /// The page, and the figures that are on it.
 pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
@@ -34,7 +34,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                 // Nothing is loaded from anywhere, not even an icon.
                 link rel="icon" href="data:,";
                 title { (manifest.study) ": " (manifest.question) }
-                style { (PreEscaped(super::FIGURE_STYLE)) (PreEscaped(super::PAGE_STYLE)) }
+                style { (PreEscaped(farside_actors::figure::STYLE)) (PreEscaped(super::PAGE_STYLE)) }
             }
             body {
                 header {

@@ -8,9 +8,9 @@ mod steps;
 use self::curves::Shown;
 use super::layout::Shape;
 use super::measure::{Measure, Study};
-use super::svg::{Area, Figure};
 use crate::study::results::Claim;
 use crate::study::summary::values::Kind;
+use farside_actors::figure::svg::{Area, Figure};
 
 /// The width of a figure that stands beside others; on a phone it fills the page.
 pub(super) const WIDTH: f64 = 480.0;

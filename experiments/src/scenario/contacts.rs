@@ -19,8 +19,8 @@ use farside_worlds::contacts::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::nearest;
-use crate::system::{Files, SetupError};
+use farside_actors::suggest::nearest;
+use farside_actors::system::{Files, SetupError};
 
 /// The most pairs that are told of one by one.
 const MAX_NOTED: usize = 50;
@@ -56,7 +56,7 @@ pub struct ContactsConfig {
 ///
 /// ```
 /// use farside_experiments::scenario::contacts::{ContactsConfig, LinkContacts};
-/// use farside_experiments::system::Files;
+/// use farside_actors::system::Files;
 /// let text = "file = 'mars-relay'\nnodes = { 1 = 'earth', 2 = 'orbiter', 3 = 'rover' }";
 /// let config: ContactsConfig = toml::from_str(text)?;
 /// let contacts = LinkContacts::read(&config, &mut Files::kept([].into()))?;
@@ -233,7 +233,7 @@ pub(super) fn hand_over(contacts: &LinkContacts, links: &mut LinkBuilder) {
 ///
 /// ```
 /// use farside_experiments::scenario::contacts::read_trace;
-/// use farside_experiments::system::Files;
+/// use farside_actors::system::Files;
 /// let trace = read_trace("rover-radio", &mut Files::kept([].into()))?;
 /// assert_eq!(
 ///     trace.to_string(),

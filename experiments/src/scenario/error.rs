@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::nearest;
 use super::source::{Place, Source, one_line};
-use crate::system::SetupError;
+use farside_actors::suggest::{did_you_mean, nearest};
+use farside_actors::system::SetupError;
 
 /// A scenario cannot be found, read or built.
 #[derive(Debug, Error)]
 pub enum ScenarioError {
     /// Neither a built-in scenario nor a file.
-    #[error("{found}: no such scenario or file{}\n  built in: {known}", did_you_mean(.nearest))]
+    #[error("{found}: no such scenario or file{}\n  built in: {known}", did_you_mean(.nearest.as_deref()))]
     NotFound {
         /// What was asked for.
         found: String,
@@ -66,7 +66,7 @@ pub enum ScenarioError {
     /// A key that does not exist.
     #[error(
         "{place}: unknown key {found:?}{within}{}\n  expected {expected}{}",
-        did_you_mean(.nearest), quoted(.place)
+        did_you_mean(.nearest.as_deref()), quoted(.place)
     )]
     UnknownKey {
         /// Where.
@@ -83,7 +83,7 @@ pub enum ScenarioError {
     /// A name that does not exist.
     #[error(
         "{place}: {key}: unknown value {found:?}{}\n  expected {expected}{}",
-        did_you_mean(.nearest), quoted(.place)
+        did_you_mean(.nearest.as_deref()), quoted(.place)
     )]
     UnknownValue {
         /// Where.
@@ -113,13 +113,6 @@ pub enum ScenarioError {
         /// What stands in the way.
         message: String,
     },
-}
-
-pub(crate) fn did_you_mean(nearest: &Option<String>) -> String {
-    match nearest {
-        Some(name) => format!("; did you mean {name:?}?"),
-        None => String::new(),
-    }
 }
 
 /// The line itself, with a mark below the column.

@@ -182,7 +182,9 @@ fn mistakes_in_links_have_a_place_and_the_nearest_name() {
 
 #[test]
 fn every_parameter_of_links_can_be_set() {
-    let text = builtin_text("network/crater-dense").unwrap();
+    let text = Registry::builtin()
+        .scenario("network/crater-dense")
+        .unwrap();
     let sets = [
         "links.default.preset=mars-relay",
         "links.default.contacts=off",
@@ -207,7 +209,7 @@ fn every_parameter_of_links_can_be_set() {
 
 #[test]
 fn every_preset_carries_traffic() {
-    let text = builtin_text("traffic/open-loop").unwrap();
+    let text = Registry::builtin().scenario("traffic/open-loop").unwrap();
     for name in Preset::names() {
         let preset = format!("links.default.preset={name}");
         let scenario = parse(text, &["until=30min", &preset, "links.default.tx_power=1W"]).unwrap();
@@ -223,7 +225,9 @@ fn every_preset_carries_traffic() {
 
 #[test]
 fn links_follow_the_plan_and_the_trace() {
-    let text = builtin_text("traffic/contact-plan").unwrap();
+    let text = Registry::builtin()
+        .scenario("traffic/contact-plan")
+        .unwrap();
     let lost = |sets: &[&str]| {
         let scenario = parse(text, &[&["until=6h"], sets].concat()).unwrap();
         let counts = scenario.assemble().unwrap().sim.run(Executor::Inline);
@@ -257,7 +261,9 @@ fn links_follow_the_plan_and_the_trace() {
 
 #[test]
 fn a_set_is_blamed_by_name() {
-    let text = builtin_text("network/crater-dense").unwrap();
+    let text = Registry::builtin()
+        .scenario("network/crater-dense")
+        .unwrap();
     for (set, part) in [
         ("links.default.loss=1.5", "from 0 to 1"),
         ("links.defualt.loss=0.5", "did you mean \"default\"?"),
@@ -276,7 +282,9 @@ fn a_set_is_blamed_by_name() {
 
 #[test]
 fn a_resolved_scenario_gives_the_same_run() {
-    let text = builtin_text("network/crater-dense").unwrap();
+    let text = Registry::builtin()
+        .scenario("network/crater-dense")
+        .unwrap();
     let sets = [
         "team.rovers=4",
         "links.rover_*-node_*.loss=0.2",
@@ -300,8 +308,9 @@ fn a_resolved_scenario_gives_the_same_run() {
 
 #[test]
 fn built_in_scenarios_are_whole() {
-    for name in builtin_names() {
-        let scenario = Scenario::open(name, &[], &Registry::builtin()).unwrap();
+    let registry = Registry::builtin();
+    for name in registry.scenario_names() {
+        let scenario = Scenario::open(name, &[], &registry).unwrap();
         assert!(!scenario.shared().description.is_empty());
         assert_eq!(scenario.name(), name);
         scenario.assemble().unwrap();
@@ -310,7 +319,9 @@ fn built_in_scenarios_are_whole() {
 
 #[test]
 fn any_text_gives_a_scenario_or_an_error() {
-    let text = builtin_text("network/crater-dense").unwrap();
+    let text = Registry::builtin()
+        .scenario("network/crater-dense")
+        .unwrap();
     for end in (0..text.len()).step_by(3) {
         let _ = parse(&text[..end], &[]);
     }

@@ -4,13 +4,15 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::scenario::{Place, ScenarioError, did_you_mean};
+use farside_actors::suggest::did_you_mean;
+
+use crate::scenario::{Place, ScenarioError};
 
 /// A study cannot be read, planned or run.
 #[derive(Debug, Error)]
 pub enum StudyError {
     /// Neither a built-in study nor a file.
-    #[error("{found}: no such study or file{}\n  built in: {known}", did_you_mean(.nearest))]
+    #[error("{found}: no such study or file{}\n  built in: {known}", did_you_mean(.nearest.as_deref()))]
     NotFound {
         /// What was asked for.
         found: String,

@@ -8,8 +8,8 @@ use farside::{Counts, End, Executor, Report};
 use serde_json::{Map, Value};
 
 use crate::scenario::{Assembled, Scenario};
-use crate::system::Results;
 use crate::wall::timed;
+use farside_actors::system::Results;
 
 use super::results::{MessageCounts, Metric, RunOutcome};
 
@@ -121,7 +121,9 @@ fn run<E: std::fmt::Display>(
     interrupts.watch(&assembled.sim.interrupt());
     let ((report, results), run_s) = timed(|| {
         let report = assembled.sim.run(Executor::Inline);
-        let results = report.as_ref().map(|report| (assembled.conclude)(report));
+        let results = report
+            .as_ref()
+            .map(|report| (assembled.system.conclude)(report));
         let results = results.unwrap_or_default();
         (report, results)
     });

@@ -1,6 +1,8 @@
 //! Factors: what a study varies, read from its file and checked.
 
-use crate::scenario::{ScenarioError, Source, nearest};
+use farside_actors::suggest::nearest;
+
+use crate::scenario::{ScenarioError, Source};
 
 use super::file::{Design, FactorFile, StudyFile};
 use super::level::{Dimension, Level, Range, settings};

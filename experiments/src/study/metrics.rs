@@ -1,107 +1,48 @@
-//! Metrics: labels and units of those that are known, and which a run has.
+//! Metrics: those that every run has, and which a run can be measured by.
 
+use farside_actors::system::Better::{Higher, Lower, Neither};
+use farside_actors::system::Metric as KnownMetric;
 use serde_json::{Map, Value};
 
 use super::file::MetricFile;
 use super::results::Metric;
 
 /// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
-const KERNEL: [&str; 8] = [
-    "events",
-    "sim_time_s",
-    "violations",
-    "messages.sent",
-    "messages.delivered",
-    "messages.lost",
-    "messages.duplicated",
-    "messages.in_flight",
-];
-
-/// Labels and units of metrics whose names say too little, by name.
-const KNOWN: [(&str, &str, &str); 37] = [
-    ("arrival_s", "time to the goal", "s"),
-    ("arrived", "rovers at their goals", "rovers"),
-    (
-        "busiest_share",
-        "share of the busiest node in what all computed",
-        "",
+pub(crate) const KERNEL: [KnownMetric; 8] = [
+    KnownMetric::number("events", "events", "events", Neither),
+    KnownMetric::number("sim_time_s", "virtual time", "s", Neither),
+    KnownMetric::number("violations", "violations", "", Lower),
+    KnownMetric::number("messages.sent", "messages sent", "messages", Neither),
+    KnownMetric::number(
+        "messages.delivered",
+        "message copies delivered",
+        "messages",
+        Higher,
     ),
-    ("collisions", "collisions", ""),
-    ("completed", "all rovers at their goals", ""),
-    ("confirmed_deadlocks", "deadlocks confirmed by probes", ""),
-    ("cycles", "planning cycles", "cycles"),
-    ("deadlocked", "standstill", ""),
-    ("events", "events", "events"),
-    ("intervention_rate", "cycles with an intervention", ""),
-    ("interventions", "interventions", "cycles"),
-    (
-        "late_optimisations",
-        "optimisations that were not done in time",
-        "",
-    ),
-    ("load_imbalance", "busiest node's load over the mean", ""),
-    ("makespan", "makespan", "steps"),
-    ("makespan_bound", "longest shortest path", "steps"),
-    ("max_plus_iterations", "max-plus iterations per cycle", ""),
-    ("mean_backtracks", "moves back per rover", ""),
-    ("mean_steps", "steps per rover", ""),
-    ("mean_stops", "stops per rover", ""),
-    ("messages.delivered", "message copies delivered", "messages"),
-    (
+    KnownMetric::number("messages.lost", "message copies lost", "messages", Lower),
+    KnownMetric::number(
         "messages.duplicated",
         "message copies duplicated",
         "messages",
+        Neither,
     ),
-    (
+    KnownMetric::number(
         "messages.in_flight",
         "message copies under way at the end",
         "messages",
+        Neither,
     ),
-    ("messages.lost", "message copies lost", "messages"),
-    ("messages.sent", "messages sent", "messages"),
-    ("outsourced", "share of the work that was handed over", ""),
-    (
-        "pairs_per_cycle",
-        "pairs of paths per node and cycle",
-        "pairs",
-    ),
-    (
-        "path_ratio",
-        "steps of those that arrived over the shortest path",
-        "",
-    ),
-    (
-        "peak_load",
-        "pairs of paths per cycle at the busiest node",
-        "pairs",
-    ),
-    ("rovers", "rovers", "rovers"),
-    ("sim_time_s", "virtual time", "s"),
-    ("suboptimality", "sum of costs over its bound", ""),
-    ("sum_of_costs", "sum of costs", "steps"),
-    ("sum_of_costs_bound", "sum of shortest paths", "steps"),
-    (
-        "time_ratio",
-        "time of those that arrived over the shortest path",
-        "",
-    ),
-    (
-        "total_steps",
-        "steps of all rovers that arrived, together",
-        "steps",
-    ),
-    (
-        "transmit_energy_j",
-        "energy of the rovers' transmissions",
-        "J",
-    ),
-    ("violations", "violations", ""),
 ];
 
-/// A metric with what the study leaves open filled in.
-pub(super) fn metric(file: &MetricFile) -> Metric {
-    let known = KNOWN.iter().find(|(name, ..)| *name == file.name);
-    let (label, unit) = known.map_or((file.name.as_str(), ""), |(_, label, unit)| (label, unit));
+/// A metric with what the study leaves open filled in, by what the kernel and the system know.
+pub(super) fn metric<'a>(
+    file: &MetricFile,
+    known: impl FnOnce(&str) -> Option<&'a KnownMetric>,
+) -> Metric {
+    let name = file.name.as_str();
+    let kernel = KERNEL.iter().find(|metric| metric.name == name);
+    let known = kernel.or_else(|| known(name));
+    let (label, unit) = known.map_or((name, ""), |metric| (metric.label, metric.unit));
     Metric {
         name: file.name.clone(),
         label: file.label.clone().unwrap_or_else(|| label.to_owned()),
@@ -130,5 +71,7 @@ pub(super) fn is_measurable(results: &Map<String, Value>, name: &str) -> bool {
 pub(super) fn measurable(results: &Map<String, Value>) -> Vec<&str> {
     let of_the_system = results.iter().filter(|(_, value)| is_measure(value));
     let names = of_the_system.map(|(name, _)| name.as_str());
-    names.chain(KERNEL).collect()
+    names
+        .chain(KERNEL.iter().map(|metric| metric.name))
+        .collect()
 }

@@ -8,10 +8,13 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::commands::CODE_VERSION;
-use crate::scenario::{self, Place, Scenario, ScenarioError, Source, nearest};
-use crate::system::{Files, Registry};
+use farside_actors::suggest::nearest;
 
-use super::builtin::{builtin_names, builtin_text};
+use crate::scenario::{self, Place, Scenario, ScenarioError, Source};
+use farside_actors::system::Files;
+
+use crate::registry::Registry;
+
 use super::design;
 use super::error::StudyError;
 use super::factors::{Blame, FactorPlan, factors};
@@ -54,19 +57,22 @@ impl Study {
     ///
     /// ```
     /// use farside_experiments::study::Study;
-    /// use farside_experiments::system::Registry;
-    /// let study = Study::open("degradation/loss")?;
+    /// use farside_experiments::registry::Registry;
+    /// let registry = Registry::builtin();
+    /// let study = Study::open("degradation/loss", &registry)?;
     /// assert!(study.question().ends_with('?'));
-    /// let plan = study.plan(&["team.rovers=5".to_owned()], Some(3), &Registry::builtin())?;
+    /// let plan = study.plan(&["team.rovers=5".to_owned()], Some(3), &registry)?;
     /// assert_eq!(plan.manifest.seeds, [1, 2, 3]);
     /// # Ok::<(), farside_experiments::study::StudyError>(())
     /// ```
     ///
     /// # Errors
     /// When it cannot be found or read, or is wrong.
-    pub fn open(study: &str) -> Result<Study, StudyError> {
-        if let Some(text) = builtin_text(study) {
-            return Self::parse(study, text.to_owned(), PathBuf::new());
+    pub fn open(study: &str, registry: &Registry) -> Result<Study, StudyError> {
+        if let Some(text) = registry.study(study) {
+            let read = Self::parse(study, text.to_owned(), PathBuf::new())?;
+            let name = study.to_owned();
+            return Ok(Study { name, ..read });
         }
         let path = Path::new(study);
         let mut missing = false;
@@ -79,7 +85,7 @@ impl Study {
             }
         });
         if missing {
-            let names = builtin_names();
+            let names = registry.study_names();
             return Err(StudyError::NotFound {
                 found: study.to_owned(),
                 nearest: nearest(study, names.iter().copied()),
@@ -105,12 +111,8 @@ impl Study {
         let blame = Blame(&source);
         let mut factors = factors(&file, &blame)?;
         let cells = design::cells(&file, &mut factors, &blame)?;
-        let name = match builtin_text(name) {
-            Some(_) => name.to_owned(),
-            None => scenario::stem(name),
-        };
         Ok(Study {
-            name,
+            name: scenario::stem(name),
             folder,
             source,
             file,
@@ -142,13 +144,13 @@ impl Study {
         registry: &Registry,
     ) -> Result<Plan, StudyError> {
         let blame = Blame(&self.source);
-        let metrics = self.metrics(&blame)?;
+        self.check_arguments(sets)?;
+        let base = self.scenario(sets, registry)?;
+        let metrics = self.metrics(&base, registry, &blame)?;
         let stop = self.stop(&metrics, &blame)?;
         let seeds = self.seeds(seeds, &blame)?;
         let baseline = self.baseline(&blame)?;
         let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
-        self.check_arguments(sets)?;
-        let base = self.scenario(sets, registry)?;
         let scenario_text = base.resolved()?;
         let (scenarios, files) = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
         let manifest = Manifest {
@@ -174,7 +176,12 @@ impl Study {
         })
     }
 
-    fn metrics(&self, blame: &Blame<'_>) -> Result<Vec<Metric>, ScenarioError> {
+    fn metrics(
+        &self,
+        base: &Scenario,
+        registry: &Registry,
+        blame: &Blame<'_>,
+    ) -> Result<Vec<Metric>, ScenarioError> {
         let listed = &self.file.metrics;
         if listed.is_empty() {
             return Err(blame.invalid("metrics", "expected at least one metric"));
@@ -188,7 +195,10 @@ impl Study {
                 return Err(blame.invalid(&format!("metrics.{index}"), message));
             }
         }
-        Ok(listed.iter().map(metrics::metric).collect())
+        let system = &base.shared().system;
+        let known = |name: &str| registry.metric(system, name);
+        let filled = |file| metrics::metric(file, known);
+        Ok(listed.iter().map(filled).collect())
     }
 
     fn stop(&self, metrics: &[Metric], blame: &Blame<'_>) -> Result<Option<Stop>, ScenarioError> {
@@ -304,7 +314,7 @@ impl Study {
         let mut all: Vec<String> = own.iter().map(|one| one.argument.clone()).collect();
         all.extend_from_slice(sets);
         let name = &self.file.scenario;
-        let opened = if scenario::builtin_text(name).is_some() {
+        let opened = if registry.scenario(name).is_some() {
             Scenario::open(name, &all, registry)
         } else {
             let path = self.folder.join(name);

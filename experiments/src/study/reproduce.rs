@@ -1,7 +1,9 @@
 //! One run of a study again, from its results folder alone.
 
 use crate::scenario::{Assembled, Scenario};
-use crate::system::{Files, Registry};
+use farside_actors::system::Files;
+
+use crate::registry::Registry;
 
 use super::design;
 use super::error::StudyError;

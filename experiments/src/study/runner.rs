@@ -78,7 +78,7 @@ pub enum Ended {
 ///
 /// ```
 /// use farside_experiments::study::{Interrupts, RunOptions, Study, results::Results, run};
-/// use farside_experiments::system::Registry;
+/// use farside_experiments::registry::Registry;
 /// let text = r#"
 ///     question = "How many rovers arrive in twenty seconds?"
 ///     scenario = "network/crater-dense"

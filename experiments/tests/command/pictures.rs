@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use farside::encoding::Schema;
-use farside_actors::network::messages::RoverState;
 use farside_logs::Log;
+use farside_network::messages::RoverState;
 
 use crate::common::{farside, text};
 

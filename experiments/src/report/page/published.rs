@@ -3,10 +3,11 @@
 use maud::{Markup, html};
 
 use crate::report::measure::Study;
-use crate::report::numbers::{Style, as_written, plain};
+use crate::report::numbers::Style;
 use crate::stats::Estimate;
 use crate::study::results::{Claim, Published};
 use crate::study::summary::published::{Beside, LineSummary};
+use farside_actors::figure::numbers::{as_written, plain};
 
 /// A published figure and the cell that it is beside.
 type Field<'a> = (usize, &'a Beside);

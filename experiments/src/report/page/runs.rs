@@ -4,8 +4,8 @@ use maud::{Markup, html};
 
 use crate::report::layout::Shape;
 use crate::report::measure::Study;
-use crate::report::numbers::plain;
 use crate::study::results::{RunOutcome, RunRecord};
+use farside_actors::figure::numbers::plain;
 
 /// The most failed runs that are listed.
 const LISTED: usize = 100;

@@ -4,12 +4,13 @@ use maud::{Markup, html};
 
 use super::anchor;
 use crate::report::measure::{Measure, Study};
-use crate::report::numbers::{Style, plain};
+use crate::report::numbers::Style;
 use crate::stats::Estimate;
 use crate::study::summary::values::Kind;
 use crate::study::summary::{
     CellSummary, ListSummary, MetricSummary, NumberSummary, OverallSummary, RateSummary,
 };
+use farside_actors::figure::numbers::plain;
 
 /// One row for each cell, one column for each metric.
 pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {

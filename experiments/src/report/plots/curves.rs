@@ -3,18 +3,18 @@
 use maud::{Markup, html};
 
 use super::{BELOW, HEIGHT, TOP, WIDTH, area};
-use crate::report::colours::DASHES;
 use crate::report::layout::{Axis, Curves, Panel};
 use crate::report::measure::{Measure, Study};
 use crate::report::numbers::Style;
 use crate::report::page::published::claim;
-use crate::report::scale::{Scale, Spacing, Tick};
-use crate::report::svg::{
+use crate::stats::Estimate;
+use crate::study::results::{self, Claim};
+use farside_actors::figure::colours::DASHES;
+use farside_actors::figure::scale::{Scale, Spacing, Tick};
+use farside_actors::figure::svg::{
     Area, EndLabel, Figure, Frame, end_label_room, end_labels, marker, measured_ticks, path,
     shortened, slug, widest,
 };
-use crate::stats::Estimate;
-use crate::study::results::{self, Claim};
 
 /// How many pieces a fitted line has.
 const FITTED_STEPS: u32 = 24;

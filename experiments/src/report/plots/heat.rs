@@ -3,12 +3,12 @@
 use maud::{Markup, html};
 
 use super::{TOP, WIDTH};
-use crate::report::colours::cividis;
 use crate::report::layout::Axis;
 use crate::report::measure::{Measure, Study};
-use crate::report::scale::text_width;
-use crate::report::svg::{Area, Figure, Px, TEXT, path, shortened, slug, widest};
 use crate::stats::Estimate;
+use farside_actors::figure::colours::cividis;
+use farside_actors::figure::scale::text_width;
+use farside_actors::figure::svg::{Area, Figure, Px, TEXT, path, shortened, slug, widest};
 
 /// From this width on, the interval fits too.
 const WITH_INTERVAL: f64 = 74.0;
@@ -192,7 +192,7 @@ impl Map<'_> {
         let (least, most) = self.ends;
         let ends = [least, most].map(|value| {
             let value = self.measure.style.scaled(value);
-            crate::report::numbers::plain(value)
+            farside_actors::figure::numbers::plain(value)
         });
         let right = self.area.x(1.0).max(WIDTH - 12.0);
         let room = widest(std::iter::once(ends[1].as_str()));

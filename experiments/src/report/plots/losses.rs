@@ -3,13 +3,15 @@
 use maud::{Markup, html};
 
 use super::WIDTH;
-use crate::report::colours::SERIES;
 use crate::report::csv::reasons;
 use crate::report::measure::Study;
-use crate::report::numbers::{decimal, plain};
-use crate::report::scale::{Scale, text_width};
-use crate::report::svg::{Area, Figure, Px, measured_ticks, path, shortened, slug, widest};
 use crate::study::results::MessageCounts;
+use farside_actors::figure::colours::SERIES;
+use farside_actors::figure::numbers::{decimal, plain};
+use farside_actors::figure::scale::{Scale, text_width};
+use farside_actors::figure::svg::{
+    Area, Figure, Px, measured_ticks, path, shortened, slug, widest,
+};
 
 const ROW: f64 = 20.0;
 

@@ -3,17 +3,17 @@
 use maud::{Markup, html};
 
 use super::{BELOW, HEIGHT, Plots, TOP, WIDTH, area};
-use crate::report::colours::{DASHES, SERIES};
 use crate::report::layout::{PANELS, Panel, Series, spread};
 use crate::report::measure::{Measure, Study};
-use crate::report::scale::Scale;
-use crate::report::svg::{
-    Area, EndLabel, Figure, Frame, end_label_room, end_labels, measured_ticks, path, shortened,
-    slug,
-};
 use crate::stats::distribution::Ecdf;
 use crate::stats::survival::kaplan_meier;
 use crate::study::summary::values::observations;
+use farside_actors::figure::colours::{DASHES, SERIES};
+use farside_actors::figure::scale::Scale;
+use farside_actors::figure::svg::{
+    Area, EndLabel, Figure, Frame, end_label_room, end_labels, measured_ticks, path, shortened,
+    slug,
+};
 
 /// One cell's curve: from a first share on, at each x a new one with its interval.
 struct Steps {

@@ -2,12 +2,12 @@
 
 use proptest::prelude::*;
 
+use super::super::Study;
 use super::super::results::{Claim, Manifest, Results};
-use super::super::{Study, builtin_names, builtin_text};
 use super::refused::{check, refused};
 use super::toy::{self, Toy, plan, registry, study};
 use super::{GRID, options, run_all};
-use crate::system::Registry;
+use crate::registry::Registry;
 
 /// A study of three levels and two delays with a published table of these figures.
 fn table(more: &str, values: &str) -> String {
@@ -361,8 +361,9 @@ fn a_mistake_in_a_variant_is_said_where_it_stands() {
 
 #[test]
 fn built_in_studies_are_whole() {
-    for name in builtin_names() {
-        let study = Study::open(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let registry = Registry::builtin();
+    for name in registry.study_names() {
+        let study = Study::open(name, &registry).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(study.question().ends_with('?'), "{name}");
         let plan = study.plan(&[], Some(1), &Registry::builtin());
         let manifest = plan
@@ -379,7 +380,7 @@ fn built_in_studies_are_whole() {
             );
         }
         // Lines are short enough for a terminal; figures of others may be long.
-        let text = builtin_text(name).unwrap();
+        let text = registry.study(name).unwrap();
         assert!(text.lines().all(|line| line.len() <= 140), "{name}");
     }
 }
@@ -388,9 +389,9 @@ fn built_in_studies_are_whole() {
 #[test]
 fn built_in_tables_are_those_of_the_paper() {
     let printed = |study: &str, title: &str| -> Vec<f64> {
-        let manifest = Study::open(study)
-            .unwrap()
-            .plan(&[], Some(1), &Registry::builtin());
+        let registry = Registry::builtin();
+        let study = Study::open(study, &registry).unwrap();
+        let manifest = study.plan(&[], Some(1), &registry);
         let manifest = manifest.unwrap().manifest;
         let table = manifest
             .published

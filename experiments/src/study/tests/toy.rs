@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use farside::prelude::*;
+use farside_actors::system::{Assembly, Results, Section, Settings, Setup, SetupError, System};
 use farside_actors::units;
 use serde::{Deserialize, Serialize};
 
+use crate::registry::Registry;
 use crate::study::{Plan, Study, StudyError};
-use crate::system::{Conclude, Registry, Results, Settings, Setup, SetupError, System};
 
 /// A folder with the toy's scenario in it.
 pub(super) struct Toy(tempfile::TempDir);
@@ -80,8 +81,12 @@ impl System for ToySystem {
         "toy"
     }
 
-    fn sections(&self) -> &[&str] {
-        &["toy"]
+    fn about(&self) -> &str {
+        "an alarm that rings once"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        vec![Section::named("toy")]
     }
 
     fn parse(
@@ -123,7 +128,7 @@ impl Settings for ToyScenario {
         toml::Table::try_from(self)
     }
 
-    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError> {
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let ToySettings {
             level,
             delay,
@@ -151,7 +156,7 @@ impl Settings for ToyScenario {
             panics: panics.clone(),
         });
         let at_last = fails("conclude");
-        Ok(Box::new(move |_report| {
+        Ok(Assembly::new(move |_: &Report| {
             if let Some(text) = at_last {
                 panic!("{text}");
             }

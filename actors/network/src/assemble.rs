@@ -1,0 +1,540 @@
+//! Assembling the network-guided system: hosts, actors, links, missions, the monitor.
+
+mod error;
+mod site;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use farside::carrier::Carrier;
+use farside::prelude::*;
+use farside::random::RandomKey;
+use farside_actors::link::{Links, Wire, Wiring};
+use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
+use nalgebra::Point3;
+
+use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
+use super::corridors::Corridors;
+use super::gaps::{self, Refused};
+use super::lng::LocalGraph;
+use super::messages::RoverId;
+use super::metrics::NetworkMetrics;
+use super::monitor::{Monitor, Score};
+use super::motion::Ways;
+use super::node::Node;
+use super::payoff::Payoffs;
+use super::rover::Rover;
+use super::schedule::Schedule;
+use super::takeover;
+use super::timing::Timing;
+
+pub use error::NetworkError;
+pub(crate) use site::Site;
+
+/// An assembled system: its actors by name, and its score.
+pub struct Network {
+    site: Arc<Site>,
+    nodes: Vec<Address<Node>>,
+    rovers: Vec<Address<Rover>>,
+    score: Arc<Mutex<Score>>,
+}
+
+/// What the system is put together from, besides its rovers.
+#[derive(Clone)]
+pub struct Parts<'a> {
+    /// Of it only the endpoints and what becomes of coverage gaps are read: `roadmap` and `sensors`
+    /// are what else it describes.
+    pub world: &'a WorldConfig,
+    /// Where rovers drive.
+    pub roadmap: Arc<Roadmap>,
+    /// The nodes, and which vertices are whose.
+    pub sensors: Arc<SensorNetwork>,
+    /// How the system works.
+    pub config: &'a NetworkConfig,
+    /// The ground that radios look over, if it is known.
+    pub terrain: Option<Arc<HeightField>>,
+}
+
+impl<'a> Parts<'a> {
+    /// With nodes as `world` places them for a seed, and nothing known of the ground.
+    ///
+    /// # Errors
+    /// When nodes cannot be placed so that they cover the roadmap.
+    pub fn placed(
+        world: &'a WorldConfig,
+        roadmap: Arc<Roadmap>,
+        config: &'a NetworkConfig,
+        seed: u64,
+    ) -> Result<Self, SensorError> {
+        let sensors = Arc::new(world.place(&roadmap, seed)?);
+        Ok(Parts {
+            world,
+            roadmap,
+            sensors,
+            config,
+            terrain: None,
+        })
+    }
+}
+
+/// Who drives from where to where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Missions {
+    /// Rovers queue at their entries, and leave the map at their goals: each one's entry and goal.
+    Queued(Vec<(VertexId, VertexId)>),
+    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal, no
+    /// two starts and no two goals alike.
+    Standing(Vec<(VertexId, VertexId)>),
+}
+
+impl Missions {
+    fn all(&self) -> &[(VertexId, VertexId)] {
+        match self {
+            Missions::Queued(all) | Missions::Standing(all) => all,
+        }
+    }
+
+    /// Whether they can be.
+    fn check(&self, roadmap: &Roadmap) -> Result<(), NetworkError> {
+        if self.all().is_empty() {
+            return Err(NetworkError::NoRovers);
+        }
+        let Missions::Standing(missions) = self else {
+            return Ok(());
+        };
+        for (what, of) in [("start", 0), ("goal", 1)] {
+            let place = |mission: &(VertexId, VertexId)| [mission.0, mission.1][of];
+            let mut places: Vec<_> = missions.iter().map(place).collect();
+            places.sort_unstable();
+            if let Some(pair) = places.windows(2).find(|pair| pair[0] == pair[1]) {
+                let vertex = pair[0];
+                return Err(NetworkError::Shared { what, vertex });
+            }
+            if let Some(&vertex) = places.last().filter(|v| v.0 as usize >= roadmap.len()) {
+                return Err(NetworkError::Outside { what, vertex });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
+/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions between
+/// neighbouring nodes and between each node and each rover; and the monitor, which ends the run.
+///
+/// # Errors
+/// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, two
+/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be; and
+/// those of `wire`.
+pub fn assemble(
+    sim: &mut Simulation,
+    parts: &Parts<'_>,
+    missions: &Missions,
+    wire: &mut Wire<'_>,
+) -> Result<Network, NetworkError> {
+    let (config, sensors) = (parts.config, &parts.sensors);
+    config.check()?;
+    missions.check(&parts.roadmap)?;
+    parts.world.gaps.check(sensors, config.policy)?;
+    let stays = matches!(missions, Missions::Standing(_));
+    let missions = missions.all().to_vec();
+    let roadmap = parts.world.open_part(&parts.roadmap, sensors);
+    let refused = gaps::refused(&roadmap, sensors, &missions);
+    let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
+    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
+    if !stays {
+        let all = (0..).map(RoverId).zip(&missions);
+        for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
+            queues.entry(*entry).or_default().push(id);
+        }
+    }
+    let node_names = names("node", sensors.len());
+    let rover_names = names("rover", missions.len());
+    gaps::check_refused(&refused, &rover_names, stays)?;
+    let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
+    let places = places_m(&roadmap, sensors, &missions);
+    for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
+        wiring.place(name, place_m);
+    }
+    if let Some(terrain) = &parts.terrain {
+        wiring.terrain(terrain.clone());
+    }
+    let links = wire(sim, &wiring)?;
+    let links = (links.slowest(), links.slowest_rate_bit_per_s());
+    let timing = timing(&roadmap, config, links)?;
+    let longest_step = longest_step(&roadmap, config, &timing)?;
+    let planned: Vec<_> = (0..)
+        .map(RoverId)
+        .zip(missions.iter().copied())
+        .filter(|(id, _)| has_way(id))
+        .collect();
+    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stays);
+    let lines = match config.takeover_after {
+        Some(_) => takeover::lines(&roadmap, sensors),
+        None => Vec::new(),
+    };
+    let site = Arc::new(Site {
+        lines,
+        payoffs: Payoffs::new(config, &roadmap),
+        corridors: match config.corridor_tokens {
+            true => Corridors::new(&roadmap, 2),
+            false => Corridors::default(),
+        },
+        schedule: schedule.map_err(NetworkError::NoPlan)?,
+        patience: config.patience(links.0, &timing),
+        timing,
+        roadmap_from: source(config, &node_names)?,
+        node_names,
+        rover_names,
+        config: config.clone(),
+        queues: queues.into_iter().collect(),
+        refused,
+        longest_step,
+        roadmap,
+        sensors: sensors.clone(),
+        missions,
+        stays,
+    });
+    let nodes = declare_nodes(sim, &site);
+    let rovers = declare_rovers(sim, &site);
+    let (monitor, score) = Monitor::new(site.clone());
+    sim.observe(monitor);
+    Ok(Network {
+        site,
+        nodes,
+        rovers,
+        score,
+    })
+}
+
+/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the one
+/// from one host to another, by their names.
+///
+/// # Errors
+/// Those of [`assemble`].
+pub fn assemble_over<C: Carrier>(
+    sim: &mut Simulation,
+    parts: &Parts<'_>,
+    missions: &Missions,
+    mut carrier: impl FnMut(&str, &str) -> C,
+) -> Result<Network, NetworkError> {
+    let mut wire =
+        |sim: &mut Simulation, wiring: &Wiring| Ok(Links::carried(sim, wiring, &mut carrier));
+    assemble(sim, parts, missions, &mut wire)
+}
+
+/// The node that `network.roadmap_from` names.
+fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, NetworkError> {
+    let Some(name) = &config.roadmap_from else {
+        return Ok(None);
+    };
+    let at = names.iter().position(|known| known == name);
+    let at = at.ok_or_else(|| NetworkError::UnknownSource {
+        name: name.clone(),
+        first: names.first().cloned().unwrap_or_default(),
+        last: names.last().cloned().unwrap_or_default(),
+    })?;
+    Ok(Some(NodeId(at as u32)))
+}
+
+/// The parts of a cycle. The paper's policy moves rovers within its cycles: where nothing is said, they
+/// are long enough for the longest edge.
+fn timing(
+    roadmap: &Roadmap,
+    config: &NetworkConfig,
+    (latency, rate_bit_per_s): (SimDuration, Option<u64>),
+) -> Result<Timing, ConfigError> {
+    let mut config = config.clone();
+    if config.policy == Policy::Paper && config.motion == Motion::Continuous {
+        let longest = Ways {
+            roadmap,
+            config: &config,
+        }
+        .longest();
+        config.traverse = longest.map_or(config.traverse, |(_, time)| time);
+    }
+    config.timing(latency, rate_bit_per_s)
+}
+
+/// The longest that a step is planned to take.
+///
+/// # Errors
+/// When an edge takes so long that a cycle of the paper's policy has no time for it, or that driving
+/// along it would look like a deadlock.
+fn longest_step(
+    roadmap: &Roadmap,
+    config: &NetworkConfig,
+    timing: &Timing,
+) -> Result<SimDuration, NetworkError> {
+    let ways = Ways { roadmap, config };
+    let longest = ways
+        .longest()
+        .filter(|_| config.motion == Motion::Continuous);
+    let Some((edge, time)) = longest else {
+        return Ok(timing.cycle);
+    };
+    let window = timing.cycle * u64::from(config.passive_window);
+    let mut limits = vec![("network.passive_window", window)];
+    if config.policy == Policy::Paper {
+        // What a rover is granted at the end of a cycle's phases it has done before the next cycle.
+        let left = timing.cycle.saturating_sub(timing.decided_after());
+        limits.insert(0, ("what network.cycle leaves after its phases", left));
+    }
+    match limits.into_iter().find(|&(_, limit)| time >= limit) {
+        None => Ok(time.max(timing.cycle)),
+        Some((limit_of, limit)) => Err(NetworkError::SlowEdge {
+            edge,
+            length_m: ways.length_m(edge.0, edge.1),
+            time,
+            limit_of,
+            limit,
+        }),
+    }
+}
+
+/// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of
+/// names is that of numbers.
+fn names(kind: &str, count: usize) -> Vec<String> {
+    let digits = count.to_string().len().max(2);
+    (1..=count)
+        .map(|i| format!("{kind}_{i:0digits$}"))
+        .collect()
+}
+
+/// An entry and a goal for each rover, at random. Of `world` only the endpoints are read.
+///
+/// ```
+/// use farside_network::{TeamConfig, WorldConfig, missions};
+/// use farside_worlds::Roadmap;
+/// let map = Roadmap::builtin("crater-dense")?;
+/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
+/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the team is empty, or the roadmap's boundary has no two places to drive between.
+pub fn missions(
+    world: &WorldConfig,
+    roadmap: &Roadmap,
+    team: &TeamConfig,
+    seed: u64,
+) -> Result<Vec<(VertexId, VertexId)>, NetworkError> {
+    if team.rovers == 0 {
+        return Err(NetworkError::NoRovers);
+    }
+    let (entries, exits) = world.endpoints.split(roadmap);
+    // With one entry that is the only exit there is nowhere to go.
+    let pairs = entries
+        .iter()
+        .flat_map(|a| exits.iter().map(move |b| (a, b)));
+    let starts: Vec<_> = entries
+        .iter()
+        .filter(|&&entry| exits.iter().any(|&exit| exit != entry))
+        .copied()
+        .collect();
+    if !pairs.into_iter().any(|(a, b)| a != b) {
+        return Err(NetworkError::Endpoints {
+            roadmap: roadmap.name().to_owned(),
+            entries: entries.len(),
+            exits: exits.len(),
+        });
+    }
+    let mission = |rover: u32| {
+        let key = RandomKey::new(seed).text("mission");
+        let mut draws = key.number(u64::from(rover)).stream();
+        let entry = *draws.choose(&starts).expect("there is a pair");
+        loop {
+            let goal = *draws.choose(&exits).expect("there is a pair");
+            if goal != entry {
+                return (entry, goal);
+            }
+        }
+    };
+    Ok((0..team.rovers).map(mission).collect())
+}
+
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
+    let declare = |(id, name): (NodeId, &String)| {
+        let host = sim.host(name);
+        sim.heavy(host);
+        let graph = Arc::new(LocalGraph::new(&site.roadmap, &site.sensors, id));
+        let site = site.clone();
+        let build = move |_: &str| Node::new(site.clone(), id, graph.clone());
+        sim.actor(host, name, build)
+    };
+    site.sensors
+        .nodes()
+        .zip(&site.node_names)
+        .map(declare)
+        .collect()
+}
+
+fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>> {
+    let declare = |(id, name): (RoverId, &String)| {
+        let host = sim.host(name);
+        let site = site.clone();
+        sim.actor(host, name, move |_| Rover::new(site.clone(), id))
+    };
+    (0..)
+        .map(RoverId)
+        .zip(&site.rover_names)
+        .map(declare)
+        .collect()
+}
+
+/// Links both ways between neighbouring nodes, and between each node and each rover.
+fn wiring(
+    sim: &mut Simulation,
+    sensors: &SensorNetwork,
+    node_names: &[String],
+    rover_names: &[String],
+) -> Wiring {
+    let mut hosts =
+        |names: &[String]| -> Vec<HostId> { names.iter().map(|name| sim.host(name)).collect() };
+    let (node_hosts, rover_hosts) = (hosts(node_names), hosts(rover_names));
+    let mut wiring = Wiring::default();
+    for id in sensors.nodes() {
+        let node = (node_hosts[id.0 as usize], &*node_names[id.0 as usize]);
+        for other in sensors.neighbors(id) {
+            let at = other.0 as usize;
+            wiring.link(node, (node_hosts[at], &node_names[at]));
+        }
+        for (host, name) in rover_hosts.iter().zip(rover_names) {
+            wiring.both_ways(node, (*host, name));
+        }
+    }
+    wiring
+}
+
+/// Where each host stands at first, in the world's frame \[m\]: nodes at their places, as high as a
+/// vertex of theirs; then rovers at their entries.
+fn places_m<'a>(
+    roadmap: &'a Roadmap,
+    sensors: &'a SensorNetwork,
+    missions: &'a [(VertexId, VertexId)],
+) -> impl Iterator<Item = Point3<f64>> + 'a {
+    let nodes = sensors.nodes().map(|id| {
+        let at = sensors.position_m(id);
+        let height_m = sensors.owned(id).first().map(|v| roadmap.height_m(*v));
+        Point3::new(at.x, at.y, height_m.unwrap_or(0.0))
+    });
+    let rovers = missions.iter().map(|(entry, _)| {
+        let at = roadmap.position_m(*entry);
+        Point3::new(at.x, at.y, roadmap.height_m(*entry))
+    });
+    nodes.chain(rovers)
+}
+
+impl Network {
+    /// The score so far: after the run, its result.
+    pub fn metrics(&self) -> NetworkMetrics {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.metrics(&self.site)
+    }
+
+    /// How long the parts of a planning cycle last.
+    pub fn timing(&self) -> Timing {
+        self.site.timing
+    }
+
+    /// Whether rovers are coordinated by max-plus, as those of the policy `paper` are.
+    pub fn coordinates(&self) -> bool {
+        self.site.config.policy == Policy::Paper
+    }
+
+    /// The length of a planning cycle, stretched if links are slow.
+    pub fn cycle(&self) -> SimDuration {
+        self.site.timing.cycle
+    }
+
+    /// How many rovers have arrived so far.
+    pub fn arrived(&self) -> u32 {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.arrived()
+    }
+
+    /// How many collisions there were so far.
+    pub fn collisions(&self) -> u32 {
+        let score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        score.collisions()
+    }
+
+    /// The nodes' names, in order; hosts are called the same.
+    pub fn node_names(&self) -> &[String] {
+        &self.site.node_names
+    }
+
+    /// The rovers' names, in order; hosts are called the same.
+    pub fn rover_names(&self) -> &[String] {
+        &self.site.rover_names
+    }
+
+    /// Each rover's entry and goal, in the order of the names.
+    pub fn missions(&self) -> &[(VertexId, VertexId)] {
+        &self.site.missions
+    }
+
+    /// The rovers that gaps leave without a way, which never enter: a sentence for each.
+    pub fn refused(&self) -> Vec<String> {
+        let sentence = |r: &Refused| r.sentence(&self.site.rover_names);
+        self.site.refused.iter().map(sentence).collect()
+    }
+
+    /// Crashes the node or rover called `actor` at `time`: it loses its plans, keeps what is
+    /// durable, and a rover stops where it is.
+    ///
+    /// # Errors
+    /// When there is no such actor.
+    pub fn crash_at(
+        &self,
+        sim: &mut Simulation,
+        time: SimTime,
+        actor: &str,
+    ) -> Result<(), NetworkError> {
+        match self.find(actor)? {
+            Found::Node(address) => sim.crash_at(time, address),
+            Found::Rover(address) => sim.crash_at(time, address),
+        }
+        Ok(())
+    }
+
+    /// Restarts the node or rover called `actor` at `time`.
+    ///
+    /// # Errors
+    /// When there is no such actor.
+    pub fn restart_at(
+        &self,
+        sim: &mut Simulation,
+        time: SimTime,
+        actor: &str,
+    ) -> Result<(), NetworkError> {
+        match self.find(actor)? {
+            Found::Node(address) => sim.restart_at(time, address),
+            Found::Rover(address) => sim.restart_at(time, address),
+        }
+        Ok(())
+    }
+
+    fn find(&self, actor: &str) -> Result<Found, NetworkError> {
+        let place = |names: &[String]| names.iter().position(|name| name == actor);
+        if let Some(at) = place(&self.site.node_names) {
+            return Ok(Found::Node(self.nodes[at]));
+        }
+        if let Some(at) = place(&self.site.rover_names) {
+            return Ok(Found::Rover(self.rovers[at]));
+        }
+        let (nodes, rovers) = (&self.site.node_names, &self.site.rover_names);
+        Err(NetworkError::UnknownActor {
+            name: actor.to_owned(),
+            first: nodes.first().cloned().unwrap_or_default(),
+            last: rovers.last().cloned().unwrap_or_default(),
+        })
+    }
+}
+
+/// An actor found by its name.
+enum Found {
+    Node(Address<Node>),
+    Rover(Address<Rover>),
+}

@@ -1,0 +1,133 @@
+//! Network-guided navigation: sensor nodes plan the paths of rovers on a roadmap, with messages.
+//!
+//! The algorithm is that of Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning for
+//! Resource-Constrained Planetary Rovers*, here called *network-guided*. In each planning cycle the
+//! nodes exchange who is where, propose candidate paths, agree on an assignment by max-plus, and
+//! send rovers on by one vertex. The paper's messages arrive at once and in order, and its
+//! guarantee against collisions rests on that. Here they are late or lost, so that a safety
+//! protocol of its own stands below the algorithm: a rover enters a vertex only when the vertex's
+//! owner has granted it, and an owner grants only what is proved to be free.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use farside::prelude::*;
+//! use farside_network::{
+//!     Missions, NetworkConfig, Parts, TeamConfig, WorldConfig, assemble_over, missions,
+//! };
+//! use farside_worlds::Roadmap;
+//!
+//! let (world, seed) = (WorldConfig::default(), 1);
+//! let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name())?);
+//! let (team, network) = (TeamConfig { rovers: 3 }, NetworkConfig::default());
+//! let parts = Parts::placed(&world, roadmap, &network, seed)?;
+//! let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
+//! let mut sim = Simulation::new(seed);
+//! let wire = FixedDelay::new(SimDuration::from_millis(5));
+//! let system = assemble_over(&mut sim, &parts, &missions, |_, _| wire.clone())?;
+//! let report = sim.run(Executor::Inline)?;
+//! assert_eq!(report.end.detail(), "@control: all rovers have arrived");
+//! let metrics = system.metrics();
+//! assert_eq!((metrics.arrived, metrics.collisions), (3, 0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Readings
+//!
+//! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
+//! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
+//! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
+//! team of 50 comes to a standstill. And a rover that stands on a leaf of its node's local
+//! neighbourhood graph has a path of length 0 to that leaf
+//! ([`leaf_wait_penalty`](NetworkConfig::leaf_wait_penalty)): without it two rovers that meet at a
+//! pocket push each other in and out of it for ever, because the zero path is worth nothing.
+//!
+//! The paper's step 5 and its request to the owner of the next vertex are one message here
+//! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that comes
+//! too late to be weighed against others is granted if the vertex is free.
+//!
+//! # Starved processors
+//!
+//! The paper's Table 1 is about processors as much as about paths. With all the computing that it
+//! asks for (`network.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
+//! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
+//! 2006. With one constant for all cells, `network.processor = "paper"` ([`Processor::PAPER`], the
+//! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
+//! which compare more and longer candidate paths. With fewer than three iterations in a cycle
+//! nearly all do.
+//!
+//! # Spreading the load
+//!
+//! Section 5 (iii) of the paper asks what could be done where rovers gather and few nodes have all the
+//! computing. Three answers can be switched on. A node with more than it can compute has neighbours
+//! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
+//! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
+//! ([`ownership`](WorldConfig::ownership)). Standstills in 16 teams each, in per cent; dense roadmap,
+//! links of 5 ms, `active_window = 150`:
+//!
+//! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
+//! |---|---|---|---|---|---|---|---|---|
+//! | 75, 21 | 31 | 0 | 0 | 0 | 0 | 6 | 0 | |
+//! | 100, 28 | 50 | 12 | 31 | 19 | 0 | 12 | 0 | |
+//! | 100, 21 | 94 | 81 | | 75 | 50 | 88 | 0 | 0 |
+//! | 75, 14 | 100 | 94 | | 100 | 75 | 94 | 25 | 0 |
+//!
+//! Each helps where some nodes have too much to do and others have not. Where all have, nobody is there to
+//! hand work to, and what helps is to let fewer rovers in: [`entry_gates`](NetworkConfig::entry_gates).
+//! With them loads are uneven again, and outsourcing does the rest. A weight of 100 is too much: detours
+//! of a third. To divide vertices by expected traffic (`traffic`) does less than to count them. Study
+//! `network/load-balancing`.
+//!
+//! # Where what is
+//!
+//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
+//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long
+//! an edge takes: `motion`. The protocol: [`messages`], `safety` (what owners and rovers keep, and why
+//! no two rovers meet), `takeover` (who answers for a node that has fallen silent), `gaps` (where
+//! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
+
+mod assemble;
+mod assignment;
+mod builtin;
+mod candidates;
+pub mod cases;
+mod config;
+mod corridors;
+mod gaps;
+mod lng;
+mod loads;
+pub mod mapf;
+mod max_plus;
+pub mod messages;
+mod metrics;
+mod monitor;
+mod motion;
+mod node;
+#[cfg(test)]
+mod open_tests;
+mod payoff;
+mod picture;
+mod processor;
+pub mod reservation;
+mod rover;
+mod safety;
+mod scene;
+mod schedule;
+mod system;
+mod takeover;
+#[cfg(test)]
+mod testing;
+mod timing;
+
+pub use assemble::{Missions, Network, NetworkError, Parts, assemble, assemble_over, missions};
+pub use candidates::{CandidatePath, Destination, FirstStep};
+pub use config::{
+    ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
+    WorldConfig,
+};
+pub use gaps::Gaps;
+pub use metrics::{Costs, Deadlock, NetworkMetrics};
+pub use node::Node;
+pub use processor::Processor;
+pub use rover::Rover;
+pub use system::NetworkSystem;
+pub use timing::Timing;

@@ -1,0 +1,447 @@
+//! The monitor: watches rovers' true positions from outside, ends the run, and keeps the score. It
+//! knows nothing of grants, owners or plans: only what rovers recorded of themselves.
+//!
+//! **Collision.** As [`Collisions`] has it; in entry queues and beyond goals nothing is claimed.
+//!
+//! **Who waits for whom**, at a standstill of the `paper` policy: a rover for the one that claims the
+//! next vertex of its shortest way ([`Roadmap::shortest_path`](farside_worlds::Roadmap)) to its goal;
+//! one in a queue for the one at its entry. Nobody waits for two, so that the circles are all there
+//! are. With `complete`, rovers that queue go their reserved ways and not the shortest: there is no
+//! such graph. Where they stay on the map, those that have no way are looked at in the same manner; and
+//! one that is at its goal with all vertices beside it taken cannot make way, and waits for those
+//! who stand there.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::{RunInfo, SimTime};
+use farside_worlds::{NodeId, VertexId};
+
+use super::assemble::Site;
+use super::config::{Motion, Policy};
+use super::loads::Loads;
+use super::messages::{NodeState, RoverId, RoverState, TakenOver};
+use super::metrics::{Costs, Deadlock, NetworkMetrics};
+use farside_actors::invariants::{Collisions, Place, WaitCycle, WaitGraph};
+
+/// What the monitor keeps of a rover, beside where it is.
+#[derive(Clone, Debug, Default)]
+struct Track {
+    previous: Option<VertexId>,
+    entered: Option<u32>,
+    arrived: Option<u32>,
+    arrived_at: Option<SimTime>,
+    transmit_energy_j: f64,
+    /// Moves begun.
+    moves: u32,
+    backtracks: u32,
+    /// The cycle of its last move.
+    moved: Option<u32>,
+    /// Edges between where it is, or will be, and its goal.
+    remaining: u32,
+    /// The same when the team was nearest to its goals.
+    remaining_then: u32,
+    /// While it stands at its goal: the time step at which it came there, see [`Costs`].
+    cost: Option<u32>,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Score {
+    tracks: Vec<Track>,
+    collisions: Collisions<VertexId>,
+    cycle: u32,
+    interventions: u32,
+    last_intervention: Option<u32>,
+    iterations: u64,
+    planned_cycles: u64,
+    loads: Loads,
+    /// When nodes that were given the roadmap knew all of it.
+    informed: Vec<SimTime>,
+    messages: u64,
+    bytes: u64,
+    last_move: u32,
+    /// The least sum of remaining distances so far, and when it was reached.
+    nearest: (u32, u32),
+    deadlock: Deadlock,
+    standstill: Option<String>,
+    wait_cycles: Vec<WaitCycle<VertexId>>,
+    taken_over: Vec<TakenOver>,
+    confirmed_deadlocks: u32,
+    last_confirmed: Vec<RoverId>,
+    ended: bool,
+}
+
+pub(crate) struct Monitor {
+    site: Arc<Site>,
+    score: Arc<Mutex<Score>>,
+    /// Who takes part, to tell rovers' samples by.
+    rovers: Vec<Option<RoverId>>,
+}
+
+impl Monitor {
+    /// A monitor, and what it will write the score to.
+    pub(crate) fn new(site: Arc<Site>) -> (Monitor, Arc<Mutex<Score>>) {
+        let start = |(rover, &(entry, goal)): (RoverId, &(VertexId, VertexId))| {
+            let remaining = match site.is_refused(rover) {
+                true => 0,
+                false => site.roadmap.distance(entry, goal),
+            };
+            Track {
+                remaining,
+                remaining_then: remaining,
+                ..Track::default()
+            }
+        };
+        let tracks: Vec<Track> = (0..).map(RoverId).zip(&site.missions).map(start).collect();
+        let sum = tracks.iter().map(|t| t.remaining).sum();
+        let mut collisions = Collisions::new();
+        for name in &site.rover_names {
+            collisions.add(name);
+        }
+        let score = Arc::new(Mutex::new(Score {
+            tracks,
+            collisions,
+            nearest: (sum, 0),
+            ..Score::default()
+        }));
+        let monitor = Monitor {
+            site,
+            score: score.clone(),
+            rovers: Vec::new(),
+        };
+        (monitor, score)
+    }
+}
+
+impl Observer for Monitor {
+    fn wants(&self) -> Wants {
+        Wants {
+            samples: true,
+            ..Wants::default()
+        }
+    }
+
+    fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        let id = |name: &String| self.site.rover_names.iter().position(|n| n == name);
+        let rover = |entity: &farside::Entity| id(&entity.name).map(|id| RoverId(id as u32));
+        self.rovers = run.entities.iter().map(rover).collect();
+        Ok(())
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let mut score = self.score.lock().unwrap_or_else(PoisonError::into_inner);
+        let cycle = self.site.cycle_at(record.time());
+        // What is on its way at the end is recorded with the time that it would have come at.
+        if cycle > score.cycle && record.class != RecordClass::InFlight {
+            score.cycle = cycle;
+            if let Some(reason) = score.verdict(&self.site) {
+                return Ok(Flow::Stop(reason));
+            }
+        }
+        if record.class.is_fate() && record.link.is_some() && record.copy == 0 {
+            score.messages += 1;
+            // The digest had it encoded: looking costs nothing.
+            score.bytes += record.body.len() as u64;
+        }
+        if record.class == RecordClass::Sample
+            && let Some(kind) = record.kind
+        {
+            let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
+            if let Some(rover) = self.rovers[record.sender.index()] {
+                let state: RoverState = kind.schema().decode(record.body).map_err(failed)?;
+                return Ok(score.follow(&self.site, rover, &state, record.time()));
+            } else if kind.name() == "NodeState" {
+                let state = kind.schema().decode(record.body).map_err(failed)?;
+                score.loads.add(record.sender.index(), &state);
+                score.count(&state);
+            } else if kind.name() == "RoadmapKnown" {
+                score.informed.push(record.time());
+            } else if kind.name() == "TakenOver" {
+                let taken = kind.schema().decode(record.body).map_err(failed)?;
+                score.taken_over.push(taken);
+            }
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+impl Score {
+    /// A node's cycle.
+    fn count(&mut self, state: &NodeState) {
+        if state.forced_stops > 0 && self.last_intervention != Some(state.cycle) {
+            self.last_intervention = Some(state.cycle);
+            self.interventions += 1;
+        }
+        if state.confirmed_deadlocks > 0 {
+            self.confirmed_deadlocks += state.confirmed_deadlocks;
+            self.last_confirmed.clone_from(&state.deadlock);
+        }
+        if state.rovers > 0 {
+            self.planned_cycles += 1;
+            self.iterations += u64::from(state.iterations);
+        }
+    }
+
+    /// A rover's change.
+    fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
+        let at = rover.0 as usize;
+        self.tracks[at].transmit_energy_j = state.transmit_energy_j;
+        let old = self.collisions.place(at);
+        let place = match (state.whereabouts.vertex, state.whereabouts.moving_to) {
+            (None, _) => Place::Away,
+            (Some(here), None) => Place::At(here),
+            (Some(here), Some(next)) => Place::Between(here, next),
+        };
+        if place == old {
+            return Flow::Continue;
+        }
+        self.collisions.update(now, at, place);
+        let cycle = self.cycle;
+        let track = &mut self.tracks[at];
+        let vertex = place.vertex();
+        if let Place::Between(_, to) = place {
+            track.moves += 1;
+            track.backtracks += u32::from(track.previous == Some(to));
+        } else if vertex != old.vertex() {
+            track.previous = old.vertex();
+        }
+        if vertex.is_some() && track.entered.is_none() {
+            track.entered = Some(cycle);
+        }
+        if vertex == Some(state.goal) && track.arrived.is_none() {
+            track.arrived = Some(cycle);
+            track.arrived_at = Some(now);
+        } else if site.stays && track.cost.is_some() {
+            // It makes way for another, and has to come back.
+            (track.arrived, track.arrived_at) = (None, None);
+        }
+        track.cost = match place {
+            Place::At(here) if here == state.goal => {
+                let step = site.timing.cycle.as_nanos();
+                let steps = (now.as_nanos() + step / 2) / step;
+                Some(track.moves.max(u32::try_from(steps).unwrap_or(u32::MAX)))
+            }
+            _ => None,
+        };
+        if let Some(claim) = place.claim() {
+            track.remaining = site.roadmap.distance(claim, state.goal);
+        }
+        track.moved = Some(cycle);
+        self.last_move = cycle;
+        let gone = |rover: usize| !self.is_out(site, rover);
+        if !self.ended && (0..self.tracks.len()).all(gone) {
+            self.ended = true;
+            let all = match site.refused.is_empty() {
+                true => "all rovers have arrived",
+                false => "all rovers that have a way have arrived",
+            };
+            return Flow::Stop(all.to_owned());
+        }
+        Flow::Continue
+    }
+
+    /// Looks back when a new cycle begins: why the run should end, if it should.
+    fn verdict(&mut self, site: &Site) -> Option<String> {
+        let sum: u32 = self.tracks.iter().map(|t| t.remaining).sum();
+        if sum < self.nearest.0 {
+            self.nearest = (sum, self.cycle);
+            for track in &mut self.tracks {
+                track.remaining_then = track.remaining;
+            }
+        }
+        if self.ended {
+            return None;
+        }
+        let config = &site.config;
+        let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
+        let reason = if still(self.last_move, config.passive_window + site.patience) {
+            self.deadlock = Deadlock::Passive;
+            "passive deadlock"
+        } else if still(self.nearest.1, config.active_window + site.patience) {
+            self.deadlock = Deadlock::Active;
+            "active deadlock"
+        } else if self.cycle >= config.cycle_limit {
+            "cycle limit"
+        } else {
+            return None;
+        };
+        self.ended = true;
+        // Why the run stopped is part of its digest, and stays as short as it was.
+        let reason = format!("{reason}: {}", self.remaining(site));
+        let looks = config.policy == Policy::Paper || site.stays;
+        if self.deadlock != Deadlock::None && looks {
+            self.wait_cycles = self.circles(site);
+        }
+        self.standstill = Some(format!("{reason}{}", self.why()));
+        Some(reason)
+    }
+
+    /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
+    fn is_out(&self, site: &Site, rover: usize) -> bool {
+        if site.is_refused(RoverId(rover as u32)) {
+            return false;
+        }
+        let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
+        match site.stays {
+            true => track.remaining > 0 || !matches!(place, Place::At(_)),
+            false => track.arrived.is_none() || place != Place::Away,
+        }
+    }
+
+    /// Who is still out, in a sentence.
+    fn remaining(&self, site: &Site) -> String {
+        let out = |rover: &usize| self.is_out(site, *rover);
+        let out: Vec<usize> = (0..self.tracks.len()).filter(out).collect();
+        let left = out.len();
+        let place = |rover: usize| self.collisions.place(rover).vertex();
+        let on_the_way = out.iter().find(|&&rover| place(rover).is_some());
+        let Some(&first) = on_the_way.or(out.first()) else {
+            return format!("{left} rovers left");
+        };
+        let name = &site.rover_names[first];
+        match place(first) {
+            Some(v) => format!("{left} rovers left, {name} at vertex {}", v.0),
+            None => format!("{left} rovers left, {name} in its queue"),
+        }
+    }
+
+    /// The circles of rovers that wait for each other.
+    fn circles(&self, site: &Site) -> Vec<WaitCycle<VertexId>> {
+        let mut waits = WaitGraph::new(self.tracks.len());
+        for (rover, &(entry, goal)) in site.missions.iter().enumerate() {
+            let next = match self.collisions.place(rover) {
+                Place::At(here) if here != goal => {
+                    vec![site.roadmap.shortest_path(here, goal)[1]]
+                }
+                Place::At(here) if site.config.policy == Policy::Complete => {
+                    let beside = site.roadmap.neighbors(here);
+                    let is_free = |v: &VertexId| self.collisions.holders(*v).is_empty();
+                    match beside.iter().any(is_free) {
+                        true => continue,
+                        false => beside.to_vec(),
+                    }
+                }
+                Place::Away if self.tracks[rover].entered.is_none() && self.is_out(site, rover) => {
+                    vec![entry]
+                }
+                _ => continue,
+            };
+            for &holder in next.iter().flat_map(|&v| self.collisions.holders(v)) {
+                waits.add(rover, holder);
+            }
+        }
+        waits.named_cycles(|rover| {
+            let at = self.collisions.place(rover).vertex();
+            (site.rover_names[rover].clone(), at)
+        })
+    }
+
+    /// What holds the team up, as far as can be seen from outside; the end of a sentence.
+    fn why(&self) -> String {
+        if let Some(shortest) = self.wait_cycles.first() {
+            return format!("; {shortest}");
+        }
+        if self.deadlock != Deadlock::Active {
+            return String::new();
+        }
+        let since = self.nearest.1;
+        let moved = |track: &&Track| track.moved.is_some_and(|cycle| cycle > since);
+        let no_nearer = |track: &&Track| track.remaining >= track.remaining_then;
+        let tracks = self.tracks.iter().filter(moved).filter(no_nearer);
+        let (vain, cycles) = (tracks.count(), self.cycle - since);
+        format!("; in {cycles} cycles {vain} rovers moved without coming nearer to their goals")
+    }
+
+    pub(crate) fn collisions(&self) -> u32 {
+        u32::try_from(self.collisions.count()).unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn arrived(&self) -> u32 {
+        let arrived = self.tracks.iter().filter(|track| track.arrived.is_some());
+        arrived.count() as u32
+    }
+
+    pub(crate) fn metrics(&self, site: &Site) -> NetworkMetrics {
+        let mut metrics = NetworkMetrics {
+            rovers: self.tracks.len() as u32,
+            collisions: self.collisions(),
+            collided: self.collisions.named().to_vec(),
+            wait_cycles: self.wait_cycles.clone(),
+            deadlock: self.deadlock,
+            interventions: self.interventions,
+            cycles: self.cycle + 1,
+            confirmed_deadlocks: self.confirmed_deadlocks,
+            standstill: self.standstill.clone(),
+            plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
+            ..NetworkMetrics::default()
+        };
+        // One has always known it.
+        if site.roadmap_from.is_some() && self.informed.len() + 1 >= site.sensors.len() {
+            let last = self.informed.iter().max().copied().unwrap_or(SimTime::ZERO);
+            metrics.roadmap_known_s = Some(last.as_secs_f64());
+        }
+        let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
+        let sentence = |t: &TakenOver| {
+            let (home, deputy) = (name(t.home), name(t.deputy));
+            format!("{home} by {deputy} in cycle {}", t.cycle)
+        };
+        metrics.refused = site.refused.len() as u32;
+        let refused = site.refused.iter();
+        metrics.refused_missions = refused.map(|r| r.sentence(&site.rover_names)).collect();
+        metrics.takeovers = self.taken_over.len() as u32;
+        metrics.taken_over = self.taken_over.iter().map(sentence).collect();
+        let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
+        metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
+        let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
+        let ring: Vec<_> = self.last_confirmed.iter().filter_map(name).collect();
+        metrics.last_confirmed = (!ring.is_empty()).then(|| ring.join(" > "));
+        metrics.completed = metrics.arrival_s.iter().all(Option::is_some);
+        metrics.deadlocked = self.deadlock != Deadlock::None;
+        let energies_j = self.tracks.iter().map(|track| track.transmit_energy_j);
+        metrics.transmit_energy_j = energies_j.sum();
+        metrics.intervention_rate = f64::from(self.interventions) / f64::from(metrics.cycles);
+        metrics.max_plus_iterations = self.iterations as f64 / self.planned_cycles.max(1) as f64;
+        self.loads.write(site.sensors.len(), &mut metrics);
+        let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
+        metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
+        metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;
+        let rovers = self.tracks.iter().zip(&site.missions);
+        let cost = |(track, &(start, goal)): (&Track, &(VertexId, VertexId))| {
+            (track.cost, site.roadmap.distance(start, goal))
+        };
+        metrics.costs = site
+            .stays
+            .then(|| Costs::new(&rovers.map(cost).collect::<Vec<_>>()));
+        for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
+            let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
+                continue;
+            };
+            let shortest = f64::from(site.roadmap.distance(entry, goal).max(1));
+            // Both the cycle of the entry and that of the arrival were spent on the way.
+            let steps = arrived + 1 - entered;
+            metrics.arrived += 1;
+            metrics.path_ratio += f64::from(steps) / shortest;
+            metrics.time_ratio += match (site.config.motion, track.arrived_at) {
+                (Motion::Continuous, Some(at)) if entry != goal => {
+                    at.as_secs_f64() / site.ways().alone(entry, goal).as_secs_f64()
+                }
+                _ => f64::from(arrived + 1) / shortest,
+            };
+            metrics.mean_steps += f64::from(steps);
+            metrics.total_steps += u64::from(steps);
+            metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
+            metrics.mean_backtracks += f64::from(track.backtracks);
+        }
+        let count = f64::from(metrics.arrived.max(1));
+        for mean in [
+            &mut metrics.path_ratio,
+            &mut metrics.time_ratio,
+            &mut metrics.mean_steps,
+            &mut metrics.mean_stops,
+            &mut metrics.mean_backtracks,
+        ] {
+            *mean /= count;
+        }
+        metrics
+    }
+}

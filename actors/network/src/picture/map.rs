@@ -1,0 +1,539 @@
+//! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1), rovers,
+//! and who stands in whose way.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+
+use farside::SimDuration;
+use farside_worlds::{NodeId, VertexId};
+use maud::{Markup, PreEscaped, html};
+
+use super::Site;
+use super::colouring;
+use super::relief::contours;
+use super::tracks::{Place, Seen};
+use super::waits::{Waits, nearer};
+use super::{Drawn, Ground};
+use farside_actors::figure::Figure;
+use farside_actors::figure::scale::text_width;
+use farside_actors::figure::svg::{Px, path};
+
+/// The middle length of an edge, in pixels; a map too large for that is drawn smaller.
+const EDGE: f64 = 34.0;
+/// The longest side of a map, in pixels.
+const LONGEST: f64 = 2400.0;
+/// Above the map: title and a line below it.
+const TOP: f64 = 64.0;
+const SIDE: f64 = 16.0;
+/// Right of the map: the legend.
+const LEGEND: f64 = 268.0;
+
+/// What is drawn where.
+struct Sheet<'a> {
+    run: &'a Drawn,
+    colours: Vec<usize>,
+    /// The north-western corner \[m\].
+    corner_m: [f64; 2],
+    px_per_m: f64,
+    width: f64,
+    height: f64,
+    /// The radius of a rover, in pixels.
+    rover: f64,
+}
+
+pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
+    let rovers = run.tracks.at(at_ns);
+    let waits = Waits::of(&run.site.roadmap, &rovers);
+    let sheet = Sheet::new(run);
+    let at = SimDuration::from_nanos(at_ns);
+    let count = |counted: fn(&Place) -> bool| rovers.iter().filter(|r| counted(&r.place)).count();
+    let on_map = count(|place| matches!(place, Place::At(_) | Place::Between(..)));
+    let (queued, gone) = (count(|p| *p == Place::Queue), count(|p| *p == Place::Gone));
+    let circled: usize = waits.circles.iter().map(Vec::len).sum();
+    let title = format!("{}, seed {}, at {at}", run.scenario, run.seed);
+    let cycle = at_ns / run.site.cycle.as_nanos();
+    let mut says =
+        format!("Cycle {cycle}. {on_map} rovers on the map, {queued} in queues, {gone} gone.");
+    if circled > 0 {
+        let behind = waits.behind.len();
+        says.push_str(&format!(
+            " {circled} wait for each other in {}, {behind} wait behind them.",
+            counted(waits.circles.len(), "circle")
+        ));
+    }
+    let pairs = sheet.coordination(&rovers);
+    let body = html! {
+        style { (PreEscaped(super::STYLE)) }
+        text class="title" x=(Px(SIDE)) y="28" { (title) }
+        text class="tick" x=(Px(SIDE)) y="50" { (says) }
+        (sheet.ground())
+        (sheet.radio())
+        (sheet.roads())
+        (sheet.ends(&rovers))
+        path class="coordination" d=(pairs) {}
+        (sheet.posts())
+        (sheet.arrows(&rovers, &waits))
+        @for seen in &rovers { (sheet.rover(seen, &waits)) }
+        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, &run.site))
+    };
+    Figure {
+        file: "map.svg".to_owned(),
+        title: format!("Map of {title}"),
+        description: says,
+        width: sheet.width + 2.0 * SIDE + LEGEND,
+        height: (sheet.height + TOP + SIDE).max(TOP + 440.0),
+        body,
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+impl<'a> Sheet<'a> {
+    fn new(run: &'a Drawn) -> Self {
+        let roadmap = &run.site.roadmap;
+        let mut lengths_m: Vec<f64> = roadmap
+            .edges()
+            .iter()
+            .map(|&(u, v)| (roadmap.position_m(v) - roadmap.position_m(u)).norm())
+            .collect();
+        lengths_m.sort_by(f64::total_cmp);
+        let middle_m = lengths_m.get(lengths_m.len() / 2).copied().unwrap_or(1.0);
+        let vertices = roadmap.vertices().map(|v| roadmap.position_m(v));
+        let posts = run
+            .site
+            .sensors
+            .nodes()
+            .map(|n| run.site.sensors.position_m(n));
+        let mut all: Vec<[f64; 2]> = vertices.chain(posts).map(|p| [p.x, p.y]).collect();
+        if let Ground::Walls { middles_m, .. } = &run.site.ground {
+            all.extend(middles_m);
+        }
+        let range = |axis: usize| {
+            let values = all.iter().map(|p| p[axis]);
+            let low = values.clone().fold(f64::INFINITY, f64::min);
+            (
+                low - middle_m,
+                values.fold(f64::NEG_INFINITY, f64::max) + middle_m,
+            )
+        };
+        let ((west, east), (south, north)) = (range(0), range(1));
+        let longest_m = (east - west).max(north - south);
+        let px_per_m = (EDGE / middle_m).min(LONGEST / longest_m);
+        Sheet {
+            colours: colouring::colours(roadmap, &run.site.sensors),
+            corner_m: [west, north],
+            px_per_m,
+            width: (east - west) * px_per_m,
+            height: (north - south) * px_per_m,
+            rover: (0.27 * middle_m * px_per_m).clamp(3.0, 9.5),
+            run,
+        }
+    }
+
+    fn px(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+        let [west, north] = self.corner_m;
+        (
+            SIDE + (x_m - west) * self.px_per_m,
+            TOP + (north - y_m) * self.px_per_m,
+        )
+    }
+
+    fn at(&self, v: VertexId) -> (f64, f64) {
+        let at = self.run.site.roadmap.position_m(v);
+        self.px([at.x, at.y])
+    }
+
+    fn colour(&self, node: NodeId) -> usize {
+        self.colours[node.0 as usize]
+    }
+
+    /// Contours or walls.
+    fn ground(&self) -> Markup {
+        let inside = |&(x, y): &(f64, f64)| {
+            let (x, y) = (x - SIDE, y - TOP);
+            (0.0..=self.width).contains(&x) && (0.0..=self.height).contains(&y)
+        };
+        match &self.run.site.ground {
+            Ground::Unknown => html! {},
+            Ground::Walls { middles_m, cell_m } => {
+                let side = cell_m * self.px_per_m;
+                let mut data = String::new();
+                for middle in middles_m {
+                    let (x, y) = self.px(*middle);
+                    let (x, y) = (x - side / 2.0, y - side / 2.0);
+                    let corners = [(x, y), (x + side, y), (x + side, y + side), (x, y + side)];
+                    data.push_str(&path(corners));
+                    data.push('Z');
+                }
+                html! { path class="wall" d=(data) {} }
+            }
+            Ground::Heights(terrain) => {
+                let heights_m = terrain.heights_m().iter().copied();
+                let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
+                let high_m = heights_m.fold(f64::NEG_INFINITY, f64::max);
+                let step_m = step((high_m - low_m) / 12.0);
+                let first = libm::ceil(low_m / step_m);
+                let levels = libm::floor(high_m / step_m) - first;
+                // Finer than two pixels nobody sees.
+                let stride = (2.0 / (terrain.resolution_m() * self.px_per_m)).max(2.0) as usize;
+                html! {
+                    @for level in 0..=levels.clamp(0.0, 40.0) as u32 {
+                        @let height_m = (first + f64::from(level)) * step_m;
+                        @let class = if height_m < 0.0 { "relief low" } else { "relief" };
+                        @let lines = contours(terrain, height_m, stride);
+                        @let px = lines.iter().map(|line| line.iter().map(|p| self.px(*p)));
+                        @let data: String = px.map(|line| parts(line, inside)).collect();
+                        @if !data.is_empty() {
+                            path class=(class) d=(data) { title { (height_m) " m" } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lines between nodes that hear each other.
+    fn radio(&self) -> Markup {
+        let sensors = &self.run.site.sensors;
+        let at = |n: NodeId| {
+            let at = sensors.position_m(n);
+            self.px([at.x, at.y])
+        };
+        let mut data = String::new();
+        for a in sensors.nodes() {
+            for &b in sensors.neighbors(a).iter().filter(|b| a < **b) {
+                data.push_str(&path([at(a), at(b)]));
+            }
+        }
+        html! { path class="radio" d=(data) {} }
+    }
+
+    /// Each edge in the colours of its ends' owners, half and half.
+    fn roads(&self) -> Markup {
+        let (roadmap, sensors) = (&self.run.site.roadmap, &self.run.site.sensors);
+        let mut roads = vec![String::new(); sensors.len()];
+        for &(u, v) in roadmap.edges() {
+            let (a, b) = (self.at(u), self.at(v));
+            let middle = ((a.0 + b.0) / 2.0, (a.1 + b.1) / 2.0);
+            let (of_u, of_v) = (sensors.owner(u), sensors.owner(v));
+            if of_u == of_v {
+                roads[of_u.0 as usize].push_str(&path([a, b]));
+            } else {
+                roads[of_u.0 as usize].push_str(&path([a, middle]));
+                roads[of_v.0 as usize].push_str(&path([middle, b]));
+            }
+        }
+        html! {
+            @for node in sensors.nodes() {
+                g class={ "n" (self.colour(node)) } {
+                    title { "node " (node.0 + 1) }
+                    path class="road" d=(roads[node.0 as usize]) {}
+                    @for v in sensors.owned(node) {
+                        @let (x, y) = self.at(*v);
+                        @let (class, says) = match sensors.covers(*v) {
+                            true => ("vertex", ""),
+                            false => ("vertex gap", ", in a gap"),
+                        };
+                        circle class=(class) cx=(Px(x)) cy=(Px(y)) r="3.2" {
+                            title { "vertex " (v.0) ", node " (node.0 + 1) (says) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Entries and exits, and how many wait at each entry.
+    fn ends(&self, rovers: &[Seen]) -> Markup {
+        let entries: BTreeSet<VertexId> = rovers.iter().map(|seen| seen.entry).collect();
+        let exits: BTreeSet<VertexId> = rovers.iter().map(|seen| seen.goal).collect();
+        let mut queues = BTreeMap::<VertexId, usize>::new();
+        for seen in rovers.iter().filter(|seen| seen.place == Place::Queue) {
+            *queues.entry(seen.entry).or_default() += 1;
+        }
+        let (from, to) = ends_of(&self.run.site.ground);
+        html! {
+            @for v in &entries {
+                @let at = self.at(*v);
+                path class="entry" d=(entry_mark(at)) { title { (from) " " (v.0) } }
+            }
+            @for v in &exits {
+                @let at = self.at(*v);
+                path class="exit" d=(exit_mark(at)) { title { (to) " " (v.0) } }
+            }
+            @for (v, queue) in &queues {
+                @let (x, y) = self.at(*v);
+                text class="queue" x=(Px(x + 8.0)) y=(Px(y - 7.0)) {
+                    "+" (queue)
+                    title { (queue) " in the queue of entry " (v.0) }
+                }
+            }
+        }
+    }
+
+    fn posts(&self) -> Markup {
+        let sensors = &self.run.site.sensors;
+        html! {
+            @for node in sensors.nodes() {
+                @let at = sensors.position_m(node);
+                @let (x, y) = self.px([at.x, at.y]);
+                @let side = [(x, y - 6.5), (x + 6.5, y), (x, y + 6.5), (x - 6.5, y)];
+                g class={ "n" (self.colour(node)) } {
+                    path class="post" d={ (path(side)) "Z" } {}
+                    text class="post-name" x=(Px(x)) y=(Px(y - 9.0)) text-anchor="middle" {
+                        "N" (node.0 + 1)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lines between the rovers of the coordination graph (section 3.2).
+    fn coordination(&self, rovers: &[Seen]) -> String {
+        let places: Vec<_> = rovers
+            .iter()
+            .filter_map(|r| Some((r, self.place(r)?)))
+            .collect();
+        let mut data = String::new();
+        if !self.run.site.coordinates {
+            return data;
+        }
+        for (at, (a, from)) in places.iter().enumerate() {
+            for (b, to) in &places[at + 1..] {
+                if let (Some(u), Some(v)) = (a.holds(), b.holds())
+                    && coordinated(&self.run.site.sensors, u, v)
+                {
+                    data.push_str(&path([*from, *to]));
+                }
+            }
+        }
+        data
+    }
+
+    /// Where a rover is, if it is on the map.
+    fn place(&self, seen: &Seen) -> Option<(f64, f64)> {
+        match seen.place {
+            Place::Queue | Place::Gone => None,
+            Place::At(v) => Some(self.at(v)),
+            Place::Between(u, v, share) => {
+                let (a, b) = (self.at(u), self.at(v));
+                Some((a.0 + (b.0 - a.0) * share, a.1 + (b.1 - a.1) * share))
+            }
+        }
+    }
+
+    fn rover(&self, seen: &Seen, waits: &Waits) -> Markup {
+        let Some((x, y)) = self.place(seen) else {
+            return html! {};
+        };
+        let roadmap = &self.run.site.roadmap;
+        let next = match seen.place {
+            Place::Between(_, to, _) => Some(to),
+            Place::At(here) => nearer(roadmap, here, seen.goal).next(),
+            Place::Queue | Place::Gone => None,
+        };
+        let (state, says) = match waits.on.get(&seen.rover) {
+            Some(on) if waits.in_circle(seen.rover) => (" circle", waits_for(on, "in a circle")),
+            Some(on) if waits.behind.contains(&seen.rover) => {
+                (" behind", waits_for(on, "behind a circle"))
+            }
+            Some(on) => (" waits", waits_for(on, "for now")),
+            None => ("", String::new()),
+        };
+        let number = (seen.rover + 1).to_string();
+        let r = self.rover;
+        let to = ends_of(&self.run.site.ground).1;
+        html! {
+            g {
+                title { "rover " (number) " to " (to) " " (seen.goal.0) (says) }
+                @if let Some(next) = next {
+                    path class={ "rover" (state) } d=(nose((x, y), self.at(next), r)) {}
+                }
+                circle class={ "rover disc" (state) } cx=(Px(x)) cy=(Px(y)) r=(Px(r)) {}
+                @if r > 6.0 {
+                    @let size = if number.len() > 2 { r } else { 1.15 * r };
+                    text class={ "number" (state) } x=(Px(x)) y=(Px(y + 0.36 * size))
+                        style={ "font-size:" (Px(size)) "px" } text-anchor="middle" { (number) }
+                }
+            }
+        }
+    }
+
+    /// From those that wait in a circle, or behind one, to those they wait for.
+    fn arrows(&self, rovers: &[Seen], waits: &Waits) -> Markup {
+        let place = |rover: &u32| {
+            let seen = rovers.iter().find(|seen| seen.rover == *rover)?;
+            self.place(seen)
+        };
+        let mut arrows = Vec::new();
+        for (rover, on) in &waits.on {
+            let circle = waits.circles.iter().find(|circle| circle.contains(rover));
+            if circle.is_none() && !waits.behind.contains(rover) {
+                continue;
+            }
+            for holder in on {
+                let within = circle.is_some_and(|circle| circle.contains(holder));
+                if let (Some(from), Some(to)) = (place(rover), place(holder)) {
+                    arrows.push((within, from, to));
+                }
+            }
+        }
+        // Those of circles lie above.
+        arrows.sort_by_key(|arrow| arrow.0);
+        html! {
+            @for (within, from, to) in arrows {
+                (arrow(from, to, self.rover, if within { "" } else { " behind" }))
+            }
+        }
+    }
+}
+
+/// Whether rovers that hold these vertices share an edge of the coordination graph: their owners are
+/// the same node or neighbours.
+pub(crate) fn coordinated(
+    sensors: &farside_worlds::SensorNetwork,
+    u: VertexId,
+    v: VertexId,
+) -> bool {
+    let (a, b) = (sensors.owner(u), sensors.owner(v));
+    a == b || sensors.are_neighbors(a, b)
+}
+
+fn waits_for(on: &[u32], how: &str) -> String {
+    let names: Vec<String> = on.iter().map(|rover| (rover + 1).to_string()).collect();
+    format!(", waits {how}, for {}", names.join(" and "))
+}
+
+/// A pointer out of a disc, towards a place.
+fn nose((x, y): (f64, f64), to: (f64, f64), r: f64) -> String {
+    let Some((dx, dy)) = direction((x, y), to) else {
+        return String::new();
+    };
+    let (tip, wide) = (1.65 * r, 0.62 * r);
+    let base = |side: f64| (x + dx * r * 0.75 - dy * side, y + dy * r * 0.75 + dx * side);
+    let data = path([base(wide), (x + dx * tip, y + dy * tip), base(-wide)]);
+    format!("{data}Z")
+}
+
+/// An arrow beside the line between two discs, so that one there and one back are two.
+fn arrow(from: (f64, f64), to: (f64, f64), r: f64, class: &str) -> Markup {
+    let Some((dx, dy)) = direction(from, to) else {
+        return html! {};
+    };
+    let aside = 0.55 * r;
+    let shift =
+        |(x, y): (f64, f64), along: f64| (x + dx * along - dy * aside, y + dy * along + dx * aside);
+    let (start, tip) = (shift(from, 0.7 * r), shift(to, -0.9 * r));
+    let back = |side: f64| (tip.0 - dx * 8.0 - dy * side, tip.1 - dy * 8.0 + dx * side);
+    html! {
+        path class={ "wait" (class) } d=(path([start, (tip.0 - dx * 6.0, tip.1 - dy * 6.0)])) {}
+        path class={ "head" (class) } d={ (path([back(4.5), tip, back(-4.5)])) "Z" } {}
+    }
+}
+
+fn direction(from: (f64, f64), to: (f64, f64)) -> Option<(f64, f64)> {
+    let (x, y) = (to.0 - from.0, to.1 - from.1);
+    let length = (x * x + y * y).sqrt();
+    (length > 0.0).then(|| (x / length, y / length))
+}
+
+/// The parts of a line that are inside.
+fn parts(line: impl Iterator<Item = (f64, f64)>, inside: impl Fn(&(f64, f64)) -> bool) -> String {
+    let (mut data, mut part) = (String::new(), Vec::new());
+    for point in line {
+        if inside(&point) {
+            part.push(point);
+        } else if !part.is_empty() {
+            data.push_str(&path(part.drain(..)));
+        }
+    }
+    data.push_str(&path(part));
+    data
+}
+
+/// 1, 2 or 5 times a power of ten, at least `rough`.
+fn step(rough: f64) -> f64 {
+    if rough <= 0.0 || !rough.is_finite() {
+        return 1.0;
+    }
+    let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
+    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
+    steps
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(10.0 * power)
+}
+
+fn entry_mark((x, y): (f64, f64)) -> String {
+    let corners = [(-7.0, -7.0), (7.0, -7.0), (7.0, 7.0), (-7.0, 7.0)];
+    format!("{}Z", path(corners.map(|(dx, dy)| (x + dx, y + dy))))
+}
+
+fn exit_mark((x, y): (f64, f64)) -> String {
+    let corner = |i: u32| {
+        let angle = f64::from(i) * PI / 3.0;
+        (x + 5.5 * libm::cos(angle), y + 5.5 * libm::sin(angle))
+    };
+    format!("{}Z", path((0..6).map(corner)))
+}
+
+/// What the ends of a rover's way are called: on a map of cells it stands at the one from the start,
+/// and stays at the other.
+fn ends_of(ground: &Ground) -> (&'static str, &'static str) {
+    match ground {
+        Ground::Walls { .. } => ("start", "goal"),
+        Ground::Heights(_) | Ground::Unknown => ("entry", "exit"),
+    }
+}
+
+fn legend(x: f64, y: f64, site: &Site) -> Markup {
+    let has_gaps = !site.sensors.gaps().is_empty();
+    let (from, to) = match ends_of(&site.ground) {
+        ("entry", to) => ("entry; +3: three in its queue", to),
+        ends => ends,
+    };
+    // One row is for those who are coordinated.
+    let left_out = |row: usize| usize::from(row > 5 && !site.coordinates);
+    let at = |row: usize| y + 24.0 * (row - left_out(row)) as f64;
+    let text = |row: usize, says: &str| {
+        debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
+        html! { text x=(Px(x + 34.0)) y=(Px(at(row) + 4.5)) { (says) } }
+    };
+    let disc = |row: usize, class: &str| {
+        let centre = (x + 12.0, at(row));
+        let class = format!("rover{class}");
+        html! {
+            path class=(class) d=(nose(centre, (x + 30.0, at(row)), 8.0)) {}
+            circle class=(class) cx=(Px(centre.0)) cy=(Px(centre.1)) r="8" {}
+        }
+    };
+    let line = |row: usize| path([(x, at(row)), (x + 26.0, at(row))]);
+    html! {
+        g {
+            (disc(0, "")) (text(0, "rover, and where it wants to go"))
+            (disc(1, " waits")) (text(1, "waits for one that can move"))
+            (disc(2, " circle")) (text(2, "wait for each other in a circle"))
+            (disc(3, " behind")) (text(3, "waits for one in a circle"))
+            (arrow((x - 4.0, at(4) - 4.0), (x + 34.0, at(4) - 4.0), 8.0, "")) (text(4, "waits for"))
+            @if site.coordinates {
+                path class="coordination" d=(line(5)) {} (text(5, "coordinated by max-plus"))
+            }
+            g class="n0" { path class="road" d=(path([(x, at(6)), (x + 13.0, at(6))])) {} }
+            g class="n3" { path class="road" d=(path([(x + 13.0, at(6)), (x + 26.0, at(6))])) {} }
+            (text(6, "roadmap, in its nodes' colours"))
+            g class="n0" { path class="post" d={ (path([(x + 12.0, at(7) - 6.5), (x + 18.5, at(7)), (x + 12.0, at(7) + 6.5), (x + 5.5, at(7))])) "Z" } {} }
+            (text(7, "node"))
+            path class="radio" d=(line(8)) {} (text(8, "nodes that hear each other"))
+            path class="entry" d=(entry_mark((x + 12.0, at(9)))) {}
+            (text(9, from))
+            path class="exit" d=(exit_mark((x + 12.0, at(10)))) {} (text(10, to))
+            @if has_gaps {
+                g class="n0" { circle class="vertex gap" cx=(Px(x + 12.0)) cy=(Px(at(11))) r="3.2" {} }
+                (text(11, "where no node reaches a rover"))
+            }
+        }
+    }
+}

@@ -1,0 +1,440 @@
+//! The network-guided system, as scenarios see it: `[world]`, `[team]`, `[network]`.
+
+use std::sync::Arc;
+
+use farside::Report;
+use farside_actors::figure::Figure;
+use farside_actors::system::{
+    Assembly, Builtin, Files, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
+    Results, Section, Settings, Setup, SetupError, System,
+};
+use farside_worlds::movingai::{self, Builtin as BuiltinMap, GridMap, GridWorld, TaskList};
+use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, SensorNetwork, WorldError};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::scene::NetworkScene;
+use crate::{
+    ConfigError, Missions, Network, NetworkConfig, NetworkError, NetworkMetrics, Parts, TeamConfig,
+    WorldConfig, assemble, builtin, metrics, missions, picture,
+};
+
+/// The most bytes of a roadmap file that are read; the reader itself takes no more than 1 MiB.
+const MAX_ROADMAP_BYTES: u64 = 2 << 20;
+
+/// The most rovers: each has a link to and from each node, and memory is finite.
+const MAX_ROVERS: u32 = 10_000;
+
+/// The network-guided system.
+pub struct NetworkSystem;
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct NetworkScenario {
+    pub(crate) world: WorldConfig,
+    pub(crate) team: TeamConfig,
+    pub(crate) network: NetworkConfig,
+}
+
+impl System for NetworkSystem {
+    fn name(&self) -> &str {
+        "network"
+    }
+
+    fn about(&self) -> &str {
+        "sensor nodes plan the paths of rovers on a roadmap, with messages"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        ["world", "team", "network"].map(Section::named).to_vec()
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        &metrics::ALL
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &builtin::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        &builtin::STUDIES
+    }
+
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(NetworkScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for NetworkScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        if !(1..=MAX_ROVERS).contains(&self.team.rovers) {
+            let found = self.team.rovers;
+            let message = format!("{found}: expected from 1 to {MAX_ROVERS}");
+            return Err(SetupError::value("team.rovers", message));
+        }
+        let checked = self.network.check();
+        checked.map_err(|error| blame(NetworkError::Config(error)))
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
+        let roadmap = Arc::new(roadmap);
+        let sensors = Arc::new(place(&self.world, &roadmap, setup.seed)?);
+        let (world, in_crater) = (&self.world, in_crater(&self.world));
+        let map = world.open_part(&roadmap, &sensors);
+        let missions = match &grid {
+            Some(grid) => Missions::Standing(grid.tasks().to_vec()),
+            None => {
+                let drawn = missions(world, &roadmap, &self.team, setup.seed);
+                Missions::Queued(drawn.map_err(blame)?)
+            }
+        };
+        let terrain = match setup.has_radios() && in_crater {
+            true => Some(Arc::new(crater()?.terrain().clone())),
+            false => None,
+        };
+        let parts = Parts {
+            world,
+            roadmap,
+            sensors: sensors.clone(),
+            config: &self.network,
+            terrain,
+        };
+        let system = setup.wired(|sim, wire| assemble(sim, &parts, &missions, wire));
+        let system = Arc::new(system.map_err(blame)?);
+        let scene = NetworkScene::new(
+            map,
+            sensors.clone(),
+            system.cycle(),
+            system.clone(),
+            in_crater,
+        );
+        let watched = system.clone();
+        let goal = Goal {
+            what: "rovers arrived",
+            of: u64::from(self.team.rovers),
+            done: Box::new(move || u64::from(watched.arrived())),
+        };
+        let notes = gaps(&sensors, &system);
+        let blocked = grid.map(|grid| {
+            let all = grid.blocked();
+            all.iter()
+                .map(|blocked| grid.explain(blocked))
+                .collect::<Vec<_>>()
+        });
+        let conclude = move |_: &Report| {
+            let mut results = results(&system.metrics());
+            if let Some(blocked) = &blocked {
+                guarantee(&mut results, blocked);
+            }
+            results
+        };
+        Ok(Assembly::new(conclude)
+            .with_goal(goal)
+            .with_scene(scene)
+            .with_notes(notes))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        files: &mut Files,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, files)
+    }
+}
+
+/// The error with the key to blame.
+fn blame(error: NetworkError) -> SetupError {
+    match error {
+        NetworkError::Links(error) => error.into(),
+        error => SetupError::value(key_of(&error), error),
+    }
+}
+
+/// The nodes.
+pub(crate) fn place(
+    world: &WorldConfig,
+    roadmap: &Roadmap,
+    seed: u64,
+) -> Result<SensorNetwork, SetupError> {
+    world.place(roadmap, seed).map_err(|error| {
+        let key = match error {
+            SensorError::NodeCount { .. } => "world.nodes",
+            SensorError::Radius { .. } => "world.radius",
+            SensorError::Coverage { .. } => "world.coverage",
+            SensorError::NoPlacement {
+                radius_m,
+                coverage_m,
+                ..
+            } if coverage_m < radius_m => "world.coverage",
+            // Which of the two to change is the user's choice; the message suggests a radius.
+            _ if world.radius_m.is_some() => "world.radius",
+            _ => "world.nodes",
+        };
+        SetupError::value(key, error)
+    })
+}
+
+/// Where nobody hears a rover, and which rovers that leaves without a way.
+fn gaps(sensors: &SensorNetwork, system: &Network) -> Vec<String> {
+    if sensors.gaps().is_empty() {
+        return Vec::new();
+    }
+    let all: Vec<String> = sensors.gaps().iter().map(ToString::to_string).collect();
+    let (count, reach_m) = (all.len(), sensors.coverage_m());
+    let mut notes = vec![format!(
+        "gaps: with a coverage of {reach_m} m no node covers {count} vertices: {}",
+        all.join(", ")
+    )];
+    notes.extend(
+        system
+            .refused()
+            .iter()
+            .map(|refused| format!("  {refused}")),
+    );
+    notes
+}
+
+/// Whether the roadmap lies in the default crater, as the built-in ones do; of others the ground is
+/// not known.
+pub(crate) fn in_crater(world: &WorldConfig) -> bool {
+    Roadmap::builtin_names().contains(&world.roadmap.name())
+}
+
+pub(crate) fn crater() -> Result<Crater, SetupError> {
+    let crater = Crater::generate(&CraterSettings::default());
+    crater.map_err(|error| SetupError::value("world.roadmap", error))
+}
+
+/// Whether the roadmap is a map of cells.
+pub(crate) fn is_grid(name: &str) -> bool {
+    name.ends_with(".map") || BuiltinMap::find(name).is_some()
+}
+
+/// Where rovers drive, and what a map of cells adds.
+pub(crate) struct Ground {
+    pub(crate) roadmap: Roadmap,
+    grid: Option<GridWorld>,
+}
+
+/// The built-in roadmap, the one in a file, or the one that the scenario has itself.
+pub(crate) fn ground(
+    world: &WorldConfig,
+    rovers: u32,
+    files: &mut Files,
+) -> Result<Ground, SetupError> {
+    let name = world.roadmap.name();
+    let wrong = |message: String| SetupError::value("world.roadmap", message);
+    if is_grid(name) {
+        let (_, grid) = grid(world, rovers, files)?;
+        let roadmap = grid.roadmap().clone();
+        return Ok(Ground {
+            roadmap,
+            grid: Some(grid),
+        });
+    }
+    if let Some(tasks) = &world.tasks {
+        let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
+        return Err(SetupError::value("world.tasks", message));
+    }
+    let plain = |roadmap| Ground {
+        roadmap,
+        grid: None,
+    };
+    if let Some(inline) = world.roadmap.table() {
+        return inline.map(plain).map_err(|error| wrong(error.to_string()));
+    }
+    if !name.ends_with(".toml") {
+        return Roadmap::builtin(name)
+            .map(plain)
+            .map_err(|error| match error {
+                WorldError::UnknownRoadmap { .. } => wrong(format!(
+                    "{error} (a roadmap of your own is a .toml file, or a MovingAI .map)"
+                )),
+                other => wrong(other.to_string()),
+            });
+    }
+    let bytes = files.read(name, MAX_ROADMAP_BYTES).map_err(wrong)?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        wrong(format!(
+            "{name}: byte {at} is not UTF-8; expected TOML text"
+        ))
+    })?;
+    let roadmap = Roadmap::from_toml(&text).map_err(|error| wrong(format!("{name}: {error}")))?;
+    Ok(plain(roadmap))
+}
+
+/// A MovingAI map, and the world that it makes with its tasks.
+pub(crate) fn grid(
+    world: &WorldConfig,
+    rovers: u32,
+    files: &mut Files,
+) -> Result<(GridMap, GridWorld), SetupError> {
+    let name = world.roadmap.name();
+    let of_map = |message: String| SetupError::value("world.roadmap", message);
+    let of_tasks = |message: String| SetupError::value("world.tasks", message);
+    let limit = movingai::MAX_FILE_BYTES as u64;
+    let builtin = BuiltinMap::find(name);
+    let (map_name, bytes) = match builtin {
+        Some(file) => (file.map_name, file.map.to_vec()),
+        None => (name, files.read(name, limit).map_err(of_map)?),
+    };
+    let in_map = |error| of_map(format!("{name}: {error}"));
+    let map = GridMap::from_movingai(&bytes).map_err(in_map)?;
+    let (tasks_name, bytes) = match (&world.tasks, builtin) {
+        (Some(tasks), _) => (tasks.as_str(), files.read(tasks, limit).map_err(of_tasks)?),
+        (None, Some(file)) => (name, file.tasks.to_vec()),
+        (None, None) => {
+            let message = "missing: expected a .scen file with the starts and goals on the map";
+            return Err(of_tasks(message.to_owned()));
+        }
+    };
+    let in_tasks = |error| of_tasks(format!("{tasks_name}: {error}"));
+    let tasks = TaskList::from_movingai(&bytes).map_err(in_tasks)?;
+    let first = tasks.first(rovers as usize).map_err(in_tasks)?;
+    let made = GridWorld::new(map_name, &map, world.cell_m, first);
+    let made = made.map_err(|error| match error.line() {
+        Some(_) => in_tasks(error),
+        None => in_map(error),
+    })?;
+    Ok((map, made))
+}
+
+/// Says whether rovers that stay at their goals are sure to arrive: only on well-formed instances.
+fn guarantee(results: &mut Results, blocked: &[String]) {
+    let well_formed = blocked.is_empty();
+    let metrics = &mut results.metrics;
+    metrics.insert("well_formed".to_owned(), well_formed.into());
+    metrics.insert("blocked_tasks".to_owned(), blocked.len().into());
+    let text = match blocked {
+        [] => "well-formed: there is a way for every rover, in any order".to_owned(),
+        [first] => format!("not well-formed: {first}"),
+        [first, rest @ ..] => format!("not well-formed: {first}; and {} more", rest.len()),
+    };
+    results.summary.push(("instance".to_owned(), text));
+}
+
+/// The key to blame.
+fn key_of(error: &NetworkError) -> &'static str {
+    match error {
+        NetworkError::NoRovers => "team.rovers",
+        NetworkError::Endpoints { .. } => "world.endpoints",
+        NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
+        NetworkError::SlowEdge { .. } => "network.speed",
+        NetworkError::Uncovered { .. }
+        | NetworkError::CannotCross
+        | NetworkError::Refused { .. } => "world.gaps",
+        NetworkError::UnknownSource { .. } => "network.roadmap_from",
+        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::Planned { key }) => KEYS
+            .iter()
+            .find(|known| known.ends_with(&format!(".{key}")))
+            .unwrap_or(&"network"),
+        _ => "network",
+    }
+}
+
+/// The most collisions that are named where a run is called wrong.
+const NAMED_IN_A_LINE: usize = 3;
+
+/// The keys of `[network]` that have ranges.
+const KEYS: [&str; 23] = [
+    "network.cycle",
+    "network.exchange",
+    "network.iteration_timeout",
+    "network.traverse",
+    "network.speed",
+    "network.location_sigma",
+    "network.location_clearance",
+    "network.location_fix",
+    "network.acceleration_limit",
+    "network.longest_path_factor",
+    "network.backtrack_penalty",
+    "network.collision_penalty_factor",
+    "network.noise",
+    "network.convergence",
+    "network.congestion_weight",
+    "network.congestion_spread",
+    "network.damping",
+    "network.processor",
+    "network.takeover_after",
+    "network.passive_window",
+    "network.active_window",
+    "network.cycle_limit",
+    "network.sabotage",
+];
+
+/// How many collisions there were, and the first of them by name.
+fn violation(metrics: &NetworkMetrics) -> String {
+    let count = metrics.collisions as usize;
+    let named = metrics.collided.iter().take(NAMED_IN_A_LINE);
+    let first: Vec<String> = named.map(ToString::to_string).collect();
+    let rest = match count - first.len().min(count) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    };
+    format!("{count} collisions: {}{rest}", first.join("; "))
+}
+
+fn results(metrics: &NetworkMetrics) -> Results {
+    let mut results = Results::of(metrics);
+    let mut line = |label: &str, text: String| {
+        results.summary.push((label.to_owned(), text));
+    };
+    line(
+        "rovers at their goals",
+        format!("{} of {}", metrics.arrived, metrics.rovers),
+    );
+    line("collisions", metrics.collisions.to_string());
+    let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
+    let deadlock = deadlock.unwrap_or("unknown").to_owned();
+    line("deadlock", deadlock);
+    if let Some(shortest) = metrics.wait_cycles.first() {
+        line("circles of rovers", metrics.wait_cycles.len().to_string());
+        line("the shortest", shortest.to_string());
+    } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
+        line("standstill", why.to_owned());
+    }
+    if metrics.refused > 0 {
+        line("rovers without a way", metrics.refused.to_string());
+    }
+    for replaced in &metrics.taken_over {
+        line("taken over", replaced.clone());
+    }
+    line("planning cycles", metrics.cycles.to_string());
+    if metrics.arrived > 0 {
+        line("time ratio", format!("{:.2}", metrics.time_ratio));
+        line("path ratio", format!("{:.2}", metrics.path_ratio));
+        line("stops per rover", format!("{:.1}", metrics.mean_stops));
+    }
+    if let Some(costs) = &metrics.costs
+        && let (Some(sum), Some(makespan)) = (costs.sum_of_costs, costs.makespan)
+    {
+        let (least, ratio) = (costs.sum_of_costs_bound, costs.suboptimality.unwrap_or(1.0));
+        line(
+            "sum of costs",
+            format!("{sum}, at least {least} ({ratio:.2})"),
+        );
+        let least = costs.makespan_bound;
+        line("makespan", format!("{makespan}, at least {least}"));
+    }
+    if metrics.collisions > 0 {
+        results.violations.push(violation(metrics));
+    }
+    results
+}

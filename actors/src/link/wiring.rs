@@ -1,0 +1,159 @@
+//! Which links a system wants, and what it may know of them once they are declared.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use farside::{Carrier, HostId, SimDuration, Simulation};
+use farside_worlds::HeightField;
+use nalgebra::Point3;
+
+use super::{LinkConfigError, LinkParams};
+
+/// The links that a system wants, one way each, and where its hosts stand at first. A system lists
+/// them all and hands them over in one call, so that whatever it asks of links afterwards is asked
+/// of all of them.
+///
+/// ```
+/// use farside::{SimDuration, Simulation};
+/// use farside_actors::link::{LinkBuilder, LinksConfig, Wiring};
+/// let mut sim = Simulation::new(1);
+/// let (base, rover) = (sim.host("base"), sim.host("rover"));
+/// let mut wiring = Wiring::default();
+/// wiring.both_ways((base, "base"), (rover, "rover"));
+/// let config: LinksConfig = toml::from_str("default = { latency = '700ms' }")?;
+/// let links = LinkBuilder::new(&config, &[])?.build(&mut sim, &wiring)?;
+/// assert_eq!(links.slowest(), SimDuration::from_millis(700));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Wiring {
+    pub(super) pairs: Vec<(usize, usize)>,
+    pub(super) hosts: Vec<(HostId, String)>,
+    /// By host: its place in `hosts`.
+    known: BTreeMap<HostId, usize>,
+    pub(super) places_m: BTreeMap<String, Point3<f64>>,
+    pub(super) terrain: Option<Arc<HeightField>>,
+}
+
+impl Wiring {
+    /// Wants the link `{from}-{to}`.
+    pub fn link(&mut self, from: (HostId, &str), to: (HostId, &str)) {
+        let (from, to) = (self.host(from), self.host(to));
+        self.pairs.push((from, to));
+    }
+
+    /// Wants the links `{a}-{b}` and `{b}-{a}`.
+    pub fn both_ways(&mut self, a: (HostId, &str), b: (HostId, &str)) {
+        self.link(a, b);
+        self.link(b, a);
+    }
+
+    fn host(&mut self, (host, name): (HostId, &str)) -> usize {
+        *self.known.entry(host).or_insert_with(|| {
+            self.hosts.push((host, name.to_owned()));
+            self.hosts.len() - 1
+        })
+    }
+
+    /// Says where the host called `name` stands at first, in metres in the world's frame. Radios
+    /// ask for it.
+    pub fn place(&mut self, name: &str, place_m: Point3<f64>) {
+        self.places_m.insert(name.to_owned(), place_m);
+    }
+
+    /// Says what ground hosts stand on, and radios look over.
+    pub fn terrain(&mut self, terrain: Arc<HeightField>) {
+        self.terrain = Some(terrain);
+    }
+
+    /// The wanted links in order, each from one host and name to another.
+    pub fn links(&self) -> impl Iterator<Item = ((HostId, &str), (HostId, &str))> {
+        let host = |at: usize| (self.hosts[at].0, self.hosts[at].1.as_str());
+        self.pairs
+            .iter()
+            .map(move |&(from, to)| (host(from), host(to)))
+    }
+}
+
+/// Declares all links of a wiring. What a system is given that is put together without a scenario.
+pub type Wire<'a> = dyn FnMut(&mut Simulation, &Wiring) -> Result<Links, LinkConfigError> + 'a;
+
+/// What is known of the links of a system before the run, by who plans: what they have when nothing
+/// degrades them. Links act by the truth, degradations included.
+#[derive(Clone, Debug, Default)]
+pub struct Links {
+    nominal: BTreeMap<(String, String), Arc<LinkParams>>,
+    slowest: SimDuration,
+    slowest_rate_bit_per_s: Option<u64>,
+    remarks: Vec<&'static str>,
+}
+
+impl Links {
+    /// Declares each link of a wiring with the carrier that `carrier` makes for it, from the names of
+    /// its ends, for simulations without a scenario. Parameters are then not known.
+    ///
+    /// ```
+    /// use farside::{FixedDelay, SimDuration, Simulation};
+    /// use farside_actors::link::{Links, Wiring};
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// let mut wiring = Wiring::default();
+    /// wiring.link((a, "a"), (b, "b"));
+    /// let delay = SimDuration::from_millis(5);
+    /// let links = Links::carried(&mut sim, &wiring, |_, _| FixedDelay::new(delay));
+    /// assert_eq!((links.slowest(), links.nominal("a", "b")), (delay, None));
+    /// ```
+    pub fn carried<C: Carrier>(
+        sim: &mut Simulation,
+        wiring: &Wiring,
+        mut carrier: impl FnMut(&str, &str) -> C,
+    ) -> Links {
+        let mut links = Links::default();
+        for ((a, from), (b, to)) in wiring.links() {
+            let carrier = carrier(from, to);
+            links.reckon(carrier.min_delay(), carrier.rate_bit_per_s());
+            sim.link(a, b, &format!("{from}-{to}"), carrier);
+        }
+        links
+    }
+
+    fn reckon(&mut self, min_delay: SimDuration, rate_bit_per_s: Option<u64>) {
+        self.slowest = self.slowest.max(min_delay);
+        let rates = [self.slowest_rate_bit_per_s, rate_bit_per_s];
+        self.slowest_rate_bit_per_s = rates.into_iter().flatten().min();
+    }
+
+    pub(super) fn add(&mut self, from: &str, to: &str, nominal: Arc<LinkParams>) {
+        self.reckon(nominal.min_delay(), nominal.fastest_bit_per_s());
+        self.nominal
+            .insert((from.to_owned(), to.to_owned()), nominal);
+    }
+
+    pub(super) fn with_remarks(mut self, remarks: BTreeSet<&'static str>) -> Self {
+        self.remarks = remarks.into_iter().collect();
+        self
+    }
+
+    /// What the links are told that has no effect, for people.
+    pub fn remarks(&self) -> &[&'static str] {
+        &self.remarks
+    }
+
+    /// What the link from one host to another has without degradations, its contacts included; none
+    /// if there is no such link.
+    pub fn nominal(&self, from: &str, to: &str) -> Option<&LinkParams> {
+        let found = self.nominal.get(&(from.to_owned(), to.to_owned()));
+        found.map(Arc::as_ref)
+    }
+
+    /// The least time that a message takes over the slowest of the links, those through radios
+    /// included; zero if there are none.
+    pub fn slowest(&self) -> SimDuration {
+        self.slowest
+    }
+
+    /// The lowest rate of a link at its fastest \[bit/s\]; none if no link has a rate.
+    pub fn slowest_rate_bit_per_s(&self) -> Option<u64> {
+        self.slowest_rate_bit_per_s
+    }
+}

@@ -1,0 +1,317 @@
+//! Systems: what a scenario can run. A [`System`] brings all that is its own: the keys that it reads,
+//! its metrics, its built-in scenarios and studies, its pictures, and how it is assembled. Whoever
+//! reads scenarios and runs studies knows this trait and no system.
+//!
+//! What this is not: the list of systems that a program knows, which is the program's.
+
+mod builtin;
+mod files;
+mod metric;
+mod picture;
+mod section;
+
+use farside::{Report, SimDuration, Simulation};
+use farside_logs::Scene;
+use serde_json::{Map, Value};
+use thiserror::Error;
+
+use crate::link::{LinkBuilder, LinkConfigError, Links, Wire, Wiring};
+pub use builtin::Builtin;
+pub use files::{Files, no_file};
+pub use metric::{Better, Metric, MetricKind};
+pub use picture::{
+    PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
+};
+pub use section::{Key, Section};
+
+/// A kind of system: reads its own tables of a scenario, and says what it has.
+///
+/// Only [`name`](System::name), [`sections`](System::sections) and [`parse`](System::parse) have to
+/// be written; a system without metrics of its own is measured by what the kernel counts.
+pub trait System: Send + Sync {
+    /// The name that scenarios give as `system`.
+    fn name(&self) -> &str;
+
+    /// What it is, in a line.
+    fn about(&self) -> &str;
+
+    /// The top-level tables of a scenario that this system reads, besides those all systems share,
+    /// each with its keys.
+    fn sections(&self) -> Vec<Section>;
+
+    /// What a run of it can be measured by.
+    fn metrics(&self) -> &[Metric] {
+        &[]
+    }
+
+    /// Its built-in scenarios, sorted by name.
+    fn scenarios(&self) -> &[Builtin] {
+        &[]
+    }
+
+    /// Its built-in studies, sorted by name.
+    fn studies(&self) -> &[Builtin] {
+        &[]
+    }
+
+    /// The pictures that can be drawn of a run's log; the first is drawn unless another is named.
+    fn pictures(&self) -> &[PictureInfo] {
+        &[]
+    }
+
+    /// Reads its tables; `T::deserialize(sections)` of a serde type is all it takes.
+    ///
+    /// # Errors
+    /// Those of serde; they become messages with file, line and column.
+    fn parse(&self, sections: toml::Deserializer<'_>)
+    -> Result<Box<dyn Settings>, toml::de::Error>;
+}
+
+/// The settings of one scenario for one system. Several threads may build from them at once.
+pub trait Settings: Send + Sync {
+    /// The same keys again, defaults filled in.
+    ///
+    /// # Errors
+    /// When a value cannot be written as TOML.
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error>;
+
+    /// Checks ranges, when the scenario is read.
+    ///
+    /// # Errors
+    /// When a value is out of its range; the error names its key.
+    fn check(&self) -> Result<(), SetupError> {
+        Ok(())
+    }
+
+    /// Declares hosts, actors and links; returns what tells the results once the run is over.
+    ///
+    /// # Errors
+    /// When the settings cannot be; the error names the key.
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
+
+    /// Draws one of [`System::pictures`] from what a run recorded.
+    ///
+    /// # Errors
+    /// When the recording has not what the picture shows, or an option makes no sense.
+    fn draw(
+        &self,
+        picture: &str,
+        _run: &dyn Recording,
+        _request: &PictureRequest,
+        _files: &mut Files,
+    ) -> Result<crate::figure::Figure, PictureError> {
+        Err(PictureError::Unknown {
+            picture: picture.to_owned(),
+        })
+    }
+}
+
+/// What a system builds from.
+pub struct Setup<'a> {
+    /// The run's seed, for worlds that are generated from it.
+    pub seed: u64,
+    /// When the run stops at the latest, if the scenario says.
+    pub until: Option<SimDuration>,
+    /// The simulation to fill.
+    pub sim: &'a mut Simulation,
+    /// Reads the files that the scenario names.
+    pub files: &'a mut Files,
+    links: Option<LinkBuilder>,
+    remarks: Vec<&'static str>,
+}
+
+impl<'a> Setup<'a> {
+    /// What a run with this seed is built from.
+    pub fn new(
+        seed: u64,
+        until: Option<SimDuration>,
+        sim: &'a mut Simulation,
+        files: &'a mut Files,
+        links: LinkBuilder,
+    ) -> Self {
+        Setup {
+            seed,
+            until,
+            sim,
+            files,
+            links: Some(links),
+            remarks: Vec::new(),
+        }
+    }
+
+    /// Declares all links of the system at once, as the scenario has them. What is asked of links is
+    /// asked of what this returns, so that no answer can come before all links are known.
+    ///
+    /// # Errors
+    /// When a pattern of the scenario matches no link, or a link cannot be.
+    ///
+    /// # Panics
+    /// When it is called twice.
+    pub fn link(&mut self, wiring: &Wiring) -> Result<Links, LinkConfigError> {
+        self.wired(|sim, wire| wire(sim, wiring))
+    }
+
+    /// [`Setup::link`] as a function to hand on, for a system that can also be put together without
+    /// a scenario.
+    pub fn wired<T>(&mut self, assemble: impl FnOnce(&mut Simulation, &mut Wire<'_>) -> T) -> T {
+        let (links, remarks) = (&mut self.links, &mut self.remarks);
+        assemble(self.sim, &mut |sim, wiring| {
+            let builder = links.take();
+            let builder = builder.expect("a system declares its links in one call");
+            let links = builder.build(sim, wiring)?;
+            *remarks = links.remarks().to_vec();
+            Ok(links)
+        })
+    }
+
+    /// Whether links go through radios, which ask where hosts are.
+    pub fn has_radios(&self) -> bool {
+        self.links.as_ref().is_some_and(LinkBuilder::has_radios)
+    }
+
+    /// What the scenario says of links that has no effect, once the system is assembled.
+    ///
+    /// # Errors
+    /// When the system has declared no links, and the scenario has patterns for some.
+    pub fn close(mut self) -> Result<Vec<&'static str>, LinkConfigError> {
+        if self.links.is_some() {
+            self.link(&Wiring::default())?;
+        }
+        Ok(self.remarks)
+    }
+}
+
+/// A system that is put together, ready to run.
+pub struct Assembly {
+    /// Tells what came of the run.
+    pub conclude: Conclude,
+    /// What the run is to achieve, for a progress bar.
+    pub goal: Option<Goal>,
+    /// Draws the run for viewers.
+    pub scene: Option<Box<dyn Scene>>,
+    /// What people may want to know of the world that is built, a line at a time.
+    pub notes: Vec<String>,
+}
+
+impl Assembly {
+    /// A system whose results `conclude` tells.
+    pub fn new(conclude: impl FnOnce(&Report) -> Results + 'static) -> Self {
+        Assembly {
+            conclude: Box::new(conclude),
+            goal: None,
+            scene: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// With a goal to count towards.
+    #[must_use]
+    pub fn with_goal(mut self, goal: Goal) -> Self {
+        self.goal = Some(goal);
+        self
+    }
+
+    /// Drawn for viewers.
+    #[must_use]
+    pub fn with_scene(mut self, scene: impl Scene + 'static) -> Self {
+        self.scene = Some(Box::new(scene));
+        self
+    }
+
+    /// With lines for people.
+    #[must_use]
+    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.notes = notes;
+        self
+    }
+}
+
+/// What a run is to achieve, in units that can be counted while it lasts.
+pub struct Goal {
+    /// What is counted: `rovers arrived`.
+    pub what: &'static str,
+    /// How many there are.
+    pub of: u64,
+    /// How many are done. Asked many times a second.
+    pub done: Box<dyn Fn() -> u64 + Send>,
+}
+
+/// Tells what came of a run.
+pub type Conclude = Box<dyn FnOnce(&Report) -> Results>;
+
+/// What came of a run, beyond what the kernel counts.
+#[derive(Clone, Debug, Default)]
+pub struct Results {
+    /// Figures for programs; names carry units.
+    pub metrics: Map<String, Value>,
+    /// The same for people: lines of a table.
+    pub summary: Vec<(String, String)>,
+    /// What must never happen and did: a collision. Any makes the command exit with 1.
+    pub violations: Vec<String>,
+}
+
+impl Results {
+    /// The fields of a struct as metrics.
+    ///
+    /// ```
+    /// use farside_actors::system::Results;
+    /// #[derive(serde::Serialize)]
+    /// struct Counted { heard: u32 }
+    /// assert_eq!(Results::of(&Counted { heard: 3 }).metrics["heard"], 3);
+    /// ```
+    pub fn of(metrics: &impl serde::Serialize) -> Self {
+        let mut results = Results::default();
+        // A struct of plain numbers, names and lists is always a JSON object.
+        if let Ok(Value::Object(all)) = serde_json::to_value(metrics) {
+            results.metrics = all;
+        }
+        results
+    }
+
+    /// Adds a line for people.
+    pub fn line(&mut self, label: impl Into<String>, text: impl Into<String>) {
+        self.summary.push((label.into(), text.into()));
+    }
+}
+
+/// Settings that cannot be.
+#[derive(Debug, Error)]
+pub enum SetupError {
+    /// Links or degradations.
+    #[error(transparent)]
+    Links(#[from] LinkConfigError),
+    /// A value of the system's own.
+    #[error("{key}: {message}")]
+    Value {
+        /// The dotted key.
+        key: String,
+        /// What was found and what was expected.
+        message: String,
+    },
+}
+
+impl SetupError {
+    /// A value that cannot be, by its dotted key.
+    ///
+    /// ```
+    /// use farside_actors::system::SetupError;
+    /// let error = SetupError::value("team.rovers", "0: expected at least 1");
+    /// assert_eq!(error.to_string(), "team.rovers: 0: expected at least 1");
+    /// ```
+    pub fn value(key: &str, message: impl ToString) -> Self {
+        SetupError::Value {
+            key: key.to_owned(),
+            message: message.to_string(),
+        }
+    }
+
+    /// The key, part by part, and the message.
+    pub fn into_parts(self) -> (Vec<String>, String) {
+        match self {
+            SetupError::Links(error) => (error.key().to_vec(), error.to_string()),
+            SetupError::Value { key, message } => {
+                (key.split('.').map(str::to_owned).collect(), message)
+            }
+        }
+    }
+}

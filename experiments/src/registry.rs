@@ -1,0 +1,124 @@
+//! The systems that a program knows: those that are built in, and those that a user adds. This is the
+//! only file here that names a system.
+//!
+//! ```no_run
+//! use farside_experiments::{cli, registry::Registry};
+//!
+//! fn main() -> std::process::ExitCode {
+//!     cli::main(Registry::builtin()) // .with(MySystem)
+//! }
+//! ```
+//!
+//! `experiments/examples/own_system.rs` is such a binary, whole.
+
+use farside_actors::suggest::nearest;
+use farside_actors::system::{Builtin, Metric, System};
+use farside_network::NetworkSystem;
+use farside_traffic::TrafficSystem;
+use thiserror::Error;
+
+/// The systems that a binary knows.
+///
+/// ```
+/// use farside_experiments::registry::Registry;
+/// let registry = Registry::builtin();
+/// assert_eq!(registry.find("network").unwrap().name(), "network");
+/// assert!(registry.scenario("network/crater-dense").unwrap().contains("rovers = 50"));
+/// assert!(registry.study("degradation/loss").unwrap().contains("links.default.loss"));
+/// assert_eq!(registry.scenario("network/moon"), None);
+/// ```
+pub struct Registry {
+    systems: Vec<Box<dyn System>>,
+}
+
+/// No system has the name.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("unknown system {found:?}: expected {expected}")]
+pub struct UnknownSystem {
+    /// The name.
+    pub found: String,
+    /// The system's name closest to it.
+    pub nearest: Option<String>,
+    /// All names.
+    pub expected: String,
+}
+
+impl Registry {
+    /// Knows no system.
+    pub fn empty() -> Self {
+        Registry {
+            systems: Vec::new(),
+        }
+    }
+
+    /// Knows the systems that are built in.
+    pub fn builtin() -> Self {
+        Registry::empty().with(NetworkSystem).with(TrafficSystem)
+    }
+
+    /// Knows `system` too; of two with one name, the later one.
+    #[must_use]
+    pub fn with(mut self, system: impl System + 'static) -> Self {
+        self.systems.retain(|known| known.name() != system.name());
+        self.systems.push(Box::new(system));
+        self
+    }
+
+    /// All systems, in the order in which they were added.
+    pub fn systems(&self) -> impl Iterator<Item = &dyn System> {
+        self.systems.iter().map(Box::as_ref)
+    }
+
+    /// The system called `name`.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn find(&self, name: &str) -> Result<&dyn System, UnknownSystem> {
+        let found = self.systems().find(|system| system.name() == name);
+        found.ok_or_else(|| {
+            let names: Vec<&str> = self.systems().map(System::name).collect();
+            UnknownSystem {
+                found: name.to_owned(),
+                nearest: nearest(name, names.iter().copied()),
+                expected: format!("one of {}", names.join(", ")),
+            }
+        })
+    }
+
+    /// The names of all built-in scenarios, sorted.
+    pub fn scenario_names(&self) -> Vec<&str> {
+        names(self.systems().flat_map(System::scenarios))
+    }
+
+    /// The text of a built-in scenario.
+    pub fn scenario(&self, name: &str) -> Option<&'static str> {
+        text(self.systems().map(System::scenarios), name)
+    }
+
+    /// The names of all built-in studies, sorted.
+    pub fn study_names(&self) -> Vec<&str> {
+        names(self.systems().flat_map(System::studies))
+    }
+
+    /// The text of a built-in study.
+    pub fn study(&self, name: &str) -> Option<&'static str> {
+        text(self.systems().map(System::studies), name)
+    }
+
+    /// What a system says of a metric, if the system is known and has it.
+    pub fn metric(&self, system: &str, name: &str) -> Option<&Metric> {
+        let system = self.systems().find(|known| known.name() == system)?;
+        system.metrics().iter().find(|metric| metric.name == name)
+    }
+}
+
+fn names<'a>(builtin: impl Iterator<Item = &'a Builtin>) -> Vec<&'a str> {
+    let mut names: Vec<&str> = builtin.map(|builtin| builtin.name).collect();
+    names.sort_unstable();
+    names
+}
+
+fn text<'a>(builtin: impl Iterator<Item = &'a [Builtin]>, name: &str) -> Option<&'static str> {
+    let mut found = builtin.filter_map(|all| Builtin::find(all, name));
+    found.next().map(|builtin| builtin.text)
+}
