@@ -2,10 +2,16 @@
 
 use std::any::{Any, TypeId};
 
-use crate::context::{Context, Core};
 use crate::encoding::{Schema, SchemaError};
+use crate::engine::{AnyActor, Core};
 use crate::fault::Outcome;
-use crate::message::Message;
+use crate::payload::Message;
+
+pub(crate) mod address;
+pub(crate) mod context;
+
+pub use address::{Address, Recipient, Target};
+pub use context::Context;
 
 /// An actor: private state that changes only in its handlers, at instants of virtual time.
 ///
@@ -90,12 +96,6 @@ accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W X);
 
-/// An actor whose type the engine does not know.
-pub(crate) trait AnyActor: Send {
-    fn started(&mut self, core: &mut Core<'_>) -> Outcome;
-    fn as_any(&mut self) -> &mut dyn Any;
-}
-
 impl<A: Actor> AnyActor for A {
     fn started(&mut self, core: &mut Core<'_>) -> Outcome {
         Actor::started(self, &mut Context::new(core))
@@ -105,6 +105,3 @@ impl<A: Actor> AnyActor for A {
         self
     }
 }
-
-/// The constructor of an actor, called with its name at the start and at each restart.
-pub(crate) type Factory = Box<dyn Fn(&str) -> Box<dyn AnyActor> + Send>;

@@ -3,6 +3,7 @@
 //! An engine knows nothing of threads. What leaves its hosts for another engine's waits in
 //! `outgoing` for the executor to carry over.
 
+mod erased;
 mod event;
 mod parts;
 mod store;
@@ -11,19 +12,17 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use crate::actor::{AnyActor, Factory};
 use crate::carrier::{AnyCarrier, SealedChange};
-use crate::context::Core;
-use crate::digest::record_hash;
 use crate::fault::{Fault, FaultCause, Outcome};
-use crate::key::{Bound, EntityId, EventKey};
-use crate::message::{MatchKey, Sealed};
-use crate::plan::{FixedMap, KindIndex, Plan};
+use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::key::{Bound, EventKey};
+use crate::plan::{FixedMap, Plan};
 use crate::queue::Entry;
 use crate::random::Stream;
-use crate::record::{Record, RecordClass};
+use crate::record::{Record, RecordClass, record_hash};
 use crate::time::SimTime;
 
+pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
 pub(crate) use parts::Parts;
 

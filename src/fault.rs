@@ -137,6 +137,11 @@ pub enum FaultCause {
     },
 }
 
+/// An observer could not go on: a full disk, for example. The run ends, its committed part stands.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct ObserverError(pub String);
+
 /// Why a simulation could not start.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BuildError {
@@ -184,7 +189,7 @@ pub enum BuildError {
     },
     /// An observer failed before the first event.
     #[error(transparent)]
-    Observer(#[from] crate::record::ObserverError),
+    Observer(#[from] ObserverError),
     /// The executor could not start its threads.
     #[error("cannot start the executor's threads: {0}")]
     Threads(String),

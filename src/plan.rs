@@ -6,13 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rustc_hash::FxBuildHasher;
 
-use crate::actor::Actor;
 use crate::encoding::Schema;
-use crate::fault::LookupError;
-use crate::key::{EntityId, EventKey};
-use crate::message::{Address, Message};
+use crate::ids::{EntityId, HostIndex, KindIndex};
+use crate::key::EventKey;
+use crate::payload::Message;
 use crate::random::name_hash;
-use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
 
 /// A hash map that is only ever asked for a key, with a hasher that is the same on every machine.
@@ -107,11 +105,6 @@ impl RunInfo {
 /// The number of a loss reason in [`Plan::reason`]: messages in flight carry two bytes, not a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Reason(u16);
-
-/// Index of a host.
-pub(crate) type HostIndex = u32;
-/// Index of a kind in [`RunInfo::kinds`].
-pub(crate) type KindIndex = u32;
 
 /// Where an entity's state lives.
 #[derive(Clone, Copy, Debug)]
@@ -210,43 +203,6 @@ impl Plan {
         at.and_then(|at| KindIndex::try_from(at).ok())
     }
 
-    /// The address of the actor called `name`.
-    pub(crate) fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        let unknown = || LookupError::Unknown {
-            name: name.to_owned(),
-        };
-        let entity = self.info.entity(name).ok_or_else(unknown)?;
-        let declared = self.address_numbers[entity.index()].ok_or_else(unknown)?;
-        let (type_id, actual) = self.actor_types[declared as usize];
-        if type_id != TypeId::of::<B>() {
-            let expected = std::any::type_name::<B>();
-            return Err(LookupError::WrongType {
-                name: name.to_owned(),
-                expected,
-                actual,
-            });
-        }
-        Ok(Address::new(declared))
-    }
-
-    /// The links that carry what `host` sends and take changes of type `C`, in name order.
-    pub(crate) fn links_from<C: Message>(&self, host: HostIndex) -> Vec<LinkId<C>> {
-        let Some(kind) = self.kind_of_type.get(&TypeId::of::<C>()) else {
-            return Vec::new();
-        };
-        let routes = &self.routes[host as usize];
-        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
-        links.extend(routes.uplink);
-        links.retain(|link| self.links[link].change_kind == *kind);
-        links.sort_unstable();
-        links.dedup();
-        let id = |link: EntityId| {
-            let declared = self.declared_links.iter().position(|known| *known == link);
-            declared.map(|declared| LinkId::new(declared as u32))
-        };
-        links.into_iter().filter_map(id).collect()
-    }
-
     /// True if records, and so encoded bodies, are needed at all.
     pub(crate) fn recording(&self) -> bool {
         self.digest || self.observed
@@ -300,7 +256,7 @@ impl Plan {
     }
 
     /// The kind of a sample type, traced when it is first met.
-    pub(crate) fn sample_kind<S: crate::message::Message>(&self) -> Result<Arc<Kind>, String> {
+    pub(crate) fn sample_kind<S: Message>(&self) -> Result<Arc<Kind>, String> {
         let type_id = TypeId::of::<S>();
         let mut kinds = self
             .sample_kinds

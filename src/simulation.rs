@@ -6,52 +6,16 @@ use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::actor::{Accepts, Actor, AnyActor, Factory, KindEntry};
+use crate::actor::{Accepts, Actor, Address, KindEntry};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
+use crate::engine::{AnyActor, Factory};
 use crate::executor::{self, Executor};
 use crate::fault::{BuildError, LookupError};
-use crate::message::Address;
+use crate::ids::{HostId, LinkId};
+use crate::payload::Message;
 use crate::record::Observer;
 use crate::report::Report;
 use crate::time::{SimDuration, SimTime};
-
-/// A host: the actors on it form one logical process and reach each other without a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct HostId(u32);
-
-impl HostId {
-    pub(crate) fn from_index(index: u32) -> Self {
-        HostId(index)
-    }
-
-    /// The host's number in order of declaration, from 0.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// A link of a simulation that takes changes of type `C`.
-pub struct LinkId<C> {
-    pub(crate) declared: u32,
-    change: std::marker::PhantomData<fn(C)>,
-}
-
-impl<C> LinkId<C> {
-    pub(crate) fn new(declared: u32) -> Self {
-        LinkId {
-            declared,
-            change: std::marker::PhantomData,
-        }
-    }
-}
-
-impl<C> Clone for LinkId<C> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<C> Copy for LinkId<C> {}
 
 struct HostDecl {
     name: String,
@@ -325,7 +289,7 @@ impl Simulation {
     }
 
     /// Changes a link at `time`.
-    pub fn change_at<C: crate::Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
+    pub fn change_at<C: Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
         let what = Planned::Change(SealedChange::new(change));
         self.control(time, Some(Target::Link(link.declared)), what);
     }

@@ -13,11 +13,11 @@ mod source;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use farside::scene::Scene;
 use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::radio::RadioConfig;
 use farside_actors::units;
-use farside_logs::Scene;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;

@@ -13,9 +13,9 @@
 
 mod files;
 
+use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
 use farside_actors::link::{LinkBuilder, LinkConfigError};
-use farside_logs::Scene;
 use serde_json::{Map, Value};
 use thiserror::Error;
 

@@ -40,7 +40,7 @@
 //! their own type, without an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
-//! skip the roles that they do not know. What is drawn ([`Scene`]) is derived from the records, in
+//! skip the roles that they do not know. What is drawn ([`farside::scene::Scene`]) is derived from the records, in
 //! Foxglove's published schemas, and never compared. Metadata: `farside` (format, code version, seed, scenario),
 //! `farside.run`, `farside.host` (what may differ between machines), and at the end `farside.end`
 //! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
@@ -73,6 +73,5 @@ pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
-pub use scene::{Drawing, Form, Level, Pose, Scene, Shape};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

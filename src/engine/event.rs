@@ -2,10 +2,11 @@
 
 use std::num::NonZeroU64;
 
+use super::erased::Sealed;
 use crate::carrier::Carriage;
-use crate::key::{EntityId, EventKey};
-use crate::message::{MatchKey, Sealed};
-use crate::plan::{KindIndex, Plan, Reason};
+use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::key::EventKey;
+use crate::plan::{Plan, Reason};
 use crate::record::{Record, RecordClass};
 use crate::time::{SimDuration, SimTime};
 

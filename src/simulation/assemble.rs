@@ -4,14 +4,12 @@
 use std::any::TypeId;
 use std::sync::{Arc, Mutex};
 
-use super::{HostId, LinkDecl, Planned, Simulation, Target};
+use super::{LinkDecl, Planned, Simulation, Target};
 use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
 use crate::fault::BuildError;
-use crate::key::EntityId;
-use crate::plan::{
-    Entity, EntityRole, FixedMap, Kind, KindIndex, LinkPlan, Place, Plan, Routes, RunInfo,
-};
+use crate::ids::{EntityId, HostId, KindIndex};
+use crate::plan::{Entity, EntityRole, FixedMap, Kind, LinkPlan, Place, Plan, Routes, RunInfo};
 use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
 

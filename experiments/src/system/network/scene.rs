@@ -10,10 +10,10 @@ use std::fmt;
 use std::sync::Arc;
 
 use farside::record::{Record, RecordClass};
+use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside::{RunInfo, SimDuration};
 use farside_actors::network::Network;
 use farside_actors::network::messages::RoverState;
-use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
 
 use super::crater;

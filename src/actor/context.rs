@@ -4,33 +4,15 @@
 use std::any::TypeId;
 use std::marker::PhantomData;
 
-use crate::actor::{Actor, Handler};
-use crate::engine::{CellState, Outbound, Parts};
+use super::address::{Address, Target, seal_change};
+use super::{Actor, Handler};
+use crate::engine::{CellState, Core, Outbound, Parts};
 use crate::fault::{FaultCause, LookupError};
-use crate::key::{EntityId, EventKey};
-use crate::message::{Address, MatchKey, Message, Target, seal_change};
-use crate::plan::KindIndex;
+use crate::ids::{EntityId, LinkId, MatchKey, TimerId};
+use crate::key::EventKey;
+use crate::payload::Message;
 use crate::random::{RandomKey, Stream};
-use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
-
-/// What a handler works with, whatever its actor's type.
-pub(crate) struct Core<'a> {
-    pub(crate) parts: &'a mut Parts,
-    pub(crate) state: &'a mut CellState,
-    pub(crate) me: EntityId,
-    /// The key of the event being handled.
-    pub(crate) key: EventKey,
-}
-
-/// A timer that is set, for [`Context::cancel`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimerId {
-    pub(crate) slot: u32,
-    pub(crate) kind: KindIndex,
-    /// Tells this timer from a later one in the same slot.
-    pub(crate) ordinal: u64,
-}
 
 /// A handler's way to the world, at one instant of virtual time.
 pub struct Context<'a, A> {
@@ -77,7 +59,22 @@ impl<'a, A: Actor> Context<'a, A> {
     /// # Errors
     /// When no actor has that name, or it is not a `B`.
     pub fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        self.parts.plan.lookup::<B>(name)
+        let plan = &self.parts.plan;
+        let unknown = || LookupError::Unknown {
+            name: name.to_owned(),
+        };
+        let entity = plan.info.entity(name).ok_or_else(unknown)?;
+        let declared = plan.address_numbers[entity.index()].ok_or_else(unknown)?;
+        let (type_id, actual) = plan.actor_types[declared as usize];
+        if type_id != TypeId::of::<B>() {
+            let expected = std::any::type_name::<B>();
+            return Err(LookupError::WrongType {
+                name: name.to_owned(),
+                expected,
+                actual,
+            });
+        }
+        Ok(Address::new(declared))
     }
 
     /// Sends `message`, within the host at once, to another host through the link between them.
@@ -130,8 +127,22 @@ impl<'a, A: Actor> Context<'a, A> {
     /// The links that carry what this host sends and take changes of type `C`, in name order: those
     /// that [`Context::tell_link`] may be called with.
     pub fn links<C: Message>(&self) -> Vec<LinkId<C>> {
-        let host = self.parts.plan.place(self.me).host;
-        self.parts.plan.links_from(host)
+        let plan = &self.parts.plan;
+        let host = plan.place(self.me).host;
+        let Some(kind) = plan.kind_of_type.get(&TypeId::of::<C>()) else {
+            return Vec::new();
+        };
+        let routes = &plan.routes[host as usize];
+        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
+        links.extend(routes.uplink);
+        links.retain(|link| plan.links[link].change_kind == *kind);
+        links.sort_unstable();
+        links.dedup();
+        let id = |link: EntityId| {
+            let declared = plan.declared_links.iter().position(|known| *known == link);
+            declared.map(|declared| LinkId::new(declared as u32))
+        };
+        links.into_iter().filter_map(id).collect()
     }
 
     /// Tells a link something: new parameters, or where this host is. The link must be one of this
