@@ -1,11 +1,11 @@
 //! What an actor is: a state, the messages it accepts, and a handler for each.
 
-use std::any::{Any, TypeId};
+use std::any::Any;
 
-use crate::encoding::{Schema, SchemaError};
 use crate::engine::{AnyActor, Core};
 use crate::fault::Outcome;
 use crate::payload::Message;
+use crate::plan::Accepted;
 
 pub(crate) mod address;
 pub(crate) mod context;
@@ -36,25 +36,7 @@ pub trait Handler<M: Message>: Actor {
 /// A tuple of message types, each of which `A` handles. Implemented for tuples of up to 24.
 pub trait Accepts<A> {
     #[doc(hidden)]
-    fn list(kinds: &mut Vec<KindEntry>);
-}
-
-/// A message type as an actor lists it.
-#[doc(hidden)]
-pub struct KindEntry {
-    pub(crate) type_id: TypeId,
-    pub(crate) type_name: &'static str,
-    pub(crate) trace: fn() -> Result<Schema, SchemaError>,
-}
-
-impl KindEntry {
-    pub(crate) fn of<M: Message>() -> Self {
-        KindEntry {
-            type_id: TypeId::of::<M>(),
-            type_name: std::any::type_name::<M>(),
-            trace: Schema::of::<M>,
-        }
-    }
+    fn list(accepted: &mut Vec<Accepted>);
 }
 
 macro_rules! accepts_tuples {
@@ -63,8 +45,8 @@ macro_rules! accepts_tuples {
         where
             $(Host: Handler<$name>,)*
         {
-            fn list(_kinds: &mut Vec<KindEntry>) {
-                $(_kinds.push(KindEntry::of::<$name>());)*
+            fn list(_accepted: &mut Vec<Accepted>) {
+                $(_accepted.push(Accepted::new::<$name>(Box::new(address::sealer::<Host, $name>())));)*
             }
         }
     };

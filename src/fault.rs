@@ -187,6 +187,9 @@ pub enum BuildError {
         /// The other.
         second: String,
     },
+    /// An actor was to be told something, and there is no such actor, or it does not accept that.
+    #[error(transparent)]
+    Lookup(#[from] LookupError),
     /// An observer failed before the first event.
     #[error(transparent)]
     Observer(#[from] ObserverError),
@@ -199,10 +202,12 @@ pub enum BuildError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
     /// No actor has the name.
-    #[error("no actor is called {name:?}")]
+    #[error("no actor is called {name:?}{}", .nearest.as_ref().map(|near| format!("; did you mean {near:?}?")).unwrap_or_default())]
     Unknown {
         /// The name.
         name: String,
+        /// The actor whose name is closest to it.
+        nearest: Option<String>,
     },
     /// The actor is of another type.
     #[error("{name} is a {actual}, not a {expected}")]
@@ -214,4 +219,47 @@ pub enum LookupError {
         /// The type it has.
         actual: &'static str,
     },
+    /// The actor does not accept messages of the type asked for.
+    #[error("{name} is a {actual}, which does not accept {kind}; it accepts {}", listed(.accepts))]
+    NotAccepted {
+        /// The actor's name.
+        name: String,
+        /// The Rust type of the message.
+        kind: &'static str,
+        /// The type of the actor.
+        actual: &'static str,
+        /// The Rust types of the messages that it accepts.
+        accepts: Vec<&'static str>,
+    },
+}
+
+impl LookupError {
+    pub(crate) fn unknown<'a>(name: &str, actors: impl Iterator<Item = &'a str>) -> Self {
+        LookupError::Unknown {
+            name: name.to_owned(),
+            nearest: nearest(name, actors),
+        }
+    }
+}
+
+fn listed(accepts: &[&str]) -> String {
+    match accepts {
+        [] => "no messages".to_owned(),
+        names => names.join(", "),
+    }
+}
+
+/// The name closest to `found` in spelling, if any comes near.
+///
+/// ```
+/// use farside::fault::nearest;
+/// let names = ["rover_01", "rover_02", "base"];
+/// assert_eq!(nearest("rovr_02", names.into_iter()), Some("rover_02".to_owned()));
+/// assert_eq!(nearest("lander", names.into_iter()), None);
+/// ```
+pub fn nearest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
+    let scored = names.map(|name| (strsim::damerau_levenshtein(found, name), name));
+    let (distance, name) = scored.min_by_key(|(distance, _)| *distance)?;
+    let limit = found.chars().count().max(name.chars().count()) / 2 + 1;
+    (distance <= limit).then(|| name.to_owned())
 }

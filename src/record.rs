@@ -43,6 +43,8 @@ pub enum RecordClass {
     Stop = 9,
     /// An actor recorded a state sample. Not part of the digest.
     Sample = 10,
+    /// A control event handed an actor a message. If the actor was crashed, nothing came of it.
+    Told = 11,
 }
 
 impl RecordClass {
@@ -60,6 +62,7 @@ impl RecordClass {
             RecordClass::Change => "change",
             RecordClass::Stop => "stop",
             RecordClass::Sample => "sample",
+            RecordClass::Told => "told",
         }
     }
 

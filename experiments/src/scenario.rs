@@ -585,13 +585,7 @@ fn part<'i>(
     Ok((Spanned::new(span.clone(), shared), Spanned::new(span, own)))
 }
 
-/// The name closest to `found` in spelling, if any comes near.
-pub(crate) fn nearest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
-    let scored = names.map(|name| (strsim::damerau_levenshtein(found, name), name));
-    let (distance, name) = scored.min_by_key(|(distance, _)| *distance)?;
-    let limit = found.chars().count().max(name.chars().count()) / 2 + 1;
-    (distance <= limit).then(|| name.to_owned())
-}
+pub(crate) use farside::fault::nearest;
 
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,7 @@
 //! - [`diff`] says which messages of two logs differ, which one first, and what caused it.
 //! - [`recover`] makes a whole file of a broken one.
 //!
-//! # The format, version 1.1
+//! # The format, version 1.2
 //!
 //! One MCAP message for each record of a run, in the order in which they were committed.
 //!
@@ -23,6 +23,7 @@
 //! | `/timer/{actor}/{kind}` | a timer fired | fired | set |
 //! | `/event/{start,crash,restart}/{actor}` | what happened to an actor | when | when |
 //! | `/event/change/{link}` | a link was changed | when | when |
+//! | `/event/told/{actor}` | a control event handed an actor a message | when | when |
 //! | `/event/stop` | the run was stopped | when | when |
 //! | `/state/{actor}/{kind}` | a state sample; never compared | when | when |
 //! | `/tf` | drawn: frames, `foxglove.FrameTransforms` | when | when |
@@ -46,7 +47,7 @@
 //! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
 //! scenario as `scenario.toml`, and the files that it read.
 //!
-//! A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
+//! 1.2 added `/event/told` and a carriage's `receive_j`. A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
 
 mod descriptors;
 mod diff;

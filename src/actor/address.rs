@@ -8,8 +8,9 @@ use super::context::Context;
 use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
 use crate::engine::{Core, Letter, Sealed};
-use crate::fault::Outcome;
+use crate::fault::{LookupError, Outcome};
 use crate::payload::{Encode, Message};
+use crate::plan::{ActorType, KindEntry};
 
 /// The address of an actor of type `A`: takes every message that `A` handles, and no other.
 ///
@@ -80,6 +81,25 @@ impl<A: Actor> Address<A> {
             seal: seal::<A, M>,
         }
     }
+}
+
+impl<M: Message> Recipient<M> {
+    /// The actor with this number in its address, of this type and called so, as one that accepts `M`.
+    pub(crate) fn of(
+        declared: u32,
+        actor_type: &ActorType,
+        name: &str,
+    ) -> Result<Self, LookupError> {
+        let accepted = actor_type.accepted(&KindEntry::of::<M>(), name)?;
+        let seal = accepted.seal.downcast_ref::<fn(M) -> Sealed>();
+        let seal = *seal.expect("what an actor accepts is kept with how it is sealed");
+        Ok(Recipient { declared, seal })
+    }
+}
+
+/// How messages of type `M` are sealed for actors of type `A`.
+pub(crate) fn sealer<A: Handler<M>, M: Message>() -> fn(M) -> Sealed {
+    seal::<A, M>
 }
 
 /// What `M` can be sent to: an [`Address`] or a [`Recipient`].

@@ -4,7 +4,7 @@
 use std::any::TypeId;
 use std::marker::PhantomData;
 
-use super::address::{Address, Target, seal_change};
+use super::address::{Address, Recipient, Target, seal_change};
 use super::{Actor, Handler};
 use crate::engine::{CellState, Core, Outbound, Parts};
 use crate::fault::{FaultCause, LookupError};
@@ -59,22 +59,60 @@ impl<'a, A: Actor> Context<'a, A> {
     /// # Errors
     /// When no actor has that name, or it is not a `B`.
     pub fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        let plan = &self.parts.plan;
-        let unknown = || LookupError::Unknown {
-            name: name.to_owned(),
-        };
-        let entity = plan.info.entity(name).ok_or_else(unknown)?;
-        let declared = plan.address_numbers[entity.index()].ok_or_else(unknown)?;
-        let (type_id, actual) = plan.actor_types[declared as usize];
-        if type_id != TypeId::of::<B>() {
-            let expected = std::any::type_name::<B>();
+        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        if actor_type.type_id != TypeId::of::<B>() {
             return Err(LookupError::WrongType {
                 name: name.to_owned(),
-                expected,
-                actual,
+                expected: std::any::type_name::<B>(),
+                actual: actor_type.name,
             });
         }
         Ok(Address::new(declared))
+    }
+
+    /// The actor called `name`, whatever its type, as one that accepts `M`: so a planner of one's own
+    /// takes the place of another under the same name.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use serde::{Deserialize, Serialize};
+    ///
+    /// #[derive(Serialize, Deserialize)]
+    /// struct Goal { east_m: f64, north_m: f64 }
+    ///
+    /// /// Takes goals. The rover below knows nothing else of it.
+    /// struct MyPlanner;
+    /// impl Actor for MyPlanner { type Accepts = (Goal,); }
+    /// impl Handler<Goal> for MyPlanner {
+    ///     fn handle(&mut self, goal: Goal, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         assert_eq!((goal.east_m, goal.north_m), (3.0, 4.0));
+    ///         ctx.stop("planned");
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// struct Rover;
+    /// impl Actor for Rover {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         let planner = ctx.recipient::<Goal>("planner")?;
+    ///         ctx.send(planner, Goal { east_m: 3.0, north_m: 4.0 });
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// sim.actor(host, "planner", |_| MyPlanner);
+    /// sim.actor(host, "rover", |_| Rover);
+    /// assert_eq!(sim.run(Executor::Inline).unwrap().end.name(), "stopped");
+    /// ```
+    ///
+    /// # Errors
+    /// When no actor has that name, or its `Accepts` does not list `M`; the error names what it lists.
+    pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
+        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        Recipient::of(declared, actor_type, name)
     }
 
     /// Sends `message`, within the host at once, to another host through the link between them.

@@ -22,7 +22,7 @@ pub(crate) enum Class {
     Held,
     /// A message is lost on its way.
     LateLoss,
-    /// An actor changes a link.
+    /// An actor changes a link; in a control event, an actor is told something.
     Tell,
     /// A shared link charges an actor for what it transmitted.
     Charge,
