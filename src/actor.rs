@@ -1,11 +1,17 @@
 //! What an actor is: a state, the messages it accepts, and a handler for each.
 
-use std::any::{Any, TypeId};
+use std::any::Any;
 
-use crate::context::{Context, Core};
-use crate::encoding::{Schema, SchemaError};
+use crate::engine::{AnyActor, Core};
 use crate::fault::Outcome;
-use crate::message::Message;
+use crate::payload::Message;
+use crate::plan::Accepted;
+
+pub(crate) mod address;
+pub(crate) mod context;
+
+pub use address::{Address, Recipient, Target};
+pub use context::Context;
 
 /// An actor: private state that changes only in its handlers, at instants of virtual time.
 ///
@@ -30,25 +36,7 @@ pub trait Handler<M: Message>: Actor {
 /// A tuple of message types, each of which `A` handles. Implemented for tuples of up to 24.
 pub trait Accepts<A> {
     #[doc(hidden)]
-    fn list(kinds: &mut Vec<KindEntry>);
-}
-
-/// A message type as an actor lists it.
-#[doc(hidden)]
-pub struct KindEntry {
-    pub(crate) type_id: TypeId,
-    pub(crate) type_name: &'static str,
-    pub(crate) trace: fn() -> Result<Schema, SchemaError>,
-}
-
-impl KindEntry {
-    pub(crate) fn of<M: Message>() -> Self {
-        KindEntry {
-            type_id: TypeId::of::<M>(),
-            type_name: std::any::type_name::<M>(),
-            trace: Schema::of::<M>,
-        }
-    }
+    fn list(accepted: &mut Vec<Accepted>);
 }
 
 macro_rules! accepts_tuples {
@@ -57,8 +45,8 @@ macro_rules! accepts_tuples {
         where
             $(Host: Handler<$name>,)*
         {
-            fn list(_kinds: &mut Vec<KindEntry>) {
-                $(_kinds.push(KindEntry::of::<$name>());)*
+            fn list(_accepted: &mut Vec<Accepted>) {
+                $(_accepted.push(Accepted::new::<$name>(Box::new(address::sealer::<Host, $name>())));)*
             }
         }
     };
@@ -90,12 +78,6 @@ accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W X);
 
-/// An actor whose type the engine does not know.
-pub(crate) trait AnyActor: Send {
-    fn started(&mut self, core: &mut Core<'_>) -> Outcome;
-    fn as_any(&mut self) -> &mut dyn Any;
-}
-
 impl<A: Actor> AnyActor for A {
     fn started(&mut self, core: &mut Core<'_>) -> Outcome {
         Actor::started(self, &mut Context::new(core))
@@ -105,6 +87,3 @@ impl<A: Actor> AnyActor for A {
         self
     }
 }
-
-/// The constructor of an actor, called with its name at the start and at each restart.
-pub(crate) type Factory = Box<dyn Fn(&str) -> Box<dyn AnyActor> + Send>;

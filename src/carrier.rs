@@ -8,11 +8,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::encoding::Schema;
-use crate::key::EntityId;
-use crate::message::{MatchKey, Message, Sealed};
+use crate::ids::{EntityId, HostId, MatchKey};
+use crate::payload::{Encode, Message};
 use crate::plan::{Kind, Plan};
 use crate::random::RandomKey;
-use crate::simulation::HostId;
 use crate::time::{SimDuration, SimTime};
 
 /// A link: decides when each message arrives, how often, or why it does not.
@@ -57,7 +56,7 @@ pub struct Parcel<'a> {
     pub(crate) copy: u32,
     pub(crate) token: Option<u64>,
     pub(crate) match_key: Option<MatchKey>,
-    pub(crate) letter: &'a Sealed,
+    pub(crate) letter: &'a dyn Encode,
     pub(crate) size: Cell<Option<u64>>,
 }
 
@@ -89,7 +88,7 @@ impl Parcel<'_> {
 
     /// The sender's host and the receiver's.
     pub fn hosts(&self) -> (HostId, HostId) {
-        let host = |entity| HostId::from_index(self.plan.place(entity).host);
+        let host = |entity| HostId(self.plan.place(entity).host);
         (host(self.sender), host(self.receiver))
     }
 
@@ -131,7 +130,7 @@ impl Parcel<'_> {
         }
         let mut scratch = Vec::new();
         // A message that cannot be encoded ends the run where it is recorded; here it is empty.
-        let _ = self.letter.0.encode(self.kind.schema(), &mut scratch);
+        let _ = self.letter.encode(self.kind.schema(), &mut scratch);
         let size = scratch.len() as u64;
         self.size.set(Some(size));
         size

@@ -7,9 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::carrier::Carriage;
 use crate::digest::Digest;
 use crate::engine::{Head, InFlight, Sink, hash_if_wanted};
-use crate::key::{EntityId, EventKey};
+use crate::fault::ObserverError;
+use crate::ids::EntityId;
+use crate::key::EventKey;
 use crate::plan::{Kind, Plan};
-use crate::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use crate::record::{Checkpoint, Flow, Observer, Record, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
 use crate::time::SimTime;
 

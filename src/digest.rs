@@ -6,12 +6,6 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
-
-use crate::key::{EntityId, EventKey};
-use crate::plan::Plan;
-use crate::record::Record;
-use crate::time::SimTime;
 
 /// The digest of a run so far: 128 bits, printed as 32 hexadecimal digits.
 ///
@@ -68,49 +62,4 @@ impl TryFrom<String> for Digest {
     fn try_from(text: String) -> Result<Self, String> {
         text.parse()
     }
-}
-
-/// What stands for the cause of an event that has none.
-const NO_CAUSE: EventKey = EventKey {
-    time: SimTime::MAX,
-    step: u32::MAX,
-    tie: 0,
-    source: EntityId::CONTROL,
-    count: u64::MAX,
-};
-
-/// The hash of one record, to extend a digest with: sixteen words, which is as far as the hash
-/// function's fast path goes. When the message was sent is not among them: it is the cause's time.
-pub(crate) fn record_hash(plan: &Plan, record: &Record<'_>) -> u128 {
-    let (key, cause) = (record.key, record.cause.unwrap_or(NO_CAUSE));
-    let shape = record.class as u64
-        | u64::from(record.match_key.is_some()) << 8
-        | u64::from(record.copy) << 32;
-    let words = [
-        key.time.as_nanos(),
-        u64::from(key.step) << 32 | u64::from(cause.step),
-        plan.name_hash(key.source),
-        key.count,
-        cause.time.as_nanos(),
-        plan.name_hash(cause.source),
-        cause.count,
-        shape,
-        plan.name_hash(record.sender),
-        plan.name_hash(record.receiver),
-        record.link.map_or(0, |link| plan.name_hash(link)),
-        record.kind.map_or(0, |kind| kind.hash()),
-        record.ordinal,
-        record.match_key.map_or(0, |key| key.bits()),
-        if record.reason.is_empty() {
-            0
-        } else {
-            xxh3_64(record.reason.as_bytes())
-        },
-        record.body.len() as u64,
-    ];
-    let mut bytes = [0u8; 16 * 8];
-    for (place, word) in bytes.chunks_exact_mut(8).zip(words) {
-        place.copy_from_slice(&word.to_le_bytes());
-    }
-    xxh3_128_with_seed(&bytes, xxh3_64(record.body))
 }

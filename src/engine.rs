@@ -3,6 +3,7 @@
 //! An engine knows nothing of threads. What leaves its hosts for another engine's waits in
 //! `outgoing` for the executor to carry over.
 
+mod erased;
 mod event;
 mod parts;
 mod store;
@@ -11,19 +12,17 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use crate::actor::{AnyActor, Factory};
 use crate::carrier::{AnyCarrier, SealedChange};
-use crate::context::Core;
-use crate::digest::record_hash;
 use crate::fault::{Fault, FaultCause, Outcome};
-use crate::key::{Bound, EntityId, EventKey};
-use crate::message::{MatchKey, Sealed};
-use crate::plan::{FixedMap, KindIndex, Plan};
+use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::key::{Bound, EventKey};
+use crate::plan::{FixedMap, Plan};
 use crate::queue::Entry;
 use crate::random::Stream;
-use crate::record::{Record, RecordClass};
+use crate::record::{Record, RecordClass, record_hash};
 use crate::time::SimTime;
 
+pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
 pub(crate) use parts::Parts;
 
@@ -126,6 +125,7 @@ pub(crate) enum Action {
     Crash,
     Restart,
     Change(SealedChange),
+    Tell(KindIndex, Sealed),
 }
 
 /// Runs the events of a set of hosts.
@@ -370,7 +370,41 @@ impl Engine {
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
             }
+            Action::Tell(kind, letter) => self.tell_actor(key, head, kind, letter, sink),
         }
+    }
+
+    /// Hands an actor a message from a control event. A crashed actor is told in vain.
+    fn tell_actor(
+        &mut self,
+        key: EventKey,
+        head: Head,
+        kind: KindIndex,
+        letter: Sealed,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let local = self.parts.plan.place(head.receiver).local as usize;
+        let state = &mut self.actors[local].state;
+        // The flow from `@control`, to which no actor sends anything.
+        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL.0, kind, None);
+        let head = Head {
+            kind: Some(kind),
+            ordinal,
+            ..head
+        };
+        self.parts.begin(key, Some(&letter), head.kind)?;
+        if self.is_crashed(head.receiver) {
+            self.commit(RecordClass::Told, key, &head, sink);
+            return Ok(());
+        }
+        self.run_handler(
+            Class::Tell,
+            RecordClass::Told,
+            key,
+            &head,
+            Some(letter),
+            sink,
+        )
     }
 
     /// Commits the event just handled, then what happened in it.

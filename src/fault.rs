@@ -1,5 +1,6 @@
 //! Faults as values: what ends a run, and what keeps one from starting.
 
+use crate::suggest::nearest;
 use thiserror::Error;
 
 use crate::key::EventKey;
@@ -137,6 +138,11 @@ pub enum FaultCause {
     },
 }
 
+/// An observer could not go on: a full disk, for example. The run ends, its committed part stands.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct ObserverError(pub String);
+
 /// Why a simulation could not start.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BuildError {
@@ -182,9 +188,12 @@ pub enum BuildError {
         /// The other.
         second: String,
     },
+    /// An actor was to be told something, and there is no such actor, or it does not accept that.
+    #[error(transparent)]
+    Lookup(#[from] LookupError),
     /// An observer failed before the first event.
     #[error(transparent)]
-    Observer(#[from] crate::record::ObserverError),
+    Observer(#[from] ObserverError),
     /// The executor could not start its threads.
     #[error("cannot start the executor's threads: {0}")]
     Threads(String),
@@ -194,10 +203,12 @@ pub enum BuildError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
     /// No actor has the name.
-    #[error("no actor is called {name:?}")]
+    #[error("no actor is called {name:?}{}", .nearest.as_ref().map(|near| format!("; did you mean {near:?}?")).unwrap_or_default())]
     Unknown {
         /// The name.
         name: String,
+        /// The actor whose name is closest to it.
+        nearest: Option<String>,
     },
     /// The actor is of another type.
     #[error("{name} is a {actual}, not a {expected}")]
@@ -209,4 +220,32 @@ pub enum LookupError {
         /// The type it has.
         actual: &'static str,
     },
+    /// The actor does not accept messages of the type asked for.
+    #[error("{name} is a {actual}, which does not accept {kind}; it accepts {}", listed(.accepts))]
+    NotAccepted {
+        /// The actor's name.
+        name: String,
+        /// The Rust type of the message.
+        kind: &'static str,
+        /// The type of the actor.
+        actual: &'static str,
+        /// The Rust types of the messages that it accepts.
+        accepts: Vec<&'static str>,
+    },
+}
+
+impl LookupError {
+    pub(crate) fn unknown<'a>(name: &str, actors: impl Iterator<Item = &'a str>) -> Self {
+        LookupError::Unknown {
+            name: name.to_owned(),
+            nearest: nearest(name, actors),
+        }
+    }
+}
+
+fn listed(accepts: &[&str]) -> String {
+    match accepts {
+        [] => "no messages".to_owned(),
+        names => names.join(", "),
+    }
 }

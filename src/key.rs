@@ -1,32 +1,11 @@
-//! Who can cause an event, and the key that puts all events of a run in one order.
+//! The key that puts all events of a run in one order.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::ids::EntityId;
 use crate::time::SimTime;
-
-/// An actor, a link or `@control`, numbered by its name's place in name order.
-///
-/// Numbers depend on which names a run declares and on nothing else; a log holds the names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct EntityId(pub(crate) u32);
-
-impl EntityId {
-    /// The source of faults, restarts, changes and stops. Sorts before every actor and link.
-    pub const CONTROL: EntityId = EntityId(0);
-
-    /// The entity's place in name order.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    /// The entity at `index`, for tables indexed by [`EntityId::index`].
-    pub fn from_index(index: usize) -> Self {
-        EntityId(u32::try_from(index).expect("entities are counted in 32 bits"))
-    }
-}
 
 /// The key of an event: keys are unique, and events are handled in key order.
 ///
@@ -35,7 +14,7 @@ impl EntityId {
 /// another actor does can change it. `tie` is zero unless the run has a tie seed.
 ///
 /// ```
-/// use farside::{key::{EntityId, EventKey}, time::SimTime};
+/// use farside::{EntityId, key::EventKey, time::SimTime};
 /// let first = EventKey { time: SimTime::ZERO, step: 0, tie: 0, source: EntityId::CONTROL, count: 0 };
 /// let hop = EventKey { step: 1, ..first };
 /// assert!(first < hop);

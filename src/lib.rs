@@ -111,33 +111,35 @@
 pub mod actor;
 pub mod carrier;
 mod commit;
-pub mod context;
 mod digest;
 pub mod encoding;
 mod engine;
 mod executor;
 pub mod fault;
+pub mod ids;
 pub mod key;
-pub mod message;
+mod payload;
 mod plan;
 mod queue;
 pub mod random;
 pub mod record;
 pub mod report;
+pub mod scene;
 mod schedule;
 mod simulation;
+pub mod suggest;
 pub mod time;
 
-pub use actor::{Accepts, Actor, Handler};
+pub use actor::{Accepts, Actor, Address, Context, Handler, Recipient};
 pub use carrier::{Carriage, Carrier, FixedDelay, Parcel, Verdicts};
-pub use context::{Context, TimerId};
 pub use digest::Digest;
 pub use executor::Executor;
 pub use fault::{BuildError, Fault, FaultCause, HandlerError, LookupError, Outcome};
-pub use message::{Address, MatchKey, Message, Recipient};
+pub use ids::{EntityId, HostId, LinkId, MatchKey, TimerId};
+pub use payload::Message;
 pub use plan::{Entity, EntityRole, Kind, RunInfo};
 pub use report::{Counts, End, Report};
-pub use simulation::{HostId, LinkId, Simulation};
+pub use simulation::Simulation;
 pub use time::{SimDuration, SimTime};
 
 /// Everything that an actor's author needs.

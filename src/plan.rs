@@ -1,18 +1,17 @@
 //! What is fixed before a run starts: who takes part, which messages they exchange, which link
 //! joins which hosts. Shared, read-only, by every engine of the run.
 
-use std::any::TypeId;
+use std::any::{Any, TypeId};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rustc_hash::FxBuildHasher;
 
-use crate::actor::Actor;
-use crate::encoding::Schema;
+use crate::encoding::{Schema, SchemaError};
 use crate::fault::LookupError;
-use crate::key::{EntityId, EventKey};
-use crate::message::{Address, Message};
+use crate::ids::{EntityId, HostIndex, KindIndex};
+use crate::key::EventKey;
+use crate::payload::Message;
 use crate::random::name_hash;
-use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
 
 /// A hash map that is only ever asked for a key, with a hasher that is the same on every machine.
@@ -49,6 +48,65 @@ impl Kind {
     /// How bodies of this kind are encoded.
     pub fn schema(&self) -> &Schema {
         &self.schema
+    }
+}
+
+/// A message type as it is declared, before it is traced.
+pub(crate) struct KindEntry {
+    pub(crate) type_id: TypeId,
+    pub(crate) type_name: &'static str,
+    pub(crate) trace: fn() -> Result<Schema, SchemaError>,
+}
+
+impl KindEntry {
+    pub(crate) fn of<M: Message>() -> Self {
+        KindEntry {
+            type_id: TypeId::of::<M>(),
+            type_name: std::any::type_name::<M>(),
+            trace: Schema::of::<M>,
+        }
+    }
+}
+
+/// A message type that an actor accepts.
+#[doc(hidden)]
+pub struct Accepted {
+    pub(crate) kind: KindEntry,
+    /// How a message of this type is sealed for the actor: a function whose type only those know who
+    /// know the message's.
+    pub(crate) seal: Box<dyn Any + Send + Sync>,
+}
+
+impl Accepted {
+    pub(crate) fn new<M: Message>(seal: Box<dyn Any + Send + Sync>) -> Self {
+        let kind = KindEntry::of::<M>();
+        Accepted { kind, seal }
+    }
+}
+
+/// A Rust type of actors, and what actors of this type accept.
+pub(crate) struct ActorType {
+    pub(crate) type_id: TypeId,
+    pub(crate) name: &'static str,
+    pub(crate) accepts: Vec<Accepted>,
+}
+
+impl ActorType {
+    /// What the type says of messages of this kind, asked of the actor called `actor`.
+    ///
+    /// # Errors
+    /// When the type's `Accepts` does not list the kind.
+    pub(crate) fn accepted(&self, kind: &KindEntry, actor: &str) -> Result<&Accepted, LookupError> {
+        let found = self
+            .accepts
+            .iter()
+            .find(|accepted| accepted.kind.type_id == kind.type_id);
+        found.ok_or_else(|| LookupError::NotAccepted {
+            name: actor.to_owned(),
+            kind: kind.type_name,
+            actual: self.name,
+            accepts: self.accepts.iter().map(|a| a.kind.type_name).collect(),
+        })
     }
 }
 
@@ -108,11 +166,6 @@ impl RunInfo {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Reason(u16);
 
-/// Index of a host.
-pub(crate) type HostIndex = u32;
-/// Index of a kind in [`RunInfo::kinds`].
-pub(crate) type KindIndex = u32;
-
 /// Where an entity's state lives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
@@ -151,8 +204,10 @@ pub(crate) struct Plan {
     pub(crate) declared_links: Vec<EntityId>,
     /// From the entity to the number in its address, if it is an actor.
     pub(crate) address_numbers: Vec<Option<u32>>,
-    /// From the number in an address to the Rust type of the actor.
-    pub(crate) actor_types: Vec<(TypeId, &'static str)>,
+    /// The Rust types of actors.
+    pub(crate) actor_types: Vec<ActorType>,
+    /// From the number in an address to the type of the actor.
+    pub(crate) type_of_actor: Vec<u32>,
     pub(crate) places: Vec<Place>,
     pub(crate) host_names: Vec<String>,
     pub(crate) routes: Vec<Routes>,
@@ -210,41 +265,16 @@ impl Plan {
         at.and_then(|at| KindIndex::try_from(at).ok())
     }
 
-    /// The address of the actor called `name`.
-    pub(crate) fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        let unknown = || LookupError::Unknown {
-            name: name.to_owned(),
-        };
-        let entity = self.info.entity(name).ok_or_else(unknown)?;
-        let declared = self.address_numbers[entity.index()].ok_or_else(unknown)?;
-        let (type_id, actual) = self.actor_types[declared as usize];
-        if type_id != TypeId::of::<B>() {
-            let expected = std::any::type_name::<B>();
-            return Err(LookupError::WrongType {
-                name: name.to_owned(),
-                expected,
-                actual,
-            });
-        }
-        Ok(Address::new(declared))
-    }
-
-    /// The links that carry what `host` sends and take changes of type `C`, in name order.
-    pub(crate) fn links_from<C: Message>(&self, host: HostIndex) -> Vec<LinkId<C>> {
-        let Some(kind) = self.kind_of_type.get(&TypeId::of::<C>()) else {
-            return Vec::new();
-        };
-        let routes = &self.routes[host as usize];
-        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
-        links.extend(routes.uplink);
-        links.retain(|link| self.links[link].change_kind == *kind);
-        links.sort_unstable();
-        links.dedup();
-        let id = |link: EntityId| {
-            let declared = self.declared_links.iter().position(|known| *known == link);
-            declared.map(|declared| LinkId::new(declared as u32))
-        };
-        links.into_iter().filter_map(id).collect()
+    /// The number in the address of the actor called `name`, and the actor's type.
+    pub(crate) fn actor(&self, name: &str) -> Result<(u32, &ActorType), LookupError> {
+        let entity = self.info.entity(name);
+        let declared = entity.and_then(|entity| self.address_numbers[entity.index()]);
+        let declared = declared.ok_or_else(|| {
+            let actors = self.declared.iter().map(|actor| self.name(*actor));
+            LookupError::unknown(name, actors)
+        })?;
+        let actor_type = self.type_of_actor[declared as usize] as usize;
+        Ok((declared, &self.actor_types[actor_type]))
     }
 
     /// True if records, and so encoded bodies, are needed at all.
@@ -300,7 +330,7 @@ impl Plan {
     }
 
     /// The kind of a sample type, traced when it is first met.
-    pub(crate) fn sample_kind<S: crate::message::Message>(&self) -> Result<Arc<Kind>, String> {
+    pub(crate) fn sample_kind<S: Message>(&self) -> Result<Arc<Kind>, String> {
         let type_id = TypeId::of::<S>();
         let mut kinds = self
             .sample_kinds

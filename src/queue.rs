@@ -6,7 +6,8 @@ use std::collections::VecDeque;
 
 use dary_heap::QuaternaryHeap;
 
-use crate::key::{Bound, EntityId, EventKey};
+use crate::ids::EntityId;
+use crate::key::{Bound, EventKey};
 use crate::time::SimTime;
 
 /// An event's key and the slot of its payload: half a cache line.

@@ -1,7 +1,8 @@
 //! When a run must pause: control events fixed beforehand, and requests to stop.
 
 use crate::engine::Action;
-use crate::key::{Bound, EntityId, EventKey};
+use crate::ids::EntityId;
+use crate::key::{Bound, EventKey};
 use crate::plan::Plan;
 use crate::time::{SimDuration, SimTime};
 

@@ -6,52 +6,17 @@ use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::actor::{Accepts, Actor, AnyActor, Factory, KindEntry};
+use crate::actor::{self, Accepts, Actor, Address, Recipient};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
+use crate::engine::{AnyActor, Factory, Sealed};
 use crate::executor::{self, Executor};
 use crate::fault::{BuildError, LookupError};
-use crate::message::Address;
+use crate::ids::{HostId, LinkId};
+use crate::payload::Message;
+use crate::plan::{ActorType, KindEntry};
 use crate::record::Observer;
 use crate::report::Report;
 use crate::time::{SimDuration, SimTime};
-
-/// A host: the actors on it form one logical process and reach each other without a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct HostId(u32);
-
-impl HostId {
-    pub(crate) fn from_index(index: u32) -> Self {
-        HostId(index)
-    }
-
-    /// The host's number in order of declaration, from 0.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// A link of a simulation that takes changes of type `C`.
-pub struct LinkId<C> {
-    pub(crate) declared: u32,
-    change: std::marker::PhantomData<fn(C)>,
-}
-
-impl<C> LinkId<C> {
-    pub(crate) fn new(declared: u32) -> Self {
-        LinkId {
-            declared,
-            change: std::marker::PhantomData,
-        }
-    }
-}
-
-impl<C> Clone for LinkId<C> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<C> Copy for LinkId<C> {}
 
 struct HostDecl {
     name: String,
@@ -61,8 +26,8 @@ struct HostDecl {
 struct ActorDecl {
     name: String,
     host: HostId,
-    type_id: TypeId,
-    type_name: &'static str,
+    /// Its place in [`Simulation::types`].
+    actor_type: u32,
     factory: Factory,
 }
 
@@ -90,6 +55,7 @@ enum Planned {
     Crash,
     Restart,
     Change(SealedChange),
+    Tell(KindEntry, Sealed),
     Stop(String),
 }
 
@@ -110,7 +76,7 @@ pub struct Simulation {
     links: Vec<LinkDecl>,
     routes: Vec<RouteDecl>,
     controls: Vec<ControlDecl>,
-    kinds: Vec<KindEntry>,
+    types: Vec<ActorType>,
     observers: Vec<Box<dyn Observer>>,
     interrupt: Arc<AtomicBool>,
     step_limit: u32,
@@ -129,7 +95,7 @@ impl Simulation {
             links: Vec::new(),
             routes: Vec::new(),
             controls: Vec::new(),
-            kinds: Vec::new(),
+            types: Vec::new(),
             observers: Vec::new(),
             interrupt: Arc::default(),
             step_limit: 10_000,
@@ -165,15 +131,31 @@ impl Simulation {
         name: &str,
         build: impl Fn(&str) -> A + Send + 'static,
     ) -> Address<A> {
-        A::Accepts::list(&mut self.kinds);
+        let actor_type = self.actor_type::<A>();
         self.actors.push(ActorDecl {
             name: name.to_owned(),
             host,
-            type_id: TypeId::of::<A>(),
-            type_name: std::any::type_name::<A>(),
+            actor_type,
             factory: Box::new(move |name| Box::new(build(name)) as Box<dyn AnyActor>),
         });
         Address::new(self.actors.len() as u32 - 1)
+    }
+
+    /// The place of an actor's type in the list of types, at its end if the type is new.
+    fn actor_type<A: Actor>(&mut self) -> u32 {
+        let type_id = TypeId::of::<A>();
+        let known = self.types.iter().position(|known| known.type_id == type_id);
+        let at = known.unwrap_or_else(|| {
+            let mut accepts = Vec::new();
+            A::Accepts::list(&mut accepts);
+            self.types.push(ActorType {
+                type_id,
+                name: std::any::type_name::<A>(),
+                accepts,
+            });
+            self.types.len() - 1
+        });
+        at as u32
     }
 
     /// Declares a link that carries what `from` sends to `to`, one way.
@@ -316,16 +298,96 @@ impl Simulation {
         Ok(())
     }
 
+    /// Tells an actor something at `time`: a goal that arrives at noon, a fault to inject. The
+    /// message is handled before anything else that happens at its instant; at time zero, before
+    /// the actor's `started`. A crashed actor is told in vain, and the log says that it was told.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use serde::{Deserialize, Serialize};
+    ///
+    /// #[derive(Serialize, Deserialize)]
+    /// struct Goal { crater: u32 }
+    ///
+    /// struct Rover;
+    /// impl Actor for Rover { type Accepts = (Goal,); }
+    /// impl Handler<Goal> for Rover {
+    ///     fn handle(&mut self, goal: Goal, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         ctx.stop(format!("crater {} at {}", goal.crater, ctx.now()));
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// let rover = sim.actor(host, "rover_01", |_| Rover);
+    /// sim.tell_at(SimTime::from_secs(43_200), rover, Goal { crater: 7 });
+    /// let report = sim.run(Executor::Inline).unwrap();
+    /// assert_eq!(report.end.to_string(), "stopped by rover_01: crater 7 at 43200s");
+    /// ```
+    pub fn tell_at<M: Message>(&mut self, time: SimTime, actor: impl actor::Target<M>, message: M) {
+        let target = Some(Target::Actor(actor.declared()));
+        let what = Planned::Tell(KindEntry::of::<M>(), actor.seal(message));
+        self.control(time, target, what);
+    }
+
+    /// [`Simulation::tell_at`] for the actor of this name, as scenarios give it.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// # struct Rover;
+    /// # impl Actor for Rover { type Accepts = (); }
+    /// #[derive(serde::Serialize, serde::Deserialize)]
+    /// struct Goal;
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// sim.actor(host, "rover_01", |_| Rover);
+    /// let error = sim.tell_named_at(SimTime::ZERO, "rover_10", Goal).unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "no actor is called \"rover_10\"; did you mean \"rover_01\"?"
+    /// );
+    /// let error = sim.tell_named_at(SimTime::ZERO, "rover_01", Goal).unwrap_err();
+    /// assert!(error.to_string().ends_with("Goal; it accepts no messages"));
+    /// ```
+    ///
+    /// # Errors
+    /// When no actor declared so far has the name, with the nearest that one has; or when it does not
+    /// accept messages of this type, with those that it accepts.
+    pub fn tell_named_at<M: Message>(
+        &mut self,
+        time: SimTime,
+        actor: &str,
+        message: M,
+    ) -> Result<(), BuildError> {
+        let recipient = self.recipient::<M>(actor)?;
+        self.tell_at(time, recipient, message);
+        Ok(())
+    }
+
+    /// The actor of this name, whatever its type, as one that accepts `M`. In a handler, ask
+    /// [`Context::recipient`](crate::Context::recipient).
+    ///
+    /// # Errors
+    /// When no actor declared so far has the name, or its `Accepts` does not list `M`.
+    pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
+        let declared = self.declared_named(name)?;
+        let actor_type = self.actors[declared as usize].actor_type as usize;
+        Recipient::of(declared, &self.types[actor_type], name)
+    }
+
     fn target_named(&self, name: &str) -> Result<Target, LookupError> {
+        self.declared_named(name).map(Target::Actor)
+    }
+
+    fn declared_named(&self, name: &str) -> Result<u32, LookupError> {
         let at = self.actor_names().position(|known| known == name);
-        let at = at.ok_or_else(|| LookupError::Unknown {
-            name: name.to_owned(),
-        })?;
-        Ok(Target::Actor(at as u32))
+        let at = at.ok_or_else(|| LookupError::unknown(name, self.actor_names()))?;
+        Ok(at as u32)
     }
 
     /// Changes a link at `time`.
-    pub fn change_at<C: crate::Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
+    pub fn change_at<C: Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
         let what = Planned::Change(SealedChange::new(change));
         self.control(time, Some(Target::Link(link.declared)), what);
     }

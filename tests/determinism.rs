@@ -16,13 +16,14 @@ prop_compose! {
         holds_16 in 0u8..9,
         shared in any::<bool>(),
         controls in prop::collection::vec((any::<u8>(), 0u64..40, any::<bool>()), 0..6),
+        tells in prop::collection::vec((any::<u8>(), 0u64..40, 0u8..4), 0..6),
         stop_after in prop_oneof![Just(0u32), 1u32..40],
         fail_after in prop_oneof![Just(0u32), 1u32..60],
         until_ns in 1u64..50,
     ) -> Chatter {
         Chatter {
             seed, tie_seed, hosts, min_delay_ns, jitter_ns, loss_16, copies_16, holds_16, shared,
-            controls, stop_after, fail_after, until_ns,
+            controls, tells, stop_after, fail_after, until_ns,
         }
     }
 }
@@ -105,6 +106,7 @@ fn without_the_min_delay_check_executors_disagree() {
         holds_16: 0,
         shared: false,
         controls: Vec::new(),
+        tells: Vec::new(),
         stop_after: 0,
         fail_after: 0,
         until_ns: 60,

@@ -5,6 +5,5 @@ pub mod figure;
 pub mod invariants;
 pub mod link;
 pub mod radio;
-pub mod suggest;
 pub mod system;
 pub mod units;

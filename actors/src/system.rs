@@ -10,8 +10,8 @@ mod metric;
 mod picture;
 mod section;
 
+use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
-use farside_logs::Scene;
 use serde_json::{Map, Value};
 use thiserror::Error;
 

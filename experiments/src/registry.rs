@@ -11,7 +11,7 @@
 //!
 //! `experiments/examples/own_system.rs` is such a binary, whole.
 
-use farside_actors::suggest::nearest;
+use farside::suggest::nearest;
 use farside_actors::system::{Builtin, Metric, System};
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;

@@ -12,11 +12,11 @@ mod source;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use farside::suggest::nearest;
 use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::radio::RadioConfig;
-use farside_actors::suggest::nearest;
 use farside_actors::system::{
     Assembly, Files, PictureError, PictureRequest, Recording, Settings, Setup, SetupError, System,
     no_file,

@@ -310,7 +310,7 @@ pub struct RecordRef<'a> {
     pub carriage: Option<Carriage>,
 }
 
-pub(crate) const CLASSES: [RecordClass; 11] = [
+pub(crate) const CLASSES: [RecordClass; 12] = [
     RecordClass::Start,
     RecordClass::Delivered,
     RecordClass::Lost,
@@ -322,6 +322,7 @@ pub(crate) const CLASSES: [RecordClass; 11] = [
     RecordClass::Change,
     RecordClass::Stop,
     RecordClass::Sample,
+    RecordClass::Told,
 ];
 
 impl<'a> RecordRef<'a> {

@@ -10,7 +10,7 @@
 //! - [`diff`] says which messages of two logs differ, which one first, and what caused it.
 //! - [`recover`] makes a whole file of a broken one.
 //!
-//! # The format, version 1.1
+//! # The format, version 1.2
 //!
 //! One MCAP message for each record of a run, in the order in which they were committed.
 //!
@@ -23,6 +23,7 @@
 //! | `/timer/{actor}/{kind}` | a timer fired | fired | set |
 //! | `/event/{start,crash,restart}/{actor}` | what happened to an actor | when | when |
 //! | `/event/change/{link}` | a link was changed | when | when |
+//! | `/event/told/{actor}` | a control event handed an actor a message | when | when |
 //! | `/event/stop` | the run was stopped | when | when |
 //! | `/state/{actor}/{kind}` | a state sample; never compared | when | when |
 //! | `/tf` | drawn: frames, `foxglove.FrameTransforms` | when | when |
@@ -40,13 +41,13 @@
 //! their own type, without an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
-//! skip the roles that they do not know. What is drawn ([`Scene`]) is derived from the records, in
+//! skip the roles that they do not know. What is drawn ([`farside::scene::Scene`]) is derived from the records, in
 //! Foxglove's published schemas, and never compared. Metadata: `farside` (format, code version, seed, scenario),
 //! `farside.run`, `farside.host` (what may differ between machines), and at the end `farside.end`
 //! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
 //! scenario as `scenario.toml`, and the files that it read.
 //!
-//! A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
+//! 1.2 added `/event/told` and a carriage's `receive_j`. A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
 
 mod descriptors;
 mod diff;
@@ -73,6 +74,5 @@ pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
-pub use scene::{Drawing, Form, Level, Pose, Scene, Shape};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

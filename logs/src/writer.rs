@@ -13,13 +13,13 @@ use std::sync::Arc;
 
 use farside::key::EventKey;
 use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::scene::Scene;
 use farside::{Kind, Report, RunInfo};
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::LogError;
 use crate::descriptors::{self, SchemaOf};
 use crate::envelope::{Encoder, put_key};
-use crate::scene::Scene;
 use crate::topics::{self, CHECKPOINT, Topics};
 use crate::wire::{put_bytes, put_number, put_text};
 pub(crate) use thread::options as mcap_options;
@@ -28,7 +28,7 @@ use viewer::Stage;
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
 pub(crate) const FORMAT_MAJOR: u32 = 1;
-pub(crate) const FORMAT_MINOR: u32 = 1;
+pub(crate) const FORMAT_MINOR: u32 = 2;
 
 /// The attachment that holds the resolved scenario.
 pub(crate) const SCENARIO_ATTACHMENT: &str = "scenario.toml";

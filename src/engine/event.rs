@@ -2,10 +2,11 @@
 
 use std::num::NonZeroU64;
 
+use super::erased::Sealed;
 use crate::carrier::Carriage;
-use crate::key::{EntityId, EventKey};
-use crate::message::{MatchKey, Sealed};
-use crate::plan::{KindIndex, Plan, Reason};
+use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::key::EventKey;
+use crate::plan::{Plan, Reason};
 use crate::record::{Record, RecordClass};
 use crate::time::{SimDuration, SimTime};
 
@@ -21,7 +22,7 @@ pub(crate) enum Class {
     Held,
     /// A message is lost on its way.
     LateLoss,
-    /// An actor changes a link.
+    /// An actor changes a link; in a control event, an actor is told something.
     Tell,
     /// A shared link charges an actor for what it transmitted.
     Charge,

@@ -9,15 +9,15 @@ use std::sync::Arc;
 
 use super::store::Store;
 use super::{
-    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Side, Sink,
+    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sealed, Side, Sink,
     hash_if_wanted,
 };
 use crate::carrier::{SealedChange, Verdicts};
-use crate::context::TimerId;
 use crate::fault::{Fault, FaultCause};
-use crate::key::{EntityId, EventKey};
-use crate::message::{Message, Sealed};
-use crate::plan::{Kind, KindIndex, Plan, Reason};
+use crate::ids::{EntityId, KindIndex, TimerId};
+use crate::key::EventKey;
+use crate::payload::Message;
+use crate::plan::{Kind, Plan, Reason};
 use crate::queue::{Entry, Queue};
 use crate::record::RecordClass;
 use crate::time::{SimDuration, SimTime};

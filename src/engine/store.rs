@@ -1,8 +1,7 @@
 //! Where events wait: what is known of a message in one table, the message itself in another, both
 //! by slot. Slots are reused, last freed first, while they are still in the cache.
 
-use super::{Class, Head, Pending, Side};
-use crate::message::Sealed;
+use super::{Class, Head, Pending, Sealed, Side};
 
 /// The events that wait, by slot.
 #[derive(Default)]

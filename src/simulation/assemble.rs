@@ -4,14 +4,12 @@
 use std::any::TypeId;
 use std::sync::{Arc, Mutex};
 
-use super::{HostId, LinkDecl, Planned, Simulation, Target};
+use super::{LinkDecl, Planned, Simulation, Target};
 use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
 use crate::fault::BuildError;
-use crate::key::EntityId;
-use crate::plan::{
-    Entity, EntityRole, FixedMap, Kind, KindIndex, LinkPlan, Place, Plan, Routes, RunInfo,
-};
+use crate::ids::{EntityId, HostId, KindIndex};
+use crate::plan::{Entity, EntityRole, FixedMap, Kind, LinkPlan, Place, Plan, Routes, RunInfo};
 use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
 
@@ -35,6 +33,7 @@ impl Simulation {
         self.check_names()?;
         let ranked = self.rank();
         let kinds = self.trace_kinds()?;
+        let controls = self.take_controls(&ranked, &kinds)?;
         let (engine_of_host, engine_of_shared, engine_count) = self.deal(split);
         let places = self.place(&ranked, &engine_of_host, engine_of_shared, engine_count);
         let look_ahead = self.look_ahead();
@@ -58,11 +57,8 @@ impl Simulation {
             declared: ranked.actors.clone(),
             declared_links: ranked.links.clone(),
             address_numbers,
-            actor_types: self
-                .actors
-                .iter()
-                .map(|a| (a.type_id, a.type_name))
-                .collect(),
+            actor_types: std::mem::take(&mut self.types),
+            type_of_actor: self.actors.iter().map(|actor| actor.actor_type).collect(),
             places,
             host_names: self.process_names(),
             routes: self.routes(&ranked)?,
@@ -83,7 +79,7 @@ impl Simulation {
                 look_ahead,
             }),
         });
-        let schedule = Schedule::new(self.take_controls(&ranked), look_ahead);
+        let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
         let interrupt = self.interrupt.clone();
         let engines = self.build_engines(&plan, &ranked, engine_count);
@@ -181,11 +177,9 @@ impl Simulation {
 
     fn trace_kinds(&self) -> Result<Kinds, BuildError> {
         let mut traced: Vec<(TypeId, &'static str, Arc<Kind>)> = Vec::new();
-        for entry in self
-            .kinds
-            .iter()
-            .chain(self.links.iter().map(|link| &link.change))
-        {
+        let accepted = self.types.iter().flat_map(|known| &known.accepts);
+        let accepted = accepted.map(|accepted| &accepted.kind);
+        for entry in accepted.chain(self.links.iter().map(|link| &link.change)) {
             if traced.iter().any(|(known, ..)| *known == entry.type_id) {
                 continue;
             }
@@ -328,8 +322,14 @@ impl Simulation {
         Ok(routes)
     }
 
-    fn take_controls(&mut self, ranked: &Ranked) -> Vec<Control> {
+    fn take_controls(
+        &mut self,
+        ranked: &Ranked,
+        kinds: &Kinds,
+    ) -> Result<Vec<Control>, BuildError> {
         let controls = std::mem::take(&mut self.controls).into_iter().enumerate();
+        let types = &self.types;
+        let actors = &self.actors;
         let control = |(count, decl): (usize, super::ControlDecl)| {
             let entity = match decl.target {
                 Some(Target::Actor(at)) => ranked.actors[at as usize],
@@ -340,13 +340,23 @@ impl Simulation {
                 Planned::Crash => ControlAction::Entity(entity, Action::Crash),
                 Planned::Restart => ControlAction::Entity(entity, Action::Restart),
                 Planned::Change(change) => ControlAction::Entity(entity, Action::Change(change)),
+                Planned::Tell(kind, letter) => {
+                    // Whoever handles a type may have left it out of `Accepts`.
+                    let Some(Target::Actor(at)) = decl.target else {
+                        unreachable!("actors are told, and nobody else");
+                    };
+                    let actor = &actors[at as usize];
+                    types[actor.actor_type as usize].accepted(&kind, &actor.name)?;
+                    let kind = kinds.of_type[&kind.type_id];
+                    ControlAction::Entity(entity, Action::Tell(kind, letter))
+                }
                 Planned::Stop(reason) => ControlAction::Stop(reason),
             };
-            Control {
+            Ok(Control {
                 time: decl.time,
                 count: count as u64,
                 what,
-            }
+            })
         };
         controls.map(control).collect()
     }

@@ -31,6 +31,8 @@ pub struct Chatter {
     pub shared: bool,
     /// Crash and restart events: actor, time (ns), and whether it is a restart.
     pub controls: Vec<(u8, u64, bool)>,
+    /// Who is told something, when (ns), and how many hops it makes from there.
+    pub tells: Vec<(u8, u64, u8)>,
     /// After how many messages handled by one actor it asks to stop; 0 for never.
     pub stop_after: u32,
     /// After how many messages handled by one actor it fails, by error or, if odd, by panic.
@@ -268,6 +270,14 @@ impl Chatter {
             } else {
                 sim.crash_at(time, address);
             }
+        }
+        for (actor, time_ns, hops) in &self.tells {
+            let address = addresses[*actor as usize % addresses.len()];
+            let chat = Chat {
+                hops: u32::from(*hops),
+                note: Some("told".to_owned()),
+            };
+            sim.tell_at(SimTime::from_nanos(*time_ns), address, chat);
         }
         sim.stop_at(SimTime::from_nanos(self.until_ns), "the model's end");
         sim

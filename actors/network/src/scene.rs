@@ -12,8 +12,8 @@ use std::sync::Arc;
 use crate::Network;
 use crate::messages::RoverState;
 use farside::record::{Record, RecordClass};
+use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside::{RunInfo, SimDuration};
-use farside_logs::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
 
 use crate::picture::colouring;

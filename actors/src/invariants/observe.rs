@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::encoding::Schema;
-use farside::key::EntityId;
+use farside::ids::EntityId;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{End, Report, RunInfo, SimDuration, SimTime};
 use serde::Serialize;

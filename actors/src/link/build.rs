@@ -14,7 +14,7 @@ use super::{
     LinksConfig, Timeline, Trace, Wiring,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
-use crate::suggest::{closest, did_you_mean};
+use farside::suggest::{closest, did_you_mean};
 
 /// A pattern, and whether any link has matched it.
 struct Pattern {

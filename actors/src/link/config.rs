@@ -11,8 +11,8 @@ use thiserror::Error;
 
 use super::params::{DEGRADE_KEYS, Key};
 use super::{LinkOverrides, LinkParams};
-use crate::suggest::did_you_mean;
 use crate::units;
+use farside::suggest::did_you_mean;
 
 /// The `[links]` table: `default`, and by pattern what some links have instead. Of several patterns
 /// that match a link and set one parameter, the last in the file wins.

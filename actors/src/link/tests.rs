@@ -92,7 +92,7 @@ impl Handler<Tick> for Source {
 /// The fate of one copy.
 #[derive(Clone, Debug, PartialEq)]
 struct Fate {
-    link: Option<farside::key::EntityId>,
+    link: Option<farside::ids::EntityId>,
     ordinal: u64,
     copy: u32,
     sent: SimTime,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use farside::key::EntityId;
+use farside::ids::EntityId;
 use farside::random::{RandomKey, Stream};
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::{RunInfo, SimTime};

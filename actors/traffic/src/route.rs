@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use farside::random::name_hash;
-use farside_actors::suggest::{closest, did_you_mean};
+use farside::suggest::{closest, did_you_mean};
 use globset::{Glob, GlobMatcher};
 
 use super::config::{FlowConfig, TrafficConfig, TrafficError};

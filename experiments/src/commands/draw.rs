@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 
 use farside::SimDuration;
+use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
-use farside_actors::suggest::{did_you_mean, nearest};
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
 };

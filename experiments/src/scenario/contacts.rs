@@ -19,7 +19,7 @@ use farside_worlds::contacts::{
 };
 use serde::{Deserialize, Serialize};
 
-use farside_actors::suggest::nearest;
+use farside::suggest::nearest;
 use farside_actors::system::{Files, SetupError};
 
 /// The most pairs that are told of one by one.

@@ -7,7 +7,7 @@ use farside_actors::units;
 use globset::Glob;
 use serde::{Deserialize, Serialize};
 
-use farside_actors::suggest::nearest;
+use farside::suggest::nearest;
 
 /// The most crashes and restarts that one entry may plan.
 const MAX_EVENTS: usize = 100_000;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::source::{Place, Source, one_line};
-use farside_actors::suggest::{did_you_mean, nearest};
+use farside::suggest::{did_you_mean, nearest};
 use farside_actors::system::SetupError;
 
 /// A scenario cannot be found, read or built.

@@ -205,7 +205,7 @@ pub(super) fn find(
     for (name, level) in wanted {
         let at = names.iter().position(|known| known == name);
         let at = at.ok_or_else(|| {
-            let near = farside_actors::suggest::nearest(name, names.iter().copied());
+            let near = farside::suggest::nearest(name, names.iter().copied());
             let hint = near.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
             let names = names.join(", ");
             format!("unknown factor {name:?}{hint} (the factors are {names})")

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use farside_actors::suggest::did_you_mean;
+use farside::suggest::did_you_mean;
 
 use crate::scenario::{Place, ScenarioError};
 

@@ -1,6 +1,6 @@
 //! Factors: what a study varies, read from its file and checked.
 
-use farside_actors::suggest::nearest;
+use farside::suggest::nearest;
 
 use crate::scenario::{ScenarioError, Source};
 

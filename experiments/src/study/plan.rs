@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::commands::CODE_VERSION;
-use farside_actors::suggest::nearest;
+use farside::suggest::nearest;
 
 use crate::scenario::{self, Place, Scenario, ScenarioError, Source};
 use farside_actors::system::Files;

@@ -1,6 +1,7 @@
 //! Drawings as messages of Foxglove's published schemas, whose field numbers these are.
 
-use super::{Drawing, Form, Pose, Shape};
+use farside::scene::{Drawing, Form, Pose, Shape};
+
 use crate::descriptors::SchemaOf;
 use crate::wire::{put_bytes, put_number, put_text, put_varint};
 

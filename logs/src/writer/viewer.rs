@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use farside::RunInfo;
 use farside::record::{Record, RecordClass};
+use farside::scene::{Drawing, Scene};
 
 use super::thread::{Batch, Header};
 use super::{Channels, Live};
 use crate::LogError;
-use crate::scene::{Drawing, Encoded, Scene};
+use crate::scene::Encoded;
 
 /// What a channel that viewers draw is for.
 const ROLE: &str = "viewer";

@@ -4,10 +4,8 @@ use std::path::Path;
 
 use farside::RunInfo;
 use farside::record::{Record, RecordClass};
-use farside_logs::{
-    DiffOptions, Drawing, Form, Level, LogOptions, Pose, Scene, Shape, TopicInfo, Verifier,
-    VerifyOutcome, diff, info,
-};
+use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
+use farside_logs::{DiffOptions, LogOptions, TopicInfo, Verifier, VerifyOutcome, diff, info};
 
 use crate::common::{Plan, log_to, logged, options, run_with};
 

@@ -7,11 +7,11 @@ use std::num::NonZeroU64;
 
 use super::{Effect, Parts};
 use crate::carrier::{Carriage, Parcel, Verdict, Verdicts};
-use crate::engine::{CellState, Class, Head, Pending, Side};
+use crate::engine::{CellState, Class, Head, Pending, Sealed, Side};
 use crate::fault::FaultCause;
-use crate::key::{EntityId, EventKey};
-use crate::message::Sealed;
-use crate::plan::{Kind, KindIndex};
+use crate::ids::{EntityId, KindIndex};
+use crate::key::EventKey;
+use crate::plan::Kind;
 use crate::time::{SimDuration, SimTime};
 
 impl Parts {
@@ -42,7 +42,7 @@ impl Parts {
             copy: head.copy,
             token: held.map(|held| held.token),
             match_key: head.match_key,
-            letter: &letter,
+            letter: &*letter.0,
             size: Cell::new(None),
         };
         let mut verdicts = std::mem::take(&mut self.verdicts);

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::commit::Batch;
 use crate::engine::{Action, Engine, Outgoing};
 use crate::fault::Fault;
-use crate::key::{Bound, EntityId, EventKey};
+use crate::ids::EntityId;
+use crate::key::{Bound, EventKey};
 
 /// An engine, what other engines sent to it, and what it did in the window that just ended.
 pub(super) struct Seat {

@@ -4,33 +4,15 @@
 use std::any::TypeId;
 use std::marker::PhantomData;
 
-use crate::actor::{Actor, Handler};
-use crate::engine::{CellState, Outbound, Parts};
+use super::address::{Address, Recipient, Target, seal_change};
+use super::{Actor, Handler};
+use crate::engine::{CellState, Core, Outbound, Parts};
 use crate::fault::{FaultCause, LookupError};
-use crate::key::{EntityId, EventKey};
-use crate::message::{Address, MatchKey, Message, Target, seal_change};
-use crate::plan::KindIndex;
+use crate::ids::{EntityId, LinkId, MatchKey, TimerId};
+use crate::key::EventKey;
+use crate::payload::Message;
 use crate::random::{RandomKey, Stream};
-use crate::simulation::LinkId;
 use crate::time::{SimDuration, SimTime};
-
-/// What a handler works with, whatever its actor's type.
-pub(crate) struct Core<'a> {
-    pub(crate) parts: &'a mut Parts,
-    pub(crate) state: &'a mut CellState,
-    pub(crate) me: EntityId,
-    /// The key of the event being handled.
-    pub(crate) key: EventKey,
-}
-
-/// A timer that is set, for [`Context::cancel`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TimerId {
-    pub(crate) slot: u32,
-    pub(crate) kind: KindIndex,
-    /// Tells this timer from a later one in the same slot.
-    pub(crate) ordinal: u64,
-}
 
 /// A handler's way to the world, at one instant of virtual time.
 pub struct Context<'a, A> {
@@ -77,7 +59,60 @@ impl<'a, A: Actor> Context<'a, A> {
     /// # Errors
     /// When no actor has that name, or it is not a `B`.
     pub fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        self.parts.plan.lookup::<B>(name)
+        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        if actor_type.type_id != TypeId::of::<B>() {
+            return Err(LookupError::WrongType {
+                name: name.to_owned(),
+                expected: std::any::type_name::<B>(),
+                actual: actor_type.name,
+            });
+        }
+        Ok(Address::new(declared))
+    }
+
+    /// The actor called `name`, whatever its type, as one that accepts `M`: so a planner of one's own
+    /// takes the place of another under the same name.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use serde::{Deserialize, Serialize};
+    ///
+    /// #[derive(Serialize, Deserialize)]
+    /// struct Goal { east_m: f64, north_m: f64 }
+    ///
+    /// /// Takes goals. The rover below knows nothing else of it.
+    /// struct MyPlanner;
+    /// impl Actor for MyPlanner { type Accepts = (Goal,); }
+    /// impl Handler<Goal> for MyPlanner {
+    ///     fn handle(&mut self, goal: Goal, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         assert_eq!((goal.east_m, goal.north_m), (3.0, 4.0));
+    ///         ctx.stop("planned");
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// struct Rover;
+    /// impl Actor for Rover {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         let planner = ctx.recipient::<Goal>("planner")?;
+    ///         ctx.send(planner, Goal { east_m: 3.0, north_m: 4.0 });
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// sim.actor(host, "planner", |_| MyPlanner);
+    /// sim.actor(host, "rover", |_| Rover);
+    /// assert_eq!(sim.run(Executor::Inline).unwrap().end.name(), "stopped");
+    /// ```
+    ///
+    /// # Errors
+    /// When no actor has that name, or its `Accepts` does not list `M`; the error names what it lists.
+    pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
+        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        Recipient::of(declared, actor_type, name)
     }
 
     /// Sends `message`, within the host at once, to another host through the link between them.
@@ -130,8 +165,22 @@ impl<'a, A: Actor> Context<'a, A> {
     /// The links that carry what this host sends and take changes of type `C`, in name order: those
     /// that [`Context::tell_link`] may be called with.
     pub fn links<C: Message>(&self) -> Vec<LinkId<C>> {
-        let host = self.parts.plan.place(self.me).host;
-        self.parts.plan.links_from(host)
+        let plan = &self.parts.plan;
+        let host = plan.place(self.me).host;
+        let Some(kind) = plan.kind_of_type.get(&TypeId::of::<C>()) else {
+            return Vec::new();
+        };
+        let routes = &plan.routes[host as usize];
+        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
+        links.extend(routes.uplink);
+        links.retain(|link| plan.links[link].change_kind == *kind);
+        links.sort_unstable();
+        links.dedup();
+        let id = |link: EntityId| {
+            let declared = plan.declared_links.iter().position(|known| *known == link);
+            declared.map(|declared| LinkId::new(declared as u32))
+        };
+        links.into_iter().filter_map(id).collect()
     }
 
     /// Tells a link something: new parameters, or where this host is. The link must be one of this

@@ -3,7 +3,7 @@
 /// The name closest to `found` in spelling, if any comes near.
 ///
 /// ```
-/// use farside_actors::suggest::nearest;
+/// use farside::suggest::nearest;
 /// let names = ["latency", "loss", "rate"];
 /// assert_eq!(nearest("latncy", names.into_iter()).as_deref(), Some("latency"));
 /// assert_eq!(nearest("x", names.into_iter()), None);
@@ -22,7 +22,7 @@ pub fn closest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<
 /// The question that an error ends with, or nothing.
 ///
 /// ```
-/// use farside_actors::suggest::did_you_mean;
+/// use farside::suggest::did_you_mean;
 /// assert_eq!(did_you_mean(Some("loss")), "; did you mean \"loss\"?");
 /// assert_eq!(did_you_mean(None), "");
 /// ```

@@ -1,70 +1,16 @@
-//! Messages, the addresses they go to, and the sealed form in which they travel.
+//! The addresses that messages go to, and how a message is sealed for one.
 
 use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use smallbox::SmallBox;
-use smallbox::space::S4;
-
-use crate::actor::{Actor, Handler};
-use crate::context::{Context, Core};
+use super::context::Context;
+use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
-use crate::fault::Outcome;
-
-/// A message: any type that serde can write and read back, and that may cross threads.
-///
-/// Implemented for every such type; derive `Serialize` and `Deserialize` and nothing else.
-pub trait Message: Serialize + DeserializeOwned + Send + 'static {}
-
-impl<M: Serialize + DeserializeOwned + Send + 'static> Message for M {}
-
-/// A protocol's own identity for a message, by which runs are compared and links draw, in place
-/// of the ordinal in its flow: the planning cycle and the iteration in it, say.
-///
-/// ```
-/// use farside::MatchKey;
-/// let key = MatchKey::new(12, 3);
-/// assert_eq!((key.major(), key.minor()), (12, 3));
-/// assert_eq!(key.to_string(), "12.3");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MatchKey(u64);
-
-impl MatchKey {
-    /// The key of iteration `minor` in cycle `major`.
-    pub const fn new(major: u32, minor: u32) -> Self {
-        MatchKey((major as u64) << 32 | minor as u64)
-    }
-
-    /// The cycle.
-    pub const fn major(self) -> u32 {
-        (self.0 >> 32) as u32
-    }
-
-    /// The iteration.
-    pub const fn minor(self) -> u32 {
-        self.0 as u32
-    }
-
-    /// Both as one number, cycle first.
-    pub const fn bits(self) -> u64 {
-        self.0
-    }
-
-    /// The key with these [`MatchKey::bits`].
-    pub const fn from_bits(bits: u64) -> Self {
-        MatchKey(bits)
-    }
-}
-
-impl fmt::Display for MatchKey {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.major(), self.minor())
-    }
-}
+use crate::engine::{Core, Letter, Sealed};
+use crate::fault::{LookupError, Outcome};
+use crate::payload::{Encode, Message};
+use crate::plan::{ActorType, KindEntry};
 
 /// The address of an actor of type `A`: takes every message that `A` handles, and no other.
 ///
@@ -137,6 +83,25 @@ impl<A: Actor> Address<A> {
     }
 }
 
+impl<M: Message> Recipient<M> {
+    /// The actor with this number in its address, of this type and called so, as one that accepts `M`.
+    pub(crate) fn of(
+        declared: u32,
+        actor_type: &ActorType,
+        name: &str,
+    ) -> Result<Self, LookupError> {
+        let accepted = actor_type.accepted(&KindEntry::of::<M>(), name)?;
+        let seal = accepted.seal.downcast_ref::<fn(M) -> Sealed>();
+        let seal = *seal.expect("what an actor accepts is kept with how it is sealed");
+        Ok(Recipient { declared, seal })
+    }
+}
+
+/// How messages of type `M` are sealed for actors of type `A`.
+pub(crate) fn sealer<A: Handler<M>, M: Message>() -> fn(M) -> Sealed {
+    seal::<A, M>
+}
+
 /// What `M` can be sent to: an [`Address`] or a [`Recipient`].
 pub trait Target<M>: Copy {
     #[doc(hidden)]
@@ -165,25 +130,6 @@ impl<M: Message> Target<M> for Recipient<M> {
     }
 }
 
-/// A message on its way, with what it takes to deliver, encode and copy it. Messages of up to 24
-/// bytes (32, if they have a spare bit pattern) travel without an allocation.
-#[doc(hidden)]
-pub struct Sealed(pub(crate) SmallBox<dyn Letter, S4>);
-
-/// What the engine can do with a message whose type it does not know.
-pub(crate) trait Letter: Send {
-    /// Hands the message to `actor`, which must be of the type it was addressed to.
-    fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome;
-    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError>;
-    /// Another letter with the message that `bytes` encode, for a link's further copies: messages
-    /// need not be `Clone`.
-    fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError>;
-    /// The change of a link that this letter holds, if it is one.
-    fn take_change(&mut self) -> Option<Box<dyn Any + Send>> {
-        None
-    }
-}
-
 /// A change of a link, on its way from an actor.
 struct Change<M>(Option<M>);
 
@@ -192,16 +138,18 @@ pub(crate) fn seal_change<M: Message>(change: M) -> Sealed {
     Sealed(smallbox::smallbox!(Change(Some(change))))
 }
 
-impl<M: Message> Letter for Change<M> {
-    fn deliver(&mut self, _actor: &mut dyn Any, _core: &mut Core<'_>) -> Outcome {
-        unreachable!("changes go to links");
-    }
-
+impl<M: Message> Encode for Change<M> {
     fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError> {
         match &self.0 {
             Some(change) => schema.encode(change, out),
             None => Ok(()),
         }
+    }
+}
+
+impl<M: Message> Letter for Change<M> {
+    fn deliver(&mut self, _actor: &mut dyn Any, _core: &mut Core<'_>) -> Outcome {
+        unreachable!("changes go to links");
     }
 
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
@@ -228,6 +176,15 @@ fn seal<A: Handler<M>, M: Message>(message: M) -> Sealed {
     Sealed(smallbox::smallbox!(letter))
 }
 
+impl<A: Handler<M>, M: Message> Encode for Addressed<A, M> {
+    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError> {
+        match &self.message {
+            Some(message) => schema.encode(message, out),
+            None => Ok(()),
+        }
+    }
+}
+
 impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
     fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome {
         let actor = actor
@@ -235,13 +192,6 @@ impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
             .expect("addresses are typed by their actor");
         let message = self.message.take().expect("a letter is delivered once");
         actor.handle(message, &mut Context::new(core))
-    }
-
-    fn encode(&self, schema: &Schema, out: &mut Vec<u8>) -> Result<(), EncodeError> {
-        match &self.message {
-            Some(message) => schema.encode(message, out),
-            None => Ok(()),
-        }
     }
 
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
