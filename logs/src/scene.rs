@@ -4,14 +4,10 @@
 //! What this is not: a part of the record. It is derived, is never compared, and may be left out;
 //! what happened is in the messages. It knows frames, shapes and colours, and no rovers.
 
-mod encode;
-
 use std::fmt::Debug;
 
 use farside::RunInfo;
 use farside::record::Record;
-
-pub(crate) use encode::Encoded;
 
 /// Draws a run: for each committed record, what changes in the picture.
 ///

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use farside::RunInfo;
 use farside::record::{Record, RecordClass};
 
+use super::foxglove::Encoded;
 use super::thread::{Batch, Header};
 use super::{Channels, Live};
 use crate::LogError;
-use crate::scene::{Drawing, Encoded, Scene};
+use crate::scene::{Drawing, Scene};
 
 /// What a channel that viewers draw is for.
 const ROLE: &str = "viewer";
