@@ -1,8 +1,27 @@
-//! Quantities as people write them in scenarios: `"250ms"`, `"1.5km"`, `"30%"`, `"128kbit/s"`.
+//! Quantities as people write them in scenarios: `"250ms"`, `"3h8min"`, `"1.5km"`, `"30%"`,
+//! `"128kbit/s"`, `"-40degC"`.
 //!
 //! Each quantity has a `parse_…` and a `print_…` function and a module for serde's `with`, with
 //! `option` inside. What is printed parses back to the same value. Numbers are read exactly: a
-//! duration that is no whole number of nanoseconds is refused, not rounded.
+//! duration that is no whole number of nanoseconds is refused, not rounded, and what becomes an
+//! `f64` is rounded once, to the nearest one.
+//!
+//! Every number has a unit, spelt as here; `kB` is 1,000 bytes and `KiB` 1,024, a `sol` is the mean
+//! solar day of Mars.
+//!
+//! | quantity | value | units |
+//! |---|---|---|
+//! | duration | nanoseconds | `ns`, `us` (`µs`), `ms`, `s`, `min`, `h`, `d`, `sol` = 88,775.244 s |
+//! | length | m | `mm`, `cm`, `m`, `km` |
+//! | speed, acceleration | m/s, m/s² | `mm/s`, `cm/s`, `m/s`, `km/s`; `mm/s2`, `cm/s2`, `m/s2` |
+//! | angle | rad | `deg`, `rad` |
+//! | energy | J | `uJ`, `mJ`, `J`, `kJ`, `MJ`, `Wh` = 3,600 J, `kWh` |
+//! | power | W | `uW`, `mW`, `W`, `kW` |
+//! | temperature | K | `K`, `degC` (`°C`) |
+//! | data size | bytes, or bits | `bit`, `kbit`, `Mbit`, `Gbit`, `B`, `kB`, ..., `KiB`, ... |
+//! | data rate | bit/s | `bit/s`, `kbit/s`, `Mbit/s`, `Gbit/s`, `B/s`, `kB/s`, `MB/s` |
+//! | rate | 1/s | `/s`, `k/s`, `M/s`, `G/s` |
+//! | fraction | 1 | none, `%` |
 //!
 //! ```
 //! use farside::SimDuration;
@@ -18,20 +37,28 @@
 //! }
 //!
 //! assert_eq!(units::parse_duration("2.6s")?, SimDuration::from_millis(2600));
+//! assert_eq!(units::parse_duration("3h8min")?, SimDuration::from_secs(188 * 60));
 //! assert_eq!(units::parse_length_m("1.5km")?, 1500.0);
 //! let error = units::parse_duration("250 parsecs").unwrap_err();
 //! assert!(error.to_string().starts_with("\"250 parsecs\": expected a duration such as \"250ms\""));
 //! # Ok::<(), farside_actors::units::UnitError>(())
 //! ```
 
+mod quantity;
 mod with;
+
+use std::f64::consts::PI;
 
 use farside::SimDuration;
 use thiserror::Error;
 
+use quantity::{
+    ACCELERATION, ANGLE, DATA_BITS, DATA_BYTES, DATA_RATE, DURATION, ENERGY, FRACTION, LENGTH,
+    POWER, RATE, SPEED, TEMPERATURE,
+};
 pub use with::{
-    acceleration_m_per_s2, data_rate_bit_per_s, data_size_bytes, duration, fraction, length_m,
-    power_w, speed_m_per_s,
+    acceleration_m_per_s2, angle_rad, data_rate_bit_per_s, data_size_bits, data_size_bytes,
+    duration, energy_j, fraction, length_m, power_w, signed_energy_j, speed_m_per_s, temperature_k,
 };
 
 /// A text is not the quantity that was expected.
@@ -54,7 +81,10 @@ pub enum UnitError {
         expected: &'static str,
     },
     /// A number with a unit of something else.
-    #[error("{found:?}: expected {expected}; {unit:?} is none of its units {units}")]
+    #[error(
+        "{found:?}: expected {expected}; {unit:?} is none of its units {units}{}",
+        nearest.map_or_else(String::new, |unit| format!("; did you mean {unit:?}?"))
+    )]
     WrongUnit {
         /// The text.
         found: String,
@@ -64,6 +94,23 @@ pub enum UnitError {
         expected: &'static str,
         /// The units there are.
         units: String,
+        /// The one that comes closest in spelling, if any comes near.
+        nearest: Option<&'static str>,
+    },
+    /// Parts of a compound that do not go from larger to smaller units.
+    #[error(
+        "{found:?}: expected {expected}; its units must go from larger to smaller ones, each once, \
+         but {unit} comes after {before}"
+    )]
+    Order {
+        /// The text.
+        found: String,
+        /// What was expected, with an example.
+        expected: &'static str,
+        /// The unit that comes too late.
+        unit: &'static str,
+        /// The unit in front of it.
+        before: &'static str,
     },
     /// The quantity, in a range that cannot be.
     #[error("{found}: expected {expected}; it must be {bounds}")]
@@ -77,220 +124,26 @@ pub enum UnitError {
     },
 }
 
-/// A unit: its symbol, and its size in base units as `factor * 10^exponent`.
-struct Unit {
-    symbol: &'static str,
-    factor: u64,
-    exponent: i32,
-}
-
-const fn unit(symbol: &'static str, factor: u64, exponent: i32) -> Unit {
-    Unit {
-        symbol,
-        factor,
-        exponent,
-    }
-}
-
-/// A quantity: how to ask for it, and its units.
-struct Quantity {
-    expected: &'static str,
-    units: &'static [Unit],
-}
-
-const DURATION: Quantity = Quantity {
-    expected: "a duration such as \"250ms\" or \"2.6s\"",
-    units: &[
-        unit("ns", 1, 0),
-        unit("us", 1, 3),
-        unit("µs", 1, 3),
-        unit("ms", 1, 6),
-        unit("s", 1, 9),
-        unit("min", 60, 9),
-        unit("h", 3_600, 9),
-        unit("d", 86_400, 9),
-    ],
-};
-
-const LENGTH: Quantity = Quantity {
-    expected: "a length such as \"40m\" or \"1.5km\"",
-    units: &[
-        unit("mm", 1, -3),
-        unit("cm", 1, -2),
-        unit("m", 1, 0),
-        unit("km", 1, 3),
-    ],
-};
-
-const SPEED: Quantity = Quantity {
-    expected: "a speed such as \"4m/s\" or \"20cm/s\"",
-    units: &[
-        unit("mm/s", 1, -3),
-        unit("cm/s", 1, -2),
-        unit("m/s", 1, 0),
-        unit("km/s", 1, 3),
-    ],
-};
-
-const ACCELERATION: Quantity = Quantity {
-    expected: "an acceleration such as \"1m/s2\" or \"20cm/s2\"",
-    units: &[
-        unit("mm/s2", 1, -3),
-        unit("cm/s2", 1, -2),
-        unit("m/s2", 1, 0),
-    ],
-};
-
-const FRACTION: Quantity = Quantity {
-    expected: "a fraction such as 0.3 or \"30%\"",
-    units: &[unit("", 1, 0), unit("%", 1, -2)],
-};
-
-const DATA_RATE: Quantity = Quantity {
-    expected: "a data rate such as \"128kbit/s\" or \"2Mbit/s\"",
-    units: &[
-        unit("bit/s", 1, 0),
-        unit("kbit/s", 1, 3),
-        unit("Mbit/s", 1, 6),
-        unit("Gbit/s", 1, 9),
-        unit("B/s", 8, 0),
-        unit("kB/s", 8, 3),
-        unit("MB/s", 8, 6),
-    ],
-};
-
-const DATA_SIZE: Quantity = Quantity {
-    expected: "a data size such as \"1500B\" or \"64kB\"",
-    units: &[
-        unit("B", 1, 0),
-        unit("kB", 1, 3),
-        unit("MB", 1, 6),
-        unit("GB", 1, 9),
-        unit("KiB", 1 << 10, 0),
-        unit("MiB", 1 << 20, 0),
-        unit("GiB", 1 << 30, 0),
-    ],
-};
-
-const POWER: Quantity = Quantity {
-    expected: "a power such as \"100mW\" or \"12W\"",
-    units: &[
-        unit("uW", 1, -6),
-        unit("mW", 1, -3),
-        unit("W", 1, 0),
-        unit("kW", 1, 3),
-    ],
-};
-
-const RATE: Quantity = Quantity {
-    expected: "a rate such as \"500k/s\" or \"2M/s\"",
-    units: &[
-        unit("/s", 1, 0),
-        unit("k/s", 1, 3),
-        unit("M/s", 1, 6),
-        unit("G/s", 1, 9),
-    ],
-};
-
-impl Quantity {
-    /// The number's text and the unit. Whitespace between them is fine.
-    fn split<'a>(&self, text: &'a str) -> Result<(&'a str, &'static Unit), UnitError> {
-        let trimmed = text.trim();
-        let end = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.');
-        let (number, symbol) = trimmed.split_at(end.unwrap_or(trimmed.len()));
-        let symbol = symbol.trim_start();
-        let digits = number.bytes().filter(u8::is_ascii_digit).count();
-        let points = number.len() - digits;
-        if digits == 0 || points > 1 {
-            return Err(UnitError::NotAQuantity {
-                found: text.to_owned(),
-                expected: self.expected,
-            });
-        }
-        if let Some(unit) = self.units.iter().find(|unit| unit.symbol == symbol) {
-            return Ok((number, unit));
-        }
-        if symbol.is_empty() {
-            return Err(self.no_unit(trimmed));
-        }
-        let symbols: Vec<&str> = self.units.iter().map(|unit| unit.symbol).collect();
-        Err(UnitError::WrongUnit {
-            found: text.to_owned(),
-            unit: symbol.to_owned(),
-            expected: self.expected,
-            units: symbols.join(", "),
-        })
-    }
-
-    fn no_unit(&self, number: impl ToString) -> UnitError {
-        UnitError::NoUnit {
-            found: number.to_string(),
-            expected: self.expected,
-        }
-    }
-
-    fn out_of_range(&self, found: impl ToString, bounds: &'static str) -> UnitError {
-        UnitError::OutOfRange {
-            found: found.to_string(),
-            expected: self.expected,
-            bounds,
-        }
-    }
-
-    /// The quantity as an exact whole number of base units; `finest` says what such a number is.
-    fn whole(&self, text: &str, finest: &'static str) -> Result<u64, UnitError> {
-        let (number, unit) = self.split(text)?;
-        let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
-        let fraction = fraction.trim_end_matches('0');
-        let too_big = || self.out_of_range(text, "smaller");
-        // The number is `digits * 10^shift`; every whole-number quantity has exponents >= 0.
-        let mut value: u128 = 0;
-        for digit in whole.bytes().chain(fraction.bytes()) {
-            value = value
-                .checked_mul(10)
-                .and_then(|v| v.checked_add(u128::from(digit - b'0')))
-                .ok_or_else(too_big)?;
-        }
-        value = value
-            .checked_mul(u128::from(unit.factor))
-            .ok_or_else(too_big)?;
-        let shift = unit.exponent - i32::try_from(fraction.len()).unwrap_or(i32::MAX);
-        let power = 10u128.checked_pow(shift.unsigned_abs());
-        let value = match power {
-            Some(power) if shift >= 0 => value.checked_mul(power).ok_or_else(too_big)?,
-            Some(power) if value.is_multiple_of(power) => value / power,
-            Some(_) => return Err(self.out_of_range(text, finest)),
-            None if value == 0 => 0,
-            None => return Err(self.out_of_range(text, finest)),
-        };
-        u64::try_from(value).map_err(|_| too_big())
-    }
-
-    /// The quantity as the `f64` nearest to what was written, in base units.
-    fn nearest(&self, text: &str) -> Result<f64, UnitError> {
-        let (number, unit) = self.split(text)?;
-        // Shifting the decimal point in the text rounds once; multiplying would round twice.
-        let value = format!("{number}e{}", unit.exponent).parse::<f64>();
-        match value {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.out_of_range(text, "smaller")),
-        }
-    }
-}
-
-/// Reads a duration: `"250ms"`, `"2.6s"`, `"5us"`, `"3min"`, `"1h"`.
+/// Reads a duration: `"250ms"`, `"2.6s"`, `"1.5sol"`, or in several units, from the largest to the
+/// smallest: `"3h8min"`, `"1d 2h 0.5s"`. Only the last number may have a fraction.
+///
+/// A sol is the mean solar day of Mars, 24 h 39 min 35.244 s (Allison and McEwen, *A post-Pathfinder
+/// evaluation of areocentric solar coordinates*, 2000).
 ///
 /// ```
 /// use farside::SimDuration;
 /// use farside_actors::units::parse_duration;
 /// assert_eq!(parse_duration("0.5ms"), Ok(SimDuration::from_micros(500)));
+/// assert_eq!(parse_duration("1sol"), parse_duration("24h39min35.244s"));
+/// assert!(parse_duration("8min3h").unwrap_err().to_string().contains("h comes after min"));
 /// assert!(parse_duration("5").unwrap_err().to_string().contains("no unit"));
 /// ```
 ///
 /// # Errors
-/// When it is none, has no unit or another quantity's, or is no whole number of nanoseconds.
+/// When it is none, has no unit or another quantity's, is no whole number of nanoseconds, or has
+/// units in another order.
 pub fn parse_duration(text: &str) -> Result<SimDuration, UnitError> {
-    let nanos = DURATION.whole(text, "a whole number of nanoseconds")?;
+    let nanos = DURATION.whole_of_parts(text, "a whole number of nanoseconds")?;
     Ok(SimDuration::from_nanos(nanos))
 }
 
@@ -415,25 +268,51 @@ pub fn print_data_rate(bit_per_s: u64) -> String {
     print_whole(bit_per_s, &["bit/s", "kbit/s", "Mbit/s", "Gbit/s"])
 }
 
-/// Reads a data size in bytes: `"1500B"`, `"64kB"`, `"1MiB"`.
+/// Reads a data size in bytes: `"1500B"`, `"64kB"`, `"1MiB"`, `"12kbit"`.
 ///
 /// ```
-/// assert_eq!(farside_actors::units::parse_data_size("1.5kB"), Ok(1500));
+/// use farside_actors::units::parse_data_size;
+/// assert_eq!(parse_data_size("1.5kB"), Ok(1500));
+/// assert_eq!(parse_data_size("12kbit"), Ok(1500));
+/// assert!(parse_data_size("12bit").unwrap_err().to_string().contains("whole number of bytes"));
 /// ```
 ///
 /// # Errors
 /// When it is none, has no unit or another quantity's, or is no whole number of bytes.
 pub fn parse_data_size(text: &str) -> Result<u64, UnitError> {
-    DATA_SIZE.whole(text, "a whole number of bytes")
+    DATA_BYTES.whole(text, "a whole number of bytes")
 }
 
-/// Writes a data size so that it parses back to the same one.
+/// Writes a data size in bytes so that it parses back to the same one.
 ///
 /// ```
 /// assert_eq!(farside_actors::units::print_data_size(64_000), "64kB");
 /// ```
 pub fn print_data_size(bytes: u64) -> String {
     print_whole(bytes, &["B", "kB", "MB", "GB"])
+}
+
+/// Reads a data size in bits: `"12bit"`, `"3Mbit"`, `"64kB"`.
+///
+/// ```
+/// use farside_actors::units::parse_data_bits;
+/// assert_eq!(parse_data_bits("1.5Mbit"), Ok(1_500_000));
+/// assert_eq!(parse_data_bits("1KiB"), Ok(8192));
+/// ```
+///
+/// # Errors
+/// When it is none, has no unit or another quantity's, or is no whole number of bits.
+pub fn parse_data_bits(text: &str) -> Result<u64, UnitError> {
+    DATA_BITS.whole(text, "a whole number of bits")
+}
+
+/// Writes a data size in bits so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_data_bits(1_500_000), "1500kbit");
+/// ```
+pub fn print_data_bits(bits: u64) -> String {
+    print_whole(bits, &["bit", "kbit", "Mbit", "Gbit"])
 }
 
 /// Reads a power in watts: `"12W"`, `"100mW"`.
@@ -455,6 +334,104 @@ pub fn parse_power_w(text: &str) -> Result<f64, UnitError> {
 /// ```
 pub fn print_power_w(power_w: f64) -> String {
     format!("{power_w}W")
+}
+
+/// Reads an energy in joules that is not negative: `"5J"`, `"1.2kWh"`, `"250mJ"`.
+///
+/// ```
+/// use farside_actors::units::parse_energy_j;
+/// assert_eq!(parse_energy_j("1.5Wh"), Ok(5400.0));
+/// assert!(parse_energy_j("-1J").unwrap_err().to_string().contains("not negative"));
+/// ```
+///
+/// # Errors
+/// When it is none, has no unit or another quantity's, or is negative.
+pub fn parse_energy_j(text: &str) -> Result<f64, UnitError> {
+    ENERGY.nearest(text)
+}
+
+/// Reads an energy in joules that may be negative, as what a battery takes up or gives.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_signed_energy_j("-0.07Wh"), Ok(-252.0));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_signed_energy_j(text: &str) -> Result<f64, UnitError> {
+    ENERGY.nearest_signed(text)
+}
+
+/// Writes an energy so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_energy_j(5400.0), "5400J");
+/// ```
+pub fn print_energy_j(energy_j: f64) -> String {
+    format!("{energy_j}J")
+}
+
+/// Reads an angle in radians, which may be negative: `"30deg"`, `"-0.5rad"`. Degrees are right to
+/// the last digit but one, since their size is no decimal number.
+///
+/// ```
+/// use std::f64::consts::PI;
+/// assert_eq!(farside_actors::units::parse_angle_rad("-180deg"), Ok(-PI));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_angle_rad(text: &str) -> Result<f64, UnitError> {
+    let (number, unit) = ANGLE.signed(text)?;
+    let angle = ANGLE.finite(text, number.nearest(1, 0))?;
+    match unit.symbol {
+        "deg" => ANGLE.finite(text, Some(angle / 180.0 * PI)),
+        _ => Ok(angle),
+    }
+}
+
+/// Writes an angle so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_angle_rad(-0.5), "-0.5rad");
+/// ```
+pub fn print_angle_rad(angle_rad: f64) -> String {
+    format!("{angle_rad}rad")
+}
+
+/// Reads a temperature in kelvins: `"-40degC"`, `"233.15K"`.
+///
+/// ```
+/// use farside_actors::units::parse_temperature_k;
+/// assert_eq!(parse_temperature_k("-40degC"), Ok(233.15));
+/// assert!(parse_temperature_k("-300degC").unwrap_err().to_string().contains("absolute zero"));
+/// ```
+///
+/// # Errors
+/// When it is none, has no unit or another quantity's, or lies below absolute zero.
+pub fn parse_temperature_k(text: &str) -> Result<f64, UnitError> {
+    let (number, unit) = TEMPERATURE.signed(text)?;
+    let temperature_k = match unit.symbol {
+        "K" => number.nearest(1, 0),
+        _ => number.nearest_sum(ZERO_DEG_C_IN_CENTIKELVIN, 2),
+    };
+    let temperature_k = TEMPERATURE.finite(text, temperature_k)?;
+    if temperature_k < 0.0 {
+        return Err(TEMPERATURE.out_of_range(text, "at least absolute zero, -273.15degC"));
+    }
+    Ok(temperature_k)
+}
+
+/// 0 °C is 273.15 K.
+const ZERO_DEG_C_IN_CENTIKELVIN: u32 = 27_315;
+
+/// Writes a temperature so that it parses back to the same one.
+///
+/// ```
+/// assert_eq!(farside_actors::units::print_temperature_k(233.15), "233.15K");
+/// ```
+pub fn print_temperature_k(temperature_k: f64) -> String {
+    format!("{temperature_k}K")
 }
 
 /// Reads how often something happens in a second: `"500k/s"`, `"2M/s"`, `"1.5G/s"`.
@@ -489,71 +466,4 @@ fn print_whole(mut value: u64, symbols: &[&str]) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    #[test]
-    fn durations_are_exact() {
-        let nanos = |text| parse_duration(text).map(SimDuration::as_nanos);
-        assert_eq!(nanos("250ms"), Ok(250_000_000));
-        assert_eq!(nanos("2.6s"), Ok(2_600_000_000));
-        assert_eq!(nanos("5us"), Ok(5_000));
-        assert_eq!(nanos("5 µs"), Ok(5_000));
-        assert_eq!(nanos("3min"), Ok(180_000_000_000));
-        assert_eq!(nanos("1h"), Ok(3_600_000_000_000));
-        assert_eq!(nanos("0.0000000010s"), Ok(1));
-        assert_eq!(nanos(".5s"), Ok(500_000_000));
-        assert_eq!(nanos("0s"), Ok(0));
-    }
-
-    #[test]
-    fn each_mistake_is_called_by_its_name() {
-        let says = |text: &str| parse_duration(text).unwrap_err().to_string();
-        assert_eq!(
-            says("5"),
-            "5: expected a duration such as \"250ms\" or \"2.6s\"; a bare number has no unit"
-        );
-        assert!(says("40m").contains("\"m\" is none of its units ns, us"));
-        assert_eq!(
-            says("soon"),
-            "\"soon\": expected a duration such as \"250ms\" or \"2.6s\""
-        );
-        assert!(says("0.5ns").contains("a whole number of nanoseconds"));
-        assert!(says("99999999999999h").contains("smaller"));
-        for rubbish in ["", ".", "-5ms", "1.2.3s", "NaN", "1e3s", "\u{0}", "s"] {
-            assert!(parse_duration(rubbish).is_err(), "{rubbish}");
-        }
-        assert!(
-            parse_fraction("1.5")
-                .unwrap_err()
-                .to_string()
-                .contains("from 0 to 1")
-        );
-        assert!(parse_data_size("1.5B").is_err());
-    }
-
-    proptest! {
-        #[test]
-        fn what_is_printed_parses_back(nanos: u64, rate: u64, length_m in 0.0..1e9f64) {
-            let duration = SimDuration::from_nanos(nanos);
-            prop_assert_eq!(parse_duration(&print_duration(duration)), Ok(duration));
-            prop_assert_eq!(parse_data_rate(&print_data_rate(rate)), Ok(rate));
-            prop_assert_eq!(parse_data_size(&print_data_size(rate)), Ok(rate));
-            prop_assert_eq!(parse_length_m(&print_length_m(length_m)), Ok(length_m));
-            prop_assert_eq!(parse_power_w(&print_power_w(length_m)), Ok(length_m));
-        }
-
-        #[test]
-        fn no_text_panics(text in ".*", number in "[0-9]{0,60}\\.?[0-9]{0,60}", unit in "(s|ns|h|m|%|GiB)") {
-            for text in [text, format!("{number}{unit}")] {
-                let _ = parse_duration(&text);
-                let _ = parse_length_m(&text);
-                let _ = parse_power_w(&text);
-                let _ = parse_fraction(&text);
-                let _ = parse_data_rate(&text);
-                let _ = parse_data_size(&text);
-            }
-        }
-    }
-}
+mod tests;

@@ -86,7 +86,7 @@ impl Registry {
     }
 
     /// The names of all built-in scenarios, sorted.
-    pub fn scenario_names(&self) -> Vec<&str> {
+    pub fn scenario_names(&self) -> Vec<&'static str> {
         names(self.systems().flat_map(System::scenarios))
     }
 
@@ -96,7 +96,7 @@ impl Registry {
     }
 
     /// The names of all built-in studies, sorted.
-    pub fn study_names(&self) -> Vec<&str> {
+    pub fn study_names(&self) -> Vec<&'static str> {
         names(self.systems().flat_map(System::studies))
     }
 
@@ -112,8 +112,8 @@ impl Registry {
     }
 }
 
-fn names<'a>(builtin: impl Iterator<Item = &'a Builtin>) -> Vec<&'a str> {
-    let mut names: Vec<&str> = builtin.map(|builtin| builtin.name).collect();
+fn names<'a>(builtin: impl Iterator<Item = &'a Builtin>) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = builtin.map(|builtin| builtin.name).collect();
     names.sort_unstable();
     names
 }

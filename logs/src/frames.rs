@@ -5,23 +5,10 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use mcap::MAGIC;
+use mcap::records::op;
+
 use crate::LogError;
-
-pub(crate) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-
-/// Opcodes of the records that this crate reads.
-pub(crate) mod op {
-    pub(crate) const HEADER: u8 = 0x01;
-    pub(crate) const FOOTER: u8 = 0x02;
-    pub(crate) const SCHEMA: u8 = 0x03;
-    pub(crate) const CHANNEL: u8 = 0x04;
-    pub(crate) const MESSAGE: u8 = 0x05;
-    pub(crate) const CHUNK: u8 = 0x06;
-    pub(crate) const MESSAGE_INDEX: u8 = 0x07;
-    pub(crate) const ATTACHMENT: u8 = 0x09;
-    pub(crate) const METADATA: u8 = 0x0C;
-    pub(crate) const DATA_END: u8 = 0x0F;
-}
 
 /// The most that one record may have, compressed or not.
 pub(crate) const LIMIT_BYTES: u64 = 512 * 1024 * 1024;
@@ -65,7 +52,7 @@ impl Frames {
         if magic != MAGIC {
             return Err(LogError::NotMcap {
                 path: path.to_owned(),
-                expected: hex(&MAGIC),
+                expected: hex(MAGIC),
                 actual: match magic.len() {
                     0 => "is empty".to_owned(),
                     length if length < MAGIC.len() => format!("has only {length} bytes"),

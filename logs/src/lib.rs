@@ -61,7 +61,6 @@ mod log;
 mod parse;
 mod recover;
 mod scan;
-mod scene;
 mod topics;
 mod verify;
 mod wire;

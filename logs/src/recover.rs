@@ -243,9 +243,7 @@ impl<'a> Saved<'a> {
         };
         let header = mcap::records::MessageHeader {
             channel_id: channel,
-            sequence: message.head.sequence,
-            log_time: message.head.log_time,
-            publish_time: message.head.publish_time,
+            ..message.head
         };
         let path = self.path;
         let written = self.writer()?.write_to_known_channel(&header, message.data);

@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use mcap::records::{MessageHeader, op};
 use prost_reflect::{DescriptorPool, MessageDescriptor};
 
 use crate::LogError;
-use crate::frames::{Frame, Frames, LIMIT_BYTES, describe, op};
+use crate::frames::{Frame, Frames, LIMIT_BYTES, describe};
 use crate::parse::{
-    AttachmentRecord, ChannelRecord, ChunkRecord, MessageHead, Parser, SchemaRecord, metadata,
+    AttachmentRecord, ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord,
+    message_header, metadata,
 };
 
 /// A schema of a log.
@@ -79,7 +81,7 @@ pub(crate) struct Position {
 /// A message where it was read.
 pub(crate) struct ScannedMessage<'a> {
     pub(crate) channel: &'a Arc<ChannelInfo>,
-    pub(crate) head: MessageHead,
+    pub(crate) head: MessageHeader,
     pub(crate) data: &'a [u8],
     pub(crate) position: Position,
 }
@@ -111,7 +113,7 @@ pub(crate) enum Item<'a> {
 
 /// What to yield once the borrow of the buffers is settled.
 enum Found {
-    Message(MessageHead, Position),
+    Message(MessageHeader, Position),
     Other,
     /// A message of so many bytes on a channel that is not declared, as behind damage: what
     /// follows it can be read.
@@ -132,7 +134,7 @@ pub(crate) struct Scanner {
     data_ended: bool,
     over: bool,
     /// The message that was yielded last.
-    last: Option<(MessageHead, Position, Within)>,
+    last: Option<(MessageHeader, Position, Within)>,
 }
 
 /// Which buffer holds a message.
@@ -241,7 +243,7 @@ impl Scanner {
         match within {
             Within::Chunk => self.message(head, position),
             Within::Frame => {
-                let data = self.frames.content().get(MessageHead::BYTES..)?;
+                let data = self.frames.content().get(MESSAGE_HEADER_BYTES..)?;
                 self.with_channel(head, data, position)
             }
         }
@@ -320,8 +322,8 @@ impl Scanner {
                 Ok(Some(Found::Other))
             }
             op::MESSAGE => {
-                let head = MessageHead::parse(self.frames.content()).ok_or_else(malformed)?;
-                self.check_channel(head.channel).map_err(Some)?;
+                let head = message_header(self.frames.content()).ok_or_else(malformed)?;
+                self.check_channel(head.channel_id).map_err(Some)?;
                 let position = Position {
                     frame: offset,
                     inner: 0,
@@ -400,8 +402,8 @@ impl Scanner {
         let malformed = || format!("a {} in a chunk that is malformed", describe(opcode));
         match opcode {
             op::MESSAGE => {
-                let head = MessageHead::parse(content).ok_or_else(malformed)?;
-                if let Err(what) = self.check_channel(head.channel) {
+                let head = message_header(content).ok_or_else(malformed)?;
+                if let Err(what) = self.check_channel(head.channel_id) {
                     return Ok(Found::Stray(content.len() as u64, what));
                 }
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
@@ -439,18 +441,18 @@ impl Scanner {
     }
 
     /// The message that [`Scanner::inner`] has just found; it ends where the next record starts.
-    fn message(&self, head: MessageHead, position: Position) -> Option<ScannedMessage<'_>> {
-        let start = position.inner as usize + 9 + MessageHead::BYTES;
+    fn message(&self, head: MessageHeader, position: Position) -> Option<ScannedMessage<'_>> {
+        let start = position.inner as usize + 9 + MESSAGE_HEADER_BYTES;
         self.with_channel(head, self.chunk.get(start..self.next_inner)?, position)
     }
 
     fn with_channel<'a>(
         &'a self,
-        head: MessageHead,
+        head: MessageHeader,
         data: &'a [u8],
         position: Position,
     ) -> Option<ScannedMessage<'a>> {
-        let channel = self.channel(head.channel)?;
+        let channel = self.channel(head.channel_id)?;
         Some(ScannedMessage {
             channel,
             head,

@@ -4,6 +4,7 @@
 //! What this is not: a way to slow a run down or to change it. The writer sees committed records
 //! only; when the disk cannot keep up, a bounded queue makes the run wait, and nothing else.
 
+mod foxglove;
 mod thread;
 mod viewer;
 

@@ -29,7 +29,6 @@
 
 mod build;
 mod builtin;
-mod decimal;
 mod error;
 mod hdtn;
 mod ion;

@@ -20,6 +20,7 @@
 
 pub mod contacts;
 pub mod crater;
+pub mod decimal;
 pub mod error;
 pub mod generate;
 pub mod movingai;

@@ -8,11 +8,13 @@ use serde::de::{Error, Visitor};
 use serde::{Deserializer, Serializer};
 
 use super::{
-    ACCELERATION, DATA_RATE, DATA_SIZE, DURATION, FRACTION, LENGTH, POWER, SPEED, UnitError,
-    check_fraction, parse_acceleration_m_per_s2, parse_data_rate, parse_data_size, parse_duration,
-    parse_fraction, parse_length_m, parse_power_w, parse_speed_m_per_s,
-    print_acceleration_m_per_s2, print_data_rate, print_data_size, print_length_m, print_power_w,
-    print_speed_m_per_s,
+    ACCELERATION, ANGLE, DATA_BITS, DATA_BYTES, DATA_RATE, DURATION, ENERGY, FRACTION, LENGTH,
+    POWER, SPEED, TEMPERATURE, UnitError, check_fraction, parse_acceleration_m_per_s2,
+    parse_angle_rad, parse_data_bits, parse_data_rate, parse_data_size, parse_duration,
+    parse_energy_j, parse_fraction, parse_length_m, parse_power_w, parse_signed_energy_j,
+    parse_speed_m_per_s, parse_temperature_k, print_acceleration_m_per_s2, print_angle_rad,
+    print_data_bits, print_data_rate, print_data_size, print_energy_j, print_length_m,
+    print_power_w, print_speed_m_per_s, print_temperature_k,
 };
 
 /// How one quantity is read, from a text or from a bare number.
@@ -171,7 +173,8 @@ quantity! {
 }
 
 quantity! {
-    /// Accelerations: `"1m/s2"` and metres in a second, gained in each second. Bare numbers are refused.
+    /// Accelerations: `"1m/s2"` and metres in a second, gained in each second. Bare numbers are
+    /// refused.
     acceleration_m_per_s2: f64, AccelerationMPerS2,
     expected ACCELERATION.expected,
     text parse_acceleration_m_per_s2,
@@ -209,10 +212,55 @@ quantity! {
 quantity! {
     /// Data sizes: `"64kB"` and bytes. Bare numbers are refused.
     data_size_bytes: u64, DataSize,
-    expected DATA_SIZE.expected,
+    expected DATA_BYTES.expected,
     text parse_data_size,
-    number |number: f64| Err(DATA_SIZE.no_unit(number)),
+    number |number: f64| Err(DATA_BYTES.no_unit(number)),
     write |value, to| to.collect_str(&print_data_size(*value))
+}
+
+quantity! {
+    /// Data sizes: `"3Mbit"` and bits. Bare numbers are refused.
+    data_size_bits: u64, DataBits,
+    expected DATA_BITS.expected,
+    text parse_data_bits,
+    number |number: f64| Err(DATA_BITS.no_unit(number)),
+    write |value, to| to.collect_str(&print_data_bits(*value))
+}
+
+quantity! {
+    /// Energies: `"1.2kWh"` and joules, not negative. Bare numbers are refused.
+    energy_j: f64, EnergyJ,
+    expected ENERGY.expected,
+    text parse_energy_j,
+    number |number: f64| Err(ENERGY.no_unit(number)),
+    write |value, to| to.collect_str(&print_energy_j(*value))
+}
+
+quantity! {
+    /// Energies that may be negative: `"-5J"` and joules. Bare numbers are refused.
+    signed_energy_j: f64, SignedEnergyJ,
+    expected ENERGY.expected,
+    text parse_signed_energy_j,
+    number |number: f64| Err(ENERGY.no_unit(number)),
+    write |value, to| to.collect_str(&print_energy_j(*value))
+}
+
+quantity! {
+    /// Angles: `"30deg"` and radians. Bare numbers are refused.
+    angle_rad: f64, AngleRad,
+    expected ANGLE.expected,
+    text parse_angle_rad,
+    number |number: f64| Err(ANGLE.no_unit(number)),
+    write |value, to| to.collect_str(&print_angle_rad(*value))
+}
+
+quantity! {
+    /// Temperatures: `"-40degC"` and kelvins. Bare numbers are refused.
+    temperature_k: f64, TemperatureK,
+    expected TEMPERATURE.expected,
+    text parse_temperature_k,
+    number |number: f64| Err(TEMPERATURE.no_unit(number)),
+    write |value, to| to.collect_str(&print_temperature_k(*value))
 }
 
 #[cfg(test)]
@@ -233,12 +281,30 @@ mod tests {
         at: Option<SimDuration>,
         #[serde(default, with = "super::data_rate_bit_per_s::option")]
         rate: Option<u64>,
+        #[serde(default, with = "super::data_size_bits::option")]
+        picture: Option<u64>,
+        #[serde(default, with = "super::energy_j::option")]
+        battery: Option<f64>,
+        #[serde(default, with = "super::signed_energy_j::option")]
+        balance: Option<f64>,
+        #[serde(default, with = "super::angle_rad::option")]
+        slope: Option<f64>,
+        #[serde(default, with = "super::temperature_k::option")]
+        coldest: Option<f64>,
     }
 
     #[test]
     fn toml_carries_every_quantity_there_and_back() {
-        let text = "latency = \"2.6s\"\nrange = \"40m\"\nloss = \"2%\"\nrate = \"128kbit/s\"\n";
+        let text = "latency = \"2.6s\"\nrange = \"40m\"\nloss = \"2%\"\nrate = \"128kbit/s\"\n\
+            picture = \"3Mbit\"\nbattery = \"1.2kWh\"\nbalance = \"-5J\"\nslope = \"90deg\"\n\
+            coldest = \"-40degC\"\n";
         let all: All = toml::from_str(text).unwrap();
+        assert_eq!(
+            (all.picture, all.battery),
+            (Some(3_000_000), Some(4_320_000.0))
+        );
+        assert_eq!((all.balance, all.coldest), (Some(-5.0), Some(233.15)));
+        assert_eq!(all.slope, Some(std::f64::consts::FRAC_PI_2));
         assert_eq!((all.loss, all.at, all.rate), (0.02, None, Some(128_000)));
         let again: All = toml::from_str(&toml::to_string(&all).unwrap()).unwrap();
         assert_eq!(again, all);
@@ -251,7 +317,7 @@ mod tests {
         assert_eq!(error.span(), Some(10..11));
         assert_eq!(
             error.message(),
-            "5: expected a duration such as \"250ms\" or \"2.6s\"; a bare number has no unit"
+            "5: expected a duration such as \"250ms\" or \"3h8min\"; a bare number has no unit"
         );
     }
 }

@@ -7,10 +7,10 @@ use farside::RunInfo;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Scene};
 
+use super::foxglove::Encoded;
 use super::thread::{Batch, Header};
 use super::{Channels, Live};
 use crate::LogError;
-use crate::scene::Encoded;
 
 /// What a channel that viewers draw is for.
 const ROLE: &str = "viewer";

@@ -188,3 +188,41 @@ fn a_message_on_an_unknown_channel_costs_only_itself() {
         .filter(|what| what.contains("channel 2"));
     assert_eq!(strays.count(), 1, "{:?}", info.missing);
 }
+
+/// Why logs are read by code of their own: what mcap's reader makes of two broken files. If this
+/// fails, mcap has become more careful, and `src/parse.rs` may be replaced.
+#[test]
+fn mcaps_own_reader_is_for_files_in_order() {
+    use std::panic::catch_unwind;
+
+    // An attachment that ends in front of its checksum: times, two empty texts, no data.
+    let attachment = [0; 8 + 8 + 4 + 4 + 8];
+    let parsed =
+        catch_unwind(|| mcap::parse_record(mcap::records::op::ATTACHMENT, &attachment).is_ok());
+    assert!(parsed.is_err(), "it is refused or read, without a panic");
+
+    // An uncompressed chunk of 9 bytes, in which a record of 50 bytes begins: it goes on in what
+    // follows the chunk.
+    let mut file = mcap::MAGIC.to_vec();
+    let mut chunk = [0; 8 + 8].to_vec();
+    chunk.extend(9u64.to_le_bytes());
+    chunk.extend([0; 4 + 4]);
+    chunk.extend(9u64.to_le_bytes());
+    chunk.push(0x80);
+    chunk.extend(50u64.to_le_bytes());
+    file.push(mcap::records::op::CHUNK);
+    file.extend((chunk.len() as u64).to_le_bytes());
+    file.extend(chunk);
+    file.extend([7; 64]);
+    let read_beyond_the_chunk = catch_unwind(move || {
+        let mut reader = mcap::sans_io::LinearReader::new();
+        reader.insert(file.len()).copy_from_slice(&file);
+        reader.notify_read(file.len());
+        match reader.next_event() {
+            Some(Ok(mcap::sans_io::LinearReadEvent::Record { data, .. })) => data == [7; 50],
+            _ => false,
+        }
+    });
+    // With checks for overflow it panics, without it reads on.
+    assert!(read_beyond_the_chunk.unwrap_or(true), "it is refused");
+}

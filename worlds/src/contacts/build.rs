@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use farside::{SimDuration, SimTime};
 
-use super::decimal::NumberError;
 use super::error::shown;
 use super::{
     ContactError, ContactPlan, ContactProblem, ContactWindow, MAX_CONTACTS, MAX_RATE_BIT_PER_S,
     Node, Note, Pair,
 };
+use crate::decimal::NumberError;
 
 /// The most characters of a node's name.
 const MAX_NAME: usize = 64;

@@ -18,9 +18,9 @@ use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
 use super::build::{self, Nodes, RawContact};
-use super::decimal::scaled;
 use super::error::shown;
 use super::{ContactError, ContactPlan, ContactProblem, MAX_CONTACTS, text_of};
+use crate::decimal::scaled;
 
 /// The keys of a contact that are read, and what they hold. Others are passed over, as HDTN does.
 const KEYS: [(&str, &str); 6] = [
@@ -300,7 +300,7 @@ impl Reader<'_> {
         number.ok_or_else(|| self.bad(value, KEYS[key].0, build::NODE_EXPECTED))
     }
 
-    fn number(&self, key: usize, places: u32, expected: &'static str) -> Result<u64, ContactError> {
+    fn number(&self, key: usize, places: i32, expected: &'static str) -> Result<u64, ContactError> {
         let value = self.value(key)?;
         let field = KEYS[key].0;
         let text = self.text(field, value)?;

@@ -17,9 +17,9 @@ mod time;
 use std::fmt::Write;
 
 use super::build::{self, Nodes, RawContact};
-use super::decimal::{scaled, unscaled};
 use super::error::shown;
 use super::{ContactError, ContactPlan, ContactProblem, text_of};
+use crate::decimal::{scaled, unscaled};
 use ranges::{Range, Ranges};
 use time::{Stamp, TimeLine};
 

@@ -4,9 +4,9 @@ use std::fmt;
 
 use farside::{SimDuration, SimTime};
 
-use super::decimal::NumberError;
 use super::error::shown;
-use super::{ContactError, ContactProblem, decimal, text_of};
+use super::{ContactError, ContactProblem, text_of};
+use crate::decimal::{NumberError, scaled};
 
 /// The most stamps of a trace.
 const MAX_STAMPS: usize = 4_000_000;
@@ -192,7 +192,7 @@ fn stamp(line: &str, number: usize) -> Result<u64, ContactError> {
         )
     };
     let is_whole = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    match decimal::scaled(text, 0) {
+    match scaled(text, 0) {
         Ok(stamp) if is_whole && stamp <= MAX_STAMP_MS => Ok(stamp),
         Err(NumberError::TooLarge) | Ok(_) if is_whole => Err(bad("milliseconds within a year")),
         _ => Err(bad("a whole number of milliseconds, one to a line")),

@@ -1,5 +1,0 @@
-//! How drawings are written: as messages of Foxglove's published schemas.
-
-mod encode;
-
-pub(crate) use encode::Encoded;
