@@ -8,6 +8,7 @@ mod builtin;
 pub mod contacts;
 mod crash;
 mod error;
+mod seeds;
 mod source;
 
 use std::collections::BTreeMap;
@@ -23,13 +24,13 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::picture::Site;
 use crate::system::{Conclude, Files, Goal, Registry, Settings, Setup, SetupError};
 pub use builtin::{builtin_names, builtin_text};
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
 pub(crate) use error::did_you_mean;
+pub use seeds::Seeds;
 pub use source::Place;
 pub(crate) use source::Source;
 
@@ -37,10 +38,12 @@ pub(crate) use source::Source;
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The keys that every system shares.
-const SHARED_KEYS: [&str; 11] = [
+const SHARED_KEYS: [&str; 13] = [
     "system",
     "description",
     "seed",
+    "problem_seed",
+    "tie_seed",
     "until",
     "contacts",
     "links",
@@ -63,6 +66,14 @@ pub struct Shared {
     /// The run's seed. TOML's integers are signed, so it has 63 bits.
     #[serde(default)]
     pub seed: u64,
+    /// What the problem is drawn from, where several runs are to share one: the world, the team, the
+    /// goals, as the system says. The run's seed unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem_seed: Option<u64>,
+    /// Shuffles what happens at one instant, to see whether a result hangs on its order. Without,
+    /// the order is that of the actors' names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tie_seed: Option<u64>,
     /// When the run stops, if the system does not stop it sooner.
     #[serde(
         default,
@@ -261,11 +272,6 @@ impl Scenario {
         &self.shared
     }
 
-    /// Replaces the seed, as `--seed` does.
-    pub fn set_seed(&mut self, seed: u64) {
-        self.shared.seed = seed;
-    }
-
     /// Where it reads files.
     pub(crate) fn files(&self) -> &Files {
         &self.files
@@ -307,16 +313,18 @@ impl Scenario {
     /// When the settings cannot be: more nodes than vertices, a pattern that matches no link, a
     /// crash of an actor that does not exist.
     pub fn assemble(&self) -> Result<Assembled, ScenarioError> {
-        self.assemble_seeded(self.shared.seed)
+        self.assemble_seeded(self.seeds())
     }
 
-    /// Builds the simulation with another seed than the scenario's, as studies do.
+    /// Builds the simulation with other seeds than the scenario's, as studies do.
     ///
     /// # Errors
     /// Those of [`Scenario::assemble`].
-    pub fn assemble_seeded(&self, seed: u64) -> Result<Assembled, ScenarioError> {
+    pub fn assemble_seeded(&self, seeds: Seeds) -> Result<Assembled, ScenarioError> {
+        let seed = seeds.run;
         let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
         let mut sim = Simulation::new(seed);
+        sim.tie_seed(self.shared.tie_seed);
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
         links.until(self.shared.until);
@@ -340,7 +348,8 @@ impl Scenario {
         });
         traces.map_err(|error| wrong(error.into()))?;
         let mut setup = Setup {
-            seed,
+            problem_seed: seeds.problem,
+            run_seed: seed,
             until: self.shared.until,
             sim: &mut sim,
             links: &mut links,
@@ -397,16 +406,6 @@ impl Scenario {
                 let late = at >= until;
                 late.then(|| format!("{what}.{index}: begins at {at}, but the run ends at {until}"))
             })
-    }
-
-    /// Where a run with this seed takes place, if on a roadmap: what pictures are drawn on.
-    ///
-    /// # Errors
-    /// When the settings cannot be.
-    pub fn site(&self, seed: u64) -> Result<Option<Site>, ScenarioError> {
-        let mut files = self.files.clone();
-        let site = self.settings.site(seed, &mut files);
-        site.map_err(|error| ScenarioError::from_setup(&self.source, error))
     }
 
     /// Whether a run ended because its time was over.

@@ -12,6 +12,7 @@
 //! `experiments/examples/own_system.rs` is such a binary, whole.
 
 mod files;
+mod series;
 
 use farside::{Report, SimDuration, Simulation};
 use farside_actors::link::{LinkBuilder, LinkConfigError};
@@ -22,6 +23,7 @@ use thiserror::Error;
 use crate::picture::Site;
 use crate::scenario::nearest;
 pub use files::Files;
+pub use series::{Series, SeriesError, SeriesMetric};
 
 /// A kind of system: reads its own tables of a scenario.
 pub trait System: Send + Sync {
@@ -30,6 +32,11 @@ pub trait System: Send + Sync {
 
     /// The top-level keys of a scenario that this system reads, besides those all systems share.
     fn sections(&self) -> &[&str];
+
+    /// The metrics of its runs that are curves ([`Series`]), with what their index is.
+    fn series(&self) -> &[SeriesMetric] {
+        &[]
+    }
 
     /// Reads those keys; `T::deserialize(sections)` of a serde type is all it takes.
     ///
@@ -53,19 +60,22 @@ pub trait Settings: Send + Sync {
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError>;
 
-    /// Where a run with this seed takes place, if on a roadmap of which pictures can be drawn.
+    /// Where a run of the problem with this seed takes place, if on a roadmap of which pictures can be drawn.
     ///
     /// # Errors
     /// Those of [`Settings::assemble`].
-    fn site(&self, _seed: u64, _files: &mut Files) -> Result<Option<Site>, SetupError> {
+    fn site(&self, _problem_seed: u64, _files: &mut Files) -> Result<Option<Site>, SetupError> {
         Ok(None)
     }
 }
 
 /// What a system builds from.
 pub struct Setup<'a> {
-    /// The run's seed, for worlds that are generated from it.
-    pub seed: u64,
+    /// What worlds, teams and goals are drawn from. Runs that share it share their problem; the
+    /// run's seed unless a scenario or a study's blocks say otherwise.
+    pub problem_seed: u64,
+    /// The run's own seed, which links, crashes and actors draw from.
+    pub run_seed: u64,
     /// When the run stops at the latest, if the scenario says.
     pub until: Option<SimDuration>,
     /// The simulation to fill.
@@ -98,7 +108,7 @@ pub type Conclude = Box<dyn FnOnce(&Report) -> Results>;
 /// What came of a run, beyond what the kernel counts.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// Figures for programs; names carry units.
+    /// Figures for programs; names carry units. A curve is a [`Series`], turned into JSON.
     pub metrics: Map<String, Value>,
     /// The same for people: lines of a table.
     pub summary: Vec<(String, String)>,

@@ -57,6 +57,14 @@ pub(super) fn as_written(value: f64) -> String {
     decimal(value, decimals.min(MOST_DECIMALS))
 }
 
+/// A figure with its unit, if it has any.
+pub(super) fn with_unit(text: String, unit: &str) -> String {
+    match unit {
+        "" => text,
+        unit => format!("{text}\u{a0}{unit}"),
+    }
+}
+
 /// How a metric's figures are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Style {

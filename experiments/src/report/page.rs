@@ -3,6 +3,7 @@
 mod method;
 pub(super) mod published;
 mod runs;
+mod series;
 mod tables;
 
 use std::collections::BTreeSet;
@@ -13,6 +14,7 @@ use super::measure::{Measure, Study};
 use super::numbers::plain;
 use super::plots::{self, Plots};
 use super::svg::Figure;
+use crate::study::summary::values::Kind;
 
 /// The page, and the figures that are on it.
 pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
@@ -114,6 +116,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                 p { (sentence) }
             } @else {
                 (tables::overall(study, measure))
+                @if measure.kind == Kind::Series { (series::told(study, measure)) }
                 @if !plots.figures.is_empty() {
                     div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
                 }

@@ -3,7 +3,8 @@
 use serde_json::{Map, Value};
 
 use super::file::MetricFile;
-use super::results::Metric;
+use super::results::{Metric, SeriesIndex};
+use crate::system::{Series, SeriesMetric};
 
 /// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
 const KERNEL: [&str; 8] = [
@@ -98,7 +99,7 @@ const KNOWN: [(&str, &str, &str); 37] = [
     ("violations", "violations", ""),
 ];
 
-/// A metric with what the study leaves open filled in.
+/// A metric with what the study leaves open filled in, as far as that is known without its system.
 pub(super) fn metric(file: &MetricFile) -> Metric {
     let known = KNOWN.iter().find(|(name, ..)| *name == file.name);
     let (label, unit) = known.map_or((file.name.as_str(), ""), |(_, label, unit)| (label, unit));
@@ -106,17 +107,41 @@ pub(super) fn metric(file: &MetricFile) -> Metric {
         name: file.name.clone(),
         label: file.label.clone().unwrap_or_else(|| label.to_owned()),
         unit: file.unit.clone().unwrap_or_else(|| unit.to_owned()),
+        index: None,
     }
 }
 
-/// Whether it can be summed up: a number, true or false, a word, a list of numbers; or nothing yet.
+/// What the index of a metric's curves is: what the study says, else what the system does. None if
+/// neither says anything.
+pub(super) fn index(file: &MetricFile, declared: &[SeriesMetric]) -> Option<SeriesIndex> {
+    let own = file.index.clone();
+    let declared = declared.iter().find(|one| one.name == file.name);
+    if own.is_none() && declared.is_none() {
+        return None;
+    }
+    let own = own.unwrap_or_default();
+    let declared = declared.copied().unwrap_or(SeriesMetric {
+        name: "",
+        index_label: "index",
+        index_unit: "",
+        lengths_differ: false,
+    });
+    Some(SeriesIndex {
+        label: own.label.unwrap_or_else(|| declared.index_label.to_owned()),
+        unit: own.unit.unwrap_or_else(|| declared.index_unit.to_owned()),
+        lengths_differ: own.lengths_differ.unwrap_or(declared.lengths_differ),
+    })
+}
+
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or nothing
+/// yet.
 fn is_measure(value: &Value) -> bool {
     match value {
         Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,
         Value::Array(entries) => entries
             .iter()
             .all(|entry| entry.is_number() || entry.is_null()),
-        Value::Object(_) => false,
+        Value::Object(_) => Series::from_json(value).is_ok(),
     }
 }
 

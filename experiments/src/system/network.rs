@@ -63,14 +63,14 @@ impl Settings for NetworkScenario {
         }
         let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
         let roadmap = Arc::new(roadmap);
-        let sensors = place(&self.world, &roadmap, setup.seed)?;
+        let sensors = place(&self.world, &roadmap, setup.problem_seed)?;
         let (world, team, settings) = (&self.world, &self.team, &self.network);
         let (map, posts) = (world.open_part(&roadmap, &sensors), Arc::new(sensors));
         let links = &mut *setup.links;
         let connect: &mut network::Connect<'_> = &mut |sim, from, to| {
             links.connect(sim, from, to);
         };
-        let (sim, seed) = (&mut *setup.sim, setup.seed);
+        let (sim, seed) = (&mut *setup.sim, setup.problem_seed);
         let system = match &grid {
             None => network::assemble(
                 sim,

@@ -54,7 +54,7 @@ impl Settings for TrafficScenario {
         let mut connect = |sim: &mut farside::Simulation, from: Host<'_>, to: Host<'_>| {
             links.connect(sim, from, to);
         };
-        let traffic = traffic::assemble(setup.sim, &self.traffic, setup.seed, &mut connect);
+        let traffic = traffic::assemble(setup.sim, &self.traffic, setup.run_seed, &mut connect);
         let traffic = traffic.map_err(wrong)?;
         Ok(Box::new(move |report| {
             results(&traffic.metrics(report.end_time))
