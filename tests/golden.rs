@@ -135,7 +135,10 @@ fn cuts_of(scenario: &'static str) -> Vec<Cut> {
 }
 
 fn cuts() -> impl Iterator<Item = Cut> {
-    Registry::builtin().scenario_names().into_iter().flat_map(cuts_of)
+    Registry::builtin()
+        .scenario_names()
+        .into_iter()
+        .flat_map(cuts_of)
 }
 
 impl Cut {

@@ -9,6 +9,7 @@ mod files;
 mod metric;
 mod picture;
 mod section;
+mod series;
 
 use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
@@ -18,11 +19,12 @@ use thiserror::Error;
 use crate::link::{LinkBuilder, LinkConfigError, Links, Wire, Wiring};
 pub use builtin::Builtin;
 pub use files::{Files, no_file};
-pub use metric::{Better, Metric, MetricKind};
+pub use metric::{Better, Metric, MetricKind, SeriesIndex};
 pub use picture::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
 };
 pub use section::{Key, Section};
+pub use series::{Series, SeriesError};
 
 /// A kind of system: reads its own tables of a scenario, and says what it has.
 ///
@@ -106,10 +108,22 @@ pub trait Settings: Send + Sync {
     }
 }
 
+/// What the chances of a run are drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    /// Of the run: links, crashes, actors.
+    pub run: u64,
+    /// Of what several runs may share: the world, the team, the goals, as the system says.
+    pub problem: u64,
+}
+
 /// What a system builds from.
 pub struct Setup<'a> {
-    /// The run's seed, for worlds that are generated from it.
-    pub seed: u64,
+    /// What worlds, teams and goals are drawn from. Runs that share it share their problem; the
+    /// run's seed unless a scenario or a study's blocks say otherwise.
+    pub problem_seed: u64,
+    /// The run's own seed, which links, crashes and actors draw from.
+    pub run_seed: u64,
     /// When the run stops at the latest, if the scenario says.
     pub until: Option<SimDuration>,
     /// The simulation to fill.
@@ -121,16 +135,17 @@ pub struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
-    /// What a run with this seed is built from.
+    /// What a run with these seeds is built from.
     pub fn new(
-        seed: u64,
+        seeds: Seeds,
         until: Option<SimDuration>,
         sim: &'a mut Simulation,
         files: &'a mut Files,
         links: LinkBuilder,
     ) -> Self {
         Setup {
-            seed,
+            problem_seed: seeds.problem,
+            run_seed: seeds.run,
             until,
             sim,
             files,
@@ -242,7 +257,7 @@ pub type Conclude = Box<dyn FnOnce(&Report) -> Results>;
 /// What came of a run, beyond what the kernel counts.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// Figures for programs; names carry units.
+    /// Figures for programs; names carry units. A curve is a [`Series`], turned into JSON.
     pub metrics: Map<String, Value>,
     /// The same for people: lines of a table.
     pub summary: Vec<(String, String)>,

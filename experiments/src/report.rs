@@ -1,7 +1,7 @@
 //! Reports: what a study found, for people and for programs.
 //!
 //! [`build`] makes of a study's results a page that needs nothing but itself, its figures one by
-//! one, and two tables. It reads no clock and draws no chance: the same results give the same bytes.
+//! one, and tables for programs. It reads no clock and draws no chance: the same results give the same bytes.
 
 pub mod csv;
 mod layout;
@@ -32,6 +32,8 @@ pub struct Report {
     pub results_csv: String,
     /// One row for each cell and metric, see [`csv::summary_csv`].
     pub summary_csv: String,
+    /// One row for each cell, curve and index, see [`csv::series_csv`]; none if there are no curves.
+    pub series_csv: Option<String>,
     /// One row for each published figure, see [`csv::published_csv`]; none if none is known.
     pub published_csv: Option<String>,
     /// What the study says, in figures.
@@ -46,7 +48,7 @@ pub struct Report {
 /// #     question: "Does it <b>escape</b>?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
 /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1],
-/// #     stop: None, published: vec![] };
+/// #     block: 1, stop: None, published: vec![] };
 /// # let results = Results { manifest, runs: vec![] };
 /// let report = farside_experiments::report::build(&results, "runs");
 /// assert!(report.page.contains("Does it &lt;b&gt;escape&lt;/b&gt;?"));
@@ -60,6 +62,7 @@ pub fn build(results: &Results, folder: &str) -> Report {
         figures,
         results_csv: csv::results_csv(results),
         summary_csv: csv::summary_csv(results, &summary),
+        series_csv: csv::series_csv(results, &summary),
         published_csv: csv::published_csv(results, &summary),
         summary,
     }

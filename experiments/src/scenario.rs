@@ -7,6 +7,7 @@
 pub mod contacts;
 mod crash;
 mod error;
+mod seeds;
 mod source;
 
 use std::collections::BTreeMap;
@@ -18,8 +19,8 @@ use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::radio::RadioConfig;
 use farside_actors::system::{
-    Assembly, Files, PictureError, PictureRequest, Recording, Settings, Setup, SetupError, System,
-    no_file,
+    Assembly, Files, PictureError, PictureRequest, Recording, Seeds, Settings, Setup, SetupError,
+    System, no_file,
 };
 use farside_actors::units;
 use nalgebra::Point3;
@@ -38,10 +39,12 @@ pub(crate) use source::Source;
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The keys that every system shares.
-const SHARED_KEYS: [&str; 11] = [
+const SHARED_KEYS: [&str; 13] = [
     "system",
     "description",
     "seed",
+    "problem_seed",
+    "tie_seed",
     "until",
     "contacts",
     "links",
@@ -64,6 +67,14 @@ pub struct Shared {
     /// The run's seed. TOML's integers are signed, so it has 63 bits.
     #[serde(default)]
     pub seed: u64,
+    /// What the problem is drawn from, where several runs are to share one: the world, the team, the
+    /// goals, as the system says. The run's seed unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem_seed: Option<u64>,
+    /// Shuffles what happens at one instant, to see whether a result hangs on its order. Without,
+    /// the order is that of the actors' names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tie_seed: Option<u64>,
     /// When the run stops, if the system does not stop it sooner.
     #[serde(
         default,
@@ -260,11 +271,6 @@ impl Scenario {
         &self.shared
     }
 
-    /// Replaces the seed, as `--seed` does.
-    pub fn set_seed(&mut self, seed: u64) {
-        self.shared.seed = seed;
-    }
-
     /// Where it reads files.
     pub(crate) fn files(&self) -> &Files {
         &self.files
@@ -306,16 +312,18 @@ impl Scenario {
     /// When the settings cannot be: more nodes than vertices, a pattern that matches no link, a
     /// crash of an actor that does not exist.
     pub fn assemble(&self) -> Result<Assembled, ScenarioError> {
-        self.assemble_seeded(self.shared.seed)
+        self.assemble_seeded(self.seeds())
     }
 
-    /// Builds the simulation with another seed than the scenario's, as studies do.
+    /// Builds the simulation with other seeds than the scenario's, as studies do.
     ///
     /// # Errors
     /// Those of [`Scenario::assemble`].
-    pub fn assemble_seeded(&self, seed: u64) -> Result<Assembled, ScenarioError> {
+    pub fn assemble_seeded(&self, seeds: Seeds) -> Result<Assembled, ScenarioError> {
+        let seed = seeds.run;
         let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
         let mut sim = Simulation::new(seed);
+        sim.tie_seed(self.shared.tie_seed);
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
             .map_err(|error| wrong(error.into()))?;
         links.until(self.shared.until);
@@ -338,7 +346,7 @@ impl Scenario {
             Ok(trace)
         });
         traces.map_err(|error| wrong(error.into()))?;
-        let mut setup = Setup::new(seed, self.shared.until, &mut sim, &mut files, links);
+        let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
         let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);

@@ -9,17 +9,23 @@
 //! | to learn | read |
 //! |---|---|
 //! | how wide a mean's interval is, and a difference's | [`bootstrap`] |
+//! | what runs that share a problem are worth | [`Blocks`] |
+//! | whether paired runs differ, and many such questions at once | [`paired`] |
 //! | what "no collision in 300 runs" is worth | [`rates`] |
 //! | when rovers arrive, if some never do | [`survival`] |
 //! | quantiles and their definition | [`distribution`] |
 //! | whether figures grow linearly | [`mod@line`] |
 
+mod blocks;
 pub mod bootstrap;
 pub mod distribution;
 pub mod line;
 mod normal;
+pub mod paired;
 pub mod rates;
 pub mod survival;
+
+pub use blocks::Blocks;
 
 #[cfg(test)]
 mod tests;

@@ -64,11 +64,13 @@
 //! figures of a table for one cell are refused. Results are kept when these tables change: a note on
 //! why ours differ may be written when the runs are done.
 
+mod blocks;
 mod design;
 mod error;
 mod execute;
 mod factors;
 mod file;
+mod lengths;
 mod level;
 mod load;
 mod metrics;

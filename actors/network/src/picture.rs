@@ -54,12 +54,12 @@ pub(crate) fn draw(
     request: &PictureRequest,
     files: &mut Files,
 ) -> Result<Figure, Failure> {
-    let site = ground::site(scenario, run.seed(), files)?;
+    let site = ground::site(scenario, run.seeds().problem, files)?;
     let drawn = Drawn {
         site,
         tracks: Tracks::read(run)?,
         scenario: run.scenario().to_owned(),
-        seed: run.seed(),
+        seed: run.seeds().run,
     };
     let figure = match picture {
         "map" => drawn.map(request.at),

@@ -91,13 +91,13 @@ impl Settings for NetworkScenario {
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
         let roadmap = Arc::new(roadmap);
-        let sensors = Arc::new(place(&self.world, &roadmap, setup.seed)?);
+        let sensors = Arc::new(place(&self.world, &roadmap, setup.problem_seed)?);
         let (world, in_crater) = (&self.world, in_crater(&self.world));
         let map = world.open_part(&roadmap, &sensors);
         let missions = match &grid {
             Some(grid) => Missions::Standing(grid.tasks().to_vec()),
             None => {
-                let drawn = missions(world, &roadmap, &self.team, setup.seed);
+                let drawn = missions(world, &roadmap, &self.team, setup.problem_seed);
                 Missions::Queued(drawn.map_err(blame)?)
             }
         };

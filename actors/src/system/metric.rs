@@ -12,6 +12,31 @@ pub enum MetricKind {
     /// A list of numbers for each run, one for each rover, say: a distribution, and survival where
     /// entries are missing.
     Sample,
+    /// A curve for each run ([`Series`](super::Series)): the mean at each index, with a band.
+    Series(SeriesIndex),
+}
+
+/// What the index of a curve is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeriesIndex {
+    /// What plots write along the axis: `planning step`.
+    pub label: &'static str,
+    /// Its unit, empty for none.
+    pub unit: &'static str,
+    /// Some runs of a cell may end at an earlier index than others. All have the same indices as far
+    /// as they go.
+    pub lengths_differ: bool,
+}
+
+impl SeriesIndex {
+    /// An index that all runs have as far as each other.
+    pub const fn new(label: &'static str, unit: &'static str) -> Self {
+        SeriesIndex {
+            label,
+            unit,
+            lengths_differ: false,
+        }
+    }
 }
 
 /// Which way a metric is better.
@@ -81,6 +106,17 @@ impl Metric {
     /// True or false for each run.
     pub const fn rate(name: &'static str, label: &'static str, better: Better) -> Self {
         Metric::new(name, label, "", MetricKind::Rate, better)
+    }
+
+    /// A curve for each run.
+    pub const fn series(
+        name: &'static str,
+        label: &'static str,
+        unit: &'static str,
+        index: SeriesIndex,
+        better: Better,
+    ) -> Self {
+        Metric::new(name, label, unit, MetricKind::Series(index), better)
     }
 
     /// With what it is, in a sentence or two.

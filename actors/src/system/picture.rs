@@ -4,6 +4,8 @@ use farside::SimDuration;
 use farside::record::RecordClass;
 use thiserror::Error;
 
+use super::Seeds;
+
 /// A picture that a system can draw of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureInfo {
@@ -50,8 +52,8 @@ pub struct PictureRequest {
 
 /// A run that was recorded, as pictures read it.
 pub trait Recording {
-    /// The run's seed.
-    fn seed(&self) -> u64;
+    /// The run's seeds.
+    fn seeds(&self) -> Seeds;
 
     /// The scenario's name.
     fn scenario(&self) -> &str;

@@ -64,7 +64,7 @@ impl Settings for TrafficScenario {
         for (index, flow) in self.traffic.flows.iter().enumerate() {
             check_period(index, flow, setup.until)?;
         }
-        let seed = setup.seed;
+        let seed = setup.run_seed;
         let traffic = setup.wired(|sim, wire| assemble(sim, &self.traffic, seed, wire))?;
         Ok(Assembly::new(move |report: &Report| {
             results(&traffic.metrics(report.end_time))

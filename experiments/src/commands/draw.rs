@@ -8,6 +8,7 @@ use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
+    Seeds,
 };
 use farside_actors::units;
 use farside_logs::{Log, LogError};
@@ -177,23 +178,27 @@ fn draw(
         from: args.from,
         along: args.along.clone(),
     };
-    scenario.draw(picture.name, &Logged(log), &request)
+    let seeds = scenario.seeds_of(log.seed(), None);
+    scenario.draw(picture.name, &Logged { log, seeds }, &request)
 }
 
 /// A log as pictures read it.
-struct Logged<'a>(&'a Log);
+struct Logged<'a> {
+    log: &'a Log,
+    seeds: Seeds,
+}
 
 impl Recording for Logged<'_> {
-    fn seed(&self) -> u64 {
-        self.0.seed()
+    fn seeds(&self) -> Seeds {
+        self.seeds
     }
 
     fn scenario(&self) -> &str {
-        self.0.scenario_name()
+        self.log.scenario_name()
     }
 
     fn excluded(&self) -> &[String] {
-        self.0.exclude()
+        self.log.exclude()
     }
 
     fn for_each(
@@ -201,7 +206,7 @@ impl Recording for Logged<'_> {
         visit: &mut dyn FnMut(&Recorded<'_>) -> Result<(), PictureError>,
     ) -> Result<RecordingEnd, PictureError> {
         let unreadable = |error: LogError| PictureError::Unreadable(error.to_string());
-        let mut records = self.0.records().map_err(unreadable)?;
+        let mut records = self.log.records().map_err(unreadable)?;
         while let Some((record, _)) = records.next_ref().map_err(unreadable)? {
             visit(&Recorded {
                 time_ns: record.key.time_ns,

@@ -9,6 +9,7 @@ use super::{CommandError, print, print_json};
 use crate::cli::Exit;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
+use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::published::{Beside, LineSummary};
 
 #[derive(clap::Args)]
@@ -31,6 +32,8 @@ struct Document {
     results_csv: String,
     summary_csv: String,
     #[serde(skip_serializing_if = "Option::is_none")]
+    series_csv: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     published_csv: Option<String>,
     plots: Vec<String>,
     /// Our figures beside published ones.
@@ -39,6 +42,9 @@ struct Document {
     /// Lines through cells, for what was published to be linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<LineSummary>,
+    /// Cells against each other, for what was published to be more.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    comparisons: Vec<ComparisonSummary>,
     runs: usize,
     missing: usize,
     failed: usize,
@@ -91,10 +97,12 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
     };
     let results_csv = write(out.join("results.csv"), &report.results_csv)?;
     let summary_csv = write(out.join("summary.csv"), &report.summary_csv)?;
-    let published_csv = match &report.published_csv {
-        Some(text) => Some(write(out.join("published.csv"), text)?),
-        None => None,
+    let if_any = |name: &str, text: &Option<String>| match text {
+        Some(text) => write(out.join(name), text).map(Some),
+        None => Ok(None),
     };
+    let series_csv = if_any("series.csv", &report.series_csv)?;
+    let published_csv = if_any("published.csv", &report.published_csv)?;
     let cells = report.summary.cells.iter();
     let published = cells.flat_map(|cell| {
         cell.published.iter().map(|beside| OfCell {
@@ -116,10 +124,12 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
     Ok(Document {
         results_csv,
         summary_csv,
+        series_csv,
         published_csv,
         plots: plots?,
         published: published.collect(),
         lines: report.summary.lines.clone(),
+        comparisons: report.summary.comparisons.clone(),
         // The page comes last: where it is, the rest is too.
         page: write(out.join("report.html"), &report.page)?,
         runs: results.runs.len(),
@@ -144,12 +154,16 @@ fn text(document: &Document) -> String {
         0 => String::new(),
         missing => format!(" of {}, the rest are not made yet", document.runs + missing),
     };
+    let series = match &document.series_csv {
+        Some(path) => format!("  curves   {path}\n"),
+        None => String::new(),
+    };
     let beside = match &document.published_csv {
         Some(path) => format!("  beside   {path}\n"),
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{beside}  plots    \
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  plots    \
          {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )

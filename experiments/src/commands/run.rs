@@ -50,8 +50,10 @@ pub(crate) struct Args {
     /// Threads for kameo; as many as there are cores unless given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Shuffle the order of simultaneous events, to see whether a result hangs on it
-    #[arg(long, value_name = "N")]
+    /// Shuffle the order of simultaneous events, to see whether a result hangs on it; instead of the
+    /// scenario's tie_seed
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     tie_seed: Option<u64>,
     /// Print the result as one JSON document
     #[arg(long)]
@@ -128,6 +130,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
     }
+    if let Some(tie_seed) = args.tie_seed {
+        scenario.set_tie_seed(tie_seed);
+    }
     if let Some(until) = args.until {
         scenario.set_until(until);
     }
@@ -141,7 +146,6 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     for remark in &assembled.remarks {
         tracing::warn!("{remark}");
     }
-    assembled.sim.tie_seed(args.tie_seed);
     let log = (!args.no_log).then_some(&args.out);
     if let Some(path) = log {
         let mut options = log_options(&scenario, &assembled, executor)?;
@@ -159,7 +163,6 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let outcome = Outcome {
         scenario: &scenario,
         executor,
-        tie_seed: args.tie_seed,
         log: log.map(|path| path.display().to_string()),
         report: &report,
         results: &results,
@@ -225,7 +228,6 @@ pub(super) fn log_options(
 struct Outcome<'a> {
     scenario: &'a Scenario,
     executor: Executor,
-    tie_seed: Option<u64>,
     log: Option<String>,
     report: &'a Report,
     results: &'a Results,
@@ -247,7 +249,7 @@ impl Outcome<'_> {
         Document {
             scenario: self.scenario.name(),
             seed: self.scenario.shared().seed,
-            tie_seed: self.tie_seed,
+            tie_seed: self.scenario.shared().tie_seed,
             executor: self.executor.name(),
             threads: threads(self.executor),
             digest: self.report.digest.to_string(),

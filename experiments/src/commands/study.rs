@@ -12,6 +12,7 @@ use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::report::csv::results_csv;
 use crate::study::results::{Results, RunOutcome};
+use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
 use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
@@ -66,6 +67,9 @@ struct Document {
     /// Lines through cells, for what was published to be linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<LineSummary>,
+    /// Cells against each other, for what was published to be more.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    comparisons: Vec<ComparisonSummary>,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
@@ -147,6 +151,7 @@ fn tell(
         violated: violated.len(),
         cells,
         lines: summary.lines,
+        comparisons: summary.comparisons,
     };
     if args.json {
         print_json(&document)?;

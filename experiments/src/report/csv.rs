@@ -3,11 +3,14 @@
 //! As RFC 4180 has it, but with line feeds alone. The same results give the same bytes; numbers are
 //! written in full, so that reading them back gives the same numbers.
 
+mod series;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
 use crate::study::results::{Claim, Manifest, Results, RunOutcome, RunRecord};
+use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::values::{Kind, kind_of, value_of};
 use crate::study::summary::{
     Difference, ListSummary, MetricSummary, NumberSummary, RateSummary, SHARES, Summary,
@@ -17,8 +20,8 @@ use crate::study::summary::{
 const COUNTS: [&str; 5] = ["sent", "delivered", "lost", "duplicated", "in_flight"];
 
 /// One row for each run, in order of (cell, seed): what it varied, how it ended, what became of its
-/// messages, and each metric that is a number, a truth value or a word. Lists are left out: they
-/// are in the results folder. What a run does not have is empty.
+/// messages, and each metric that is a number, a truth value or a word. Lists and curves are left
+/// out: they are in the results folder. What a run does not have is empty.
 pub fn results_csv(results: &Results) -> String {
     let manifest = &results.manifest;
     let reasons = reasons(results);
@@ -28,7 +31,7 @@ pub fn results_csv(results: &Results) -> String {
         .map(|metric| metric.name.as_str())
         // What is counted has its columns already.
         .filter(|name| !name.starts_with("messages.") && !FIXED.contains(name))
-        .filter(|name| kind_of(results, name) != Kind::List)
+        .filter(|name| !matches!(kind_of(results, name), Kind::List | Kind::Series))
         .collect();
     let counts = COUNTS.iter().map(|count| format!("messages.{count}"));
     let by_reason = reasons
@@ -144,7 +147,9 @@ fn number(value: f64) -> String {
 }
 
 /// One row for each cell and metric. `estimate` is the mean of numbers, the rate of truth values,
-/// the median of lists; what a kind does not have is empty, as is what cannot be known.
+/// the median of lists; of curves, which [`series_csv`] has in full, there is `holds_from`, the index
+/// from which on they differ from the baseline's. What a kind does not have is empty, as is what cannot
+/// be known.
 pub fn summary_csv(results: &Results, summary: &Summary) -> String {
     let manifest = &results.manifest;
     let mut header = vec!["cell".to_owned()];
@@ -179,7 +184,9 @@ pub fn summary_csv(results: &Results, summary: &Summary) -> String {
     table.finish()
 }
 
-const COLUMNS: [&str; 25] = [
+pub use series::series_csv;
+
+const COLUMNS: [&str; 26] = [
     "runs",
     "failed",
     "metric",
@@ -205,9 +212,10 @@ const COLUMNS: [&str; 25] = [
     "censored",
     "never",
     "words",
+    "holds_from",
 ];
 
-const PUBLISHED: [&str; 14] = [
+const PUBLISHED: [&str; 23] = [
     "metric",
     "table",
     "unit",
@@ -222,12 +230,23 @@ const PUBLISHED: [&str; 14] = [
     "slope",
     "intercept",
     "r_squared",
+    "other",
+    "from_index",
+    "by_at_least",
+    "by_at_most",
+    "equal_within",
+    "at_index",
+    "difference_low",
+    "difference_high",
+    "verdict",
 ];
 
-/// One row for each cell beside which a figure was published, and one for each line through cells
-/// (its `cell` is empty, and its factors' values are those that the cells share). All figures are in
-/// the publication's `unit`; `claim` is `value`, `about`, `below`, `above` or `linear`. None if the
-/// study knows no published figures.
+/// One row for each cell beside which a figure was published, one for each line through cells (its
+/// `cell` is empty, and its factors' values are those that the cells share), and one for each cell that
+/// was published to exceed or to equal another, `other` (of curves, the difference is the one
+/// `at_index` that speaks most against the claim). All figures are in the publication's `unit`; `claim`
+/// is `value`, `about`, `below`, `above`, `linear`, `exceeds` or `equals`. None if the study knows no
+/// published figures.
 pub fn published_csv(results: &Results, summary: &Summary) -> Option<String> {
     let manifest = &results.manifest;
     if manifest.published.is_empty() {
@@ -252,7 +271,6 @@ pub fn published_csv(results: &Results, summary: &Summary) -> Option<String> {
                     one.inside
                         .map_or_else(String::new, |inside| inside.to_string()),
                 );
-                row.extend([String::new(), String::new(), String::new()]);
                 table.row(row);
             }
         }
@@ -270,8 +288,34 @@ pub fn published_csv(results: &Results, summary: &Summary) -> Option<String> {
             row.extend([line.slope, line.intercept, line.r_squared].map(number));
             table.row(row);
         }
+        for one in summary.comparisons.iter().filter(|one| one.table == index) {
+            table.row(compared(manifest, one));
+        }
     }
     Some(table.finish())
+}
+
+/// The row of a cell against another.
+fn compared(manifest: &Manifest, one: &ComparisonSummary) -> Vec<String> {
+    let number_or_none = |value: Option<f64>| value.map_or_else(String::new, number);
+    let claim = match one.equal_within {
+        Some(_) => "equals",
+        None => "exceeds",
+    };
+    let mut row = vec![one.cell.to_string()];
+    row.extend(texts(manifest, one.cell));
+    row.extend([one.metric.clone(), one.title.clone(), one.unit.clone()]);
+    row.extend([claim.to_owned(), String::new(), one.n.to_string()]);
+    // Neither cell's own figure, but how they differ.
+    row.extend(std::iter::repeat_n(String::new(), 3));
+    row.push(number(one.difference));
+    row.extend(std::iter::repeat_n(String::new(), 4));
+    row.push(one.other.to_string());
+    row.extend([one.from_index, one.by_at_least, one.by_at_most].map(number_or_none));
+    row.extend([one.equal_within, one.index].map(number_or_none));
+    row.extend([one.ci_low, one.ci_high].map(number));
+    row.push(one.verdict.name().to_owned());
+    row
 }
 
 /// A claim's name, and its figure.
@@ -282,6 +326,7 @@ fn claimed(claim: &Claim) -> (&'static str, Option<f64>) {
         Claim::Below(figure) => ("below", Some(*figure)),
         Claim::Above(figure) => ("above", Some(*figure)),
         Claim::Linear(_) => ("linear", None),
+        Claim::Exceeds(_) => ("exceeds", None),
     }
 }
 
@@ -306,6 +351,15 @@ fn figures(summary: &MetricSummary) -> Figures<'_> {
         MetricSummary::Number(number) => numbers(number),
         MetricSummary::Rate(rate) => rates(rate),
         MetricSummary::List(list) => lists(list),
+        MetricSummary::Series(series) => {
+            let difference = series.difference.as_ref();
+            let from = difference.and_then(|difference| difference.holds_from);
+            BTreeMap::from([
+                ("kind", "series".to_owned()),
+                ("n", series.n.to_string()),
+                ("holds_from", from.map_or_else(String::new, number)),
+            ])
+        }
         MetricSummary::Text { n, counts } => {
             let words = counts
                 .iter()

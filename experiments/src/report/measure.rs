@@ -1,9 +1,10 @@
 //! A metric of a study, as plots and tables show it.
 
 use super::layout::Layout;
-use super::numbers::Style;
+use super::numbers::{Style, with_unit};
 use crate::stats::{Estimate, rates};
 use crate::study::results::{Metric, Results};
+use crate::study::summary::series::SeriesSummary;
 use crate::study::summary::values::{Kind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
 use farside_actors::figure::numbers::plain;
@@ -54,6 +55,11 @@ impl<'a> Study<'a> {
         metrics.map(measure).collect()
     }
 
+    /// How many blocks so many runs of a cell are, or runs that share no problem.
+    pub(super) fn blocks(&self, runs: usize) -> usize {
+        runs.div_ceil(self.results.manifest.block.max(1))
+    }
+
     /// The baseline, if there is anything to compare with it.
     pub(super) fn baseline(&self) -> Option<usize> {
         self.summary
@@ -92,12 +98,33 @@ impl Measure<'_> {
             MetricSummary::Rate(rate) => rate.difference.as_ref(),
             _ => None,
         };
-        let of = |difference: &Difference| Estimate {
-            value: difference.mean,
-            low: difference.ci_low,
-            high: difference.ci_high,
-        };
-        difference.filter(|difference| difference.n > 0).map(of)
+        let known = difference.filter(|difference| difference.n > 0);
+        known.map(Difference::estimate)
+    }
+
+    /// The curves of a cell, if the metric is one.
+    pub(super) fn series<'b>(&self, cell: &'b CellSummary) -> Option<&'b SeriesSummary> {
+        match &cell.metrics.get(self.index)?.summary {
+            MetricSummary::Series(series) => Some(series),
+            _ => None,
+        }
+    }
+
+    /// What the index of its curves is: `planning step (s)`, or `index` where nobody says.
+    pub(super) fn index_label(&self) -> String {
+        match &self.metric.index {
+            Some(index) if index.unit.is_empty() => index.label.clone(),
+            Some(index) => format!("{} ({})", index.label, index.unit),
+            None => "index".to_owned(),
+        }
+    }
+
+    /// An index in words: `planning step 12`, `time 3 s`.
+    pub(super) fn index_told(&self, index: f64) -> String {
+        let index_of = self.metric.index.as_ref();
+        let label = index_of.map_or("index", |one| one.label.as_str());
+        let unit = index_of.map_or("", |one| one.unit.as_str());
+        with_unit(format!("{label} {}", plain(index)), unit)
     }
 
     /// How many runs of a cell say anything.

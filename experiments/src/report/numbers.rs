@@ -4,6 +4,14 @@ use farside_actors::figure::numbers::{decimal, decimals_for, plain};
 
 use crate::stats::Estimate;
 
+/// A figure with its unit, if it has any.
+pub(super) fn with_unit(text: String, unit: &str) -> String {
+    match unit {
+        "" => text,
+        unit => format!("{text}\u{a0}{unit}"),
+    }
+}
+
 /// How a metric's figures are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Style {

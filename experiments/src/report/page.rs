@@ -3,6 +3,7 @@
 mod method;
 pub(super) mod published;
 mod runs;
+mod series;
 mod tables;
 
 use std::collections::BTreeSet;
@@ -11,6 +12,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::measure::{Measure, Study};
 use super::plots::{self, Plots};
+use crate::study::summary::values::Kind;
 use farside_actors::figure::numbers::plain;
 use farside_actors::figure::svg::Figure;
 
@@ -114,6 +116,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                 p { (sentence) }
             } @else {
                 (tables::overall(study, measure))
+                @if measure.kind == Kind::Series { (series::told(study, measure)) }
                 @if !plots.figures.is_empty() {
                     div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
                 }

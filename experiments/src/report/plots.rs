@@ -3,6 +3,7 @@
 mod curves;
 mod heat;
 mod losses;
+mod series;
 mod steps;
 
 use self::curves::Shown;
@@ -33,6 +34,10 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
         figures: Vec::new(),
         notes: Vec::new(),
     };
+    if measure.kind == Kind::Series {
+        series::curves(study, measure, &mut plots);
+        return plots;
+    }
     let plotted = matches!(measure.kind, Kind::Number | Kind::Rate | Kind::List);
     if !plotted || measure.constant(study.summary).is_some() {
         return plots;

@@ -7,24 +7,27 @@
 //! as rliable does (Agarwal and others, *Deep Reinforcement Learning at the Edge of the
 //! Statistical Precipice*, 2021).
 //!
-//! With a handful of values any bootstrap is too sure of itself: no value beyond those that were
-//! seen is ever drawn. Take 30 seeds a cell.
+//! What is drawn are blocks ([`Blocks`]): the runs that share a problem together, or each run alone.
+//!
+//! With a handful of blocks any bootstrap is too sure of itself: no value beyond those that were
+//! seen is ever drawn. Take 30 blocks a cell.
 
-use farside::random::{RandomKey, Stream};
+use farside::random::RandomKey;
 
+use super::blocks::Pool;
 use super::distribution::quantile;
-use super::{Estimate, finite_sorted, normal};
+use super::{Blocks, Estimate, normal};
 
 /// How often values are drawn anew. The ends of an interval then err by some 6 % of the standard
 /// error of what is estimated: less than what a table shows.
 pub const RESAMPLES: usize = 2000;
 
 /// A figure of some values that are sorted, least first.
-type Statistic = fn(&[f64]) -> f64;
+pub(super) type Statistic = fn(&[f64]) -> f64;
 
 /// The mean, with its BCa interval.
 ///
-/// Of one value the interval is unknown; of equal values it is that value, and nobody can tell
+/// Of one block the interval is unknown; of equal values it is that value, and nobody can tell
 /// from them how rare another one is.
 ///
 /// ```
@@ -35,8 +38,8 @@ type Statistic = fn(&[f64]) -> f64;
 /// assert!((estimate.value - 1.65).abs() < 1e-12);
 /// assert!(estimate.low > 1.1 && estimate.high < 3.0);
 /// ```
-pub fn mean(values: &[f64], key: RandomKey) -> Estimate {
-    let [mean] = bca(values, key, [mean_of]);
+pub fn mean(values: impl Into<Blocks>, key: RandomKey) -> Estimate {
+    let [mean] = bca(&values.into(), key, [mean_of]);
     mean
 }
 
@@ -51,26 +54,37 @@ pub fn mean(values: &[f64], key: RandomKey) -> Estimate {
 /// let (mean, middle) = mean_and_interquartile_mean(&times, RandomKey::new(0));
 /// assert_eq!((mean.value, middle.value), (25.0, 2.5));
 /// ```
-pub fn mean_and_interquartile_mean(values: &[f64], key: RandomKey) -> (Estimate, Estimate) {
-    let [mean, middle] = bca(values, key, [mean_of, interquartile_mean_of]);
+pub fn mean_and_interquartile_mean(
+    values: impl Into<Blocks>,
+    key: RandomKey,
+) -> (Estimate, Estimate) {
+    let [mean, middle] = bca(&values.into(), key, [mean_of, interquartile_mean_of]);
     (mean, middle)
 }
 
-/// The mean of `here - there` over runs that are paired by seed, with its BCa interval. Seeds are
-/// drawn, so that what a seed does to both sides drops out: of equal sides it is exactly 0.
+/// The mean of `here - there` over runs that are paired by seed, in their blocks, with its BCa
+/// interval. Blocks of pairs are drawn, so that what a seed does to both sides drops out: of equal
+/// sides it is exactly 0.
 ///
 /// ```
 /// use farside::random::RandomKey;
 /// use farside_experiments::stats::bootstrap::paired_difference;
 /// // Seeds differ by tens, the two cells by one.
-/// let pairs = [(11.0, 10.0), (21.5, 20.0), (30.5, 30.0), (41.0, 40.0)];
+/// let pairs = [(11.0, 10.0), (21.5, 20.0), (30.5, 30.0), (41.0, 40.0)].map(|pair| vec![pair]);
 /// let difference = paired_difference(&pairs, RandomKey::new(0));
 /// assert_eq!(difference.value, 1.0);
 /// assert!(difference.low > 0.0);
 /// ```
-pub fn paired_difference(pairs: &[(f64, f64)], key: RandomKey) -> Estimate {
-    let differences: Vec<f64> = pairs.iter().map(|(here, there)| here - there).collect();
-    mean(&differences, key)
+pub fn paired_difference(pairs: &[Vec<(f64, f64)>], key: RandomKey) -> Estimate {
+    mean(differences(pairs), key)
+}
+
+/// What is here less what is there, in blocks.
+pub fn differences(pairs: &[Vec<(f64, f64)>]) -> Blocks {
+    let of_block =
+        |block: &Vec<(f64, f64)>| block.iter().map(|(here, there)| here - there).collect();
+    let blocks: Vec<Vec<f64>> = pairs.iter().map(of_block).collect();
+    blocks.into()
 }
 
 /// What several cells say together.
@@ -89,18 +103,23 @@ pub struct Overall {
 /// use farside::random::RandomKey;
 /// use farside_experiments::stats::bootstrap::stratified;
 /// // Two cells far apart: that is no reason to be unsure of their mean.
-/// let cells = [vec![1.0, 1.1, 0.9], vec![100.0, 100.1, 99.9]];
+/// let cells = [[1.0, 1.1, 0.9], [100.0, 100.1, 99.9]].map(|cell| (&cell).into());
 /// let overall = stratified(&cells, RandomKey::new(0));
 /// assert!((overall.mean.value - 50.5).abs() < 1e-12);
 /// assert!(overall.mean.width() < 0.2);
 /// ```
-pub fn stratified(cells: &[Vec<f64>], key: RandomKey) -> Overall {
-    let cells: Vec<Vec<f64>> = cells.iter().map(|cell| finite_sorted(cell)).collect();
-    let cells: Vec<&Vec<f64>> = cells.iter().filter(|cell| !cell.is_empty()).collect();
+pub fn stratified(cells: &[Blocks], key: RandomKey) -> Overall {
+    let cells: Vec<&Blocks> = cells.iter().filter(|cell| cell.count() > 0).collect();
     let pool = Pool::new(&cells);
-    let means: Vec<f64> = cells.iter().map(|cell| mean_of(cell)).collect();
+    let mean_of_cell = |blocks: &Vec<Vec<usize>>| {
+        let places = blocks.iter().flatten();
+        let mut values: Vec<f64> = places.map(|place| pool.sorted[*place]).collect();
+        values.sort_by(f64::total_cmp);
+        mean_of(&values)
+    };
+    let means: Vec<f64> = pool.places.iter().map(mean_of_cell).collect();
     let (mean, middle) = (mean_of(&means), interquartile_mean_of(&pool.sorted));
-    if cells.iter().all(|cell| cell.len() < 2) {
+    if cells.iter().all(|cell| cell.count() < 2) {
         return Overall {
             mean: Estimate::unknown(mean),
             interquartile_mean: Estimate::unknown(middle),
@@ -112,10 +131,8 @@ pub fn stratified(cells: &[Vec<f64>], key: RandomKey) -> Overall {
     let mut replicates = [const { Vec::new() }; 2];
     for _ in 0..RESAMPLES {
         drawn.fill(0);
-        let sum_of_means: f64 = pool
-            .places
-            .iter()
-            .map(|places| pool.draw(places, &mut stream, &mut drawn))
+        let sum_of_means: f64 = (0..cells.len())
+            .map(|cell| pool.draw(cell, &mut stream, &mut drawn))
             .sum();
         replicates[0].push(sum_of_means / cells.len() as f64);
         expand(&pool.sorted, &drawn, &mut values);
@@ -132,88 +149,60 @@ pub fn stratified(cells: &[Vec<f64>], key: RandomKey) -> Overall {
     }
 }
 
-/// The values of all cells together, and where each cell's values are among them: so a redrawn
-/// pool is sorted by counting.
-struct Pool {
-    sorted: Vec<f64>,
-    places: Vec<Vec<usize>>,
-}
-
-impl Pool {
-    fn new(cells: &[&Vec<f64>]) -> Self {
-        let mut tagged: Vec<(f64, usize)> = Vec::new();
-        for (cell, values) in cells.iter().enumerate() {
-            tagged.extend(values.iter().map(|value| (*value, cell)));
-        }
-        tagged.sort_by(|(a, x), (b, y)| a.total_cmp(b).then(x.cmp(y)));
-        let mut places = vec![Vec::new(); cells.len()];
-        for (place, (_, cell)) in tagged.iter().enumerate() {
-            places[*cell].push(place);
-        }
-        Pool {
-            sorted: tagged.into_iter().map(|(value, _)| value).collect(),
-            places,
-        }
-    }
-
-    /// Draws one cell anew, counts what was drawn, and returns the mean.
-    fn draw(&self, places: &[usize], stream: &mut Stream, drawn: &mut [u32]) -> f64 {
-        let mut sum = 0.0;
-        for _ in 0..places.len() {
-            let place = places[stream.below(places.len() as u64) as usize];
-            drawn[place] += 1;
-            sum += self.sorted[place];
-        }
-        sum / places.len() as f64
-    }
-}
-
 /// BCa intervals of several statistics, from the same draws.
 fn bca<const N: usize>(
-    values: &[f64],
+    blocks: &Blocks,
     key: RandomKey,
     statistics: [Statistic; N],
 ) -> [Estimate; N] {
-    let sorted = finite_sorted(values);
-    let n = sorted.len();
-    if n < 2 {
-        return statistics.map(|statistic| Estimate::unknown(statistic(&sorted)));
+    let pool = Pool::new(&[blocks]);
+    let sorted = &pool.sorted;
+    if blocks.count() < 2 {
+        return statistics.map(|statistic| Estimate::unknown(statistic(sorted)));
     }
-    if sorted[0] == sorted[n - 1] {
+    if sorted[0] == sorted[sorted.len() - 1] {
         let (low, high) = (sorted[0], sorted[0]);
         let value = low;
         return [Estimate { value, low, high }; N];
     }
+    let mut replicates = replicates(&pool, key, &statistics).into_iter();
+    statistics.map(|statistic| bca_interval(&pool, statistic, replicates.next().as_deref()))
+}
+
+/// What each statistic says of each redrawn sample, least first.
+pub(super) fn replicates<const N: usize>(
+    pool: &Pool,
+    key: RandomKey,
+    statistics: &[Statistic; N],
+) -> [Vec<f64>; N] {
     let mut stream = key.stream();
-    let mut drawn = vec![0u32; n];
-    let mut resample = Vec::with_capacity(n);
+    let mut drawn = vec![0u32; pool.sorted.len()];
+    let mut resample = Vec::with_capacity(pool.sorted.len());
     let mut replicates = [const { Vec::new() }; N];
     for _ in 0..RESAMPLES {
         drawn.fill(0);
-        for _ in 0..n {
-            drawn[stream.below(n as u64) as usize] += 1;
-        }
-        expand(&sorted, &drawn, &mut resample);
+        pool.draw(0, &mut stream, &mut drawn);
+        expand(&pool.sorted, &drawn, &mut resample);
         for (statistic, replicates) in statistics.iter().zip(&mut replicates) {
             replicates.push(statistic(&resample));
         }
     }
-    let mut replicates = replicates.into_iter();
-    statistics.map(|statistic| {
-        let mut replicates = replicates.next().unwrap_or_default();
+    for replicates in &mut replicates {
         replicates.sort_by(f64::total_cmp);
-        bca_interval(&sorted, statistic, &replicates)
-    })
+    }
+    replicates
 }
 
-fn bca_interval(sorted: &[f64], statistic: Statistic, replicates: &[f64]) -> Estimate {
+fn bca_interval(pool: &Pool, statistic: Statistic, replicates: Option<&[f64]>) -> Estimate {
+    let replicates = replicates.unwrap_or_default();
+    let sorted = &pool.sorted;
     let value = statistic(sorted);
     // Replicates that equal the estimate but for rounding are half below it.
     let near = 1e-12 * (sorted[sorted.len() - 1] - sorted[0]);
     let below = replicates.partition_point(|replicate| *replicate < value - near);
     let up_to = replicates.partition_point(|replicate| *replicate <= value + near);
     let bias = normal::quantile((below + up_to) as f64 / (2 * replicates.len()) as f64);
-    let acceleration = acceleration(sorted, statistic);
+    let acceleration = acceleration(pool, statistic);
     let corrected = |z: f64| {
         let z = bias + z;
         let share = normal::cumulative(bias + z / (1.0 - acceleration * z));
@@ -225,15 +214,20 @@ fn bca_interval(sorted: &[f64], statistic: Statistic, replicates: &[f64]) -> Est
     interval(value, replicates, low.min(high), low.max(high))
 }
 
-/// How fast the spread of the estimate changes with what is estimated, from leaving out each value
+/// How fast the spread of the estimate changes with what is estimated, from leaving out each block
 /// in turn.
-fn acceleration(sorted: &[f64], statistic: Statistic) -> f64 {
-    let mut rest = Vec::with_capacity(sorted.len());
-    let left_out: Vec<f64> = (0..sorted.len())
+fn acceleration(pool: &Pool, statistic: Statistic) -> f64 {
+    let mut rest = Vec::with_capacity(pool.sorted.len());
+    let left_out: Vec<f64> = pool.places[0]
+        .iter()
         .map(|out| {
             rest.clear();
-            rest.extend_from_slice(&sorted[..out]);
-            rest.extend_from_slice(&sorted[out + 1..]);
+            let mut from = 0;
+            for place in out {
+                rest.extend_from_slice(&pool.sorted[from..*place]);
+                from = place + 1;
+            }
+            rest.extend_from_slice(&pool.sorted[from..]);
             statistic(&rest)
         })
         .collect();
@@ -269,7 +263,7 @@ fn expand(sorted: &[f64], drawn: &[u32], values: &mut Vec<f64>) {
     }
 }
 
-fn mean_of(values: &[f64]) -> f64 {
+pub(super) fn mean_of(values: &[f64]) -> f64 {
     if values.is_empty() {
         return f64::NAN;
     }

@@ -1,20 +1,27 @@
 //! The statistics against those of scipy, statsmodels, lifelines and R, and what holds for any
 //! values.
 
+mod blocks;
+
 use farside::random::RandomKey;
 use proptest::prelude::*;
 
-use super::Estimate;
 use super::bootstrap::{mean, mean_and_interquartile_mean, paired_difference, stratified};
 use super::distribution::{Ecdf, quantile};
 use super::rates::{mcnemar, paired_rate_difference, wilson};
 use super::survival::{Observation, Survival, kaplan_meier};
+use super::{Blocks, Estimate};
 
 /// Skewed, as times on bad links are.
 const SKEWED: [f64; 30] = [
     1.2, 1.9, 1.4, 1.1, 3.0, 1.3, 1.25, 1.7, 2.2, 1.05, 1.15, 5.5, 1.33, 1.45, 1.6, 1.8, 1.02, 1.5,
     2.6, 1.9, 1.12, 1.21, 1.36, 4.1, 1.07, 1.66, 1.28, 1.42, 2.05, 1.55,
 ];
+
+/// Each pair a block.
+fn alone<T: Copy>(pairs: &[T]) -> Vec<Vec<T>> {
+    pairs.iter().map(|pair| vec![*pair]).collect()
+}
 
 fn key() -> RandomKey {
     RandomKey::new(0).text("test")
@@ -40,6 +47,7 @@ fn bootstrap_agrees_with_scipy() {
     let reversed = SKEWED.iter().rev().enumerate();
     let others = reversed.map(|(at, value)| value * 0.9 + 0.05 * at as f64);
     let pairs: Vec<(f64, f64)> = SKEWED.iter().copied().zip(others).collect();
+    let pairs = alone(&pairs);
     close(
         paired_difference(&pairs, key()),
         -0.5491,
@@ -58,7 +66,7 @@ fn stratified_bootstrap_agrees_with_numpy() {
         SKEWED[10..20].iter().map(|value| value + 2.0).collect(),
         SKEWED[20..].iter().map(|value| value * 3.0).collect(),
     ];
-    let overall = stratified(&cells, key());
+    let overall = stratified(&cells.each_ref().map(Blocks::from), key());
     close(overall.mean, 3.547, 3.0417, 4.2183, 0.06);
     close(overall.interquartile_mean, 3.310625, 3.0863, 3.6031, 0.03);
 }
@@ -235,7 +243,11 @@ fn little_or_nothing_gives_a_defined_answer() {
     let same = mean(&[0.1; 30], key());
     assert_eq!((same.value, same.low, same.high), (0.1, 0.1, 0.1));
     assert!(stratified(&[], key()).mean.value.is_nan());
-    assert!(!stratified(&[vec![1.0], vec![2.0]], key()).mean.is_known());
+    assert!(
+        !stratified(&[(&[1.0]).into(), (&[2.0]).into()], key())
+            .mean
+            .is_known()
+    );
     assert_eq!((wilson(0, 0).low, wilson(0, 0).high), (0.0, 1.0));
     assert_eq!(mcnemar(&[]).p, 1.0);
     assert!(quantile(&[], 0.5).is_nan());
@@ -292,10 +304,10 @@ proptest! {
     fn intervals_hold_their_estimates(values in values(), others in values()) {
         let (mean, middle) = mean_and_interquartile_mean(&values, key());
         prop_assert!(holds(&mean) && holds(&middle));
-        let overall = stratified(&[values.clone(), others.clone()], key());
+        let overall = stratified(&[(&values).into(), (&others).into()], key());
         prop_assert!(holds(&overall.mean) && holds(&overall.interquartile_mean));
         let pairs: Vec<(f64, f64)> = values.into_iter().zip(others).collect();
-        prop_assert!(holds(&paired_difference(&pairs, key())));
+        prop_assert!(holds(&paired_difference(&alone(&pairs), key())));
     }
 
     #[test]
@@ -309,7 +321,7 @@ proptest! {
             bits(mean_and_interquartile_mean(&values, key())),
             bits(mean_and_interquartile_mean(&shuffled, key()))
         );
-        let cells = |values: &[f64]| stratified(&[values.to_vec(), vec![1.0, 2.0]], key());
+        let cells = |values: &[f64]| stratified(&[values.into(), (&[1.0, 2.0]).into()], key());
         prop_assert_eq!(cells(&values), cells(&shuffled));
     }
 
@@ -319,7 +331,8 @@ proptest! {
         // To a third, if it were not for what is drawn.
         let (few, many) = (mean(&values, key()), mean(&often, key()));
         prop_assert!(many.width() < 0.5 * few.width(), "{few:?} {many:?}");
-        let (few, many) = (stratified(&[values], key()), stratified(&[often], key()));
+        let (few, many) = (&values, &often);
+        let [few, many] = [few, many].map(|values| stratified(&[values.into()], key()));
         prop_assert!(many.mean.width() < 0.5 * few.mean.width());
     }
 
@@ -327,7 +340,7 @@ proptest! {
     fn a_cell_does_not_differ_from_itself(values in prop::collection::vec(-1e9..1e9f64, 2..40)) {
         let pairs: Vec<(f64, f64)> = values.iter().map(|value| (*value, *value)).collect();
         let zero = Estimate { value: 0.0, low: 0.0, high: 0.0 };
-        prop_assert_eq!(paired_difference(&pairs, key()), zero);
+        prop_assert_eq!(paired_difference(&alone(&pairs), key()), zero);
     }
 
     #[test]

@@ -112,6 +112,14 @@ pub enum StoreError {
         /// What is wrong.
         message: String,
     },
+    /// Curves of one cell that have other lengths or indices.
+    #[error("{}: {message}", .path.display())]
+    Series {
+        /// The results folder.
+        path: PathBuf,
+        /// Which runs, and what differs.
+        message: String,
+    },
     /// The folder holds the results of something else.
     #[error(
         "{}: holds other results: {difference}\n  give another folder with --out, or remove this one",

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use crate::scenario::{Assembled, Scenario};
 use crate::wall::timed;
-use farside_actors::system::Results;
+use farside_actors::system::{Results, Seeds};
 
 use super::results::{MessageCounts, Metric, RunOutcome};
 
@@ -84,18 +84,18 @@ impl Executed {
     }
 }
 
-/// Runs `scenario` with `seed` on this thread; `prepare` may add observers. `None` if it was
+/// Runs `scenario` with `seeds` on this thread; `prepare` may add observers. `None` if it was
 /// interrupted: that says nothing about the run.
 pub(crate) fn execute<E: std::fmt::Display>(
     scenario: &Scenario,
-    seed: u64,
+    seeds: Seeds,
     metrics: &[Metric],
     interrupts: &Interrupts,
     prepare: impl FnOnce(&mut Assembled) -> Result<(), E>,
 ) -> Option<Executed> {
     // What a panic leaves behind half done is dropped with the simulation.
     let executed = catch_unwind(AssertUnwindSafe(|| {
-        run(scenario, seed, metrics, interrupts, prepare)
+        run(scenario, seeds, metrics, interrupts, prepare)
     }));
     executed.unwrap_or_else(|payload| {
         let text = panic_text(&*payload);
@@ -105,12 +105,12 @@ pub(crate) fn execute<E: std::fmt::Display>(
 
 fn run<E: std::fmt::Display>(
     scenario: &Scenario,
-    seed: u64,
+    seeds: Seeds,
     metrics: &[Metric],
     interrupts: &Interrupts,
     prepare: impl FnOnce(&mut Assembled) -> Result<(), E>,
 ) -> Option<Executed> {
-    let (assembled, setup_s) = timed(|| scenario.assemble_seeded(seed));
+    let (assembled, setup_s) = timed(|| scenario.assemble_seeded(seeds));
     let mut assembled = match assembled {
         Ok(assembled) => assembled,
         Err(error) => return Some(Executed::failed(error.to_string())),

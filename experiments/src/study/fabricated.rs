@@ -125,6 +125,7 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
             baseline: Some(0),
             cells: cells.collect(),
             seeds: (1..=seeds).collect(),
+            block: 1,
             stop: None,
             published: Vec::new(),
             factors,
@@ -149,6 +150,7 @@ fn metrics() -> Vec<Metric> {
         name: name.to_owned(),
         label: label.to_owned(),
         unit: unit.to_owned(),
+        index: None,
     };
     metrics.map(metric).to_vec()
 }

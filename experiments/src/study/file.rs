@@ -25,6 +25,7 @@ pub(super) struct StudyFile {
     pub(super) cells: Option<u32>,
     pub(super) design_seed: Option<u64>,
     pub(super) seeds: Option<Seeds>,
+    pub(super) block: Option<u32>,
     pub(super) metrics: Vec<MetricFile>,
     pub(super) baseline: Option<toml::Table>,
     pub(super) stop: Option<StopFile>,
@@ -152,6 +153,16 @@ pub(super) struct MetricFile {
     pub(super) name: String,
     pub(super) label: Option<String>,
     pub(super) unit: Option<String>,
+    pub(super) index: Option<IndexFile>,
+}
+
+/// What a study says of a curve's index, instead of what its system says.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct IndexFile {
+    pub(super) label: Option<String>,
+    pub(super) unit: Option<String>,
+    pub(super) lengths_differ: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -160,6 +171,7 @@ struct MetricTable {
     name: String,
     label: Option<String>,
     unit: Option<String>,
+    index: Option<IndexFile>,
 }
 
 impl<'de> Deserialize<'de> for MetricFile {
@@ -170,7 +182,7 @@ impl<'de> Deserialize<'de> for MetricFile {
             type Value = MetricFile;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a metric's name, or a table of name, label and unit")
+                f.write_str("a metric's name, or a table of name, label, unit and index")
             }
 
             fn visit_str<E: Error>(self, name: &str) -> Result<MetricFile, E> {
@@ -178,6 +190,7 @@ impl<'de> Deserialize<'de> for MetricFile {
                     name: name.to_owned(),
                     label: None,
                     unit: None,
+                    index: None,
                 })
             }
 
@@ -187,6 +200,7 @@ impl<'de> Deserialize<'de> for MetricFile {
                     name: table.name,
                     label: table.label,
                     unit: table.unit,
+                    index: table.index,
                 })
             }
         }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::error::StoreError;
+use super::lengths::Lengths;
 use super::results::{FORMAT, Manifest, Results, RunOutcome, RunRecord};
 use super::store::io;
 
@@ -16,10 +17,12 @@ impl Results {
     ///
     /// # Errors
     /// When it is none, is of another format, or holds a line that is no record; the error names the
-    /// line. A last line that is cut is no error: its run was not done.
+    /// line; when the runs of a cell have curves over different indices. A last line that is cut is no
+    /// error: its run was not done.
     pub fn load(folder: &Path) -> Result<Results, StoreError> {
         let manifest = manifest(folder)?;
         let runs = runs(folder, &manifest)?;
+        check_series(folder, &manifest, &runs)?;
         Ok(Results { manifest, runs })
     }
 
@@ -31,7 +34,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![] };
     /// let run = |seed| RunRecord { cell: 0, seed, outcome: RunOutcome::Failed { error: "x".into() } };
     /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
     /// let whole = Results::merge([half(2), half(1)])?.unwrap();
@@ -56,8 +59,21 @@ impl Results {
             whole.runs.extend(part.runs);
         }
         whole.runs = in_order(whole.runs)?;
+        check_series(Path::new("these results"), &whole.manifest, &whole.runs)?;
         Ok(Some(whole))
     }
+}
+
+/// Refuses curves of one cell that have other lengths or indices.
+fn check_series(folder: &Path, manifest: &Manifest, runs: &[RunRecord]) -> Result<(), StoreError> {
+    let mut lengths = Lengths::default();
+    let mut checked = runs.iter().map(|run| lengths.check(manifest, run));
+    checked.try_for_each(|checked| {
+        checked.map_err(|message| StoreError::Series {
+            path: folder.to_owned(),
+            message,
+        })
+    })
 }
 
 /// The manifest of a results folder.
@@ -218,6 +234,7 @@ pub(super) fn difference(a: &Manifest, b: &Manifest) -> String {
         ("the cells", a.cells != b.cells),
         ("the metrics", a.metrics != b.metrics),
         ("the baseline", a.baseline != b.baseline),
+        ("the blocks of seeds", a.block != b.block),
         ("the stopping rule", a.stop != b.stop),
         ("the published figures", a.published != b.published),
     ];

@@ -1,11 +1,13 @@
 //! Metrics: those that every run has, and which a run can be measured by.
 
 use farside_actors::system::Better::{Higher, Lower, Neither};
-use farside_actors::system::Metric as KnownMetric;
+use farside_actors::system::{
+    Metric as KnownMetric, MetricKind, Series, SeriesIndex as KnownIndex,
+};
 use serde_json::{Map, Value};
 
 use super::file::MetricFile;
-use super::results::Metric;
+use super::results::{Metric, SeriesIndex};
 
 /// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
 pub(crate) const KERNEL: [KnownMetric; 8] = [
@@ -47,17 +49,38 @@ pub(super) fn metric<'a>(
         name: file.name.clone(),
         label: file.label.clone().unwrap_or_else(|| label.to_owned()),
         unit: file.unit.clone().unwrap_or_else(|| unit.to_owned()),
+        index: index(file, known),
     }
 }
 
-/// Whether it can be summed up: a number, true or false, a word, a list of numbers; or nothing yet.
+/// What the index of a curve is: what the study says of it, and for the rest the system.
+fn index(file: &MetricFile, known: Option<&KnownMetric>) -> Option<SeriesIndex> {
+    let own = file.index.clone();
+    let declared = known.and_then(|metric| match metric.kind {
+        MetricKind::Series(index) => Some(index),
+        _ => None,
+    });
+    if own.is_none() && declared.is_none() {
+        return None;
+    }
+    let own = own.unwrap_or_default();
+    let declared = declared.unwrap_or(KnownIndex::new("index", ""));
+    Some(SeriesIndex {
+        label: own.label.unwrap_or_else(|| declared.label.to_owned()),
+        unit: own.unit.unwrap_or_else(|| declared.unit.to_owned()),
+        lengths_differ: own.lengths_differ.unwrap_or(declared.lengths_differ),
+    })
+}
+
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or nothing
+/// yet.
 fn is_measure(value: &Value) -> bool {
     match value {
         Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,
         Value::Array(entries) => entries
             .iter()
             .all(|entry| entry.is_number() || entry.is_null()),
-        Value::Object(_) => false,
+        Value::Object(_) => Series::from_json(value).is_ok(),
     }
 }
 

@@ -149,8 +149,10 @@ impl Study {
         let metrics = self.metrics(&base, registry, &blame)?;
         let stop = self.stop(&metrics, &blame)?;
         let seeds = self.seeds(seeds, &blame)?;
+        let block = super::blocks::block(&self.file, &self.factors, seeds.len(), &blame)?;
         let baseline = self.baseline(&blame)?;
         let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
+        super::blocks::check_problem(&base, block, &blame)?;
         let scenario_text = base.resolved()?;
         let (scenarios, files) = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
         let manifest = Manifest {
@@ -166,6 +168,7 @@ impl Study {
             baseline,
             cells: self.cells,
             seeds,
+            block,
             stop,
             published,
         };
@@ -355,7 +358,7 @@ impl Study {
         for (index, cell) in self.cells.iter().enumerate() {
             let built = of_cell(base.name(), text, cell, files.clone(), registry);
             let built = built.and_then(|scenario| {
-                let assembled = scenario.assemble_seeded(seed)?;
+                let assembled = scenario.assemble_seeded(scenario.seeds_of(seed, None))?;
                 Ok((scenario, assembled.files))
             });
             let (scenario, read) = built.map_err(|error| self.refused(index, error))?;
@@ -448,18 +451,25 @@ impl Plan {
             }
         }
         if let Some(stop) = &self.manifest.stop
-            && let Some(Value::Array(_) | Value::String(_)) = results.get(&stop.metric)
+            && let Some(Value::Array(_) | Value::String(_) | Value::Object(_)) =
+                results.get(&stop.metric)
         {
             let metric = &stop.metric;
             let message = format!("{metric}: expected a metric that is a number, or true or false");
             return Err(blame.invalid("stop.metric", message));
         }
+        self.check_published(results)
+    }
+
+    /// Checks that what was published is of metrics of which it can be said, as a run that ended has
+    /// them.
+    pub(super) fn check_published(
+        &self,
+        results: &Map<String, Value>,
+    ) -> Result<(), ScenarioError> {
+        let blame = Blame(&self.source);
         for (index, table) in self.manifest.published.iter().enumerate() {
-            if let Some(Value::String(_)) = results.get(&table.metric) {
-                let metric = &table.metric;
-                let message = format!("{metric}: expected a metric that is counted or measured");
-                return Err(blame.invalid(&format!("published.{index}.metric"), message));
-            }
+            super::published::check_kind(index, table, results.get(&table.metric), &blame)?;
         }
         Ok(())
     }

@@ -1,6 +1,11 @@
 //! Published figures: what a study file says of them, checked against its metrics and cells.
 
+mod exceeds;
+
+use serde_json::Value;
+
 use crate::scenario::ScenarioError;
+use farside_actors::system::Series;
 
 use super::factors::{Blame, FactorPlan};
 use super::file::{PublishedFile, StudyFile};
@@ -8,7 +13,10 @@ use super::level::Level;
 use super::results::{Cell, Claim, Metric, Published, PublishedFigure};
 
 /// The keys of a figure that say what is claimed; it has one of them.
-const CLAIMS: [&str; 5] = ["value", "about", "below", "above", "linear"];
+const CLAIMS: [&str; 6] = ["value", "about", "below", "above", "linear", EXCEEDS];
+
+/// The claim that one cell is more than another; read in [`exceeds`].
+const EXCEEDS: &str = "exceeds";
 
 /// Its key for the publication's own words.
 const QUOTE: &str = "quote";
@@ -111,6 +119,8 @@ impl Known<'_> {
         let names = self.names();
         let mut cells: Vec<usize> = (0..self.cells.len()).collect();
         let mut claims = Vec::new();
+        // What is more than what is known once all levels are.
+        let exceeds = entry.contains_key(EXCEEDS);
         let mut quote = String::new();
         for (key, value) in entry {
             let here = [keys, std::slice::from_ref(key)].concat();
@@ -119,6 +129,11 @@ impl Known<'_> {
                 let level = self.level(&here, factor, value)?;
                 let has = |cell: &Cell| level.is(&cell.values[factor], &cell.texts[factor]);
                 cells.retain(|cell| has(&self.cells[*cell]));
+            } else if key == EXCEEDS || exceeds::DETAILS.contains(&key.as_str()) {
+                if !exceeds {
+                    let message = "only a figure with exceeds has this key";
+                    return Err(self.blame.invalid_at(&here, message));
+                }
             } else if CLAIMS.contains(&key.as_str()) {
                 claims.push(self.claim(&here, key, value)?);
             } else if key == QUOTE {
@@ -128,19 +143,23 @@ impl Known<'_> {
                 })?;
                 words.clone_into(&mut quote);
             } else {
-                let known: Vec<&str> = names.iter().copied().chain(CLAIMS).chain([QUOTE]).collect();
+                let known = names.iter().copied().chain(CLAIMS);
+                let known: Vec<&str> = known.chain(exceeds::DETAILS).chain([QUOTE]).collect();
                 return Err(self.blame.unknown_at(&here, key, &known));
             }
+        }
+        if exceeds && !cells.is_empty() {
+            claims.push(Claim::Exceeds(self.comparison(keys, entry, &cells)?));
+        }
+        if cells.is_empty() {
+            let message = "no cell has all these values";
+            return Err(self.blame.invalid_at(keys, message));
         }
         let [claim] = claims.as_slice() else {
             let names = CLAIMS.join(", ");
             let message = format!("{} claims: expected one of {names}", claims.len());
             return Err(self.blame.invalid_at(keys, message));
         };
-        if cells.is_empty() {
-            let message = "no cell has all these values";
-            return Err(self.blame.invalid_at(keys, message));
-        }
         if let Claim::Linear(name) = claim {
             self.check_line(keys, name, &cells)?;
         }
@@ -214,18 +233,22 @@ impl Known<'_> {
             }
             return Ok(Claim::Linear(name.to_owned()));
         }
-        let number = value
-            .as_float()
-            .or_else(|| value.as_integer().map(|n| n as f64));
-        let number = number.filter(|number| number.is_finite()).ok_or_else(|| {
-            let message = format!("{value}: expected a number, in the publication's unit");
-            self.blame.invalid_at(keys, message)
-        })?;
+        let number = self.number(keys, value)?;
         Ok(match kind {
             "about" => Claim::About(number),
             "below" => Claim::Below(number),
             "above" => Claim::Above(number),
             _ => Claim::Value(number),
+        })
+    }
+
+    fn number(&self, keys: &[String], value: &toml::Value) -> Result<f64, ScenarioError> {
+        let number = value
+            .as_float()
+            .or_else(|| value.as_integer().map(|n| n as f64));
+        number.filter(|number| number.is_finite()).ok_or_else(|| {
+            let message = format!("{value}: expected a number, in the publication's unit");
+            self.blame.invalid_at(keys, message)
         })
     }
 
@@ -250,21 +273,98 @@ impl Known<'_> {
         Ok(())
     }
 
-    /// Refuses a second figure for a cell: one of the two is a slip.
+    /// Refuses a second figure for a cell: one of the two is a slip. A cell may be compared with
+    /// several others, and from several indices on.
     fn check_apart(
         &self,
         keys: &[String],
         before: &[PublishedFigure],
         figure: &PublishedFigure,
     ) -> Result<(), ScenarioError> {
-        let shape = |figure: &PublishedFigure| matches!(figure.claim, Claim::Linear(_));
-        let others = before.iter().filter(|other| shape(other) == shape(figure));
-        let both = others
-            .flat_map(|other| &other.cells)
-            .find(|cell| figure.cells.contains(cell));
-        let Some(cell) = both else { return Ok(()) };
-        let texts = self.cells[*cell].texts.join(", ");
+        let others = before.iter().flat_map(subjects);
+        let others: Vec<Subject> = others.collect();
+        let both = subjects(figure).find(|subject| others.contains(subject));
+        let Some(Subject { cell, .. }) = both else {
+            return Ok(());
+        };
+        let texts = self.cells[cell].texts.join(", ");
         let message = format!("another figure of this table is for cell {cell} ({texts}) too");
         Err(self.blame.invalid_at(keys, message))
     }
+}
+
+/// What a figure is said of: two figures of a table are never said of the same.
+#[derive(Debug, PartialEq)]
+struct Subject {
+    cell: usize,
+    is_line: bool,
+    /// The other cell, and the index from which on.
+    compared: Option<(usize, Option<f64>)>,
+}
+
+fn subjects(figure: &PublishedFigure) -> impl Iterator<Item = Subject> {
+    figure
+        .cells
+        .iter()
+        .enumerate()
+        .map(|(place, cell)| Subject {
+            cell: *cell,
+            is_line: matches!(figure.claim, Claim::Linear(_)),
+            compared: match &figure.claim {
+                Claim::Exceeds(claim) => Some((claim.others[place], claim.from_index)),
+                _ => None,
+            },
+        })
+}
+
+/// Checks that what a table claims can be said of its metric, as a run that ended reports it.
+///
+/// # Errors
+/// When words have figures, or a curve has; when what is no number is compared; when an index is
+/// given of what is no curve, or one beyond its end.
+pub(super) fn check_kind(
+    index: usize,
+    table: &Published,
+    reported: Option<&Value>,
+    blame: &Blame<'_>,
+) -> Result<(), ScenarioError> {
+    let metric = &table.metric;
+    let series = reported.and_then(|value| Series::from_json(value).ok());
+    if let Some(Value::String(_)) = reported {
+        let message = format!("{metric}: expected a metric that is counted or measured");
+        return Err(blame.invalid(&format!("published.{index}.metric"), message));
+    }
+    for (place, figure) in table.figures.iter().enumerate() {
+        let at = |key: &str| format!("published.{index}.values.{place}{key}");
+        let Claim::Exceeds(claim) = &figure.claim else {
+            if series.is_some() {
+                let message = format!("{metric} is a curve: expected exceeds, and no figure");
+                return Err(blame.invalid(&at(""), message));
+            }
+            continue;
+        };
+        if let Some(Value::Array(_)) = reported {
+            let message = format!(
+                "{metric} is a list: expected a metric that is a number, true or false, or a curve"
+            );
+            return Err(blame.invalid(&at(".exceeds"), message));
+        }
+        // A metric that this run does not report says nothing of its kind.
+        let (Some(from), Some(_)) = (claim.from_index, reported) else {
+            continue;
+        };
+        let key = at(".from_index");
+        match series.as_ref().map(|series| series.index().last()) {
+            None => {
+                let message = format!("{metric} is no curve, so it has no index");
+                return Err(blame.invalid(&key, message));
+            }
+            Some(Some(last)) if *last < from => {
+                let message = format!("{from}: the last index of {metric} is {last}");
+                return Err(blame.invalid(&key, message));
+            }
+            Some(_) => {}
+        }
+    }
+    Ok(())
 }

@@ -104,10 +104,11 @@ pub(crate) fn reproduce<E: std::fmt::Display>(
     let files = Files::kept(manifest.files.clone());
     let text = &manifest.scenario_text;
     let mut scenario = of_cell(&manifest.scenario, text, cell, files, registry)?;
-    scenario.set_seed(record.seed);
+    let seeds = scenario.seeds_of(record.seed, manifest.problem_seed(record.seed));
+    scenario.set_seeds(seeds);
     let executed = execute(
         &scenario,
-        record.seed,
+        seeds,
         &manifest.metrics,
         interrupts,
         |assembled| prepare(&scenario, assembled),

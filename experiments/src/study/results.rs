@@ -39,6 +39,9 @@ pub struct Manifest {
     pub cells: Vec<Cell>,
     /// The seeds, the same for each cell; with a stopping rule, the most there may be.
     pub seeds: Vec<u64>,
+    /// How many seeds, in the order of [`Manifest::seeds`], share a problem: 1 if none do.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub block: usize,
     /// When a cell has seeds enough; without, each cell runs with all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
@@ -46,6 +49,30 @@ pub struct Manifest {
     /// are kept when these change.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub published: Vec<Published>,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_one(block: &usize) -> bool {
+    *block == 1
+}
+
+impl Manifest {
+    /// The seed of the problem that the run with this seed has: without blocks its own, which
+    /// is none here; with blocks, the first seed of its block.
+    pub fn problem_seed(&self, seed: u64) -> Option<u64> {
+        if self.block <= 1 {
+            return None;
+        }
+        let place = self.seeds.iter().position(|known| *known == seed)?;
+        self.seeds.get(place - place % self.block).copied()
+    }
 }
 
 /// When a cell has seeds enough.
@@ -141,7 +168,7 @@ pub struct Cell {
 
 /// What is measured. What a run reports under the metric's name decides how it is summed up:
 /// a number by its mean, true or false as a rate, a list of numbers as a distribution (`null`: it
-/// had not happened when the run ended).
+/// had not happened when the run ended), a curve ([`farside_actors::system::Series`]) index by index.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Metric {
@@ -151,6 +178,22 @@ pub struct Metric {
     pub label: String,
     /// The unit, empty for none.
     pub unit: String,
+    /// What the index of a curve is. None of a metric that is no curve, or of which nobody says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub index: Option<SeriesIndex>,
+}
+
+/// What the index of a curve is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesIndex {
+    /// What plots write along the axis (`planning step`).
+    pub label: String,
+    /// The unit, empty for none.
+    pub unit: String,
+    /// Some runs of a cell may end at an earlier index than others.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lengths_differ: bool,
 }
 
 /// Figures of one metric that others published.
@@ -207,6 +250,29 @@ pub enum Claim {
     Above(f64),
     /// That it grows, or falls, linearly with a factor, which is named.
     Linear(String),
+    /// That it is more than in another cell, or as much, with the same seeds.
+    Exceeds(Comparison),
+}
+
+/// What a publication says of the difference of a cell to another, in the publication's unit: that
+/// it is above 0, unless `equal_within` says how near to 0 it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Comparison {
+    /// The other cell of each of [`PublishedFigure::cells`].
+    pub others: Vec<usize>,
+    /// For curves: the first index at which it is claimed, and from there on at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_index: Option<f64>,
+    /// The least difference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_at_least: Option<f64>,
+    /// The greatest difference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_at_most: Option<f64>,
+    /// The greatest difference to either side.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equal_within: Option<f64>,
 }
 
 /// What came of one run.

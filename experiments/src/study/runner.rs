@@ -9,8 +9,10 @@ use serde_json::Value;
 
 use crate::scenario::{Assembled, Scenario};
 
-use super::error::StudyError;
+use super::error::{StoreError, StudyError};
 use super::execute::{Executed, Interrupts, execute};
+use super::lengths::Lengths;
+use super::load;
 use super::plan::Plan;
 use super::pool::{self, Dispatch};
 use super::results::{Manifest, Metric, Results, RunOutcome, RunRecord};
@@ -115,6 +117,13 @@ pub fn run(
             None => return Ok(Ended::Interrupted),
         }
     } else {
+        // Figures of others may be added when the runs are done.
+        let runs = load::runs(&options.folder, &plan.manifest)?;
+        let done = runs.iter().find_map(|run| match &run.outcome {
+            RunOutcome::Done { metrics, .. } => Some(metrics),
+            RunOutcome::Failed { .. } => None,
+        });
+        done.map_or(Ok(()), |metrics| plan.check_published(metrics))?;
         Vec::new()
     };
     let Plan {
@@ -127,6 +136,11 @@ pub fn run(
     let mut runs = Runs::new(manifest, store, options, interrupts.clone(), watch);
     for record in &known {
         runs.note(record);
+        let checked = runs.lengths.check(&runs.manifest, record);
+        checked.map_err(|message| StoreError::Series {
+            path: options.folder.clone(),
+            message,
+        })?;
     }
     for run in tried {
         if runs.is_ours(run.cell, run.seed) {
@@ -140,7 +154,8 @@ pub fn run(
     let flag = interrupts.clone();
     let work = move |job: Job| {
         let scenario = &scenarios[job.cell];
-        let executed = execute(scenario, job.seed, &measured, &flag, unobserved);
+        let seeds = scenario.seeds_of(job.seed, job.problem_seed);
+        let executed = execute(scenario, seeds, &measured, &flag, unobserved);
         executed.map(|executed| Run {
             cell: job.cell,
             seed: job.seed,
@@ -172,7 +187,8 @@ fn try_out(
     let first = manifest.seeds.len().min(FAILURES);
     for (cell, scenario) in plan.scenarios.iter().enumerate().take(cells) {
         for &seed in &manifest.seeds[..first] {
-            let executed = execute(scenario, seed, &manifest.metrics, interrupts, unobserved);
+            let seeds = scenario.seeds_of(seed, manifest.problem_seed(seed));
+            let executed = execute(scenario, seeds, &manifest.metrics, interrupts, unobserved);
             let Some(executed) = executed else {
                 return Ok(None);
             };
@@ -198,6 +214,7 @@ fn try_out(
 struct Job {
     cell: usize,
     seed: u64,
+    problem_seed: Option<u64>,
 }
 
 /// A run that is done.
@@ -220,6 +237,7 @@ struct Runs<'a> {
     store: Store,
     shard: Shard,
     keep_going: bool,
+    folder: PathBuf,
     interrupts: Interrupts,
     watch: &'a mut dyn FnMut(Progress),
     /// What is known of each run, by cell and place of the seed.
@@ -239,6 +257,8 @@ struct Runs<'a> {
     failed: usize,
     done: usize,
     since_start: usize,
+    /// Which indices the curves of each cell have.
+    lengths: Lengths,
     /// Why nothing more is begun.
     trouble: Option<StudyError>,
 }
@@ -256,6 +276,7 @@ impl<'a> Runs<'a> {
             store,
             shard: options.shard,
             keep_going: options.keep_going,
+            folder: options.folder.clone(),
             interrupts,
             watch,
             known: vec![vec![None; seeds]; cells],
@@ -271,6 +292,7 @@ impl<'a> Runs<'a> {
             failed: 0,
             done: 0,
             since_start: 0,
+            lengths: Lengths::default(),
             trouble: None,
             manifest,
         };
@@ -303,7 +325,7 @@ impl<'a> Runs<'a> {
             Some(stop) => {
                 let known = self.known[cell].iter();
                 let samples: Vec<_> = known.map(|run| run.map(|run| run.sample)).collect();
-                stop::target(stop, all, &samples)
+                stop::target(stop, all, self.manifest.block, &samples)
             }
         };
         let more = self.target[cell]..target;
@@ -428,6 +450,7 @@ impl Dispatch for Runs<'_> {
         Some(Job {
             cell,
             seed: self.manifest.seeds[place],
+            problem_seed: self.manifest.problem_seed(self.manifest.seeds[place]),
         })
     }
 
@@ -457,6 +480,12 @@ impl Runs<'_> {
             setup_s: executed.setup_s,
             run_s: executed.run_s,
         };
+        if let Err(message) = self.lengths.check(&self.manifest, &record) {
+            let path = self.folder.clone();
+            let error = StoreError::Series { path, message };
+            self.trouble.get_or_insert(error.into());
+            return;
+        }
         if let Err(error) = self.store.append(&record, &times) {
             self.trouble.get_or_insert(error.into());
             return;
@@ -482,7 +511,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![] };
     /// let results = Results { manifest, runs: Vec::new() }; // one cell, two seeds
     /// assert_eq!(results.missing(), 2);
     /// ```
@@ -500,7 +529,7 @@ impl Results {
                     Some(sample(&run.outcome, &stop.metric))
                 })
                 .collect();
-            let target = stop::target(stop, seeds.len(), &samples);
+            let target = stop::target(stop, seeds.len(), self.manifest.block, &samples);
             samples[..target]
                 .iter()
                 .filter(|sample| sample.is_none())

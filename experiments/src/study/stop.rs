@@ -2,9 +2,7 @@
 //! and on nothing else, so it is the same however runs were interrupted, ordered or parted.
 
 use super::results::Stop;
-
-/// The 97.5 % quantile of the normal distribution.
-const Z: f64 = 1.959_963_984_540_054;
+use crate::stats::{Blocks, Z_95 as Z, rates};
 
 /// What a run says about the metric that decides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,50 +16,51 @@ pub(super) enum Sample {
 }
 
 /// How many seeds the cell is to have, of at most `max`, as far as `samples` (by seed, none for a
-/// run that is not yet done) can tell. More done runs may raise it, and never lower it.
-pub(super) fn target(stop: &Stop, max: usize, samples: &[Option<Sample>]) -> usize {
+/// run that is not yet done) can tell. More done runs may raise it, and never lower it. Of seeds in
+/// blocks, whole blocks are taken.
+pub(super) fn target(stop: &Stop, max: usize, block: usize, samples: &[Option<Sample>]) -> usize {
     let mut look = stop.min_seeds.min(max);
     while look < max {
         let first: Option<Vec<Sample>> = samples[..look].iter().copied().collect();
         match first {
             // Not all there yet, or enough.
             None => return look,
-            Some(first) if width(&first) <= stop.width => return look,
+            Some(first) if width(&first, block) <= stop.width => return look,
             // Half as many again: a look at each seed would stop at the first lucky one.
-            Some(_) => look = (look + look.div_ceil(2)).min(max),
+            Some(_) => {
+                look = (look + look.div_ceil(2))
+                    .next_multiple_of(block.max(1))
+                    .min(max)
+            }
         }
     }
     look
 }
 
-/// The width of the metric's 95 % interval: Student's for the mean of numbers, Wilson's for a rate.
-fn width(samples: &[Sample]) -> f64 {
-    let flags: Vec<bool> = samples
-        .iter()
-        .filter_map(|sample| match sample {
+/// The width of the metric's 95 % interval: Student's for the mean of the blocks' means of numbers,
+/// Wilson's for a rate.
+fn width(samples: &[Sample], block: usize) -> f64 {
+    let blocks = || samples.chunks(block.max(1));
+    let flags = |block: &[Sample]| -> Vec<bool> {
+        let flags = block.iter().filter_map(|sample| match sample {
             Sample::Flag(flag) => Some(*flag),
             _ => None,
-        })
-        .collect();
-    if !flags.is_empty() {
-        return wilson_width(&flags);
+        });
+        flags.collect()
+    };
+    let flags: Vec<Vec<bool>> = blocks().map(flags).collect();
+    if flags.iter().any(|block| !block.is_empty()) {
+        return rates::wilson_in_blocks(&flags).width();
     }
-    let numbers: Vec<f64> = samples
-        .iter()
-        .filter_map(|sample| match sample {
+    let numbers = |block: &[Sample]| -> Vec<f64> {
+        let numbers = block.iter().filter_map(|sample| match sample {
             Sample::Number(number) => Some(*number),
             _ => None,
-        })
-        .collect();
-    student_width(&numbers)
-}
-
-fn wilson_width(flags: &[bool]) -> f64 {
-    let n = flags.len() as f64;
-    let p = flags.iter().filter(|flag| **flag).count() as f64 / n;
-    let z2 = Z * Z;
-    let root = (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-    2.0 * Z * root / (1.0 + z2 / n)
+        });
+        numbers.collect()
+    };
+    let numbers: Vec<Vec<f64>> = blocks().map(numbers).collect();
+    student_width(&Blocks::from(numbers).means())
 }
 
 fn student_width(numbers: &[f64]) -> f64 {
@@ -109,7 +108,7 @@ mod tests {
             );
         }
         // Wilson's interval for 0 of 30 is [0, 0.1135].
-        assert!((wilson_width(&[false; 30]) - 0.1135).abs() < 1e-4);
+        assert!((width(&[Sample::Flag(false); 30], 1) - 0.1135).abs() < 1e-4);
     }
 
     #[test]
@@ -117,16 +116,16 @@ mod tests {
         let noisy: Vec<_> = (0..40)
             .map(|i| Some(Sample::Number(f64::from(i % 2))))
             .collect();
-        assert_eq!(target(&stop(1e-9), 40, &noisy), 40);
-        assert_eq!(target(&stop(10.0), 40, &noisy), 5);
-        let between = target(&stop(0.6), 40, &noisy);
+        assert_eq!(target(&stop(1e-9), 40, 1, &noisy), 40);
+        assert_eq!(target(&stop(10.0), 40, 1, &noisy), 5);
+        let between = target(&stop(0.6), 40, 1, &noisy);
         assert!([8, 12, 18, 27].contains(&between), "{between}");
         // What is not done yet cannot decide.
         let mut gap = noisy.clone();
         gap[6] = None;
-        assert_eq!(target(&stop(0.6), 40, &gap), 8);
+        assert_eq!(target(&stop(0.6), 40, 1, &gap), 8);
         let failed = vec![Some(Sample::None); 40];
-        assert_eq!(target(&stop(10.0), 40, &failed), 40);
-        assert_eq!(target(&stop(10.0), 3, &noisy), 3);
+        assert_eq!(target(&stop(10.0), 40, 1, &failed), 40);
+        assert_eq!(target(&stop(10.0), 3, 1, &noisy), 3);
     }
 }

@@ -1,25 +1,29 @@
 //! What a study's results say, cell by cell, in figures.
 //!
-//! [`summarise`] makes of each metric what its kind asks for: a mean, a rate or a distribution,
-//! each with its interval at 95 % and, paired by seed, its difference to the baseline. How each is
+//! [`summarise`] makes of each metric what its kind asks for: a mean, a rate, a distribution or a
+//! curve, each with its interval at 95 % and, paired by seed, its difference to the baseline. Where
+//! seeds share problems, what varies by chance are the blocks of them. How each is
 //! computed, and after whom, is said in [`crate::stats`].
 
+pub mod comparisons;
+mod figures;
 pub mod published;
+pub mod series;
 pub mod values;
 
 use std::collections::BTreeMap;
 
-use farside::random::RandomKey;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use super::results::{MessageCounts, Results, RunOutcome, RunRecord};
-use crate::stats::distribution::Ecdf;
-use crate::stats::survival::{Survival, kaplan_meier};
-use crate::stats::{Estimate, bootstrap, rates};
+use super::results::{MessageCounts, Results, RunOutcome};
+use crate::stats::Estimate;
+use comparisons::ComparisonSummary;
+use figures::{list_summary, number_summary, overall, rate_summary, text_summary};
 use published::{Beside, LineSummary};
-use values::{Kind, kind_of, number_of, observations, value_of};
+use series::{SeriesSummary, series_summary};
+use values::{Kind, kind_of};
 
 /// The shares at which distributions are given.
 pub const SHARES: [f64; 7] = [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95];
@@ -51,6 +55,9 @@ pub struct Summary {
     /// Lines through cells, for whatever was published to be linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineSummary>,
+    /// Cells against each other, for whatever was published to be more than something else.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub comparisons: Vec<ComparisonSummary>,
 }
 
 /// What one cell says.
@@ -107,6 +114,8 @@ pub enum MetricSummary {
     Rate(RateSummary),
     /// Lists of numbers.
     List(ListSummary),
+    /// Curves.
+    Series(SeriesSummary),
     /// Words, and how many runs say each.
     Text {
         /// How many runs say anything.
@@ -123,7 +132,7 @@ pub enum MetricSummary {
 
 impl MetricSummary {
     /// The figure that stands for the cell, with its interval: the mean, the rate, or the median of
-    /// lists. None if no run says anything, and for words.
+    /// lists. None if no run says anything, for curves and for words.
     pub fn estimate(&self) -> Option<Estimate> {
         let (value, low, high) = match self {
             MetricSummary::Number(one) if one.n > 0 => (one.mean, one.ci_low, one.ci_high),
@@ -142,6 +151,7 @@ impl MetricSummary {
             MetricSummary::Number(number) => number.n,
             MetricSummary::Rate(rate) => rate.n,
             MetricSummary::List(list) => list.n,
+            MetricSummary::Series(series) => series.n,
             MetricSummary::Text { n, .. } | MetricSummary::Absent { n } => *n,
         }
     }
@@ -215,6 +225,26 @@ pub struct Difference {
     pub ci_high: f64,
 }
 
+impl Difference {
+    fn new(n: usize, estimate: Estimate) -> Self {
+        Difference {
+            n,
+            mean: estimate.value,
+            ci_low: estimate.low,
+            ci_high: estimate.high,
+        }
+    }
+
+    /// The figure with its interval.
+    pub fn estimate(&self) -> Estimate {
+        Estimate {
+            value: self.mean,
+            low: self.ci_low,
+            high: self.ci_high,
+        }
+    }
+}
+
 /// Lists of a cell, pooled over its runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ListSummary {
@@ -261,12 +291,12 @@ pub struct OverallSummary {
 /// ```
 /// # use farside_experiments::study::results::*;
 /// # use serde_json::json;
-/// # let metric = |name: &str| Metric { name: name.into(), label: name.into(), unit: "s".into() };
+/// # let metric = |name: &str| Metric { name: name.into(), label: name.into(), unit: "s".into(), index: None };
 /// # let manifest = Manifest { format: FORMAT, code_version: "1".into(), study: "doc".into(),
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],
 /// #     baseline: None, cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }],
-/// #     seeds: (0..8).collect(), stop: None, published: vec![] };
+/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![] };
 /// # let run = |seed: u64| RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
 /// #     timed_out: false, events: 1, messages: MessageCounts::default(),
@@ -304,71 +334,15 @@ pub fn summarise(results: &Results) -> Summary {
         failed: cells.iter().map(|cell| cell.failed).sum(),
         overall: overall.collect(),
         lines,
+        comparisons: comparisons::compare(results, &kinds),
         cells,
     }
-}
-
-/// The mean of some values with its interval, `(mean, low, high)`, as [`bootstrap::mean`] has it:
-/// what a stopping rule looks at. Fewer than two values give an infinite interval.
-///
-/// True-or-false metrics are better served by [`interval_of_metric`]: if all values are equal, this
-/// interval has no width, and Wilson's has.
-///
-/// ```
-/// use farside_experiments::study::summary::interval_of;
-/// let (mean, low, high) = interval_of(&[1.0, 2.0, 3.0, 4.0]);
-/// assert!(mean == 2.5 && 1.0 < low && high < 4.0);
-/// assert_eq!(interval_of(&[1.0]).2, f64::INFINITY);
-/// ```
-pub fn interval_of(values: &[f64]) -> (f64, f64, f64) {
-    let key = RandomKey::new(0).text("interval_of");
-    let Estimate { value, low, high } = bootstrap::mean(values, key);
-    (value, low, high)
-}
-
-/// The interval that the summary of `cell` has for the metric `name`: around the mean of numbers,
-/// the rate of truth values, or the median of lists. None for words, and for what no run of the
-/// cell reports. The kind is judged by the runs of the cell alone.
-pub fn interval_of_metric(results: &Results, cell: usize, name: &str) -> Option<Estimate> {
-    let runs = results.of_cell(cell);
-    let reported = runs.iter().find_map(|run| value_of(&run.outcome, name))?;
-    match reported.as_ref() {
-        Value::Array(_) => Some(survival(runs, name).median()),
-        Value::Bool(_) => {
-            let truths = truths(runs, name);
-            let happened = truths.values().filter(|yes| **yes).count();
-            Some(rates::wilson(happened, truths.len()))
-        }
-        Value::Number(_) => {
-            let values: Vec<f64> = numbers(runs, name).into_values().collect();
-            Some(bootstrap::mean(&values, key(results, cell, name)))
-        }
-        Value::Null | Value::String(_) | Value::Object(_) => None,
-    }
-}
-
-/// When what a list counts happens in the given runs of one cell, see [`observations`].
-pub fn survival(runs: &[RunRecord], name: &str) -> Survival {
-    kaplan_meier(&observations(runs, name))
 }
 
 /// The baseline, if there is such a cell.
 fn baseline(results: &Results) -> Option<usize> {
     let cells = results.manifest.cells.len();
     results.manifest.baseline.filter(|cell| *cell < cells)
-}
-
-/// The address of the draws for a metric in a cell. By names, so that a study with one more cell or
-/// metric keeps the intervals of all others.
-fn key(results: &Results, cell: usize, metric: &str) -> RandomKey {
-    let texts = results.manifest.cells.get(cell).map(|cell| &cell.texts);
-    let factors = results.manifest.factors.iter().map(|factor| &factor.name);
-    let base = RandomKey::new(0).text("bootstrap").text(metric);
-    let name: Vec<String> = factors
-        .zip(texts.into_iter().flatten())
-        .map(|(factor, text)| format!("{factor}={text}"))
-        .collect();
-    base.text(&name.join("\n"))
 }
 
 fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, Kind)]) -> CellSummary {
@@ -408,7 +382,8 @@ fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, Kind)]) -> C
         let of_metric = match kind {
             Kind::Number => MetricSummary::Number(number_summary(results, cell, name)),
             Kind::Rate => MetricSummary::Rate(rate_summary(results, cell, name)),
-            Kind::List => MetricSummary::List(list_summary(runs, name)),
+            Kind::List => MetricSummary::List(list_summary(results, cell, name)),
+            Kind::Series => MetricSummary::Series(series_summary(results, cell, name)),
             Kind::Text => text_summary(runs, name),
             Kind::Absent => MetricSummary::Absent { n: 0 },
         };
@@ -428,164 +403,6 @@ fn add_counts(total: &mut MessageCounts, run: &MessageCounts) {
     total.in_flight += run.in_flight;
     for (reason, count) in &run.lost_by_reason {
         *total.lost_by_reason.entry(reason.clone()).or_default() += count;
-    }
-}
-
-/// The numbers of some runs, by seed.
-fn numbers(runs: &[RunRecord], name: &str) -> BTreeMap<u64, f64> {
-    let numbers = runs
-        .iter()
-        .map(|run| Some((run.seed, number_of(run, name)?)));
-    numbers.flatten().collect()
-}
-
-/// The truth values of some runs, by seed.
-fn truths(runs: &[RunRecord], name: &str) -> BTreeMap<u64, bool> {
-    let truths = runs
-        .iter()
-        .map(|run| Some((run.seed, value_of(&run.outcome, name)?.as_bool()?)));
-    truths.flatten().collect()
-}
-
-/// What two cells say with the same seed.
-fn paired<T: Copy>(here: &BTreeMap<u64, T>, there: &BTreeMap<u64, T>) -> Vec<(T, T)> {
-    let pairs = here
-        .iter()
-        .map(|(seed, value)| Some((*value, *there.get(seed)?)));
-    pairs.flatten().collect()
-}
-
-/// The baseline to compare `cell` with.
-fn other(results: &Results, cell: usize) -> Option<&[RunRecord]> {
-    let baseline = baseline(results).filter(|baseline| *baseline != cell)?;
-    Some(results.of_cell(baseline))
-}
-
-fn number_summary(results: &Results, cell: usize, name: &str) -> NumberSummary {
-    let here = numbers(results.of_cell(cell), name);
-    let key = key(results, cell, name);
-    let difference = other(results, cell).map(|there| {
-        let pairs = paired(&here, &numbers(there, name));
-        Difference::new(
-            pairs.len(),
-            bootstrap::paired_difference(&pairs, key.text("difference")),
-        )
-    });
-    let values: Vec<f64> = here.into_values().collect();
-    let (mean, iqm) = bootstrap::mean_and_interquartile_mean(&values, key);
-    NumberSummary {
-        n: values.len(),
-        mean: mean.value,
-        ci_low: mean.low,
-        ci_high: mean.high,
-        iqm: iqm.value,
-        iqm_low: iqm.low,
-        iqm_high: iqm.high,
-        // Of NaN and a number, the functions return the number.
-        min: values.iter().copied().fold(f64::NAN, f64::min),
-        max: values.iter().copied().fold(f64::NAN, f64::max),
-        difference,
-    }
-}
-
-impl Difference {
-    fn new(n: usize, estimate: Estimate) -> Self {
-        Difference {
-            n,
-            mean: estimate.value,
-            ci_low: estimate.low,
-            ci_high: estimate.high,
-        }
-    }
-}
-
-fn rate_summary(results: &Results, cell: usize, name: &str) -> RateSummary {
-    let here = truths(results.of_cell(cell), name);
-    let happened = here.values().filter(|yes| **yes).count();
-    let rate = rates::wilson(happened, here.len());
-    let pairs = other(results, cell).map(|there| paired(&here, &truths(there, name)));
-    let test = pairs.as_deref().map(rates::mcnemar);
-    RateSummary {
-        n: here.len(),
-        happened,
-        mean: rate.value,
-        ci_low: rate.low,
-        ci_high: rate.high,
-        difference: test
-            .map(|test| Difference::new(test.pairs(), rates::paired_rate_difference(&test))),
-        mcnemar: test.map(|test| McNemarSummary {
-            only_here: test.only_first,
-            only_baseline: test.only_second,
-            p: test.p,
-        }),
-    }
-}
-
-fn list_summary(runs: &[RunRecord], name: &str) -> ListSummary {
-    let observations = observations(runs, name);
-    let curve = kaplan_meier(&observations);
-    let happened = observations.iter().filter(|one| one.happened).count();
-    let never = observations.iter().filter(|one| one.time.is_infinite());
-    let never = never.count();
-    let median = curve.median();
-    let all_happened = happened == observations.len();
-    let times: Vec<f64> = observations.iter().map(|one| one.time).collect();
-    let ecdf = Ecdf::new(if all_happened { &times } else { &[] });
-    let quantile = |share: f64| {
-        if all_happened {
-            ecdf.quantile(share)
-        } else {
-            curve.quantile(share)
-        }
-    };
-    ListSummary {
-        n: runs
-            .iter()
-            .filter(|run| value_of(&run.outcome, name).is_some_and(|value| value.is_array()))
-            .count(),
-        values: observations.len(),
-        happened,
-        censored: observations.len() - happened - never,
-        never,
-        median: median.value,
-        median_low: median.low,
-        median_high: median.high,
-        quantiles: SHARES
-            .iter()
-            .map(|share| (format!("p{:02.0}", share * 100.0), quantile(*share)))
-            .collect(),
-    }
-}
-
-fn text_summary(runs: &[RunRecord], name: &str) -> MetricSummary {
-    let mut counts = BTreeMap::new();
-    for value in runs.iter().filter_map(|run| value_of(&run.outcome, name)) {
-        let word = value
-            .as_str()
-            .map_or_else(|| value.to_string(), str::to_owned);
-        *counts.entry(word).or_default() += 1;
-    }
-    MetricSummary::Text {
-        n: counts.values().sum(),
-        counts,
-    }
-}
-
-fn overall(results: &Results, name: &str) -> OverallSummary {
-    let cells = 0..results.manifest.cells.len();
-    let values: Vec<Vec<f64>> = cells
-        .map(|cell| numbers(results.of_cell(cell), name).into_values().collect())
-        .collect();
-    let key = RandomKey::new(0).text("stratified").text(name);
-    let overall = bootstrap::stratified(&values, key);
-    let (mean, iqm) = (overall.mean, overall.interquartile_mean);
-    OverallSummary {
-        mean: mean.value,
-        ci_low: mean.low,
-        ci_high: mean.high,
-        iqm: iqm.value,
-        iqm_low: iqm.low,
-        iqm_high: iqm.high,
     }
 }
 

@@ -1,6 +1,7 @@
 //! What studies promise: mistakes are said before anything runs, and what a folder ends up with
 //! does not depend on interruptions, order, shards or how many runs at once.
 
+mod curves;
 mod published;
 mod refused;
 mod toy;

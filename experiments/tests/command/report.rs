@@ -34,10 +34,12 @@ fn manifest() -> Manifest {
             name: "time_ratio".to_owned(),
             label: "time ratio".to_owned(),
             unit: String::new(),
+            index: None,
         }],
         baseline: Some(0),
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
         seeds: (1..=4).collect(),
+        block: 1,
         stop: None,
         published: Vec::new(),
     }

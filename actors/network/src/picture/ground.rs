@@ -11,10 +11,10 @@ use super::{Ground, Site};
 use crate::Policy;
 use crate::system::{NetworkScenario, crater, grid, ground, in_crater, is_grid, place};
 
-/// The roadmap, the nodes and the ground, as they are for a run with this seed.
+/// The roadmap, the nodes and the ground, as they are for a run of the problem with this seed.
 pub(super) fn site(
     scenario: &NetworkScenario,
-    seed: u64,
+    problem_seed: u64,
     files: &mut Files,
 ) -> Result<Site, SetupError> {
     let (world, rovers) = (&scenario.world, scenario.team.rovers);
@@ -32,7 +32,7 @@ pub(super) fn site(
             (roadmap, Ground::Unknown)
         }
     };
-    let sensors = place(world, &roadmap, seed)?;
+    let sensors = place(world, &roadmap, problem_seed)?;
     Ok(Site {
         roadmap: world.open_part(&Arc::new(roadmap), &sensors),
         sensors: Arc::new(sensors),

@@ -8,7 +8,7 @@ use crate::stats::bootstrap::RESAMPLES;
 /// A method: what it is for, and how it is done.
 type Method = (&'static str, &'static str);
 
-const METHODS: [Method; 9] = [
+const METHODS: [Method; 12] = [
     (
         "Means",
         "The interval is a bootstrap's, bias-corrected and accelerated (BCa; Efron 1987), because \
@@ -30,6 +30,19 @@ const METHODS: [Method; 9] = [
          rates have Newcombe's interval for pairs (1998, method 10), and McNemar's test (1947), exact \
          and two-sided: the two counts are the seeds with which it is true only here, and only in the \
          baseline.",
+    ),
+    (
+        "Blocks",
+        "Where seeds share a problem in blocks, what is drawn and paired are blocks: five runs on one \
+         problem do not say what five problems do. Bootstraps draw whole blocks. Rates count for as \
+         many runs as their blocks are worth (Rao and Scott 1992), and in McNemar's test chance decides \
+         the sign of a whole block (exact randomisation test, Fisher 1935).",
+    ),
+    (
+        "Curves",
+        "Means and differences index by index, as for numbers, from the same draws at each index. \
+         Student's test over the blocks' mean differences gives a p for each index, and Holm's method \
+         (1979) holds all indices of one curve against the baseline together.",
     ),
     (
         "Survival",
@@ -59,13 +72,23 @@ const METHODS: [Method; 9] = [
          only bend upwards a little have a high one too, so the farthest cell is named as well.",
     ),
     (
+        "Published comparisons",
+        "That a cell exceeds another is judged by the paired interval. Of curves the claim is for each \
+         index from one on: it holds if each interval says so, and does not hold if one says the \
+         contrary and Student's p against the broken bound, adjusted by Holm for these indices, is at \
+         most 0.05. That two are equal within a margin holds if the 95 % interval is within it, which is \
+         stricter than two one-sided tests at 5 %.",
+    ),
+    (
         "Many comparisons",
         "Intervals and p are for one comparison each. Of many that are made at once, some stand out by \
-         chance: nothing is corrected for that.",
+         chance: nothing is corrected for that but the number of indices of a curve.",
     ),
 ];
 
 pub(super) fn section(study: &Study<'_>) -> Markup {
+    let blocks = study.results.manifest.block > 1;
+    let drawn = if blocks { "blocks of seeds" } else { "seeds" };
     html! {
         section id="method" {
             h2 { "How the figures are made" }
@@ -76,9 +99,9 @@ pub(super) fn section(study: &Study<'_>) -> Markup {
                  figure; a run that has no value of a metric does not count for it, as the column of \
                  runs shows. results.csv has every run, summary.csv every figure in full."
             }
-            @if study.results.manifest.seeds.len() < 20 {
+            @if study.blocks(study.results.manifest.seeds.len()) < 20 {
                 p class="bad" {
-                    "With fewer than 20 seeds a cell, intervals of means are too narrow: a bootstrap \
+                    "With fewer than 20 " (drawn) " a cell, intervals of means are too narrow: a bootstrap \
                      draws no value that was not seen. 30 are better."
                 }
             }

@@ -1,9 +1,11 @@
 //! Our figures beside those that others published.
 
+mod comparisons;
+
 use maud::{Markup, html};
 
 use crate::report::measure::Study;
-use crate::report::numbers::Style;
+use crate::report::numbers::{Style, with_unit};
 use crate::stats::Estimate;
 use crate::study::results::{Claim, Published};
 use crate::study::summary::published::{Beside, LineSummary};
@@ -37,7 +39,7 @@ pub(super) fn section(study: &Study<'_>) -> Markup {
                 p class="note" {
                     "Ours is the mean (of rates the rate, of lists the median) with its 95 % interval. ✓ \
                      marks published figures that our interval allows, ✗ those that it does not. The \
-                     table is in published.csv, too."
+                     tables are in published.csv, too."
                 }
                 @for (index, table) in tables.iter().enumerate() { (of_table(study, index, table)) }
             }
@@ -61,6 +63,7 @@ fn of_table(study: &Study<'_>, index: usize, table: &Published) -> Markup {
             }
         }
         @if !lines.is_empty() { (as_lines(study, &lines)) }
+        (comparisons::of_table(study, index))
         @if !table.note.is_empty() { p { (table.note) } }
         @if !table.why.is_empty() { p { b { "Why ours differ. " } (table.why) } }
     }
@@ -251,13 +254,6 @@ fn estimate(one: &Beside) -> Estimate {
     }
 }
 
-fn with_unit(text: String, unit: &str) -> String {
-    match unit {
-        "" => text,
-        unit => format!("{text}\u{a0}{unit}"),
-    }
-}
-
 fn ours(one: &Beside) -> String {
     if !one.estimate.is_finite() {
         return "–".to_owned();
@@ -281,6 +277,7 @@ pub(in crate::report) fn claim(claim: &Claim, unit: &str) -> String {
         Claim::Below(number) => ("under ", number),
         Claim::Above(number) => ("over ", number),
         Claim::Linear(factor) => return format!("linear in {factor}"),
+        Claim::Exceeds(_) => return "more than another".to_owned(),
     };
     format!("{word}{}", with_unit(as_written(*number), unit))
 }

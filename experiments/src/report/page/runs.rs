@@ -21,6 +21,10 @@ pub(super) fn what_was_run(study: &Study<'_>) -> Markup {
         p {
             "Scenario " b { (manifest.scenario) } " in " (counted(cells, "cell")) (varied(study))
             ", with " (counted(manifest.seeds.len(), "seed")) (if cells > 1 { " each" } else { "" })
+            @if manifest.block > 1 {
+                ", in " (counted(manifest.seeds.len() / manifest.block, "block")) " of "
+                (manifest.block) " that share a problem"
+            }
             ": " (counted(study.results.runs.len(), "run")) ". "
             (plain(summary.n as f64)) " came to their end"
             @if timed_out > 0 { ", " (plain(timed_out as f64)) " of them because their time was over" }

@@ -26,6 +26,10 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                         ", and the difference to the baseline over the same seeds. ▲ and ▼ mark \
                          differences whose interval leaves out 0: of twenty that are none, about \
                          one is marked. Differences of rates are in percentage points (pp)."
+                        @if shown.iter().any(|measure| measure.kind == Kind::Series) {
+                            " Of curves it is said from which index on they differ, if they do at the \
+                             last."
+                        }
                     } @else { "." }
                 }
         div class="scroll" tabindex="0" {
@@ -49,7 +53,7 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                                     small class="bad" { (cell.failed) " failed" }
                                 }
                             }
-                            @for measure in &shown { (overview_field(measure, cell)) }
+                            @for measure in &shown { (overview_field(study, measure, cell)) }
                         }
                     }
                 }
@@ -58,13 +62,16 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
     }
 }
 
-fn overview_field(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
+fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) -> Markup {
     if let Some(MetricSummary::Text { counts, .. }) =
         cell.metrics.get(measure.index).map(|named| &named.summary)
     {
         return html! {
             td { @for (word, count) in counts { small { (word) ": " (count) } } }
         };
+    }
+    if let Some(series) = measure.series(cell) {
+        return html! { td { (super::series::in_short(study, measure, cell, series)) } };
     }
     let Some(estimate) = measure.estimate(cell) else {
         return html! { td { "–" } };
@@ -75,20 +82,20 @@ fn overview_field(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
             @if estimate.width() != 0.0 { small { (measure.style.interval(&estimate)) } }
             // Nothing more is to be said of what never varies.
             @if let Some(difference) = measure.difference(cell).filter(|one| one.width() != 0.0) {
-                (marked(measure.style.of_differences(), &difference, measure.n(cell)))
+                (marked(measure.style.of_differences(), &difference, study.blocks(measure.n(cell))))
             }
         }
     }
 }
 
-/// From so many runs on a difference is marked: with five, chance alone has all of them on one side
+/// From so many blocks of runs on a difference is marked: with five, chance alone has all of them on one side
 /// of 0 in one case of sixteen, and a bootstrap of values on one side is sure of it.
 const MARKED_FROM: usize = 6;
 
 /// A difference, marked if its interval leaves out 0.
-fn marked(style: Style, difference: &Estimate, runs: usize) -> Markup {
+fn marked(style: Style, difference: &Estimate, blocks: usize) -> Markup {
     let apart = difference.low > 0.0 || difference.high < 0.0;
-    let sure = apart && difference.is_known() && runs >= MARKED_FROM;
+    let sure = apart && difference.is_known() && blocks >= MARKED_FROM;
     let sign = match (sure, difference.value > 0.0) {
         (true, true) => "\u{a0}▲",
         (true, false) => "\u{a0}▼",
@@ -192,6 +199,14 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
             "75 %",
             "95 %",
         ],
+        Kind::Series => &[
+            "last index",
+            "mean there",
+            "95 % interval",
+            "difference there",
+            "95 % interval",
+            "differs from",
+        ],
         Kind::Text | Kind::Absent => &["says"],
     };
     html! {
@@ -226,6 +241,7 @@ fn fields(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
         MetricSummary::Number(number) => number_fields(measure, cell, number),
         MetricSummary::Rate(rate) => rate_fields(measure, cell, rate),
         MetricSummary::List(list) => list_fields(measure, cell, list),
+        MetricSummary::Series(series) => super::series::fields(measure, series),
         MetricSummary::Text { counts, .. } => html! {
             td class="text" {
                 @for (index, (word, count)) in counts.iter().enumerate() {
@@ -238,7 +254,7 @@ fn fields(measure: &Measure<'_>, cell: &CellSummary) -> Markup {
     }
 }
 
-fn estimate_fields(style: Style, estimate: Option<Estimate>) -> Markup {
+pub(super) fn estimate_fields(style: Style, estimate: Option<Estimate>) -> Markup {
     html! {
         @if let Some(estimate) = estimate {
             td { (style.value(&estimate)) }

@@ -57,7 +57,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
         .iter()
         .enumerate()
         .all(|(cell, _)| {
-            observations(study.results.of_cell(cell), name)
+            observations(study.results, cell, name)
                 .iter()
                 .all(|one| one.happened)
         });
@@ -115,7 +115,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
 
 /// Panels with one cell for each curve: those along the curves' factor are parted by the factor
 /// along x, because here x is taken.
-fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
+pub(super) fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
     let one = |name: String, cell: usize| Series {
         name,
         cells: vec![cell],
@@ -187,7 +187,7 @@ fn panels(study: &Study<'_>) -> (Option<usize>, Vec<Panel>) {
 }
 
 fn steps(study: &Study<'_>, metric: &str, cell: usize, name: &str, all_happened: bool) -> Steps {
-    let observations = observations(study.results.of_cell(cell), metric);
+    let observations = observations(study.results, cell, metric);
     let steps = if all_happened {
         let times: Vec<f64> = observations.iter().map(|one| one.time).collect();
         let steps = Ecdf::new(&times);

@@ -89,6 +89,10 @@ pub(super) fn set_beside(manifest: &Manifest, cells: &mut [CellSummary]) -> Vec<
                 lines.extend(lines_of(manifest, cells, index, figure, factor));
                 continue;
             }
+            // Of two cells, not of one: see [`super::comparisons`].
+            if let Claim::Exceeds(_) = figure.claim {
+                continue;
+            }
             // A manifest may be of anyone's making: cells that are not there are passed over.
             for cell in &figure.cells {
                 if let Some(cell) = cells.get_mut(*cell) {
@@ -117,7 +121,7 @@ fn beside(index: usize, table: &Published, figure: &PublishedFigure, cell: &Cell
             Some(value - bound).filter(|over| *over <= 0.0),
             high > bound,
         ),
-        Claim::Linear(_) => (None, false),
+        Claim::Linear(_) | Claim::Exceeds(_) => (None, false),
     };
     let known = low.is_finite() && high.is_finite();
     Beside {

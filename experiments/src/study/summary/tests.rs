@@ -3,7 +3,10 @@
 use serde_json::json;
 
 use super::super::fabricated::{self, latency, loss, true_ratio};
+use super::values::{number_of, observations};
 use super::*;
+use crate::stats::survival::kaplan_meier;
+use crate::study::results::RunRecord;
 
 fn degradation() -> Results {
     fabricated::study("degradation", vec![latency(), loss()], 30)
@@ -118,7 +121,7 @@ fn what_never_happens_stays_at_risk() {
         let run = done(json!({"arrival_s": [10.0, null]}), 20.0, timed_out);
         let late = done(json!({"arrival_s": [30.0, 40.0]}), 50.0, false);
         let results = one_cell("arrival_s", vec![run, late]);
-        let curve = super::survival(&results.runs, "arrival_s");
+        let curve = kaplan_meier(&observations(&results, 0, "arrival_s"));
         (list(&summarise(&results).cells[0], 0).clone(), curve)
     };
     let (censored, curve) = list_of(true);
@@ -215,24 +218,6 @@ fn cells_are_summed_up_each_for_itself() {
     few.runs.retain(|run| run.cell < 3);
     let (all, few) = (summarise(&all), summarise(&few));
     assert_eq!(all.cells[..3], few.cells[..]);
-}
-
-#[test]
-fn the_stopping_rule_sees_what_the_summary_says() {
-    let results = degradation();
-    let summary = summarise(&results);
-    let cell = &summary.cells[7];
-    let ratio = interval_of_metric(&results, 7, "time_ratio").unwrap();
-    assert_eq!(
-        (ratio.value, ratio.low),
-        (number(cell, 1).mean, number(cell, 1).ci_low)
-    );
-    let completed = interval_of_metric(&results, 7, "completed").unwrap();
-    assert_eq!(completed.high, rate(cell, 0).ci_high);
-    let arrival = interval_of_metric(&results, 7, "arrival_s").unwrap();
-    assert_eq!(arrival.value, list(cell, 4).median);
-    assert_eq!(interval_of_metric(&results, 7, "deadlock"), None);
-    assert_eq!(interval_of_metric(&results, 99, "time_ratio"), None);
 }
 
 #[test]

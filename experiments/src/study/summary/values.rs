@@ -1,11 +1,13 @@
 //! What a run says under a metric's name, and of which kind it is.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use serde_json::Value;
 
 use crate::stats::survival::Observation;
 use crate::study::results::{MessageCounts, Results, RunOutcome, RunRecord};
+use farside_actors::system::Series;
 
 /// What a metric's values are, in all cells alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +18,8 @@ pub enum Kind {
     Rate,
     /// Lists of numbers, summed up as a distribution.
     List,
+    /// Curves, summed up index by index.
+    Series,
     /// Words, which are counted.
     Text,
     /// No run reports it.
@@ -77,8 +81,8 @@ pub fn number_of(run: &RunRecord, name: &str) -> Option<f64> {
     number.filter(|number| number.is_finite())
 }
 
-/// The kind of a metric, from what all runs say. One list makes it lists, one word makes it words;
-/// numbers and truth values together are numbers.
+/// The kind of a metric, from what all runs say. One list makes it lists, one curve curves, one word
+/// makes it words; numbers and truth values together are numbers.
 pub fn kind_of(results: &Results, name: &str) -> Kind {
     let mut kind = Kind::Absent;
     for run in &results.runs {
@@ -87,6 +91,7 @@ pub fn kind_of(results: &Results, name: &str) -> Kind {
         };
         match (value.as_ref(), kind) {
             (Value::Array(_), _) => return Kind::List,
+            (Value::Object(_), _) if Series::from_json(&value).is_ok() => return Kind::Series,
             (Value::String(_) | Value::Object(_), _) => kind = Kind::Text,
             (Value::Number(_), Kind::Absent | Kind::Rate) => kind = Kind::Number,
             (Value::Bool(_), Kind::Absent) => kind = Kind::Rate,
@@ -98,10 +103,19 @@ pub fn kind_of(results: &Results, name: &str) -> Kind {
 
 /// What the runs of a cell say under the name of a list, as things that were watched: rovers, say,
 /// until they arrived. A `null` in a run whose time was over is censored at its end. In a run that
-/// ended otherwise it never happens: it is watched for ever. `runs` are one cell's.
-pub fn observations(runs: &[RunRecord], name: &str) -> Vec<Observation> {
+/// ended otherwise it never happens: it is watched for ever. What one run lists shares its fate, and so
+/// do runs of one block.
+pub fn observations(results: &Results, cell: usize, name: &str) -> Vec<Observation> {
     let mut observations = Vec::new();
-    for (group, run) in runs.iter().enumerate() {
+    let manifest = &results.manifest;
+    let places = manifest.seeds.iter().enumerate();
+    let places: BTreeMap<u64, usize> = match manifest.block {
+        0 | 1 => BTreeMap::new(),
+        _ => places.map(|(place, seed)| (*seed, place)).collect(),
+    };
+    for (alone, run) in results.of_cell(cell).iter().enumerate() {
+        let place = places.get(&run.seed);
+        let group = place.map_or(alone, |place| place / manifest.block);
         let Some(value) = value_of(&run.outcome, name) else {
             continue;
         };
@@ -125,6 +139,16 @@ pub fn observations(runs: &[RunRecord], name: &str) -> Vec<Observation> {
         }));
     }
     observations
+}
+
+/// The curves of a cell's runs, by seed; a run that has none is left out.
+pub fn curves(results: &Results, cell: usize, name: &str) -> BTreeMap<u64, Series> {
+    let runs = results.of_cell(cell).iter();
+    let curves = runs.filter_map(|run| {
+        let value = value_of(&run.outcome, name)?;
+        Some((run.seed, Series::from_json(&value).ok()?))
+    });
+    curves.collect()
 }
 
 fn timed_out(run: &RunRecord) -> bool {

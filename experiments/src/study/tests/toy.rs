@@ -139,7 +139,7 @@ impl Settings for ToyScenario {
         if level < 0.0 {
             return Err(SetupError::value("toy.level", "expected no less than 0"));
         }
-        let seed = setup.seed;
+        let seed = setup.run_seed;
         let hit = fail_seeds.contains(&seed) && (fail_level == 0.0 || fail_level == level);
         let text = format!("no luck with seed {seed}");
         let fails = |place: &str| (hit && fails == place).then(|| text.clone());
