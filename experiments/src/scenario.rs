@@ -550,7 +550,7 @@ type Parts<'i> = (Spanned<DeTable<'i>>, Spanned<DeTable<'i>>);
 fn part<'i>(
     source: &Source,
     document: Spanned<DeTable<'i>>,
-    sections: &[&str],
+    sections: &[String],
 ) -> Result<Parts<'i>, ScenarioError> {
     let span = document.span();
     let (mut shared, mut own) = (DeTable::new(), DeTable::new());
@@ -558,10 +558,11 @@ fn part<'i>(
         let name = key.get_ref().as_ref();
         if SHARED_KEYS.contains(&name) {
             shared.insert(key, value);
-        } else if sections.contains(&name) {
+        } else if sections.iter().any(|section| section == name) {
             own.insert(key, value);
         } else {
-            let known = || SHARED_KEYS.iter().chain(sections).copied();
+            let own = || sections.iter().map(String::as_str);
+            let known = || SHARED_KEYS.iter().copied().chain(own());
             return Err(ScenarioError::UnknownKey {
                 place: source.place(key.span().start),
                 found: name.to_owned(),
@@ -575,11 +576,12 @@ fn part<'i>(
 }
 
 /// The top-level tables that a system reads.
-fn roots(system: &dyn System) -> Vec<&'static str> {
+fn roots(system: &dyn System) -> Vec<String> {
     let mut roots = Vec::new();
     for section in system.sections() {
-        if !roots.contains(&section.root()) {
-            roots.push(section.root());
+        let root = section.root().to_owned();
+        if !roots.contains(&root) {
+            roots.push(root);
         }
     }
     roots
