@@ -11,3 +11,4 @@ mod network_planning;
 mod network_safety;
 mod network_team;
 mod scenarios;
+mod seams;

@@ -238,6 +238,9 @@ parameters! {
     /// The power while transmitting, in watts: an attempt takes `tx_power 8 (L + overhead) / rate`
     /// from the sender.
     tx_power_w: f64 = 0.0, key "tx_power", as Power, IfOn;
+    /// The power while receiving, in watts: a message that arrives takes
+    /// `rx_power 8 (L + overhead) / rate` from its receiver's host.
+    rx_power_w: f64 = 0.0, key "rx_power", as Power, IfOn;
     /// The link is out: everything is lost.
     outage: bool = false, key "outage", as Plain<bool>, Always;
 }
@@ -282,6 +285,10 @@ impl LinkParams {
             (
                 self.tx_power_w > 0.0 && !timed,
                 "tx_power without a rate: a transmission takes no time, so no energy",
+            ),
+            (
+                self.rx_power_w > 0.0 && !timed,
+                "rx_power without a rate: a transmission takes no time, so no energy",
             ),
             (
                 self.queue.is_some() && !timed && !self.store_and_forward && self.retries == 0,
