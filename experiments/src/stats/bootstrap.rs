@@ -160,9 +160,10 @@ fn bca<const N: usize>(
     if blocks.count() < 2 {
         return statistics.map(|statistic| Estimate::unknown(statistic(sorted)));
     }
-    if sorted[0] == sorted[sorted.len() - 1] {
-        let (low, high) = (sorted[0], sorted[0]);
-        let value = low;
+    let (least, greatest) = (sorted[0], sorted[sorted.len() - 1]);
+    // Differences that are equal in truth differ by roundings.
+    if greatest - least <= 1e-13 * least.abs().max(greatest.abs()) {
+        let (value, low, high) = (least, least, least);
         return [Estimate { value, low, high }; N];
     }
     let mut replicates = replicates(&pool, key, &statistics).into_iter();
