@@ -60,7 +60,8 @@ pub trait Settings: Send + Sync {
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Conclude, SetupError>;
 
-    /// Where a run of the problem with this seed takes place, if on a roadmap of which pictures can be drawn.
+    /// Where a run of the problem with this seed takes place, if on a roadmap of which pictures can
+    /// be drawn.
     ///
     /// # Errors
     /// Those of [`Settings::assemble`].

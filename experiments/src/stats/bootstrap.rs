@@ -7,7 +7,8 @@
 //! as rliable does (Agarwal and others, *Deep Reinforcement Learning at the Edge of the
 //! Statistical Precipice*, 2021).
 //!
-//! What is drawn are blocks ([`Blocks`]): the runs that share a problem together, or each run alone.
+//! What is drawn are blocks ([`Blocks`]): the runs that share a problem together, or each run
+//! alone.
 //!
 //! With a handful of blocks any bootstrap is too sure of itself: no value beyond those that were
 //! seen is ever drawn. Take 30 blocks a cell.

@@ -133,8 +133,8 @@ pub(super) fn index(file: &MetricFile, declared: &[SeriesMetric]) -> Option<Seri
     })
 }
 
-/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or nothing
-/// yet.
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or
+/// nothing yet.
 fn is_measure(value: &Value) -> bool {
     match value {
         Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,

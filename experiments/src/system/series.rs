@@ -43,8 +43,8 @@ pub struct SeriesMetric {
     pub index_label: &'static str,
     /// The unit of the index, empty for none.
     pub index_unit: &'static str,
-    /// Some runs of a cell may end at an earlier index than others. All have the same indices as far
-    /// as they go.
+    /// Some runs of a cell may end at an earlier index than others. All have the same indices as
+    /// far as they go.
     pub lengths_differ: bool,
 }
 

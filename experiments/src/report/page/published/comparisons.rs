@@ -13,9 +13,9 @@ pub(super) fn note(study: &Study<'_>) -> Markup {
     html! {
         @if !all.is_empty() {
             p class="note" {
-                "Where a cell is said to be more than another, the difference is paired by seed. The \
-                 claim holds if the whole 95 % interval is where it says, and does not hold if the \
-                 whole interval is elsewhere."
+                "Where a cell is said to be more than another, the difference is paired by seed. \
+                 The claim holds if the whole 95 % interval is where it says, and does not hold if \
+                 the whole interval is elsewhere."
                 @if all.iter().any(|one| one.index.is_some()) {
                     " Of curves it is for each index from the first on, and the one is shown that \
                      speaks most against it."
