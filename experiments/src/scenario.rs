@@ -67,8 +67,8 @@ pub struct Shared {
     /// The run's seed. TOML's integers are signed, so it has 63 bits.
     #[serde(default)]
     pub seed: u64,
-    /// What the problem is drawn from, where several runs are to share one: the world, the team, the
-    /// goals, as the system says. The run's seed unless given.
+    /// What the problem is drawn from, where several runs are to share one: the world, the team,
+    /// the goals, as the system says. The run's seed unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub problem_seed: Option<u64>,
     /// Shuffles what happens at one instant, to see whether a result hangs on its order. Without,

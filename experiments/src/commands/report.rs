@@ -163,8 +163,8 @@ fn text(document: &Document) -> String {
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  plots    \
-         {plots}\n",
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  \
+         plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )
 }

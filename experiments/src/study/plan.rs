@@ -461,8 +461,8 @@ impl Plan {
         self.check_published(results)
     }
 
-    /// Checks that what was published is of metrics of which it can be said, as a run that ended has
-    /// them.
+    /// Checks that what was published is of metrics of which it can be said, as a run that ended
+    /// has them.
     pub(super) fn check_published(
         &self,
         results: &Map<String, Value>,
