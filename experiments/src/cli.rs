@@ -8,7 +8,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, builtin, check, diff, draw, info, recover, report, reproduce, run, study, verify,
+    CommandError, builtin, check, diff, draw, explain, info, recover, report, reproduce, run,
+    study, verify,
 };
 use crate::registry::Registry;
 
@@ -51,6 +52,8 @@ enum Command {
     Check(check::Args),
     /// List the scenarios that are built in
     Scenarios(builtin::Args),
+    /// Say what a key of scenarios or a metric is, or list them all
+    Explain(explain::Args),
     /// Say what is in a log
     Info(info::Args),
     /// Run a log's scenario again and compare every message
@@ -121,6 +124,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Run(args) => run::run(&args, registry),
         Command::Check(args) => check::run(&args, registry),
         Command::Scenarios(args) => builtin::scenarios(&args, registry),
+        Command::Explain(args) => explain::run(&args, registry),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),

@@ -4,6 +4,7 @@ pub(crate) mod builtin;
 pub(crate) mod check;
 pub(crate) mod diff;
 pub(crate) mod draw;
+pub(crate) mod explain;
 pub(crate) mod info;
 mod interrupt;
 mod progress;

@@ -21,7 +21,7 @@ enum Shown {
 
 macro_rules! parameters {
     ($(
-        $(#[$doc:meta])*
+        $(#[doc = $doc:literal])*
         $field:ident: $type:ty = $default:expr,
             key $key:literal $(or $alias:literal)*, as $form:ty, $shown:ident;
     )*) => {
@@ -36,7 +36,7 @@ macro_rules! parameters {
         /// ```
         #[derive(Clone, Debug, PartialEq)]
         pub struct LinkParams {
-            $($(#[$doc])* pub $field: $type,)*
+            $($(#[doc = $doc])* pub $field: $type,)*
         }
 
         /// Some parameters of a link; what is absent stays as it is.
@@ -51,7 +51,7 @@ macro_rules! parameters {
         pub struct LinkOverrides {
             /// What all parameters are replaced by, before the others here.
             pub preset: Option<Preset>,
-            $($(#[$doc])* pub $field: Option<$type>,)*
+            $($(#[doc = $doc])* pub $field: Option<$type>,)*
         }
 
         impl Default for LinkParams {
@@ -99,6 +99,23 @@ macro_rules! parameters {
         impl From<LinkParams> for LinkOverrides {
             fn from(params: LinkParams) -> Self {
                 LinkOverrides { preset: None, $($field: Some(params.$field),)* }
+            }
+        }
+
+        impl LinkParams {
+            /// What there is to know of each key.
+            pub fn keys() -> Vec<crate::system::Key> {
+                let preset = crate::system::Key {
+                    name: "preset",
+                    about: &["What all parameters are replaced by, before the others here."],
+                    expected: String::new(),
+                };
+                let own = [$(crate::system::Key {
+                    name: $key,
+                    about: &[$($doc),*],
+                    expected: String::new(),
+                }),*];
+                std::iter::once(preset).chain(own).collect()
             }
         }
 

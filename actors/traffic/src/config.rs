@@ -79,11 +79,11 @@ settings! {
         pub period: SimDuration [with = "units::duration"],
             such_that(
                 "a time over zero between two messages",
-                |period| match period.is_zero() {
+                |period: &SimDuration| match period.is_zero() {
                     true => "missing, or 0s".to_owned(),
                     false => period.to_string(),
                 },
-                |period| !period.is_zero(),
+                |period: &SimDuration| !period.is_zero(),
             );
         /// How many messages a burst has; only with `arrivals = "burst"`.
         pub burst: Option<u32> [skip_serializing_if = "Option::is_none"],
@@ -92,8 +92,8 @@ settings! {
         pub size_bytes as "size": u64 [with = "units::data_size_bytes"] = 200,
             such_that(
                 "9B to 1MiB",
-                |bytes| units::print_data_size(*bytes),
-                |bytes| (Datagram::MIN_SIZE_BYTES..=Datagram::MAX_SIZE_BYTES).contains(bytes),
+                |bytes: &u64| units::print_data_size(*bytes),
+                |bytes: &u64| (Datagram::MIN_SIZE_BYTES..=Datagram::MAX_SIZE_BYTES).contains(bytes),
             );
         /// When the flow begins.
         pub start: SimDuration [with = "units::duration"];

@@ -81,7 +81,6 @@ impl TrafficPlan {
         let mut flows: Vec<Flow> = Vec::new();
         let mut ids = BTreeSet::new();
         for (index, entry) in config.flows.iter().enumerate() {
-            
             let key = |last: &str| format!("flow.{index}.{last}");
             let from = matching(&hosts, &entry.from, key("from"))?;
             let to = matching(&hosts, &entry.to, key("to"))?;

@@ -3,96 +3,65 @@
 
 use farside::random::RandomKey;
 use farside::{SimDuration, SimTime, Simulation};
-use farside_actors::units;
+use farside_actors::{settings, units};
 use globset::Glob;
-use serde::{Deserialize, Serialize};
 
 use farside::suggest::nearest;
 
 /// The most crashes and restarts that one entry may plan.
 const MAX_EVENTS: usize = 100_000;
 
-/// A `[[crash]]` entry.
-///
-/// | key | meaning | default |
-/// |---|---|---|
-/// | `actor` | a name, or a pattern over names (`node_*`) | needed, or `host` |
-/// | `host` | the same for hosts: all actors of a host crash at one instant | needed, or `actor` |
-/// | `fraction` | the share of those that match, rounded to whole ones | all |
-/// | `at` | when it crashes, or with `mtbf` from when on | needed; with `mtbf` 0 s |
-/// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
-/// | `restart` | when it is started again | never |
-/// | `restart_after` | how long after the crash it is started again | never |
-/// | `mtbf` | it crashes again and again, each time after an exponential time of this mean | |
-/// | `mttr` | and is down for an exponential time of this mean | it stays down |
-///
-/// Who is among the fraction and when it crashes are drawn by (run seed, entry, name): a larger
-/// fraction crashes the same ones at the same times, and more.
-///
-/// ```
-/// use farside_experiments::scenario::Crash;
-/// let crash: Crash = toml::from_str("actor = 'node_*'\nfraction = '10%'\nat = '60s'")?;
-/// assert_eq!(crash.fraction, 0.1);
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Crash {
-    /// The actor's name, or a pattern over actors' names.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub actor: Option<String>,
-    /// The host's name, or a pattern over hosts' names: all actors of a host crash together.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub host: Option<String>,
-    /// The share of those that match.
-    #[serde(default = "all", with = "units::fraction")]
-    pub fraction: f64,
-    /// When it crashes, from the start of the run.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub at: Option<SimDuration>,
-    /// How much later than `at` it may be.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub within: Option<SimDuration>,
-    /// When it is started again, from the start of the run; without, it stays down.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub restart: Option<SimDuration>,
-    /// How long after the crash it is started again.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub restart_after: Option<SimDuration>,
-    /// The mean time between failures.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub mtbf: Option<SimDuration>,
-    /// The mean time to repair.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub mttr: Option<SimDuration>,
-}
-
-fn all() -> f64 {
-    1.0
+settings! {
+    /// A `[[crash]]` entry.
+    ///
+    /// | key | meaning | default |
+    /// |---|---|---|
+    /// | `actor` | a name, or a pattern over names (`node_*`) | needed, or `host` |
+    /// | `host` | the same for hosts: all actors of a host crash at one instant | needed, or `actor` |
+    /// | `fraction` | the share of those that match, rounded to whole ones | all |
+    /// | `at` | when it crashes, or with `mtbf` from when on | needed; with `mtbf` 0 s |
+    /// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
+    /// | `restart` | when it is started again | never |
+    /// | `restart_after` | how long after the crash it is started again | never |
+    /// | `mtbf` | it crashes again and again, each time after an exponential time of this mean | |
+    /// | `mttr` | and is down for an exponential time of this mean | it stays down |
+    ///
+    /// Who is among the fraction and when it crashes are drawn by (run seed, entry, name): a larger
+    /// fraction crashes the same ones at the same times, and more.
+    ///
+    /// ```
+    /// use farside_experiments::scenario::Crash;
+    /// let crash: Crash = toml::from_str("actor = 'node_*'\nfraction = '10%'\nat = '60s'")?;
+    /// assert_eq!(crash.fraction, 0.1);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    pub struct Crash {
+        /// The actor's name, or a pattern over actors' names.
+        pub actor: Option<String> [skip_serializing_if = "Option::is_none"];
+        /// The host's name, or a pattern over hosts' names: all actors of a host crash together.
+        pub host: Option<String> [skip_serializing_if = "Option::is_none"];
+        /// The share of those that match, rounded to whole ones.
+        pub fraction: f64 [with = "units::fraction"] = 1.0;
+        /// When it crashes, from the start of the run; with `mtbf`, from when on.
+        pub at: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// How much later than `at` it may be: a time drawn evenly.
+        pub within: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// When it is started again, from the start of the run; without, it stays down.
+        pub restart: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// How long after the crash it is started again.
+        pub restart_after: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// The mean time between failures: it crashes again and again, each time after an
+        /// exponential time of this mean.
+        pub mtbf: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// The mean time to repair: it is down for an exponential time of this mean.
+        pub mttr: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+    }
 }
 
 /// What is wrong with an entry: the key to blame, what was found and what was expected.
@@ -111,7 +80,7 @@ fn mistake(key: &'static str, message: impl ToString) -> Mistake {
 
 impl Crash {
     /// Finds what can be found without knowing the actors.
-    pub(super) fn check(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
+    pub(super) fn check_alone(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
         self.target()?;
         if self.at.is_none() && self.mtbf.is_none() {
             let message =
@@ -373,7 +342,7 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_refused() {
         let until = Some(SimDuration::from_secs(100));
-        let wrong = |text: &str| crash(&format!("actor = 'x'\n{text}")).check(until);
+        let wrong = |text: &str| crash(&format!("actor = 'x'\n{text}")).check_alone(until);
         let key = |text: &str| wrong(text).unwrap_err().key;
         assert_eq!(key("at = '5s'\nrestart = '5s'"), "restart");
         assert_eq!(key("at = '5s'\nwithin = '5s'\nrestart = '9s'"), "restart");
@@ -385,16 +354,16 @@ mod tests {
         assert_eq!(key("at = '5s'\nrestart_after = '0s'"), "restart_after");
         assert_eq!(
             crash("actor = 'x'\nmtbf = '5s'")
-                .check(None)
+                .check_alone(None)
                 .unwrap_err()
                 .key,
             "mtbf"
         );
         assert_eq!(wrong("mtbf = '5s'\nmttr = '1s'"), Ok(()));
         assert_eq!(key("at = '5s'\nhost = 'x'"), "host");
-        let nobody = crash("at = '5s'").check(until).unwrap_err();
+        let nobody = crash("at = '5s'").check_alone(until).unwrap_err();
         assert_eq!(nobody.key, "actor");
-        assert_eq!(crash("at = '5s'\nhost = 'x'").check(until), Ok(()));
+        assert_eq!(crash("at = '5s'\nhost = 'x'").check_alone(until), Ok(()));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use farside::random::{RandomKey, Stream};
 use serde_json::{Map, Value, json};
 
-use crate::system::Series;
+use farside_actors::system::Series;
 
 use super::results::{
     Cell, FORMAT, Factor, Manifest, MessageCounts, Metric, Results, RunOutcome, RunRecord, Scale,
