@@ -8,7 +8,7 @@ use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record};
 use farside_actors::link::{Link, LinkParams, Path, Transmitter};
 use farside_experiments::scenario::Scenario;
-use farside_experiments::system::Registry;
+use farside_experiments::registry::Registry;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
