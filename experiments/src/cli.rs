@@ -8,7 +8,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, builtin, check, diff, draw, explain, info, recover, report, reproduce, run,
+    CommandError, Exit, builtin, check, diff, draw, explain, info, recover, report, reproduce, run,
     study, verify,
 };
 use crate::registry::Registry;
@@ -77,21 +77,6 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-}
-
-/// How a command ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Exit {
-    Done = 0,
-    Different = 1,
-    Wrong = 2,
-    Failed = 3,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        ExitCode::from(exit as u8)
-    }
 }
 
 /// The command line of a binary that knows these systems.

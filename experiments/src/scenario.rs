@@ -4,9 +4,11 @@
 //! has of its own are read by the system ([`farside_actors::system::System`]). A mistake is one message
 //! with its place, what was found, what was expected and the nearest valid name.
 
+mod blame;
 pub mod contacts;
 mod crash;
 mod error;
+mod place;
 mod reference;
 mod seeds;
 mod source;
@@ -34,8 +36,8 @@ use crate::registry::Registry;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
+pub use place::Place;
 pub use reference::shared_sections;
-pub use source::Place;
 pub(crate) use source::Source;
 
 /// The most bytes of a scenario or study that are read.

@@ -7,8 +7,8 @@ use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record};
 use farside_actors::link::{Link, LinkParams, Path, Transmitter};
-use farside_experiments::scenario::Scenario;
 use farside_experiments::registry::Registry;
+use farside_experiments::scenario::Scenario;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@ use farside::suggest::{did_you_mean, nearest};
 use farside_actors::system::{Better, Key, Metric, MetricKind, Section};
 use serde_json::{Value, json};
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::scenario::shared_sections;
 use crate::study::KERNEL_METRICS;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;

@@ -11,10 +11,11 @@ use farside_logs::{Attachment, LogOptions, LogWriter};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::table::{self, Group};
-use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
-use crate::cli::Exit;
+use super::{CommandError, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
+use crate::version::CODE_VERSION;
 use farside_actors::system::Results;
 
 use crate::registry::Registry;

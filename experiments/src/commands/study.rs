@@ -7,8 +7,8 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::{CommandError, interrupt, print, print_json};
-use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::report::csv::results_csv;
 use crate::study::results::{Manifest, Results, RunOutcome};

@@ -4,10 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::StoreError;
+use super::error::{StoreError, io};
 use super::lengths::Lengths;
 use super::results::{FORMAT, Manifest, Results, RunOutcome, RunRecord};
-use super::store::io;
 
 /// The file that says what is run.
 pub(super) const MANIFEST: &str = "manifest.json";

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use crate::commands::CODE_VERSION;
 use farside::suggest::nearest;
 
 use crate::scenario::{self, Place, Scenario, ScenarioError, Source};
+use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
