@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use super::*;
-use farside_actors::link::{LinkBuilder, LinksConfig};
+use farside_actors::link::LinksConfig;
+use farside_actors::wiring::LinkBuilder;
 
 /// What was sent on the first hop, by flow and number: when, how large, and whether it arrived.
 type Sends = BTreeMap<(u32, u32), (SimTime, usize, bool)>;

@@ -14,7 +14,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::scene::{Drawing, Level, Scene};
 use farside::RunInfo;
 use farside_actors::figure::{Figure, svg};
-use farside_actors::link::Wiring;
+use farside_actors::wiring::Wiring;
 use farside_actors::system::settings::{Table, over};
 use farside_actors::system::{
     Assembly, Better, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
