@@ -212,7 +212,7 @@ pub enum BuildError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
     /// No actor has the name.
-    #[error("no actor is called {name:?}{}", .nearest.as_ref().map(|near| format!("; did you mean {near:?}?")).unwrap_or_default())]
+    #[error("no actor is called {name:?}{}", suggestion(.nearest.as_deref()))]
     Unknown {
         /// The name.
         name: String,
@@ -252,6 +252,10 @@ impl LookupError {
     }
 }
 
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
+}
+
 fn listed(accepts: &[&str]) -> String {
     match accepts {
         [] => "no messages".to_owned(),
@@ -265,7 +269,7 @@ fn listed(accepts: &[&str]) -> String {
 /// use farside::fault::nearest;
 /// let names = ["rover_01", "rover_02", "base"];
 /// assert_eq!(nearest("rovr_02", names.into_iter()), Some("rover_02".to_owned()));
-/// assert_eq!(nearest("lander", names.into_iter()), None);
+/// assert_eq!(nearest("opportunity", names.into_iter()), None);
 /// ```
 pub fn nearest<'a>(found: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
     let scored = names.map(|name| (strsim::damerau_levenshtein(found, name), name));
