@@ -82,6 +82,19 @@ mod tests {
         assert_eq!(given.seeds_of(5, Some(3)), seeds(5, 3));
     }
 
+    /// What is built is the problem that pictures show: the places of nodes decide where none hears.
+    #[test]
+    fn what_is_built_is_the_problem() {
+        let scenario = Scenario::open("network/crater-gaps", &[], &Registry::builtin()).unwrap();
+        let notes = |run, problem| {
+            let assembled = scenario.assemble_seeded(Seeds { run, problem }).unwrap();
+            assert!(!assembled.notes.is_empty());
+            assembled.notes
+        };
+        assert_eq!(notes(1, 1), notes(2, 1));
+        assert_ne!(notes(1, 1), notes(1, 2));
+    }
+
     /// A run whose problem is its own says nothing of one, and its scenario is as it always was.
     #[test]
     fn seeds_are_written_where_they_say_something() {
