@@ -82,7 +82,8 @@ mod tests {
         assert_eq!(given.seeds_of(5, Some(3)), seeds(5, 3));
     }
 
-    /// What is built is the problem that pictures show: the places of nodes decide where none hears.
+    /// What is built is the problem that pictures show: the places of nodes decide where none
+    /// hears.
     #[test]
     fn what_is_built_is_the_problem() {
         let scenario = Scenario::open("network/crater-gaps", &[], &Registry::builtin()).unwrap();
