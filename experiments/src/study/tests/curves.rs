@@ -373,10 +373,6 @@ fn blocks_must_divide_the_seeds() {
 #[test]
 fn a_mistake_in_a_claim_is_said_where_it_stands() {
     let place = Place::new();
-    let claim = |metric: &str, values: &str| {
-        let head = "title = 'T'\nsource = 'S'\n";
-        format!("{STUDY}[[published]]\nmetric = '{metric}'\n{head}values = [{values}]\n")
-    };
     let greedy = "exceeds = { planner = 'greedy' }";
     for (values, starts, holds) in [
         (
@@ -457,7 +453,19 @@ fn a_mistake_in_a_claim_is_said_where_it_stands() {
             "{values}: {holds:?} is not in {message}"
         );
     }
-    // What only a run can tell: before the others are made, and in a folder that has them.
+}
+
+/// A study in which this is claimed of a metric.
+fn claim(metric: &str, values: &str) -> String {
+    let head = "title = 'T'\nsource = 'S'\n";
+    format!("{STUDY}[[published]]\nmetric = '{metric}'\n{head}values = [{values}]\n")
+}
+
+/// Before the other runs are made, and in a folder that has them already.
+#[test]
+fn what_only_a_run_can_tell_of_a_claim_is_said_where_it_stands() {
+    let place = Place::new();
+    let greedy = "exceeds = { planner = 'greedy' }";
     place
         .run(&STUDY.replace("seeds = 30", "seeds = 5"), "there")
         .unwrap();
