@@ -43,16 +43,15 @@ fn with_policy(mut case: Case, policy: Policy) -> Case {
 
 fn any_policy() -> impl Strategy<Value = Case> {
     let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
-    let all = (cases(Bounds::default()), policy, any::<[bool; 5]>());
+    let all = (cases(Bounds::default()), policy, any::<[bool; 4]>());
     all.prop_map(|(mut case, policy, switches)| {
-        let [chains, is_rigid, gates, tokens, resolution] = switches;
+        let [chains, is_rigid, gates, resolution] = switches;
         case.network = match is_rigid {
             true => rigid(),
             false => NetworkConfig::default(),
         };
         case.network.acceleration_chains = chains;
         case.network.entry_gates = gates;
-        case.network.corridor_tokens = tokens;
         case.network.junction_resolution = resolution;
         with_policy(case, policy)
     })

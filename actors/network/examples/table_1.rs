@@ -9,7 +9,7 @@
 //! `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight), `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
 //! west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
 //! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
-//! `leaf_wait`, `noise`. Aids: `gates`, `tokens`, `probes`, `resolution` (true, false), `gate` (occupancy),
+//! `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate` (occupancy),
 //! `probe_after`, `hold` (cycles).
 
 use std::sync::Arc;
@@ -135,7 +135,6 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "chains" => network.acceleration_chains = value.parse()?,
             "gates" => network.entry_gates = value.parse()?,
             "gate" => network.entry_gate_occupancy = value.parse()?,
-            "tokens" => network.corridor_tokens = value.parse()?,
             "probes" => network.deadlock_probes = value.parse()?,
             "probe_after" => network.probe_after = value.parse()?,
             "resolution" => network.junction_resolution = value.parse()?,

@@ -14,7 +14,6 @@ use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, V
 use nalgebra::Point3;
 
 use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
-use super::corridors::Corridors;
 use super::gaps::{self, Refused};
 use super::lng::LocalGraph;
 use super::messages::RoverId;
@@ -176,10 +175,6 @@ pub fn assemble(
     let site = Arc::new(Site {
         lines,
         payoffs: Payoffs::new(config, &roadmap),
-        corridors: match config.corridor_tokens {
-            true => Corridors::new(&roadmap, 2),
-            false => Corridors::default(),
-        },
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: config.patience(links.0, &timing),
         timing,

@@ -6,7 +6,7 @@
 
 use farside_worlds::VertexId;
 
-use super::candidates::{Destination, FirstStep};
+use super::candidates::FirstStep;
 use super::config::Priority;
 use super::messages::{Assignment, RoverId};
 
@@ -20,8 +20,6 @@ pub(crate) struct Request {
     pub(crate) from: VertexId,
     /// For how many cycles it has stood there.
     pub(crate) waited: u32,
-    /// The path's end, if the rover leaves the roadmap there.
-    pub(crate) leaves_at: Option<VertexId>,
     /// The path begins with a wait because the vertex is occupied: it may accelerate.
     pub(crate) follows: bool,
 }
@@ -34,11 +32,7 @@ impl Request {
             FirstStep::Move(vertex) => (vertex, false),
             FirstStep::Follow(vertex) => (vertex, true),
         };
-        let path = &assignment.path;
-        let leaves = path.destination == Destination::Goal;
-        let leaves_at = path.vertices.last().copied().filter(|_| leaves);
         Some(Request {
-            leaves_at,
             vertex,
             rover: assignment.rover,
             step: assignment.step,
@@ -74,7 +68,6 @@ mod tests {
             rover: RoverId(rover),
             step: 1,
             from: v(2),
-            leaves_at: None,
             waited,
             follows,
         }

@@ -178,10 +178,6 @@ pub struct NetworkConfig {
     /// The share of the vertices of the owner's local neighbourhood graph up to which gates are
     /// open, from 0 to 1.
     pub entry_gate_occupancy: f64,
-    /// Corridor tokens: chains of at least two vertices in which no two rovers can pass each other
-    /// are entered in one direction at a time. They take part in each cycle's exchanges: with links slower than
-    /// those, traffic in corridors waits for the news.
-    pub corridor_tokens: bool,
     /// Wait-for probes, which confirm deadlocks and name the rovers in them.
     pub deadlock_probes: bool,
     /// A rover that has come no nearer to its goal for so many cycles waits, as probes see it; at
@@ -248,7 +244,6 @@ impl Default for NetworkConfig {
             acceleration_chains: false,
             entry_gates: false,
             entry_gate_occupancy: 0.15,
-            corridor_tokens: false,
             deadlock_probes: false,
             probe_after: 6,
             junction_resolution: false,
@@ -468,6 +463,17 @@ mod tests {
         };
         let timing = network.timing(SimDuration::from_millis(5), None);
         assert!(matches!(timing, Err(ConfigError::Schedule { .. })));
+    }
+
+    #[test]
+    fn a_key_that_is_gone_is_unknown() {
+        let error = toml::from_str::<NetworkConfig>("corridor_tokens = true").unwrap_err();
+        assert!(
+            error
+                .message()
+                .starts_with("unknown field `corridor_tokens`"),
+            "{error}"
+        );
     }
 
     #[test]

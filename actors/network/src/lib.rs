@@ -91,7 +91,6 @@ mod builtin;
 mod candidates;
 pub mod cases;
 mod config;
-mod corridors;
 mod gaps;
 mod lng;
 mod loads;

@@ -327,56 +327,6 @@ pub struct Aside {
     pub until: u32,
 }
 
-/// Node to node: corridor reports on their way to the keepers, and tokens on their way to the members.
-/// The receiver takes what is meant for it and passes on the rest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CorridorNews {
-    /// The node that sends.
-    pub node: NodeId,
-    /// The planning cycle in which that was.
-    pub cycle: u32,
-    /// The neighbour it is sent to.
-    pub to: NodeId,
-    /// Reports.
-    pub reports: Vec<CorridorReport>,
-    /// Tokens.
-    pub tokens: Vec<CorridorToken>,
-}
-
-/// What a member of a corridor tells its keeper once a cycle.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CorridorReport {
-    /// The corridor, from 0 in the order of their lowest vertices.
-    pub corridor: u32,
-    /// The member.
-    pub node: NodeId,
-    /// The planning cycle at whose exchange of locations this was so.
-    pub cycle: u32,
-    /// The token's epoch as the member knows it.
-    pub epoch: u32,
-    /// How many of its vertices in the corridor are not free.
-    pub inside: u32,
-    /// Whether rovers want to go in, forward and backward.
-    pub wanted: [bool; 2],
-    /// Free vertices at the exit forward and backward, where it is the member's.
-    pub room: [Option<u32>; 2],
-}
-
-/// What the keeper of a corridor tells its members once a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CorridorToken {
-    /// The corridor.
-    pub corridor: u32,
-    /// The member.
-    pub to: NodeId,
-    /// The planning cycle in which it was decided.
-    pub cycle: u32,
-    /// The state: open if odd. It is open forward in 1, 5, 9, ..., backward in 3, 7, 11, ...
-    pub epoch: u32,
-    /// There is room behind the exit for one more.
-    pub room: bool,
-}
-
 /// A rover's state as it records it at every change: the truth, not what a node believes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverState {

@@ -1,7 +1,7 @@
 //! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
 //! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
 //! [`optimise`], admission in [`admit`]. What helps the paper's policy out of standstills, each behind
-//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`]; what evens out loads:
+//! a key of its own: [`gates`], [`probes`], [`resolution`]; what evens out loads:
 //! [`balance`].
 
 mod admit;
@@ -15,7 +15,6 @@ mod resolution;
 mod takeover;
 #[cfg(test)]
 mod tests;
-mod tokens;
 
 use std::sync::Arc;
 
@@ -28,8 +27,8 @@ use super::assignment::Request;
 use super::config::Policy;
 use super::lng::LocalGraph;
 use super::messages::{
-    Account, Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck,
-    Holding, Load, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
+    Account, Aside, Assignments, Beacon, CandidatePaths, Departed, DepartedAck, Holding, Load,
+    Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
 };
 use super::reservation::messages::{ItineraryAnswer, Relay};
 use super::reservation::{Atlas, RegistryDue};
@@ -39,7 +38,6 @@ use optimise::Optimiser;
 use probes::Probes;
 use resolution::Resolution;
 use takeover::Wards;
-use tokens::Watch;
 
 /// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
 /// cycle, and owns vertices by the safety protocol.
@@ -65,8 +63,6 @@ pub struct Node {
     wards: Option<Wards>,
     probes: Probes,
     resolution: Resolution,
-    /// By corridor, once tokens are used.
-    watches: Vec<Watch>,
     /// When the timer of the `complete` policy fires \[ns\].
     pub(super) alarm: Option<(u64, TimerId)>,
 }
@@ -139,7 +135,6 @@ impl Node {
             wards: None,
             probes: Probes::default(),
             resolution: Resolution::default(),
-            watches: Vec::new(),
             alarm: None,
         }
     }
@@ -181,7 +176,6 @@ impl Actor for Node {
         WaitProbe,
         Resolve,
         Aside,
-        CorridorNews,
         ProcessorDone,
         Account,
         Replaced,

@@ -7,7 +7,6 @@ use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
 use crate::config::{Motion, NetworkConfig};
-use crate::corridors::Corridors;
 use crate::gaps::Refused;
 use crate::messages::RoverId;
 use crate::motion::Ways;
@@ -30,8 +29,6 @@ pub(crate) struct Site {
     /// Who gives the roadmap to all others.
     pub(crate) roadmap_from: Option<NodeId>,
     pub(crate) payoffs: Payoffs,
-    /// Where rovers cannot pass each other; none unless `corridor_tokens` asks for them.
-    pub(crate) corridors: Corridors,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
     /// Each rover's entry, or where it stands at first, and its goal.

@@ -18,7 +18,6 @@ impl Node {
     pub(super) fn admit(&mut self, ctx: &mut Context<'_, Self>) {
         self.forced_stops = 0;
         let mut wanted: Vec<VertexId> = self.requests.iter().map(|r| r.vertex).collect();
-        self.heed_tokens(ctx);
         wanted.sort_unstable();
         wanted.dedup();
         for vertex in wanted {
@@ -45,16 +44,6 @@ impl Node {
             handed,
             late: self.optimiser.is_at_work(),
         });
-    }
-
-    /// Strikes out what corridor tokens forbid in this cycle.
-    fn heed_tokens(&mut self, ctx: &mut Context<'_, Self>) {
-        if !self.site.config.corridor_tokens {
-            return;
-        }
-        let mut requests = std::mem::take(&mut self.requests);
-        requests.retain(|request| self.token_permits(ctx, request));
-        self.requests = requests;
     }
 
     /// Admits the best of those that ask for `vertex`, if it is free. False if nobody is.
@@ -254,8 +243,7 @@ impl Handler<Assignments> for Node {
             }
             // Too late to be weighed against others. Granted if the vertex is free, so that
             // latency slows rovers down and does not stop them.
-            let request = Request::of(assignment).filter(|r| self.owns(r.vertex));
-            let Some(request) = request.filter(|r| self.token_permits(ctx, r)) else {
+            let Some(request) = Request::of(assignment).filter(|r| self.owns(r.vertex)) else {
                 continue;
             };
             let Request {

@@ -63,13 +63,9 @@ impl Node {
         }
     }
 
-    /// Whether gates and tokens let the next rover of a queue in.
-    fn lets_in(&mut self, ctx: &mut Context<'_, Self>, entry: VertexId, queue: &[RoverId]) -> bool {
-        let Some(next) = ctx.durable::<Ledger>().next_in(entry, queue) else {
-            return false;
-        };
-        let (_, goal) = self.site.missions[next.0 as usize];
-        self.gate_is_open(ctx) && self.token_admits(ctx, entry, goal)
+    /// Whether the gate lets the next rover of a queue in.
+    fn lets_in(&self, ctx: &mut Context<'_, Self>, entry: VertexId, queue: &[RoverId]) -> bool {
+        ctx.durable::<Ledger>().next_in(entry, queue).is_some() && self.gate_is_open(ctx)
     }
 
     /// Repeats grants and departures that were not answered.
@@ -101,7 +97,7 @@ impl Node {
         ctx.send(self.rovers[rover.0 as usize], Grant { node, step, to });
     }
 
-    /// Step 1, and corridors' reports beside it.
+    /// Step 1.
     pub(super) fn locate(&mut self, ctx: &mut Context<'_, Self>) {
         if !self.spread(ctx) {
             return;
@@ -122,13 +118,11 @@ impl Node {
             );
         }
         self.tell_partners(ctx, &Content::Locations(message));
-        self.report_corridors(ctx);
     }
 
     /// Steps 2 and 3.
     pub(super) fn propose(&mut self, ctx: &mut Context<'_, Self>) {
         self.survey();
-        self.decide_corridors(ctx);
         self.probe(ctx);
         let rovers: Vec<_> = self
             .movable(ctx)
@@ -184,12 +178,6 @@ impl Node {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
-        let mut forbidden = Vec::new();
-        for next in self.graph.neighbors(here) {
-            if self.token_forbids(ctx, here, next) {
-                forbidden.push(next);
-            }
-        }
         let ledger = ctx.durable::<Ledger>();
         let occupied = |v| {
             if self.owns(v) {
@@ -200,8 +188,7 @@ impl Node {
         if let Some(paths) = self.path_aside(here, held, occupied) {
             return paths;
         }
-        let closed = |v| occupied(v) || forbidden.contains(&v);
-        let mut paths = candidates(self.surveyed(), here, goal, closed);
+        let mut paths = candidates(self.surveyed(), here, goal, occupied);
         // Who was sent here goes back at no penalty.
         let previous = held.previous.filter(|_| !self.was_sent(held.rover, here));
         let key = u64::from(self.cycle) << 32 | u64::from(held.rover.0);
