@@ -15,6 +15,7 @@ use nalgebra::Point3;
 
 use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
 use super::gaps::{self, Refused};
+use super::ids;
 use super::lng::LocalGraph;
 use super::messages::RoverId;
 use super::metrics::NetworkMetrics;
@@ -287,12 +288,10 @@ fn longest_step(
     }
 }
 
-/// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of
-/// names is that of numbers.
 fn names(kind: &str, count: usize) -> Vec<String> {
-    let digits = count.to_string().len().max(2);
-    (1..=count)
-        .map(|i| format!("{kind}_{i:0digits$}"))
+    let count = count as u32;
+    (0..count)
+        .map(|number| ids::name(kind, number, count))
         .collect()
 }
 

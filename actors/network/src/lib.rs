@@ -92,6 +92,7 @@ mod candidates;
 pub mod cases;
 mod config;
 mod gaps;
+mod ids;
 mod lng;
 mod loads;
 pub mod mapf;
@@ -116,6 +117,8 @@ mod takeover;
 #[cfg(test)]
 mod testing;
 mod timing;
+mod tracks;
+mod waits;
 
 pub use assemble::{Missions, Network, NetworkError, Parts, assemble, assemble_over, missions};
 pub use candidates::{CandidatePath, Destination, FirstStep};

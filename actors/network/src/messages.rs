@@ -4,15 +4,12 @@
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
+pub use super::ids::RoverId;
+
+use farside_actors::invariants::Place;
+
 use super::candidates::CandidatePath;
 use super::reservation::messages::{Relay, Way};
-
-/// The number of a rover, from 0; its actor is called `rover_` and the number plus one.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
-)]
-#[serde(transparent)]
-pub struct RoverId(pub u32);
 
 /// Rover to node, each cycle and at each change: where it is. Cumulative: a later one replaces any
 /// that were lost. With `moving_to` it says LEAVING: the rover is irrevocably on its way, and its
@@ -39,6 +36,17 @@ pub struct Whereabouts {
     pub vertex: Option<VertexId>,
     /// The vertex it is on its way to, irrevocably.
     pub moving_to: Option<VertexId>,
+}
+
+impl Whereabouts {
+    /// Where that is on the roadmap.
+    pub fn place(&self) -> Place<VertexId> {
+        match (self.vertex, self.moving_to) {
+            (None, _) => Place::Away,
+            (Some(here), None) => Place::At(here),
+            (Some(here), Some(next)) => Place::Between(here, next),
+        }
+    }
 }
 
 /// Node to rover: take step `step`, to a vertex that is now yours, or off the roadmap. Repeated

@@ -1,40 +1,85 @@
-//! Who waits for whom at an instant, and who waits in a circle.
+//! Who waits for whom at an instant, and who waits in a circle: the one rule of it, for what a run
+//! reports and for what its pictures show.
+//!
+//! A rover waits if it stands, is not at its goal, and each vertex that would bring it nearer to its
+//! goal is claimed by another rover. Where rovers stay on the map and make room for others (policy
+//! `complete`), one that is at its goal waits too if all vertices beside it are claimed: it cannot
+//! let anybody pass. Rovers in entry queues hold nothing, so that nobody waits for them. With policies
+//! whose rovers take planned paths other than the shortest, there is no such graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use farside_actors::invariants::WaitGraph;
+use farside_actors::invariants::{Place, WaitCycle, WaitGraph};
 use farside_worlds::{Roadmap, VertexId};
 
-use super::tracks::{Place, Seen};
+use crate::config::Policy;
 
-/// The wait-for graph of rovers at an instant. A rover waits if it stands, is not at its goal, and
-/// each vertex that would bring it nearer to its goal is held by another rover.
+/// A rover at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Standing {
+    /// Its number, from 0.
+    pub(crate) rover: u32,
+    pub(crate) place: Place<VertexId>,
+    pub(crate) goal: VertexId,
+}
+
+/// For what rovers of a policy wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WaitRule {
+    /// There is no telling: they take other paths than the shortest.
+    Unknown,
+    /// For the vertices on shortest paths to their goals.
+    ShortestPaths,
+    /// For these; and at their goals for any vertex beside them, to make room for others.
+    AndRoom,
+}
+
+impl WaitRule {
+    /// That of a policy whose rovers stay on the map, or queue at entries and leave it.
+    pub(crate) fn of(policy: Policy, stays: bool) -> WaitRule {
+        match (policy, stays) {
+            (Policy::Complete, true) => WaitRule::AndRoom,
+            (Policy::Paper, _) | (_, true) => WaitRule::ShortestPaths,
+            _ => WaitRule::Unknown,
+        }
+    }
+}
+
+/// The wait-for graph of rovers at an instant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Waits {
     /// Those that wait, and for whom, each list sorted.
     pub(crate) on: BTreeMap<u32, Vec<u32>>,
     /// Rovers that wait for each other: each list is a strongly connected part of the graph, made of
-    /// rovers that none can leave on a shortest way before another of them does.
+    /// rovers that none can leave on a shortest path before another of them does.
     pub(crate) circles: Vec<Vec<u32>>,
     /// Those that wait, if not in a circle, then for one.
     pub(crate) behind: BTreeSet<u32>,
 }
 
 impl Waits {
-    pub(crate) fn of(roadmap: &Roadmap, rovers: &[Seen]) -> Waits {
+    pub(crate) fn of(roadmap: &Roadmap, rule: WaitRule, rovers: &[Standing]) -> Waits {
+        if rule == WaitRule::Unknown {
+            return Waits::default();
+        }
         let holders: BTreeMap<VertexId, u32> = rovers
             .iter()
-            .filter_map(|seen| Some((seen.holds()?, seen.rover)))
+            .filter_map(|standing| Some((standing.place.claim()?, standing.rover)))
             .collect();
-        let waiting = |seen: &Seen| {
-            let Place::At(here) = seen.place else {
+        let waiting = |standing: &Standing| {
+            let Place::At(here) = standing.place else {
                 return None;
             };
-            let holders: Option<BTreeSet<u32>> = nearer(roadmap, here, seen.goal)
-                .map(|next| holders.get(&next).copied())
+            let wanted: Vec<VertexId> = match (here == standing.goal, rule) {
+                (true, WaitRule::AndRoom) => roadmap.neighbors(here).to_vec(),
+                _ => nearer(roadmap, here, standing.goal).collect(),
+            };
+            let holders = wanted.iter().map(|next| holders.get(next).copied());
+            let holders: Vec<u32> = holders
+                .collect::<Option<BTreeSet<u32>>>()?
+                .into_iter()
                 .collect();
-            let holders: Vec<u32> = holders?.into_iter().collect();
-            (!holders.is_empty()).then_some((seen.rover, holders))
+            (!holders.is_empty()).then_some((standing.rover, holders))
         };
         let on: BTreeMap<u32, Vec<u32>> = rovers.iter().filter_map(waiting).collect();
         let stuck = stuck(&on);
@@ -50,6 +95,24 @@ impl Waits {
         }
     }
 
+    /// One way round each circle, the shortest first, with rovers' names and the vertices that they
+    /// hold.
+    pub(crate) fn named(
+        &self,
+        name: impl Fn(u32) -> String,
+        rovers: &[Standing],
+    ) -> Vec<WaitCycle<VertexId>> {
+        let circled: BTreeSet<u32> = self.circles.iter().flatten().copied().collect();
+        graph(&self.on, |rover| circled.contains(&rover)).named_cycles(|rover| {
+            let rover = rover as u32;
+            let standing = rovers.iter().find(|standing| standing.rover == rover);
+            (
+                name(rover),
+                standing.and_then(|standing| standing.place.claim()),
+            )
+        })
+    }
+
     pub(crate) fn in_circle(&self, rover: u32) -> bool {
         self.circles.iter().any(|circle| circle.contains(&rover))
     }
@@ -61,7 +124,7 @@ impl Waits {
     }
 }
 
-/// The neighbours of `here` on shortest ways to `goal`.
+/// The neighbours of `here` on shortest paths to `goal`.
 pub(crate) fn nearer(
     roadmap: &Roadmap,
     here: VertexId,
@@ -122,10 +185,9 @@ mod tests {
 
     use super::*;
 
-    fn standing(rover: u32, at: u32, goal: u32) -> Seen {
-        Seen {
+    fn standing(rover: u32, at: u32, goal: u32) -> Standing {
+        Standing {
             rover,
-            entry: VertexId(0),
             goal: VertexId(goal),
             place: Place::At(VertexId(at)),
         }
@@ -147,16 +209,33 @@ mod tests {
             standing(2, 3, 0),
             standing(3, 5, 5),
         ];
-        let waits = Waits::of(&map, &team);
+        let waits = Waits::of(&map, WaitRule::ShortestPaths, &team);
         assert_eq!(waits.circles, [vec![1, 2]]);
         assert_eq!(waits.behind, BTreeSet::from([0]));
         assert_eq!(waits.round(&[1, 2]), [1, 2]);
+        let named = waits.named(|rover| format!("r{rover}"), &team);
+        assert_eq!(
+            named[0].to_string(),
+            "r1 at 2 waits for r2 at 3, which waits for r1"
+        );
+        assert_eq!(Waits::of(&map, WaitRule::Unknown, &team), Waits::default());
         // One that drives on frees all behind it.
         let mut team = team;
-        team[2].place = Place::Between(VertexId(3), VertexId(4), 0.5);
-        let waits = Waits::of(&map, &team);
+        team[2].place = Place::Between(VertexId(3), VertexId(4));
+        let waits = Waits::of(&map, WaitRule::ShortestPaths, &team);
         assert_eq!(waits.on, BTreeMap::from([(0, vec![1])]));
         assert!(waits.circles.is_empty() && waits.behind.is_empty());
+    }
+
+    #[test]
+    fn who_is_at_its_goal_waits_for_room_where_it_is_to_make_some() {
+        let (map, team) = (
+            line(3),
+            [standing(0, 0, 2), standing(1, 1, 1), standing(2, 2, 0)],
+        );
+        let circles = |rule| Waits::of(&map, rule, &team).circles;
+        assert_eq!(circles(WaitRule::AndRoom), [vec![0, 1, 2]]);
+        assert!(circles(WaitRule::ShortestPaths).is_empty());
     }
 
     proptest! {
