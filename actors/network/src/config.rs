@@ -2,16 +2,16 @@
 //! defaults. Every reading of the paper that its text leaves open is a key here. `[world]` and
 //! `[team]` are in `world`.
 
+mod auto;
 mod world;
 
 use farside::SimDuration;
 use serde::{Deserialize, Serialize};
 
-use super::processor::Processor;
-use super::timing;
+use crate::max_plus::processor::Processor;
 use farside_actors::units;
 
-pub use world::{RoadmapSource, TeamConfig, WorldConfig};
+pub use world::{Gaps, RoadmapSource, TeamConfig, WorldConfig};
 
 /// Who decides which rover asks for which vertex.
 #[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -82,14 +82,14 @@ pub struct NetworkConfig {
     pub policy: Policy,
     /// The length of a planning cycle: at most one move of each rover. `None`, which is `"auto"` in
     /// a scenario, is as long as its parts take over the slowest link, at least 1 s: see
-    /// [`super::Timing`]. The next three the same.
-    #[serde(with = "timing::auto")]
+    /// [`Timing`](crate::Timing). The next three the same.
+    #[serde(with = "auto")]
     pub cycle: Option<SimDuration>,
     /// How long each exchange of step 1, 3 and 5 may take, and the rovers' beacons before them.
-    #[serde(with = "timing::auto")]
+    #[serde(with = "auto")]
     pub exchange: Option<SimDuration>,
     /// The cycle's time for max-plus (the paper: 500 ms).
-    #[serde(with = "timing::auto")]
+    #[serde(with = "auto")]
     pub optimisation: Option<SimDuration>,
     /// The most iterations of max-plus in a cycle (the paper: 100).
     pub max_iterations: u32,
@@ -117,7 +117,7 @@ pub struct NetworkConfig {
     /// its crowding. With 0 what its own rovers are is all, which neighbours know anyway.
     pub congestion_spread: f64,
     /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
-    #[serde(with = "timing::auto")]
+    #[serde(with = "auto")]
     pub iteration_timeout: Option<SimDuration>,
     /// How long a rover takes along an edge, with `motion = "cycles"`.
     #[serde(with = "units::duration")]

@@ -86,50 +86,50 @@
 //! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
-mod assignment;
+mod baseline;
 mod builtin;
-mod candidates;
 pub mod cases;
 mod config;
+mod error;
+mod failover;
 mod gaps;
 mod ids;
-mod lng;
-mod loads;
 pub mod mapf;
 mod max_plus;
 pub mod messages;
 mod metrics;
+mod missions;
 mod monitor;
 mod motion;
 mod node;
 #[cfg(test)]
 mod open_tests;
-mod payoff;
 mod picture;
-mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
+mod scenario;
 mod scene;
-mod schedule;
+mod shared;
 mod system;
-mod takeover;
 #[cfg(test)]
 mod testing;
 mod timing;
 mod tracks;
 mod waits;
+mod world;
 
-pub use assemble::{Missions, Network, NetworkError, Parts, assemble, assemble_over, missions};
-pub use candidates::{CandidatePath, Destination, FirstStep};
+pub use assemble::{Missions, Network, Parts, assemble, assemble_over};
 pub use config::{
-    ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
-    WorldConfig,
+    ConfigError, Gaps, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage,
+    TeamConfig, WorldConfig,
 };
-pub use gaps::Gaps;
+pub use error::NetworkError;
+pub use max_plus::candidates::{CandidatePath, Destination, FirstStep};
+pub use max_plus::processor::Processor;
 pub use metrics::{Costs, Deadlock, NetworkMetrics};
+pub use missions::missions;
 pub use node::Node;
-pub use processor::Processor;
 pub use rover::Rover;
 pub use system::NetworkSystem;
 pub use timing::Timing;

@@ -11,12 +11,15 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside::{RunInfo, SimTime};
 use farside_worlds::{NodeId, VertexId};
 
-use super::assemble::Site;
 use super::config::Motion;
-use super::loads::Loads;
-use super::messages::{NodeState, RoverId, RoverState, TakenOver};
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use super::waits::{Standing, WaitRule, Waits};
+use crate::failover::messages::TakenOver;
+use crate::ids::RoverId;
+use crate::max_plus::loads::Loads;
+use crate::max_plus::messages::NodeState;
+use crate::safety::messages::RoverState;
+use crate::shared::Shared;
 use farside_actors::invariants::{Collisions, Place, WaitCycle};
 
 /// What the monitor keeps of a rover, beside where it is.
@@ -67,7 +70,7 @@ pub(crate) struct Score {
 }
 
 pub(crate) struct Monitor {
-    site: Arc<Site>,
+    site: Arc<Shared>,
     score: Arc<Mutex<Score>>,
     /// Who takes part, to tell rovers' samples by.
     rovers: Vec<Option<RoverId>>,
@@ -75,7 +78,7 @@ pub(crate) struct Monitor {
 
 impl Monitor {
     /// A monitor, and what it will write the score to.
-    pub(crate) fn new(site: Arc<Site>) -> (Monitor, Arc<Mutex<Score>>) {
+    pub(crate) fn new(site: Arc<Shared>) -> (Monitor, Arc<Mutex<Score>>) {
         let start = |(rover, &(entry, goal)): (RoverId, &(VertexId, VertexId))| {
             let remaining = match site.is_refused(rover) {
                 true => 0,
@@ -178,7 +181,7 @@ impl Score {
     }
 
     /// A rover's change.
-    fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
+    fn follow(&mut self, site: &Shared, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
         self.tracks[at].transmit_energy_j = state.transmit_energy_j;
         let old = self.collisions.place(at);
@@ -232,7 +235,7 @@ impl Score {
     }
 
     /// Looks back when a new cycle begins: why the run should end, if it should.
-    fn verdict(&mut self, site: &Site) -> Option<String> {
+    fn verdict(&mut self, site: &Shared) -> Option<String> {
         let sum: u32 = self.tracks.iter().map(|t| t.remaining).sum();
         if sum < self.nearest.0 {
             self.nearest = (sum, self.cycle);
@@ -267,7 +270,7 @@ impl Score {
     }
 
     /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
-    fn is_out(&self, site: &Site, rover: usize) -> bool {
+    fn is_out(&self, site: &Shared, rover: usize) -> bool {
         if site.is_refused(RoverId(rover as u32)) {
             return false;
         }
@@ -279,7 +282,7 @@ impl Score {
     }
 
     /// Who is still out, in a sentence.
-    fn remaining(&self, site: &Site) -> String {
+    fn remaining(&self, site: &Shared) -> String {
         let out = |rover: &usize| self.is_out(site, *rover);
         let out: Vec<usize> = (0..self.tracks.len()).filter(out).collect();
         let left = out.len();
@@ -296,7 +299,7 @@ impl Score {
     }
 
     /// The circles of rovers that wait for each other.
-    fn circles(&self, site: &Site) -> Vec<WaitCycle<VertexId>> {
+    fn circles(&self, site: &Shared) -> Vec<WaitCycle<VertexId>> {
         let standing = |(rover, &(_, goal)): (u32, &(VertexId, VertexId))| Standing {
             rover,
             place: self.collisions.place(rover as usize),
@@ -333,7 +336,7 @@ impl Score {
         arrived.count() as u32
     }
 
-    pub(crate) fn metrics(&self, site: &Site) -> NetworkMetrics {
+    pub(crate) fn metrics(&self, site: &Shared) -> NetworkMetrics {
         let mut metrics = NetworkMetrics {
             rovers: self.tracks.len() as u32,
             collisions: self.collisions(),

@@ -23,7 +23,7 @@ use thiserror::Error;
 pub(crate) use site::{Ground, Site};
 
 use crate::ids;
-use crate::system::NetworkScenario;
+use crate::scenario::NetworkScenario;
 use crate::tracks::{Sighting, Tracks, TracksError};
 use crate::waits::{Standing, Waits};
 pub(crate) use map::coordinated;

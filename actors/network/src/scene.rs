@@ -10,7 +10,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::Network;
-use crate::messages::RoverState;
+use crate::safety::messages::RoverState;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside::{RunInfo, SimDuration};
@@ -18,7 +18,7 @@ use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
 
 use crate::picture::colouring;
 use crate::picture::coordinated;
-use crate::system::crater;
+use crate::world::crater;
 
 /// The frame that everything is placed in.
 const MAP: &str = "map";

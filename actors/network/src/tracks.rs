@@ -9,7 +9,7 @@ use farside_actors::system::{PictureError, Recording};
 use farside_worlds::VertexId;
 use thiserror::Error;
 
-use crate::messages::RoverState;
+use crate::safety::messages::RoverState;
 use crate::waits::Standing;
 
 /// A rover's state from a time on.

@@ -133,7 +133,7 @@ fn a_run_and_its_pictures_name_the_same_circle() {
         "{first} waits for {}, which waits for {first_name}.",
         rest.join(", which waits for ")
     );
-    for more in [&[][..], &["--corridor", "auto"]] {
+    for more in [&[][..], &["corridor", "--along", "auto"]] {
         let picture = drawn(folder.path(), more);
         assert!(picture.contains(&named), "{named} is not in the picture");
     }

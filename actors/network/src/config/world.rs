@@ -9,7 +9,6 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::gaps::Gaps;
 use farside_actors::units;
 
 /// Where rovers drive: the roadmap and the sensor nodes over it.
@@ -76,6 +75,25 @@ impl Default for WorldConfig {
             ownership: Ownership::default(),
             placement_seed: None,
         }
+    }
+}
+
+/// What becomes of vertices at which no node reaches a rover.
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Gaps {
+    /// There must be none.
+    #[default]
+    Refuse,
+    /// They are closed: nothing leads there.
+    Close,
+    /// Rovers cross them out of everybody's hearing (the `complete` policy only).
+    Cross,
+}
+
+impl Gaps {
+    fn is_refuse(&self) -> bool {
+        *self == Gaps::Refuse
     }
 }
 

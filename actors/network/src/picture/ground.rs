@@ -9,8 +9,9 @@ use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
 use super::{Ground, Site};
 use crate::Policy;
-use crate::system::{NetworkScenario, crater, grid, ground, in_crater, is_grid, place};
+use crate::scenario::NetworkScenario;
 use crate::waits::WaitRule;
+use crate::world::{crater, grid, ground, in_crater, is_grid, place};
 
 /// The roadmap, the nodes and the ground, as they are for a run of the problem with this seed.
 pub(super) fn site(
