@@ -200,8 +200,12 @@ pub struct Carriage {
     pub retries: SimDuration,
     /// How often it was transmitted; 0 if it never left.
     pub attempts: u32,
-    /// What the transmissions took from the sender, in joules.
+    /// What the transmissions took from the sender, in joules. It is charged by
+    /// [`Verdicts::charge`]; this says so in the log.
     pub energy_j: f64,
+    /// What receiving takes from the receiver's host when the message arrives, in joules, charged
+    /// then. See [`crate::Context::host_receive_energy_j`].
+    pub receive_j: f64,
 }
 
 impl Carriage {
@@ -238,6 +242,9 @@ impl fmt::Display for Carriage {
         write!(f, "{} attempt{plural}", self.attempts)?;
         if self.energy_j != 0.0 {
             write!(f, ", {} J", self.energy_j)?;
+        }
+        if self.receive_j != 0.0 {
+            write!(f, ", {} J to receive", self.receive_j)?;
         }
         Ok(())
     }

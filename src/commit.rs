@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::carrier::Carriage;
 use crate::digest::Digest;
-use crate::engine::{Head, InFlight, Sink, hash_if_wanted};
+use crate::engine::{FirstSample, Head, InFlight, Sink, hash_if_wanted};
 use crate::fault::ObserverError;
 use crate::ids::EntityId;
 use crate::key::EventKey;
@@ -197,6 +197,9 @@ impl Sink for Committer {
         self.last = key;
     }
 
+    /// The one engine that commits here has compared it with all others.
+    fn first_sample(&mut self, _sample: FirstSample) {}
+
     fn paused(&self) -> bool {
         self.stop.is_some() || self.failure.is_some() || self.interrupt.load(Ordering::Relaxed)
     }
@@ -216,6 +219,7 @@ struct Kept {
 pub(crate) struct Batch {
     kept: Vec<Kept>,
     bytes: Vec<u8>,
+    pub(crate) first_samples: Vec<FirstSample>,
 }
 
 impl Batch {
@@ -323,6 +327,10 @@ impl Sink for Batch {
             carriage: None,
         };
         self.commit(&record, 0);
+    }
+
+    fn first_sample(&mut self, sample: FirstSample) {
+        self.first_samples.push(sample);
     }
 
     fn paused(&self) -> bool {

@@ -24,7 +24,7 @@ use crate::time::SimTime;
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
-pub(crate) use parts::Parts;
+pub(crate) use parts::{FirstSample, Parts, SampleNames};
 
 /// Where an engine commits what happened, in key order.
 pub(crate) trait Sink {
@@ -38,6 +38,8 @@ pub(crate) trait Sink {
         reason: &'static str,
         sends: u32,
     );
+    /// A type of samples was used for the first time in one engine, in the event just committed.
+    fn first_sample(&mut self, sample: FirstSample);
     /// True once the run must not go on without its driver having a look.
     fn paused(&self) -> bool;
 }
@@ -192,6 +194,9 @@ impl Engine {
         if key.step > self.parts.plan.step_limit {
             return Err(self.step_limit_fault(key, class, &head));
         }
+        if class == Class::Message && head.has_side {
+            self.charge_receiver(head.receiver, side);
+        }
         let record = match class {
             Class::Void => return Ok(()),
             Class::Start => RecordClass::Start,
@@ -209,7 +214,10 @@ impl Engine {
             Class::Charge => {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.plan.place(head.receiver).local as usize;
-                self.actors[local].state.charged_j += charge.map_or(0.0, |charge| charge.energy_j);
+                let charge_j = charge.map_or(0.0, |charge| charge.energy_j);
+                self.actors[local].state.charged_j += charge_j;
+                let host = self.parts.plan.place(head.receiver).host;
+                self.parts.energy(host).transmit_j += charge_j;
                 return Ok(());
             }
             Class::LateLoss => {
@@ -218,6 +226,17 @@ impl Engine {
             }
         };
         self.run_handler(class, record, key, &head, letter, sink)
+    }
+
+    /// Charges a host for receiving a message, which its radio does whether or not the actor is there
+    /// to take it.
+    fn charge_receiver(&mut self, receiver: EntityId, side: Option<Side>) {
+        let carriage = side.and_then(|side| side.carriage);
+        let charge_j = carriage.map_or(0.0, |carriage| carriage.receive_j);
+        if charge_j != 0.0 {
+            let host = self.parts.plan.place(receiver).host;
+            self.parts.energy(host).receive_j += charge_j;
+        }
     }
 
     fn cell(&self, actor: EntityId) -> &ActorCell {
@@ -269,8 +288,7 @@ impl Engine {
         let Some(cause) = result.err().or(kernels_own) else {
             unreachable!("called with a fault at hand");
         };
-        let kind = head.kind.map(|kind| self.parts.plan.kind(kind).name());
-        let message = kind.map(|kind| format!("{kind} from {}", self.parts.plan.name(head.sender)));
+        let message = head.message(&self.parts.plan);
         self.parts.note_unfinished(key, class, *head);
         let blamed = self.parts.carrying.unwrap_or(head.receiver);
         self.parts.fault_at(key, blamed, message, *cause)
@@ -421,7 +439,7 @@ impl Engine {
             sink.count_event(class, key, head, reason, parts.sends);
         }
         if !parts.effects.is_empty() {
-            parts.commit_effects(sink);
+            parts.commit_effects(head, sink);
         }
     }
 

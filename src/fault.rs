@@ -128,6 +128,16 @@ pub enum FaultCause {
         /// The last hops, as `sender -> receiver (kind)`.
         chain: Vec<String>,
     },
+    /// Two types of state samples share a name, which a log could not tell apart.
+    #[error("two types of state samples are called {name}: {first} and {second}")]
+    SampleNames {
+        /// The shared name.
+        name: String,
+        /// The Rust type that had it first.
+        first: String,
+        /// The other.
+        second: String,
+    },
     /// A message's value does not fit the schema traced from its type.
     #[error("cannot encode {kind}: {error}")]
     Encoding {

@@ -16,6 +16,7 @@ prop_compose! {
         holds_16 in 0u8..9,
         shared in any::<bool>(),
         controls in prop::collection::vec((any::<u8>(), 0u64..40, any::<bool>()), 0..6),
+        hosts_energy in any::<bool>(),
         tells in prop::collection::vec((any::<u8>(), 0u64..40, 0u8..4), 0..6),
         stop_after in prop_oneof![Just(0u32), 1u32..40],
         fail_after in prop_oneof![Just(0u32), 1u32..60],
@@ -23,7 +24,7 @@ prop_compose! {
     ) -> Chatter {
         Chatter {
             seed, tie_seed, hosts, min_delay_ns, jitter_ns, loss_16, copies_16, holds_16, shared,
-            controls, tells, stop_after, fail_after, until_ns,
+            controls, hosts_energy, tells, stop_after, fail_after, until_ns,
         }
     }
 }
@@ -106,6 +107,7 @@ fn without_the_min_delay_check_executors_disagree() {
         holds_16: 0,
         shared: false,
         controls: Vec::new(),
+        hosts_energy: false,
         tells: Vec::new(),
         stop_after: 0,
         fail_after: 0,

@@ -31,6 +31,7 @@ fn noisy() -> Chatter {
         holds_16: 4,
         shared: false,
         controls: Vec::new(),
+        hosts_energy: false,
         tells: Vec::new(),
         stop_after: 0,
         fail_after: 0,

@@ -10,4 +10,6 @@ mod network_complete;
 mod network_planning;
 mod network_safety;
 mod network_team;
+mod outside;
 mod scenarios;
+mod seams;

@@ -50,6 +50,7 @@
 //! | `retries` | | number | 0 | stop-and-wait repetitions |
 //! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
 //! | `tx_power` | | power | 0 | `tx_power 8 (L + overhead) / rate` of the sender's energy each attempt |
+//! | `rx_power` | | power | 0 | `rx_power 8 (L + overhead) / rate` of the receiving host's energy for what arrives; listening, and what does not arrive, costs nothing |
 //! | `radio` | | name | none | what the link goes through, see [`crate::radio`] |
 //! | `outage` | | bool | false | the link is out; reason `outage` |
 //!

@@ -10,6 +10,7 @@ mod metric;
 mod picture;
 mod section;
 mod series;
+pub mod settings;
 
 use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};

@@ -40,7 +40,8 @@
 //! assert_eq!(units::parse_duration("3h8min")?, SimDuration::from_secs(188 * 60));
 //! assert_eq!(units::parse_length_m("1.5km")?, 1500.0);
 //! let error = units::parse_duration("250 parsecs").unwrap_err();
-//! assert!(error.to_string().starts_with("\"250 parsecs\": expected a duration such as \"250ms\""));
+//! let expected = "\"250 parsecs\": expected a duration such as \"250ms\"";
+//! assert!(error.to_string().starts_with(expected));
 //! # Ok::<(), farside_actors::units::UnitError>(())
 //! ```
 
@@ -127,8 +128,8 @@ pub enum UnitError {
 /// Reads a duration: `"250ms"`, `"2.6s"`, `"1.5sol"`, or in several units, from the largest to the
 /// smallest: `"3h8min"`, `"1d 2h 0.5s"`. Only the last number may have a fraction.
 ///
-/// A sol is the mean solar day of Mars, 24 h 39 min 35.244 s (Allison and McEwen, *A post-Pathfinder
-/// evaluation of areocentric solar coordinates*, 2000).
+/// A sol is the mean solar day of Mars, 24 h 39 min 35.244 s (Allison and McEwen, *A
+/// post-Pathfinder evaluation of areocentric solar coordinates*, 2000).
 ///
 /// ```
 /// use farside::SimDuration;

@@ -8,7 +8,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, builtin, check, diff, draw, info, recover, report, reproduce, run, study, verify,
+    CommandError, Exit, builtin, check, diff, draw, explain, info, recover, report, reproduce, run,
+    study, verify,
 };
 use crate::registry::Registry;
 
@@ -51,6 +52,8 @@ enum Command {
     Check(check::Args),
     /// List the scenarios that are built in
     Scenarios(builtin::Args),
+    /// Say what a key of scenarios or a metric is, or list them all
+    Explain(explain::Args),
     /// Say what is in a log
     Info(info::Args),
     /// Run a log's scenario again and compare every message
@@ -74,21 +77,6 @@ enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
-}
-
-/// How a command ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Exit {
-    Done = 0,
-    Different = 1,
-    Wrong = 2,
-    Failed = 3,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        ExitCode::from(exit as u8)
-    }
 }
 
 /// The command line of a binary that knows these systems.
@@ -121,6 +109,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Run(args) => run::run(&args, registry),
         Command::Check(args) => check::run(&args, registry),
         Command::Scenarios(args) => builtin::scenarios(&args, registry),
+        Command::Explain(args) => explain::run(&args, registry),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args),

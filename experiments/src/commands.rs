@@ -4,6 +4,7 @@ pub(crate) mod builtin;
 pub(crate) mod check;
 pub(crate) mod diff;
 pub(crate) mod draw;
+pub(crate) mod explain;
 pub(crate) mod info;
 mod interrupt;
 mod progress;
@@ -18,17 +19,30 @@ pub(crate) mod verify;
 use std::io::Write;
 use std::path::PathBuf;
 
+use std::process::ExitCode;
+
 use farside::BuildError;
 use farside_logs::LogError;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::cli::Exit;
 use crate::scenario::ScenarioError;
 use crate::study::{StoreError, StudyError};
 
-/// The version that logs are stamped with.
-pub(crate) const CODE_VERSION: &str = env!("CARGO_PKG_VERSION");
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Exit {
+    Done = 0,
+    Different = 1,
+    Wrong = 2,
+    Failed = 3,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        ExitCode::from(exit as u8)
+    }
+}
 
 /// Why a command could not do its work.
 #[derive(Debug, Error)]

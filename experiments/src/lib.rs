@@ -24,4 +24,5 @@ pub mod report;
 pub mod scenario;
 pub mod stats;
 pub mod study;
+mod version;
 mod wall;

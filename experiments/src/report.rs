@@ -1,7 +1,8 @@
 //! Reports: what a study found, for people and for programs.
 //!
 //! [`build`] makes of a study's results a page that needs nothing but itself, its figures one by
-//! one, and tables for programs. It reads no clock and draws no chance: the same results give the same bytes.
+//! one, and tables for programs. It reads no clock and draws no chance: the same results give the
+//! same bytes.
 
 pub mod csv;
 mod layout;
@@ -32,7 +33,8 @@ pub struct Report {
     pub results_csv: String,
     /// One row for each cell and metric, see [`csv::summary_csv`].
     pub summary_csv: String,
-    /// One row for each cell, curve and index, see [`csv::series_csv`]; none if there are no curves.
+    /// One row for each cell, curve and index, see [`csv::series_csv`]; none if there are no
+    /// curves.
     pub series_csv: Option<String>,
     /// One row for each published figure, see [`csv::published_csv`]; none if none is known.
     pub published_csv: Option<String>,

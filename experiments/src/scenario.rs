@@ -4,9 +4,12 @@
 //! has of its own are read by the system ([`farside_actors::system::System`]). A mistake is one message
 //! with its place, what was found, what was expected and the nearest valid name.
 
+mod blame;
 pub mod contacts;
 mod crash;
 mod error;
+mod place;
+mod reference;
 mod seeds;
 mod source;
 
@@ -18,11 +21,12 @@ use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
 use farside_actors::radio::RadioConfig;
+use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Files, PictureError, PictureRequest, Recording, Seeds, Settings, Setup, SetupError,
     System, no_file,
 };
-use farside_actors::units;
+use farside_actors::{settings, units};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -32,77 +36,48 @@ use crate::registry::Registry;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
-pub use source::Place;
+pub use place::Place;
+pub use reference::shared_sections;
 pub(crate) use source::Source;
 
 /// The most bytes of a scenario or study that are read.
 const MAX_BYTES: u64 = 4 << 20;
 
-/// The keys that every system shares.
-const SHARED_KEYS: [&str; 13] = [
-    "system",
-    "description",
-    "seed",
-    "problem_seed",
-    "tie_seed",
-    "until",
-    "contacts",
-    "links",
-    "radios",
-    "places",
-    "degrade",
-    "crash",
-    "log",
-];
-
-/// What every scenario has, whatever its system.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shared {
-    /// The name of the system that runs.
-    pub system: String,
-    /// One line about the scenario.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub description: String,
-    /// The run's seed. TOML's integers are signed, so it has 63 bits.
-    #[serde(default)]
-    pub seed: u64,
-    /// What the problem is drawn from, where several runs are to share one: the world, the team, the
-    /// goals, as the system says. The run's seed unless given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub problem_seed: Option<u64>,
-    /// Shuffles what happens at one instant, to see whether a result hangs on its order. Without,
-    /// the order is that of the actors' names.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tie_seed: Option<u64>,
-    /// When the run stops, if the system does not stop it sooner.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub until: Option<SimDuration>,
-    /// A contact plan that says when the links of its hosts are there.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub contacts: Option<ContactsConfig>,
-    /// The parameters of the links.
-    #[serde(default)]
-    pub links: LinksConfig,
-    /// The radios that links may go through, by name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub radios: BTreeMap<String, RadioConfig>,
-    /// Where hosts stand at first, where the system does not say: x east, y north, z up.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub places: BTreeMap<String, [Coordinate; 3]>,
-    /// When links are worse.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub degrade: Vec<Degrade>,
-    /// When actors crash.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub crash: Vec<Crash>,
-    /// What the log holds.
-    #[serde(default)]
-    pub log: LogSettings,
+settings! {
+    /// What every scenario has, whatever its system.
+    pub struct Shared {
+        /// The name of the system that runs.
+        pub system: String;
+        /// One line about the scenario.
+        pub description: String [skip_serializing_if = "String::is_empty"];
+        /// The run's seed. TOML's integers are signed, so it has 63 bits.
+        pub seed: u64;
+        /// What the problem is drawn from, where several runs are to share one: the world, the team,
+        /// the goals, as the system says. The run's seed unless given.
+        pub problem_seed: Option<u64> [skip_serializing_if = "Option::is_none"];
+        /// Shuffles what happens at one instant, to see whether a result hangs on its order.
+        /// Without, the order is that of the actors' names.
+        pub tie_seed: Option<u64> [skip_serializing_if = "Option::is_none"];
+        /// When the run stops, if the system does not stop it sooner.
+        pub until: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// A contact plan that says when the links of its hosts are there.
+        pub contacts: Option<ContactsConfig> [skip_serializing_if = "Option::is_none"];
+        /// The parameters of the links: `[links.default]`, and a table for each pattern over links'
+        /// names, which are `{from}-{to}`.
+        pub links: LinksConfig;
+        /// The radios that links may go through, by name.
+        pub radios: BTreeMap<String, RadioConfig> [skip_serializing_if = "BTreeMap::is_empty"];
+        /// Where hosts stand at first, where the system does not say: x east, y north, z up.
+        pub places: BTreeMap<String, [Coordinate; 3]>
+            [skip_serializing_if = "BTreeMap::is_empty"];
+        /// When links are worse.
+        pub degrade: Vec<Degrade> [skip_serializing_if = "Vec::is_empty"];
+        /// When actors crash.
+        pub crash: Vec<Crash> [skip_serializing_if = "Vec::is_empty"];
+        /// What the log holds.
+        pub log: LogSettings;
+    }
 }
 
 /// A coordinate as scenarios write it, in metres: a length that may be negative.
@@ -128,22 +103,13 @@ impl From<Coordinate> for String {
     }
 }
 
-/// The `[log]` table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogSettings {
-    /// Topics that are not written, as globs; `*` does not match `/`, `**` does.
-    pub exclude: Vec<String>,
-    /// Whether the log holds what viewers draw: `/tf`, `/scene`, `/poses/...`, `/log`.
-    pub viewer: bool,
-}
-
-impl Default for LogSettings {
-    fn default() -> Self {
-        LogSettings {
-            exclude: Vec::new(),
-            viewer: true,
-        }
+settings! {
+    /// The `[log]` table.
+    pub struct LogSettings {
+        /// Topics that are not written, as globs; `*` does not match `/`, `**` does.
+        pub exclude: Vec<String>;
+        /// Whether the log holds what viewers draw: `/tf`, `/scene`, `/poses/...`, `/log`.
+        pub viewer: bool = true;
     }
 }
 
@@ -433,7 +399,7 @@ impl Scenario {
 
     fn check_crashes(&self) -> Result<(), ScenarioError> {
         for (index, crash) in self.shared.crash.iter().enumerate() {
-            let checked = crash.check(self.shared.until);
+            let checked = crash.check_alone(self.shared.until);
             checked.map_err(|mistake| self.crash_error(index, mistake))?;
         }
         Ok(())
@@ -550,18 +516,20 @@ type Parts<'i> = (Spanned<DeTable<'i>>, Spanned<DeTable<'i>>);
 fn part<'i>(
     source: &Source,
     document: Spanned<DeTable<'i>>,
-    sections: &[&str],
+    sections: &[String],
 ) -> Result<Parts<'i>, ScenarioError> {
     let span = document.span();
+    let shared_keys = &Shared::sections("")[0].keys;
     let (mut shared, mut own) = (DeTable::new(), DeTable::new());
     for (key, value) in document.into_inner() {
         let name = key.get_ref().as_ref();
-        if SHARED_KEYS.contains(&name) {
+        if shared_keys.iter().any(|key| key.name == name) {
             shared.insert(key, value);
-        } else if sections.contains(&name) {
+        } else if sections.iter().any(|section| section == name) {
             own.insert(key, value);
         } else {
-            let known = || SHARED_KEYS.iter().chain(sections).copied();
+            let own = || sections.iter().map(String::as_str);
+            let known = || shared_keys.iter().map(|key| key.name).chain(own());
             return Err(ScenarioError::UnknownKey {
                 place: source.place(key.span().start),
                 found: name.to_owned(),
@@ -575,11 +543,12 @@ fn part<'i>(
 }
 
 /// The top-level tables that a system reads.
-fn roots(system: &dyn System) -> Vec<&'static str> {
+fn roots(system: &dyn System) -> Vec<String> {
     let mut roots = Vec::new();
     for section in system.sections() {
-        if !roots.contains(&section.root()) {
-            roots.push(section.root());
+        let root = section.root().to_owned();
+        if !roots.contains(&root) {
+            roots.push(root);
         }
     }
     roots

@@ -37,6 +37,45 @@
 //! ]
 //! ```
 //!
+//! # Blocks
+//!
+//! Seeds may share a problem: `seeds = 30` and `block = 5` give six problems of five runs each.
+//! Seeds 1 to 5 have the world, the team and the goals of `problem_seed`
+//! 1, seeds 6 to 10 those of 6, and so on; what else happens by chance is each run's own.
+//! Bootstraps and paired tests then draw problems and not runs, as five runs on one problem do not
+//! say what five problems do. A log's scenario holds the `problem_seed`, so that it can be verified
+//! by itself.
+//!
+//! # Ties
+//!
+//! `tie_seed` is a key of scenarios: it shuffles what happens at one instant. As a factor it tells
+//! whether a result hangs on that order. `values` gives some seeds; a variant that sets nothing is
+//! the order of the actors' names.
+//!
+//! ```toml
+//! [[factor]]
+//! name = "ties"
+//! key = "tie_seed"
+//! values = [1, 2, 3]
+//! ```
+//!
+//! # Curves
+//!
+//! A metric may be a curve over an index, as a reward over the steps of an optimiser: a
+//! [`Series`](crate::system::Series). What the index is, is declared once, by the system
+//! ([`System::series`](crate::system::System::series)); a study may say it differently.
+//!
+//! ```toml
+//! metrics = [
+//!     "reward",
+//!     { name = "coverage", index = { label = "time", unit = "s", lengths_differ = true } },
+//! ]
+//! ```
+//!
+//! All runs of a cell have the same indices, unless `lengths_differ` says that some may end
+//! earlier. The report shows each cell's mean with its band, the paired difference to the baseline
+//! at each index, and from which index on it holds to the last.
+//!
 //! # Published figures
 //!
 //! A `[[published]]` table has figures of others for one metric. The report sets them beside ours.
@@ -59,10 +98,28 @@
 //! ```
 //!
 //! Each of `values` names levels of factors, and is for every cell that has them all; a factor that
-//! it does not name may have any. Its claim is one of `value`, `about`, `below`, `above` (a number in
-//! `unit`), or `linear`, the name of a factor along which the metric should grow linearly. Two
-//! figures of a table for one cell are refused. Results are kept when these tables change: a note on
-//! why ours differ may be written when the runs are done.
+//! it does not name may have any. Its claim is one of `value`, `about`, `below`, `above` (a number
+//! in `unit`), `linear`, the name of a factor along which the metric should grow linearly, or
+//! `exceeds`. Two figures of a table for one cell are refused.
+//!
+//! `exceeds` has the levels in which another cell differs, and claims that there the metric, a
+//! number, a rate or a curve, is less. The claim is judged by the interval of the difference over
+//! the same seeds: it holds, does not hold, or is undecided.
+//!
+//! ```toml
+//! values = [
+//!     { planner = "search", exceeds = { planner = "greedy" }, from_index = 15 },
+//!     { planner = "search", exceeds = { planner = "random" }, by_at_least = 1, by_at_most = 3 },
+//!     { planner = "search", exceeds = { planner = "oracle" }, equal_within = 0.05 },
+//! ]
+//! ```
+//!
+//! `from_index` is for curves: the claim is then for each index from there on, else for all.
+//! `by_at_least` and `by_at_most` bound the difference, in `unit`; `equal_within` says that it is
+//! 0, as nearly as that.
+//!
+//! Results are kept when these tables change: a note on why ours differ may be written when the
+//! runs are done.
 
 mod blocks;
 mod design;
@@ -86,6 +143,7 @@ pub mod summary;
 
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
+pub(crate) use metrics::KERNEL as KERNEL_METRICS;
 pub use plan::{Plan, Study};
 pub use runner::{Ended, Progress, RunOptions, run};
 pub use store::Shard;

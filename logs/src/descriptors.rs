@@ -115,6 +115,7 @@ fn carriage() -> DescriptorProto {
             field("retries_ns", 5, Type::Uint64),
             field("attempts", 6, Type::Uint32),
             field("energy_j", 7, Type::Double),
+            field("receive_j", 8, Type::Double),
         ],
         ..Default::default()
     }

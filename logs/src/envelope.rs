@@ -187,7 +187,7 @@ pub(crate) fn put_key(out: &mut Vec<u8>, number: u32, key: &EventKey, source: &s
 
 /// Appends how a link carried a message, as a message field.
 fn put_carriage(out: &mut Vec<u8>, carriage: &Carriage) {
-    // Seven fields of at most eleven bytes: the length always fits one byte.
+    // Eight fields of at most eleven bytes: the length always fits one byte.
     let at = out.len();
     put_varint(out, u64::from(field::CARRIAGE) << 3 | 2);
     let length_at = out.len();
@@ -199,6 +199,7 @@ fn put_carriage(out: &mut Vec<u8>, carriage: &Carriage) {
     put_number(out, 5, carriage.retries.as_nanos());
     put_number(out, 6, u64::from(carriage.attempts));
     put_double(out, 7, carriage.energy_j);
+    put_double(out, 8, carriage.receive_j);
     let length = out.len() - length_at - 1;
     debug_assert!(length < 0x80 && at < length_at);
     out[length_at] = length as u8;
@@ -217,6 +218,7 @@ fn read_carriage(message: &[u8]) -> Option<Carriage> {
             5 => carriage.retries = nanos()?,
             6 => carriage.attempts = u32::try_from(value.number()?).ok()?,
             7 => carriage.energy_j = value.double()?,
+            8 => carriage.receive_j = value.double()?,
             _ => {}
         }
     }

@@ -37,8 +37,9 @@
 //! `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`), `sent_ns`,
 //! `cause`, `match_key`, `body`, and `carriage`: how the link carried the message, its delay in parts
 //! (`queue_ns`, `serialization_ns`, `propagation_ns`, `jitter_ns`, `retries_ns`), the `attempts` it
-//! took and the `energy_j` they cost; that explains a fate and is never compared. What has no body is a `farside.log.Event`. State samples are
-//! their own type, without an envelope.
+//! took, the `energy_j` they cost and the `receive_j` that receiving took; that explains a fate and is
+//! never compared. What has no body is a `farside.log.Event`. State samples are their own type, without
+//! an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
 //! skip the roles that they do not know. What is drawn ([`farside::scene::Scene`]) is derived from the records, in

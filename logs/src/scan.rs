@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use mcap::records::{MessageHeader, op};
+use prost::Message;
+use prost_reflect::prost_types::FileDescriptorSet;
 use prost_reflect::{DescriptorPool, MessageDescriptor};
 
 use crate::LogError;
@@ -34,7 +36,14 @@ impl SchemaInfo {
             if self.encoding != "protobuf" {
                 return None;
             }
-            let pool = DescriptorPool::decode(self.data.as_slice()).ok()?;
+            let set = FileDescriptorSet::decode(self.data.as_slice()).ok()?;
+            // prost-reflect 0.16 panics on a syntax that it does not know, such as `editions`.
+            let is_known =
+                |syntax: Option<&str>| matches!(syntax, None | Some("proto2" | "proto3"));
+            if !set.file.iter().all(|file| is_known(file.syntax.as_deref())) {
+                return None;
+            }
+            let pool = DescriptorPool::from_file_descriptor_set(set).ok()?;
             pool.get_message_by_name(&self.name)
         };
         self.descriptor.get_or_init(decode).as_ref()

@@ -197,6 +197,96 @@ impl<'a, A: Actor> Context<'a, A> {
         self.state.charged_j
     }
 
+    /// What links have charged all actors of this host so far for transmitting, in joules: so that
+    /// the actor that keeps the battery sees what the planner beside it sent. It outlives crashes.
+    ///
+    /// A link of this host's own charges as the message is sent; a shared link, one
+    /// [`Carrier::min_delay`](crate::Carrier::min_delay) after each transmission.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use farside::carrier::{Carriage, NoChange};
+    /// use farside::{Carrier, Parcel, Verdicts};
+    /// # use serde::{Deserialize, Serialize};
+    ///
+    /// /// Takes 2 J from the sender, and 0.5 J from the receiver.
+    /// struct Radio;
+    /// impl Carrier for Radio {
+    ///     type Change = NoChange;
+    ///     fn min_delay(&self) -> SimDuration { SimDuration::from_millis(10) }
+    ///     fn carry(&mut self, _parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+    ///         let carriage = Carriage {
+    ///             propagation: self.min_delay(),
+    ///             attempts: 1,
+    ///             energy_j: 2.0,
+    ///             receive_j: 0.5,
+    ///             ..Carriage::default()
+    ///         };
+    ///         verdicts.deliver_as(self.min_delay(), carriage);
+    ///         verdicts.charge(2.0);
+    ///     }
+    ///     fn change(&mut self, _change: NoChange, _now: SimTime) {}
+    /// }
+    /// # #[derive(Serialize, Deserialize)] struct Plan;
+    /// # #[derive(Serialize, Deserialize)] struct Minute;
+    ///
+    /// struct Planner;
+    /// impl Actor for Planner {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         let base = ctx.recipient::<Plan>("base")?;
+    ///         ctx.send(base, Plan);
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// struct Battery;
+    /// impl Actor for Battery {
+    ///     type Accepts = (Minute,);
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         ctx.timer(SimDuration::from_secs(60), Minute);
+    ///         Ok(())
+    ///     }
+    /// }
+    /// impl Handler<Minute> for Battery {
+    ///     fn handle(&mut self, _: Minute, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         // The planner sent it, from this host.
+    ///         assert_eq!((ctx.transmit_energy_j(), ctx.host_transmit_energy_j()), (0.0, 2.0));
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// struct Base;
+    /// impl Actor for Base { type Accepts = (Plan,); }
+    /// impl Handler<Plan> for Base {
+    ///     fn handle(&mut self, _: Plan, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         assert_eq!(ctx.host_receive_energy_j(), 0.5);
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// let mut sim = Simulation::new(1);
+    /// let (rover, base) = (sim.host("rover_01"), sim.host("base"));
+    /// sim.actor(rover, "rover_01/planner", |_| Planner);
+    /// sim.actor(rover, "rover_01/battery", |_| Battery);
+    /// sim.actor(base, "base", |_| Base);
+    /// sim.link(rover, base, "rover_01-base", Radio);
+    /// assert_eq!(sim.run(Executor::Inline).unwrap().end.name(), "completed");
+    /// ```
+    pub fn host_transmit_energy_j(&self) -> f64 {
+        let host = self.parts.plan.place(self.me).host;
+        self.parts.energy_so_far(host).transmit_j
+    }
+
+    /// What receiving has taken from this host so far, in joules: [`Carriage::receive_j`] of all
+    /// that arrived for its actors, charged when it arrives, crashed or not. It outlives crashes.
+    ///
+    /// [`Carriage::receive_j`]: crate::Carriage::receive_j
+    pub fn host_receive_energy_j(&self) -> f64 {
+        let host = self.parts.plan.place(self.me).host;
+        self.parts.energy_so_far(host).receive_j
+    }
+
     /// This actor's random stream for `purpose`, derived from (run seed, actor, purpose,
     /// incarnation). It goes on where it was left.
     pub fn random(&mut self, purpose: &'static str) -> &mut Stream {
@@ -245,9 +335,13 @@ impl<'a, A: Actor> Context<'a, A> {
 
     /// Records a sample of this actor's state, for logs, monitors and viewers. Samples are no part
     /// of the digest, and cost next to nothing if nobody watches.
+    ///
+    /// Logs know a sample by the serde name of its type. A second type of the same name is a fault,
+    /// [`FaultCause::SampleNames`], watched or not.
     pub fn sample<S: Message>(&mut self, sample: &S) {
+        let at = self.parts.sample_type::<S>(self.me);
         if self.samples_wanted() {
-            self.parts.add_sample(self.me, sample);
+            self.parts.add_sample(self.me, at, sample);
         }
     }
 

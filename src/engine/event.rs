@@ -98,6 +98,12 @@ impl Head {
         self.cause.map_or(key.time, |cause| cause.time)
     }
 
+    /// The message being handled and who sent it, as faults name them.
+    pub(crate) fn message(&self, plan: &Plan) -> Option<String> {
+        let kind = plan.kind(self.kind?).name();
+        Some(format!("{kind} from {}", plan.name(self.sender)))
+    }
+
     /// The event that scheduled the next hop: the cause, the hand-over to a shared link, or the
     /// link's last look at a message that it held.
     pub(crate) fn scheduled_by(&self, plan: &Plan, side: Option<&Side>) -> Option<EventKey> {

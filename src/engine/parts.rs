@@ -2,6 +2,7 @@
 //! what the event in hand has done so far.
 
 mod carrying;
+mod sampling;
 
 use std::any::TypeId;
 use std::ops::Range;
@@ -10,17 +11,17 @@ use std::sync::Arc;
 use super::store::Store;
 use super::{
     CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sealed, Side, Sink,
-    hash_if_wanted,
 };
 use crate::carrier::{SealedChange, Verdicts};
 use crate::fault::{Fault, FaultCause};
-use crate::ids::{EntityId, KindIndex, TimerId};
+use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
-use crate::payload::Message;
 use crate::plan::{Kind, Plan, Reason};
 use crate::queue::{Entry, Queue};
-use crate::record::RecordClass;
 use crate::time::{SimDuration, SimTime};
+
+use sampling::SampleType;
+pub(crate) use sampling::{FirstSample, SampleNames};
 
 /// What happened in the event in hand besides the event: committed right after it.
 pub(crate) enum Effect {
@@ -34,6 +35,15 @@ pub(crate) enum Effect {
         kind: Arc<Kind>,
         body: Range<usize>,
     },
+    /// A type of samples was used for the first time.
+    FirstSample(Box<FirstSample>),
+}
+
+/// What links have charged the actors of one host, in joules.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct HostEnergy {
+    pub(crate) transmit_j: f64,
+    pub(crate) receive_j: f64,
 }
 
 /// The mutable part of an engine, apart from its actors.
@@ -53,6 +63,10 @@ pub(crate) struct Parts {
     pub(crate) effects: Vec<Effect>,
     effect_bytes: Vec<u8>,
     verdicts: Verdicts,
+    /// The types of samples met so far.
+    sample_types: Vec<SampleType>,
+    /// By host, as far as hosts of this engine were charged anything.
+    energies: Vec<HostEnergy>,
     pub(crate) sends: u32,
     /// Boxed: it is looked at after every event, and nearly always empty.
     pub(crate) fault: Option<Box<FaultCause>>,
@@ -81,6 +95,8 @@ impl Parts {
             effects: Vec::new(),
             effect_bytes: Vec::new(),
             verdicts: Verdicts::default(),
+            sample_types: Vec::new(),
+            energies: Vec::new(),
             sends: 0,
             fault: None,
             carrying: None,
@@ -215,7 +231,11 @@ impl Parts {
                 let engine = self.plan.place(link).engine;
                 self.schedule(engine, key, Class::HandOver, head, Some(letter));
             } else {
-                state.charged_j += self.carry(link, head, letter, None);
+                let charge_j = self.carry(link, head, letter, None);
+                if charge_j != 0.0 {
+                    state.charged_j += charge_j;
+                    self.energy(from.host).transmit_j += charge_j;
+                }
             }
         } else {
             self.raise(FaultCause::NoRoute {
@@ -225,6 +245,24 @@ impl Parts {
                 kind: self.plan.kind(kind).name().to_owned(),
             });
         }
+    }
+
+    /// What links have charged this host, to be charged more. It outlives crashes, as spent energy
+    /// does.
+    pub(crate) fn energy(&mut self, host: HostIndex) -> &mut HostEnergy {
+        let at = host as usize;
+        if self.energies.len() <= at {
+            self.energies.resize(at + 1, HostEnergy::default());
+        }
+        &mut self.energies[at]
+    }
+
+    /// What links have charged this host so far.
+    pub(crate) fn energy_so_far(&self, host: HostIndex) -> HostEnergy {
+        self.energies
+            .get(host as usize)
+            .copied()
+            .unwrap_or_default()
     }
 
     /// The key that `source` gives an event `delay` from now.
@@ -277,51 +315,6 @@ impl Parts {
                 pending,
             });
         }
-    }
-
-    pub(crate) fn add_sample<S: Message>(&mut self, entity: EntityId, sample: &S) {
-        let start = self.effect_bytes.len();
-        let kind = self.plan.sample_kind::<S>().and_then(|kind| {
-            let encoded = kind.schema().encode(sample, &mut self.effect_bytes);
-            encoded.map(|()| kind).map_err(|error| error.to_string())
-        });
-        match kind {
-            Ok(kind) => {
-                let body = start..self.effect_bytes.len();
-                self.effects.push(Effect::Sample { entity, kind, body });
-            }
-            // A run must not depend on whether it is watched, so a sample that cannot be written
-            // is no fault.
-            Err(error) => {
-                self.effect_bytes.truncate(start);
-                tracing::warn!(actor = self.plan.name(entity), %error, "state sample dropped");
-            }
-        }
-    }
-
-    pub(crate) fn commit_effects(&mut self, sink: &mut impl Sink) {
-        for effect in self.effects.drain(..) {
-            match effect {
-                Effect::Lost { head, body, side } => {
-                    let body = &self.effect_bytes[body];
-                    let side = side.as_deref();
-                    let record = head.record(&self.plan, RecordClass::Lost, self.key, body, side);
-                    sink.commit(&record, hash_if_wanted(&self.plan, &record));
-                }
-                Effect::Sample { entity, kind, body } => {
-                    let head = Head {
-                        cause: Some(self.key),
-                        ..Head::of_entity(entity)
-                    };
-                    let body = &self.effect_bytes[body];
-                    let class = RecordClass::Sample;
-                    let mut record = head.record(&self.plan, class, self.key, body, None);
-                    record.kind = Some(&kind);
-                    sink.commit(&record, 0);
-                }
-            }
-        }
-        self.effect_bytes.clear();
     }
 
     pub(crate) fn set_timer(

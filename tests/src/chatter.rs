@@ -31,6 +31,8 @@ pub struct Chatter {
     pub shared: bool,
     /// Crash and restart events: actor, time (ns), and whether it is a restart.
     pub controls: Vec<(u8, u64, bool)>,
+    /// Links charge receivers, and what a host was charged is part of what its actors say.
+    pub hosts_energy: bool,
     /// Who is told something, when (ns), and how many hops it makes from there.
     pub tells: Vec<(u8, u64, u8)>,
     /// After how many messages handled by one actor it asks to stop; 0 for never.
@@ -69,6 +71,7 @@ pub struct NewLoss {
 struct Talker {
     names: Arc<Vec<(String, usize)>>,
     host: usize,
+    hosts_energy: bool,
     handled: u32,
     stop_after: u32,
     fail_after: u32,
@@ -89,6 +92,18 @@ impl Actor for Talker {
 }
 
 impl Talker {
+    fn energies(&self, name: &str, ctx: &Context<'_, Self>) -> String {
+        let own_j = ctx.transmit_energy_j();
+        match self.hosts_energy {
+            false => format!("{name} {own_j}"),
+            true => {
+                let (sent_j, received_j) =
+                    (ctx.host_transmit_energy_j(), ctx.host_receive_energy_j());
+                format!("{name} {own_j} {sent_j} {received_j}")
+            }
+        }
+    }
+
     fn talk(&mut self, ctx: &mut Context<'_, Self>, hops: u32) -> Outcome {
         if hops == 0 {
             return Ok(());
@@ -100,9 +115,7 @@ impl Talker {
             let chat = Chat {
                 hops: hops - 1,
                 // What links charge is part of what happens.
-                note: hops
-                    .is_multiple_of(2)
-                    .then(|| format!("{name} {}", ctx.transmit_energy_j())),
+                note: hops.is_multiple_of(2).then(|| self.energies(name, ctx)),
             };
             match ctx.random("how").below(3) {
                 0 => ctx.send_keyed(to, MatchKey::new(hops, self.handled), chat),
@@ -170,6 +183,7 @@ struct Noisy {
     copies_16: u8,
     holds_16: u8,
     undercut: bool,
+    receive_j: f64,
 }
 
 impl Carrier for Noisy {
@@ -204,6 +218,8 @@ impl Carrier for Noisy {
                 queue: parcel.now().since(parcel.sent()),
                 propagation: delay,
                 attempts: round + 1,
+                energy_j: 0.25,
+                receive_j: self.receive_j,
                 ..Carriage::default()
             };
             if draws.uniform() >= one_in_16(self.loss_16) {
@@ -250,9 +266,11 @@ impl Chatter {
         for (name, host) in names.iter() {
             let (names, host) = (names.clone(), *host);
             let (stop_after, fail_after) = (self.stop_after, self.fail_after);
+            let hosts_energy = self.hosts_energy;
             addresses.push(sim.actor(hosts[host], name, move |_| Talker {
                 names: names.clone(),
                 host,
+                hosts_energy,
                 handled: 0,
                 stop_after,
                 fail_after,
@@ -291,6 +309,7 @@ impl Chatter {
             copies_16: self.copies_16,
             holds_16: self.holds_16,
             undercut,
+            receive_j: if self.hosts_energy { 0.125 } else { 0.0 },
         };
         let medium = self.shared.then(|| sim.shared_link("medium", noisy()));
         for (a, from) in hosts.iter().enumerate() {

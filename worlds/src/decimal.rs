@@ -285,8 +285,8 @@ mod tests {
     /// A product that would not fit 128 bits, of which the quotient does.
     #[test]
     fn factors_are_exact() {
-        let half_a_tebibyte: Decimal = "0.000000000931322574615478515625".parse().unwrap();
-        assert_eq!(half_a_tebibyte.whole(1 << 30, 0), Ok(1));
+        let a_byte_in_gibibytes: Decimal = "0.000000000931322574615478515625".parse().unwrap();
+        assert_eq!(a_byte_in_gibibytes.whole(1 << 30, 0), Ok(1));
         let digits = "0.00000000000000000000000000000000000001".parse::<Decimal>();
         assert_eq!(digits.unwrap().whole(10_u64.pow(19), 19), Ok(1));
     }
@@ -334,7 +334,8 @@ mod tests {
         #[test]
         fn a_float_is_read_as_the_standard_library_does(value: f64) {
             let decimal = format!("{value:e}").parse::<Decimal>();
-            prop_assert_eq!(decimal.ok().and_then(|d| d.nearest(1, 0)), Some(value).filter(|v| v.is_finite()));
+            let nearest = decimal.ok().and_then(|decimal| decimal.nearest(1, 0));
+            prop_assert_eq!(nearest, value.is_finite().then_some(value));
         }
 
         #[test]

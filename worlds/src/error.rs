@@ -1,7 +1,6 @@
 //! What can be wrong with a world that a user described, with what was expected and what was found.
 
-use crate::roadmap::VertexId;
-use crate::sensors::NodeId;
+use crate::ids::{NodeId, VertexId};
 
 /// Why a world cannot be read or built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

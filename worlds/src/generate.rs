@@ -15,7 +15,8 @@ use nalgebra::Point2;
 
 use crate::crater::{Crater, CraterSettings};
 use crate::error::WorldError;
-use crate::roadmap::{Roadmap, VertexId};
+use crate::ids::VertexId;
+use crate::roadmap::Roadmap;
 use ground::Ground;
 use network::Network;
 

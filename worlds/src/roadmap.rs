@@ -11,37 +11,18 @@ mod endpoints;
 mod file;
 mod well_formed;
 
-use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::Point2;
-use serde::{Deserialize, Serialize};
 
 use crate::error::RoadmapError;
+use crate::ids::VertexId;
 pub(crate) use check::segments_meet;
 use distances::Distances;
 pub use distances::DistancesTo;
 pub use endpoints::Endpoints;
 pub use file::RoadmapTable;
 pub use well_formed::{Blocked, well_formed};
-
-/// The index of a vertex of a [`Roadmap`], from 0.
-///
-/// ```
-/// use farside_worlds::VertexId;
-/// assert!(VertexId(2) < VertexId(10));
-/// ```
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
-)]
-#[serde(transparent)]
-pub struct VertexId(pub u32);
-
-impl fmt::Display for VertexId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 /// The most vertices a roadmap may have: twice a full grid of 256 by 256, and more than the largest
 /// map of the benchmark of multi-agent path-finding, `orz900d`, has.

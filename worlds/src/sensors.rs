@@ -12,22 +12,10 @@ mod placement;
 pub use ownership::Ownership;
 
 use nalgebra::Point2;
-use serde::{Deserialize, Serialize};
 
 use crate::error::SensorError;
-use crate::roadmap::{MAX_COORDINATE_M, Roadmap, VertexId};
-
-/// The index of a node of a [`SensorNetwork`], from 0.
-///
-/// ```
-/// use farside_worlds::NodeId;
-/// assert!(NodeId(2) < NodeId(10));
-/// ```
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
-)]
-#[serde(transparent)]
-pub struct NodeId(pub u32);
+use crate::ids::{NodeId, VertexId};
+use crate::roadmap::{MAX_COORDINATE_M, Roadmap};
 
 /// Radio nodes over a roadmap (*network-guided*, sections 2 and 4). Each vertex belongs to the node
 /// nearest to it; nodes within the radius of each other are neighbours. Immutable.

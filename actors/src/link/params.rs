@@ -21,7 +21,7 @@ enum Shown {
 
 macro_rules! parameters {
     ($(
-        $(#[$doc:meta])*
+        $(#[doc = $doc:literal])*
         $field:ident: $type:ty = $default:expr,
             key $key:literal $(or $alias:literal)*, as $form:ty, $shown:ident;
     )*) => {
@@ -36,7 +36,7 @@ macro_rules! parameters {
         /// ```
         #[derive(Clone, Debug, PartialEq)]
         pub struct LinkParams {
-            $($(#[$doc])* pub $field: $type,)*
+            $($(#[doc = $doc])* pub $field: $type,)*
         }
 
         /// Some parameters of a link; what is absent stays as it is.
@@ -51,7 +51,7 @@ macro_rules! parameters {
         pub struct LinkOverrides {
             /// What all parameters are replaced by, before the others here.
             pub preset: Option<Preset>,
-            $($(#[$doc])* pub $field: Option<$type>,)*
+            $($(#[doc = $doc])* pub $field: Option<$type>,)*
         }
 
         impl Default for LinkParams {
@@ -99,6 +99,23 @@ macro_rules! parameters {
         impl From<LinkParams> for LinkOverrides {
             fn from(params: LinkParams) -> Self {
                 LinkOverrides { preset: None, $($field: Some(params.$field),)* }
+            }
+        }
+
+        impl LinkParams {
+            /// What there is to know of each key.
+            pub fn keys() -> Vec<crate::system::Key> {
+                let preset = crate::system::Key {
+                    name: "preset",
+                    about: &["What all parameters are replaced by, before the others here."],
+                    expected: String::new(),
+                };
+                let own = [$(crate::system::Key {
+                    name: $key,
+                    about: &[$($doc),*],
+                    expected: String::new(),
+                }),*];
+                std::iter::once(preset).chain(own).collect()
             }
         }
 
@@ -238,6 +255,9 @@ parameters! {
     /// The power while transmitting, in watts: an attempt takes `tx_power 8 (L + overhead) / rate`
     /// from the sender.
     tx_power_w: f64 = 0.0, key "tx_power", as Power, IfOn;
+    /// The power while receiving, in watts: a message that arrives takes
+    /// `rx_power 8 (L + overhead) / rate` from its receiver's host.
+    rx_power_w: f64 = 0.0, key "rx_power", as Power, IfOn;
     /// The link is out: everything is lost.
     outage: bool = false, key "outage", as Plain<bool>, Always;
 }
@@ -282,6 +302,10 @@ impl LinkParams {
             (
                 self.tx_power_w > 0.0 && !timed,
                 "tx_power without a rate: a transmission takes no time, so no energy",
+            ),
+            (
+                self.rx_power_w > 0.0 && !timed,
+                "rx_power without a rate: a transmission takes no time, so no energy",
             ),
             (
                 self.queue.is_some() && !timed && !self.store_and_forward && self.retries == 0,

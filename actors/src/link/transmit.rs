@@ -339,6 +339,7 @@ impl Transmitter {
             failed: None,
             sent: false,
             energy_j: 0.0,
+            receive_j: 0.0,
             answer: propagation,
         };
         if let Some(closed) = timeline.closed(start) {
@@ -369,6 +370,8 @@ impl Transmitter {
         attempt.at = (attempt.end + way).max(parcel.now() + self.floor);
         if is_corrupt(params, parcel, draws) {
             attempt.failed = Some(CORRUPT);
+        } else {
+            attempt.receive_j = params.rx_power_w * airtime.as_secs_f64();
         }
         attempt
     }

@@ -285,6 +285,7 @@ impl Radio {
         let way = arrival.since(now).max(link.transmitter.min_delay());
         let mut carriage = self.carriage(parcel, at, now);
         carriage.propagation = attempt.propagation;
+        carriage.receive_j = attempt.receive_j;
         carriage.jitter_ns = difference(way, attempt.propagation);
         verdicts.deliver_as(way, carriage);
     }

@@ -72,6 +72,7 @@ impl TrafficPlan {
     /// # Errors
     /// When a value cannot be, a name is there twice, or a glob matches nothing.
     pub fn new(config: &TrafficConfig) -> Result<TrafficPlan, TrafficError> {
+        config.check_all()?;
         let hosts = hosts(config)?;
         if config.flows.is_empty() {
             let message = "no flow: expected at least one [[traffic.flow]]";
@@ -80,7 +81,6 @@ impl TrafficPlan {
         let mut flows: Vec<Flow> = Vec::new();
         let mut ids = BTreeSet::new();
         for (index, entry) in config.flows.iter().enumerate() {
-            entry.check(index)?;
             let key = |last: &str| format!("flow.{index}.{last}");
             let from = matching(&hosts, &entry.from, key("from"))?;
             let to = matching(&hosts, &entry.to, key("to"))?;

@@ -1,6 +1,7 @@
 //! Open-loop traffic, as scenarios see it: `[traffic]`.
 
 use farside::{Report, SimDuration};
+use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Builtin, Metric, Results, Section, Settings, Setup, SetupError, System,
 };
@@ -30,7 +31,7 @@ impl System for TrafficSystem {
     }
 
     fn sections(&self) -> Vec<Section> {
-        vec![Section::named("traffic")]
+        TrafficConfig::sections("traffic")
     }
 
     fn metrics(&self) -> &[Metric] {
@@ -52,6 +53,10 @@ impl System for TrafficSystem {
 impl Settings for TrafficScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        Ok(self.traffic.check_all()?)
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 use crate::registry::Registry;
 
 #[derive(clap::Args)]

@@ -1,7 +1,7 @@
 //! `farside check`: read, check, print the resolved scenario, and what became of its files.
 
+use super::Exit;
 use super::{CommandError, print};
-use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 

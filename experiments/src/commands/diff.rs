@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use farside_logs::DiffOptions;
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -15,9 +15,9 @@ use farside_logs::{Log, LogError};
 use serde::Serialize;
 use serde_json::json;
 
+use super::Exit;
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -121,12 +121,11 @@ fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
     let width = pictures.iter().map(|picture| picture.name.len()).max();
     let width = width.unwrap_or(0);
     let line = |picture: &PictureInfo| {
-        let takes = options(picture).join(", ");
-        let indent = " ".repeat(width);
-        format!(
-            "{:width$}  {}\n{indent}  takes {takes}",
-            picture.name, picture.about
-        )
+        let takes = match picture.takes {
+            [] => String::new(),
+            _ => format!("\n{:width$}  takes {}", "", options(picture).join(", ")),
+        };
+        format!("{:width$}  {}{takes}", picture.name, picture.about)
     };
     print(pictures.iter().map(line).collect::<Vec<_>>().join("\n"))?;
     Ok(Exit::Done)

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::{CommandError, print, print_json};
-use crate::cli::Exit;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
@@ -163,8 +163,8 @@ fn text(document: &Document) -> String {
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  plots    \
-         {plots}\n",
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  \
+         plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )
 }

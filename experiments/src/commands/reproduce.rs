@@ -8,13 +8,14 @@ use farside_logs::LogWriter;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::run::log_options;
-use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
-use crate::cli::Exit;
+use super::{CommandError, interrupt, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario};
 use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
 use crate::study::{Interrupts, Reproduction, find_run, reproduce};
+use crate::version::CODE_VERSION;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

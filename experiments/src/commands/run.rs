@@ -11,10 +11,11 @@ use farside_logs::{Attachment, LogOptions, LogWriter};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::table::{self, Group};
-use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
-use crate::cli::Exit;
+use super::{CommandError, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
+use crate::version::CODE_VERSION;
 use farside_actors::system::Results;
 
 use crate::registry::Registry;
@@ -50,8 +51,8 @@ pub(crate) struct Args {
     /// Threads for kameo; as many as there are cores unless given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Shuffle the order of simultaneous events, to see whether a result hangs on it; instead of the
-    /// scenario's tie_seed
+    /// Shuffle the order of simultaneous events, to see whether a result hangs on it; instead of
+    /// the scenario's tie_seed
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     tie_seed: Option<u64>,

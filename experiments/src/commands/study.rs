@@ -7,11 +7,11 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::Exit;
 use super::{CommandError, interrupt, print, print_json};
-use crate::cli::Exit;
 use crate::registry::Registry;
 use crate::report::csv::results_csv;
-use crate::study::results::{Results, RunOutcome};
+use crate::study::results::{Manifest, Results, RunOutcome};
 use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
@@ -233,6 +233,7 @@ fn text(results: &Results, document: &Document) -> String {
         }
         rows.push(row);
     }
+    let curves = curves(manifest, &document.cells);
     let (study, question, out) = (&document.study, &document.question, &document.out);
     let runs = document.runs;
     let failed = match document.failed {
@@ -244,9 +245,40 @@ fn text(results: &Results, document: &Document) -> String {
         missing => format!("{runs} runs in {out}{failed}; {missing} are left to other shards"),
     };
     format!(
-        "{study}: {question}\n\n{}\nmeans, of lists the medians; {after}\n",
+        "{study}: {question}\n\n{}\n{curves}means, of lists the medians; {after}\n",
         columns(&rows)
     )
+}
+
+/// From which index on curves differ from those of the baseline, a line for each; none without
+/// curves.
+fn curves(manifest: &Manifest, cells: &Value) -> String {
+    let mut out = String::new();
+    for metric in &manifest.metrics {
+        for (at, cell) in manifest.cells.iter().enumerate() {
+            let difference = &cells[at]["metrics"][&metric.name]["difference"];
+            let (Some(from), Some(is_more)) = (
+                difference["holds_from"].as_f64(),
+                difference["is_more"].as_bool(),
+            ) else {
+                continue;
+            };
+            let index = metric.index.as_ref();
+            let (label, unit) = index.map_or(("index", ""), |one| (&one.label, &one.unit));
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            };
+            let (name, texts) = (&metric.name, cell.texts.join(", "));
+            let more = if is_more { "more" } else { "less" };
+            out.push_str(&format!(
+                "{name}, cell {at} ({texts}): {more} than in the baseline from {label} \
+                 {from}{unit} on\n"
+            ));
+        }
+    }
+    out
 }
 
 /// A number with four digits.

@@ -7,10 +7,11 @@ use farside::SimDuration;
 use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome};
 use serde::Serialize;
 
+use super::Exit;
 use super::run::{ExecutorName, FILE_PREFIX};
-use super::{CODE_VERSION, CommandError, interrupt, print, print_json, progress};
-use crate::cli::Exit;
+use super::{CommandError, interrupt, print, print_json, progress};
 use crate::scenario::{Scenario, ScenarioError};
+use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;

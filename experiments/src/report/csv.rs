@@ -147,9 +147,9 @@ fn number(value: f64) -> String {
 }
 
 /// One row for each cell and metric. `estimate` is the mean of numbers, the rate of truth values,
-/// the median of lists; of curves, which [`series_csv`] has in full, there is `holds_from`, the index
-/// from which on they differ from the baseline's. What a kind does not have is empty, as is what cannot
-/// be known.
+/// the median of lists; of curves, which [`series_csv`] has in full, there is `holds_from`, the
+/// index from which on they differ from the baseline's. What a kind does not have is empty, as is
+/// what cannot be known.
 pub fn summary_csv(results: &Results, summary: &Summary) -> String {
     let manifest = &results.manifest;
     let mut header = vec!["cell".to_owned()];
@@ -242,11 +242,11 @@ const PUBLISHED: [&str; 23] = [
 ];
 
 /// One row for each cell beside which a figure was published, one for each line through cells (its
-/// `cell` is empty, and its factors' values are those that the cells share), and one for each cell that
-/// was published to exceed or to equal another, `other` (of curves, the difference is the one
-/// `at_index` that speaks most against the claim). All figures are in the publication's `unit`; `claim`
-/// is `value`, `about`, `below`, `above`, `linear`, `exceeds` or `equals`. None if the study knows no
-/// published figures.
+/// `cell` is empty, and its factors' values are those that the cells share), and one for each cell
+/// that was published to exceed or to equal another, `other` (of curves, the difference is the one
+/// `at_index` that speaks most against the claim). All figures are in the publication's `unit`;
+/// `claim` is `value`, `about`, `below`, `above`, `linear`, `exceeds` or `equals`. None if the
+/// study knows no published figures.
 pub fn published_csv(results: &Results, summary: &Summary) -> Option<String> {
     let manifest = &results.manifest;
     if manifest.published.is_empty() {

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::*;
 use crate::study::fabricated::{self, bandwidth, latency, loss, planner};
-use crate::study::results::{Claim, Published, PublishedFigure, RunOutcome};
+use crate::study::results::{Claim, Comparison, Published, PublishedFigure, RunOutcome};
 
 fn latency_and_loss() -> Results {
     fabricated::study("degradation", vec![latency(), loss()], 30)
@@ -101,6 +101,48 @@ fn beside() -> Results {
     results
 }
 
+/// With curves, long and short, in blocks, and claims of them that hold and do not.
+fn curves(steps: u32, seeds: u64) -> Results {
+    let factors = vec![planner(), loss()];
+    let mut results = fabricated::study("curves", factors, seeds);
+    results.manifest.block = 5;
+    let mut results = fabricated::with_curves(results, steps);
+    let claim = |from_index, by_at_most| {
+        Claim::Exceeds(Comparison {
+            others: vec![14, 99],
+            from_index,
+            by_at_least: None,
+            by_at_most,
+            equal_within: None,
+        })
+    };
+    let figure = |claim| PublishedFigure {
+        cells: vec![0, 1],
+        claim,
+        quote: "<much> more".to_owned(),
+    };
+    let table = |metric: &str, claim| Published {
+        metric: metric.to_owned(),
+        title: format!("Figure of {metric}"),
+        source: "A. N. Other".to_owned(),
+        unit: "%".to_owned(),
+        scale: 100.0,
+        rows: None,
+        figures: vec![figure(claim)],
+        note: String::new(),
+        why: String::new(),
+    };
+    results.manifest.published = vec![
+        table("reward", claim(Some(0.5 * f64::from(steps - 2)), None)),
+        table("reward", claim(None, Some(10.0))),
+        table("completed", claim(None, None)),
+        table("time_ratio", claim(None, Some(0.5))),
+        table("arrival_s", claim(None, None)),
+        table("nothing", claim(None, None)),
+    ];
+    results
+}
+
 fn studies() -> Vec<(&'static str, Results)> {
     let mut few = fabricated::study("few", vec![loss()], 1);
     few.runs.truncate(2);
@@ -127,6 +169,9 @@ fn studies() -> Vec<(&'static str, Results)> {
         ("none", none),
         ("hostile", hostile()),
         ("beside", beside()),
+        ("curves", curves(60, 30)),
+        ("short-curves", curves(12, 30)),
+        ("few-curves", curves(12, 5)),
     ]
 }
 

@@ -3,91 +3,65 @@
 
 use farside::random::RandomKey;
 use farside::{SimDuration, SimTime, Simulation};
-use farside_actors::units;
+use farside_actors::{settings, units};
 use globset::Glob;
-use serde::{Deserialize, Serialize};
 
 use farside::suggest::nearest;
 
 /// The most crashes and restarts that one entry may plan.
 const MAX_EVENTS: usize = 100_000;
 
-/// A `[[crash]]` entry.
-///
-/// | key | meaning | default |
-/// |---|---|---|
-/// | `actor` | a name, or a pattern over names (`node_*`) | needed |
-/// | `fraction` | the share of the actors that match, rounded to whole ones | all |
-/// | `at` | when it crashes, or with `mtbf` from when on | needed; with `mtbf` 0 s |
-/// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
-/// | `restart` | when it is started again | never |
-/// | `restart_after` | how long after the crash it is started again | never |
-/// | `mtbf` | it crashes again and again, each time after an exponential time of this mean | |
-/// | `mttr` | and is down for an exponential time of this mean | it stays down |
-///
-/// Who is among the fraction and when it crashes are drawn by (run seed, entry, actor): a larger
-/// fraction crashes the same actors at the same times, and more.
-///
-/// ```
-/// use farside_experiments::scenario::Crash;
-/// let crash: Crash = toml::from_str("actor = 'node_*'\nfraction = '10%'\nat = '60s'")?;
-/// assert_eq!(crash.fraction, 0.1);
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Crash {
-    /// The actor's name, or a pattern over actors' names.
-    pub actor: String,
-    /// The share of the actors that match.
-    #[serde(default = "all", with = "units::fraction")]
-    pub fraction: f64,
-    /// When it crashes, from the start of the run.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub at: Option<SimDuration>,
-    /// How much later than `at` it may be.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub within: Option<SimDuration>,
-    /// When it is started again, from the start of the run; without, it stays down.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub restart: Option<SimDuration>,
-    /// How long after the crash it is started again.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub restart_after: Option<SimDuration>,
-    /// The mean time between failures.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub mtbf: Option<SimDuration>,
-    /// The mean time to repair.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub mttr: Option<SimDuration>,
-}
-
-fn all() -> f64 {
-    1.0
+settings! {
+    /// A `[[crash]]` entry.
+    ///
+    /// | key | meaning | default |
+    /// |---|---|---|
+    /// | `actor` | a name, or a pattern over names (`node_*`) | needed, or `host` |
+    /// | `host` | the same for hosts: all actors of a host crash at one instant | needed, or `actor` |
+    /// | `fraction` | the share of those that match, rounded to whole ones | all |
+    /// | `at` | when it crashes, or with `mtbf` from when on | needed; with `mtbf` 0 s |
+    /// | `within` | it crashes at a time drawn evenly from `at` to `at + within` | at `at` |
+    /// | `restart` | when it is started again | never |
+    /// | `restart_after` | how long after the crash it is started again | never |
+    /// | `mtbf` | it crashes again and again, each time after an exponential time of this mean | |
+    /// | `mttr` | and is down for an exponential time of this mean | it stays down |
+    ///
+    /// Who is among the fraction and when it crashes are drawn by (run seed, entry, name): a larger
+    /// fraction crashes the same ones at the same times, and more.
+    ///
+    /// ```
+    /// use farside_experiments::scenario::Crash;
+    /// let crash: Crash = toml::from_str("actor = 'node_*'\nfraction = '10%'\nat = '60s'")?;
+    /// assert_eq!(crash.fraction, 0.1);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    pub struct Crash {
+        /// The actor's name, or a pattern over actors' names.
+        pub actor: Option<String> [skip_serializing_if = "Option::is_none"];
+        /// The host's name, or a pattern over hosts' names: all actors of a host crash together.
+        pub host: Option<String> [skip_serializing_if = "Option::is_none"];
+        /// The share of those that match, rounded to whole ones.
+        pub fraction: f64 [with = "units::fraction"] = 1.0;
+        /// When it crashes, from the start of the run; with `mtbf`, from when on.
+        pub at: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// How much later than `at` it may be: a time drawn evenly.
+        pub within: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// When it is started again, from the start of the run; without, it stays down.
+        pub restart: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// How long after the crash it is started again.
+        pub restart_after: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// The mean time between failures: it crashes again and again, each time after an
+        /// exponential time of this mean.
+        pub mtbf: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+        /// The mean time to repair: it is down for an exponential time of this mean.
+        pub mttr: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+    }
 }
 
 /// What is wrong with an entry: the key to blame, what was found and what was expected.
@@ -106,7 +80,8 @@ fn mistake(key: &'static str, message: impl ToString) -> Mistake {
 
 impl Crash {
     /// Finds what can be found without knowing the actors.
-    pub(super) fn check(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
+    pub(super) fn check_alone(&self, until: Option<SimDuration>) -> Result<(), Mistake> {
+        self.target()?;
         if self.at.is_none() && self.mtbf.is_none() {
             let message =
                 "this key is missing: expected when it crashes, as in at = \"60s\", or `mtbf`";
@@ -156,6 +131,20 @@ impl Crash {
         Ok(())
     }
 
+    /// The key that says who crashes, and the pattern there.
+    fn target(&self) -> Result<(&'static str, &str), Mistake> {
+        match (&self.actor, &self.host) {
+            (Some(actor), None) => Ok(("actor", actor)),
+            (None, Some(host)) => Ok(("host", host)),
+            (Some(_), Some(_)) => Err(mistake("host", "expected `actor` or `host`, not both")),
+            (None, None) => {
+                let message = "this key is missing: expected who crashes, as in \
+                               actor = \"node_01\", or `host`";
+                Err(mistake("actor", message))
+            }
+        }
+    }
+
     fn from(&self) -> SimDuration {
         self.at.unwrap_or(SimDuration::ZERO)
     }
@@ -180,16 +169,35 @@ impl Crash {
                     let message = format!("more than {MAX_EVENTS} crashes and restarts");
                     return Err(mistake("mtbf", message));
                 }
-                let known =
-                    sim.crash_named_at(SimTime::ZERO + down, &name)
-                        .and_then(|()| match up {
-                            Some(up) => sim.restart_named_at(SimTime::ZERO + up, &name),
-                            None => Ok(()),
-                        });
-                debug_assert!(known.is_ok(), "chosen among the actors there are");
+                self.plan_one(sim, &name, down, up);
             }
         }
         Ok(())
+    }
+
+    /// Plans one crash of the actor or host called `name`, and its return.
+    fn plan_one(
+        &self,
+        sim: &mut Simulation,
+        name: &str,
+        down: SimDuration,
+        up: Option<SimDuration>,
+    ) {
+        let (down, up) = (SimTime::ZERO + down, up.map(|up| SimTime::ZERO + up));
+        if self.host.is_some() {
+            let host = sim.host(name);
+            sim.crash_host_at(down, host);
+            if let Some(up) = up {
+                sim.restart_host_at(up, host);
+            }
+            return;
+        }
+        let crash = sim.crash_named_at(down, name);
+        let restart = up.map_or(Ok(()), |up| sim.restart_named_at(up, name));
+        debug_assert!(
+            crash.and(restart).is_ok(),
+            "chosen among the actors there are"
+        );
     }
 
     /// Who crashes: of those that match, the fraction with the least draws.
@@ -198,25 +206,26 @@ impl Crash {
         sim: &Simulation,
         draws: &dyn Fn(&str) -> RandomKey,
     ) -> Result<Vec<String>, Mistake> {
-        let glob = Glob::new(&self.actor).map_err(|error| {
-            let (found, why) = (&self.actor, error.kind());
-            mistake(
-                "actor",
-                format!("{found:?} is no pattern over names: {why}"),
-            )
+        let (key, found) = self.target()?;
+        let glob = Glob::new(found).map_err(|error| {
+            let why = error.kind();
+            mistake(key, format!("{found:?} is no pattern over names: {why}"))
         })?;
         let glob = glob.compile_matcher();
-        let names = sim.actor_names().filter(|name| glob.is_match(name));
-        let mut names: Vec<String> = names.map(str::to_owned).collect();
+        let known: Vec<&str> = match key {
+            "host" => sim.host_names().collect(),
+            _ => sim.actor_names().collect(),
+        };
+        let names = known.iter().filter(|name| glob.is_match(name));
+        let mut names: Vec<String> = names.map(|name| (*name).to_owned()).collect();
         if names.is_empty() {
-            let known: Vec<&str> = sim.actor_names().collect();
-            let hint = nearest(&self.actor, known.iter().copied());
+            let hint = nearest(found, known.iter().copied());
             let hint = hint.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
-            let (found, count) = (&self.actor, known.len());
+            let count = known.len();
             let message = format!(
-                "{found:?}: expected the name of one of {count} actors, or a pattern{hint}"
+                "{found:?}: expected the name of one of {count} {key}s, or a pattern{hint}"
             );
-            return Err(mistake("actor", message));
+            return Err(mistake(key, message));
         }
         names.sort_by(|a, b| {
             let draw = |name: &str| draws(name).text("chosen").uniform();
@@ -333,7 +342,7 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_refused() {
         let until = Some(SimDuration::from_secs(100));
-        let wrong = |text: &str| crash(&format!("actor = 'x'\n{text}")).check(until);
+        let wrong = |text: &str| crash(&format!("actor = 'x'\n{text}")).check_alone(until);
         let key = |text: &str| wrong(text).unwrap_err().key;
         assert_eq!(key("at = '5s'\nrestart = '5s'"), "restart");
         assert_eq!(key("at = '5s'\nwithin = '5s'\nrestart = '9s'"), "restart");
@@ -345,11 +354,27 @@ mod tests {
         assert_eq!(key("at = '5s'\nrestart_after = '0s'"), "restart_after");
         assert_eq!(
             crash("actor = 'x'\nmtbf = '5s'")
-                .check(None)
+                .check_alone(None)
                 .unwrap_err()
                 .key,
             "mtbf"
         );
         assert_eq!(wrong("mtbf = '5s'\nmttr = '1s'"), Ok(()));
+        assert_eq!(key("at = '5s'\nhost = 'x'"), "host");
+        let nobody = crash("at = '5s'").check_alone(until).unwrap_err();
+        assert_eq!(nobody.key, "actor");
+        assert_eq!(crash("at = '5s'\nhost = 'x'").check_alone(until), Ok(()));
+    }
+
+    #[test]
+    fn hosts_are_chosen_by_name_and_an_unknown_one_is_named() {
+        let chosen = |text: &str| crash(text).chosen(&team(), &|name| key(name));
+        assert_eq!(chosen("host = 'node_07'\nat = '5s'").unwrap(), ["node_07"]);
+        assert_eq!(chosen("host = 'node_*'\nat = '5s'").unwrap().len(), 20);
+        let unknown = chosen("host = 'nod_07'\nat = '5s'").unwrap_err();
+        assert_eq!(unknown.key, "host");
+        let message = "\"nod_07\": expected the name of one of 20 hosts, or a pattern; \
+                       did you mean \"node_07\"?";
+        assert_eq!(unknown.message, message);
     }
 }

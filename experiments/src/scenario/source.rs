@@ -8,53 +8,11 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::ScenarioError;
-
-/// The most characters of a `--set` argument that a message repeats.
-const MAX_SHOWN: usize = 80;
+use super::error::ScenarioError;
+use super::place::{MAX_SHOWN, Place, one_line};
 
 /// The most keys in a path; scenarios have at most four. Tables are dropped recursively.
 const MAX_DEPTH: usize = 16;
-
-/// Where something stands: in a file, or in a `--set` argument.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// In the scenario's text.
-    File {
-        /// The file, or the name of a built-in scenario.
-        name: String,
-        /// The line, from 1.
-        line: usize,
-        /// The column, from 1, counted in characters.
-        column: usize,
-        /// The line's text.
-        text: String,
-    },
-    /// In an argument of the command line.
-    Set {
-        /// The argument, `KEY=VALUE`.
-        argument: String,
-    },
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Place::File {
-                name, line, column, ..
-            } => write!(f, "{name}:{line}:{column}"),
-            Place::Set { argument } => {
-                let shown: String = argument.chars().take(MAX_SHOWN).collect();
-                let dots = if shown.len() < argument.len() {
-                    "..."
-                } else {
-                    ""
-                };
-                write!(f, "--set {shown}{dots}")
-            }
-        }
-    }
-}
 
 /// A `--set` argument, taken apart.
 struct Set {
@@ -335,10 +293,6 @@ fn split_set(argument: &str) -> Result<(Vec<String>, usize), ScenarioError> {
         }
     }
     Err(wrong("expected KEY=VALUE, as in team.rovers=75"))
-}
-
-pub(super) fn one_line(message: &str) -> String {
-    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

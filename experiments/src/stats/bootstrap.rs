@@ -7,7 +7,8 @@
 //! as rliable does (Agarwal and others, *Deep Reinforcement Learning at the Edge of the
 //! Statistical Precipice*, 2021).
 //!
-//! What is drawn are blocks ([`Blocks`]): the runs that share a problem together, or each run alone.
+//! What is drawn are blocks ([`Blocks`]): the runs that share a problem together, or each run
+//! alone.
 //!
 //! With a handful of blocks any bootstrap is too sure of itself: no value beyond those that were
 //! seen is ever drawn. Take 30 blocks a cell.
@@ -160,9 +161,10 @@ fn bca<const N: usize>(
     if blocks.count() < 2 {
         return statistics.map(|statistic| Estimate::unknown(statistic(sorted)));
     }
-    if sorted[0] == sorted[sorted.len() - 1] {
-        let (low, high) = (sorted[0], sorted[0]);
-        let value = low;
+    let (least, greatest) = (sorted[0], sorted[sorted.len() - 1]);
+    // Differences that are equal in truth differ by roundings.
+    if greatest - least <= 1e-13 * least.abs().max(greatest.abs()) {
+        let (value, low, high) = (least, least, least);
         return [Estimate { value, low, high }; N];
     }
     let mut replicates = replicates(&pool, key, &statistics).into_iter();

@@ -2,10 +2,10 @@
 
 use super::Blocks;
 
-/// How often chance alone would bring the mean of the blocks' means as far from `expected`: Student's
-/// test (*The Probable Error of a Mean*, 1908), two-sided, with a block as what varies. Of blocks of
-/// one run each that is the paired t-test. Not a number with fewer than two blocks; where all blocks
-/// say the same it is 1 or 0.
+/// How often chance alone would bring the mean of the blocks' means as far from `expected`:
+/// Student's test (*The Probable Error of a Mean*, 1908), two-sided, with a block as what varies.
+/// Of blocks of one run each that is the paired t-test. Not a number with fewer than two blocks;
+/// where all blocks say the same it is 1 or 0.
 ///
 /// ```
 /// use farside_experiments::stats::{Blocks, paired::student};

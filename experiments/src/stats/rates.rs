@@ -72,8 +72,8 @@ pub fn wilson_in_blocks(blocks: &[Vec<bool>]) -> Estimate {
     }
 }
 
-/// The share of runs that runs in blocks are worth: `sums` has the sum and the number of runs of each
-/// block, and `variance` is that of one run.
+/// The share of runs that runs in blocks are worth: `sums` has the sum and the number of runs of
+/// each block, and `variance` is that of one run.
 fn worth(sums: &[(f64, f64)], variance: f64) -> f64 {
     let n: f64 = sums.iter().map(|(_, n)| n).sum();
     let m = sums.len() as f64;
@@ -138,8 +138,8 @@ pub fn mcnemar(pairs: &[(bool, bool)]) -> McNemar {
     }
 }
 
-/// McNemar's test with blocks of pairs that share a problem. The sign of a whole block is what chance
-/// decides: the exact randomisation test of the blocks' differences (Fisher, *The Design of
+/// McNemar's test with blocks of pairs that share a problem. The sign of a whole block is what
+/// chance decides: the exact randomisation test of the blocks' differences (Fisher, *The Design of
 /// Experiments*, 1935, section 21), which with blocks of one pair is McNemar's.
 ///
 /// ```

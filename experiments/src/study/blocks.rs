@@ -12,8 +12,8 @@ const PROBLEM_SEED: &str = "problem_seed";
 /// How many seeds a block has: 1 unless the study says.
 ///
 /// # Errors
-/// When the seeds, or those after which a cell may stop, are no whole number of blocks; when a factor
-/// varies the problem, too.
+/// When the seeds, or those after which a cell may stop, are no whole number of blocks; when a
+/// factor varies the problem, too.
 pub(super) fn block(
     file: &StudyFile,
     factors: &[FactorPlan],

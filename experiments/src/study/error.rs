@@ -1,6 +1,6 @@
 //! What can be wrong with a study, its results folder, or its runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -158,4 +158,13 @@ pub enum StoreError {
         /// The other.
         b: String,
     },
+}
+
+/// What makes of an error of the operating system one of a folder.
+pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(std::io::Error) -> StoreError {
+    move |source| StoreError::Io {
+        path: path.to_owned(),
+        doing,
+        source,
+    }
 }

@@ -4,8 +4,11 @@
 use farside::random::{RandomKey, Stream};
 use serde_json::{Map, Value, json};
 
+use farside_actors::system::Series;
+
 use super::results::{
     Cell, FORMAT, Factor, Manifest, MessageCounts, Metric, Results, RunOutcome, RunRecord, Scale,
+    SeriesIndex,
 };
 
 /// The virtual time at which a run is over.
@@ -132,6 +135,48 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
         },
         runs,
     }
+}
+
+/// The same with a curve of `steps` values, `reward`, that falls with harm from half the way on. Of
+/// some runs some values are missing, and of all runs those at the third step.
+pub(crate) fn with_curves(mut results: Results, steps: u32) -> Results {
+    results.manifest.metrics.insert(
+        0,
+        Metric {
+            name: "reward".to_owned(),
+            label: "reward".to_owned(),
+            unit: "points".to_owned(),
+            index: Some(SeriesIndex {
+                label: "planning <step>".to_owned(),
+                unit: "s".to_owned(),
+                lengths_differ: false,
+            }),
+        },
+    );
+    let manifest = &results.manifest;
+    for run in &mut results.runs {
+        let problem = manifest.problem_seed(run.seed).unwrap_or(run.seed);
+        let shared = RandomKey::new(problem)
+            .text("curve")
+            .stream()
+            .normal(9.0, 1.0);
+        let mut stream = RandomKey::new(run.seed)
+            .number(run.cell as u64)
+            .text("curve")
+            .stream();
+        let value = |step: u32| {
+            let past = (f64::from(step) / f64::from(steps) - 0.5).max(0.0);
+            let value = shared - 3.0 * past * run.cell as f64 + stream.normal(0.0, 0.5);
+            (step != 2 && !stream.chance(0.05)).then_some(value)
+        };
+        let values = (0..steps).map(value).collect();
+        let index = (0..steps).map(|step| 0.5 * f64::from(step)).collect();
+        let series = Series::new(index, values).expect("indices that rise");
+        if let RunOutcome::Done { metrics, .. } = &mut run.outcome {
+            metrics.insert("reward".to_owned(), series.into());
+        }
+    }
+    results
 }
 
 fn metrics() -> Vec<Metric> {

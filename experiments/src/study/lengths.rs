@@ -16,8 +16,9 @@ impl Lengths {
     /// Takes a run into account.
     ///
     /// # Errors
-    /// In words, when it reports what is no curve under the name of one, or a curve over other indices
-    /// than another run of its cell. Where lengths may differ, one must begin as the other does.
+    /// In words, when it reports what is no curve under the name of one, or a curve over other
+    /// indices than another run of its cell. Where lengths may differ, one must begin as the other
+    /// does.
     pub(super) fn check(&mut self, manifest: &Manifest, run: &RunRecord) -> Result<(), String> {
         for metric in &manifest.metrics {
             let value = value_of(&run.outcome, &metric.name);

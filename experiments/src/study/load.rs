@@ -4,10 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::StoreError;
+use super::error::{StoreError, io};
 use super::lengths::Lengths;
 use super::results::{FORMAT, Manifest, Results, RunOutcome, RunRecord};
-use super::store::io;
 
 /// The file that says what is run.
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -16,9 +15,9 @@ impl Results {
     /// Reads a results folder, all its shards, as far as it goes.
     ///
     /// # Errors
-    /// When it is none, is of another format, or holds a line that is no record; the error names the
-    /// line; when the runs of a cell have curves over different indices. A last line that is cut is no
-    /// error: its run was not done.
+    /// When it is none, is of another format, or holds a line that is no record; the error names
+    /// the line; when the runs of a cell have curves over different indices. A last line that is
+    /// cut is no error: its run was not done.
     pub fn load(folder: &Path) -> Result<Results, StoreError> {
         let manifest = manifest(folder)?;
         let runs = runs(folder, &manifest)?;

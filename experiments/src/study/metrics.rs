@@ -72,8 +72,8 @@ fn index(file: &MetricFile, known: Option<&KnownMetric>) -> Option<SeriesIndex> 
     })
 }
 
-/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or nothing
-/// yet.
+/// Whether it can be summed up: a number, true or false, a word, a list of numbers, a curve; or
+/// nothing yet.
 fn is_measure(value: &Value) -> bool {
     match value {
         Value::Number(_) | Value::Bool(_) | Value::String(_) | Value::Null => true,

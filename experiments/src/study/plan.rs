@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use crate::commands::CODE_VERSION;
 use farside::suggest::nearest;
 
 use crate::scenario::{self, Place, Scenario, ScenarioError, Source};
+use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
@@ -461,8 +461,8 @@ impl Plan {
         self.check_published(results)
     }
 
-    /// Checks that what was published is of metrics of which it can be said, as a run that ended has
-    /// them.
+    /// Checks that what was published is of metrics of which it can be said, as a run that ended
+    /// has them.
     pub(super) fn check_published(
         &self,
         results: &Map<String, Value>,

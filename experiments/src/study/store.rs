@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::error::StoreError;
+use super::error::{StoreError, io};
 use super::load::{self, MANIFEST};
 use super::results::{Manifest, RunRecord};
 
@@ -186,14 +186,6 @@ fn append((path, file): &mut (PathBuf, File), line: &impl Serialize) -> Result<(
     // In one piece: a reader, or who goes on after a kill, sees whole lines but for the last.
     let written = file.write_all(&text).and_then(|()| file.flush());
     written.map_err(io(path, "cannot write to it"))
-}
-
-pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(std::io::Error) -> StoreError {
-    move |source| StoreError::Io {
-        path: path.to_owned(),
-        doing,
-        source,
-    }
 }
 
 /// The first entry of a folder that no killed process of ours can have left in an empty one.

@@ -288,3 +288,154 @@ fn wrong_studies_exit_with_2_and_write_nothing() {
     }
     assert!(!folder.path().join("results").exists());
 }
+
+/// Ties as a factor: the same seeds, another order of what happens at one instant.
+#[test]
+fn ties_may_be_a_factor() {
+    let folder = tempfile::tempdir().unwrap();
+    let factor = "[[factor]]\nname = 'loss'\nkey = 'links.default.loss'\nvalues = [0, '30%']\n";
+    let ties = "[[factor]]\nname = 'ties'\nvariants = [{ name = 'by name' }, \
+        { name = 'one', set = { tie_seed = 1 } }]\n[[factor]]\nname = 'more'\nkey = 'tie_seed'\n\
+        values = [2, 3]\n";
+    let both = SMALL.replace(factor, ties);
+    write(folder.path(), "small.toml", &both);
+    let refused = farside(folder.path(), &["study", "small.toml"]);
+    assert!(
+        text(&refused.stderr).contains("another factor sets this key"),
+        "{refused:?}"
+    );
+    let key = "[[factor]]\nname = 'ties'\nkey = 'tie_seed'\nvalues = [1, 2]\n";
+    write(folder.path(), "small.toml", &SMALL.replace(factor, key));
+    let said = study(folder.path(), &[]);
+    assert_eq!(said["cells"][1]["factors"]["ties"], 2);
+    let digest = |row: &str| row.split(',').nth(5).map(str::to_owned);
+    let rows = read(folder.path(), "results/small/results.csv");
+    let rows: Vec<_> = rows.lines().skip(1).map(digest).collect();
+    assert!(rows.len() == 8 && rows[0] != rows[4], "{rows:?}");
+    let again = [
+        "reproduce",
+        "results/small",
+        "--cell",
+        "ties=2",
+        "--seed",
+        "1",
+        "--out",
+        "a.mcap",
+    ];
+    assert_eq!(farside(folder.path(), &again).status.code(), Some(0));
+    assert_eq!(
+        farside(folder.path(), &["verify", "a.mcap"]).status.code(),
+        Some(0)
+    );
+    let info = json(&farside(folder.path(), &["info", "a.mcap", "--json"]));
+    assert_eq!(info["run"]["tie_seed"], 2, "{info}");
+}
+
+/// Two seeds of one problem: the same rovers with the same goals, other chances. The log of a run
+/// says which problem it had.
+#[test]
+fn blocks_share_a_problem_and_logs_say_which() {
+    let folder = tempfile::tempdir().unwrap();
+    write(
+        folder.path(),
+        "small.toml",
+        &SMALL.replace("seeds = 4", "seeds = 4\nblock = 2"),
+    );
+    let said = study(folder.path(), &[]);
+    assert_eq!(said["missing"], 0);
+    let goals = |seed: &str| {
+        let log = format!("{seed}.mcap");
+        let again = [
+            "reproduce",
+            "results/small",
+            "--cell",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            &log,
+        ];
+        let output = farside(folder.path(), &again);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let verified = farside(folder.path(), &["verify", &log, "--executor", "inline"]);
+        assert_eq!(
+            verified.status.code(),
+            Some(0),
+            "{}",
+            text(&verified.stdout)
+        );
+        let drawn = farside(folder.path(), &["draw", &log, "--out", "map.svg"]);
+        assert_eq!(drawn.status.code(), Some(0), "{}", text(&drawn.stderr));
+        let info = json(&farside(folder.path(), &["info", &log, "--json"]));
+        let scenario = farside(folder.path(), &["diff", &log, "1.mcap", "--json"]);
+        (info["run"]["seed"].clone(), scenario.status.code())
+    };
+    assert_eq!(goals("1"), (1.into(), Some(0)));
+    assert_eq!(goals("2"), (2.into(), Some(1)));
+    let problem = |seed: &str, problem: &str| {
+        let seeds = format!("seed={seed}");
+        let of = format!("problem_seed={problem}");
+        let sets = [
+            "--set",
+            "team.rovers=3",
+            "--set",
+            "until=12s",
+            "--set",
+            &seeds,
+            "--set",
+            &of,
+        ];
+        let common = ["--set", "links.default.loss=30%", "--no-log", "--json"];
+        let run = farside(folder.path(), &[&["run"], &sets[..], &common].concat());
+        json(&run)["digest"].clone()
+    };
+    let rows = read(folder.path(), "results/small/results.csv");
+    let recorded = |at: usize| rows.lines().nth(at).and_then(|row| row.split(',').nth(5));
+    assert_eq!(problem("2", "1").as_str(), recorded(6), "{rows}");
+    assert_ne!(problem("2", "2").as_str(), recorded(6));
+    assert_eq!(problem("3", "3").as_str(), recorded(7));
+    assert_eq!(problem("4", "3").as_str(), recorded(8));
+    let refused = farside(folder.path(), &["study", "small.toml", "--seeds", "5"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        text(&refused.stderr)
+            .contains("--seeds 5: no whole number of blocks of 2: 4 or 6 would be"),
+        "{}",
+        text(&refused.stderr)
+    );
+}
+
+/// A scenario's own tie seed holds, and the argument overrides it.
+#[test]
+fn a_scenario_has_a_tie_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = ["run", "--set", "team.rovers=5", "--until", "10s", "--json"];
+    let run = |more: &[&str]| json(&farside(folder.path(), &[&small, more].concat()));
+    let by_key = run(&["--set", "tie_seed=5", "--out", "key.mcap"]);
+    let by_argument = run(&["--tie-seed", "5", "--out", "argument.mcap"]);
+    let by_both = run(&["--set", "tie_seed=4", "--tie-seed", "5", "--no-log"]);
+    let without = run(&["--no-log"]);
+    assert_eq!(by_key["digest"], by_argument["digest"]);
+    assert_eq!(by_key["digest"], by_both["digest"]);
+    assert_ne!(by_key["digest"], without["digest"]);
+    assert_eq!(
+        (&by_key["tie_seed"], &without["tie_seed"]),
+        (&5.into(), &Value::Null)
+    );
+    for log in ["key.mcap", "argument.mcap"] {
+        assert_eq!(
+            farside(folder.path(), &["verify", log]).status.code(),
+            Some(0),
+            "{log}"
+        );
+    }
+    let same = farside(folder.path(), &["diff", "key.mcap", "argument.mcap"]);
+    assert_eq!(same.status.code(), Some(0), "{}", text(&same.stdout));
+    let wrong = farside(folder.path(), &["run", "--set", "tie_seed=-1", "--no-log"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(
+        text(&wrong.stderr).contains("expected a whole number from 0 on"),
+        "{}",
+        text(&wrong.stderr)
+    );
+}

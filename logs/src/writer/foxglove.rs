@@ -123,8 +123,8 @@ fn stamp(time_ns: u64) -> Timestamp {
     }
 }
 
-/// The quaternion that turns east to `heading`, from the half-angle formulas: square roots are exact
-/// on every platform, sines are not.
+/// The quaternion that turns east to `heading`, from the half-angle formulas: square roots are
+/// exact on every platform, sines are not.
 fn orientation([east, north]: [f64; 2]) -> Quaternion {
     let length = (east * east + north * north).sqrt();
     let (z, w) = if length > 0.0 && length.is_finite() {

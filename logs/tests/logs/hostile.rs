@@ -1,5 +1,6 @@
 //! Files that are wrong in every way: a clear error or a result, never a panic.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::sync::OnceLock;
 
@@ -225,4 +226,30 @@ fn mcaps_own_reader_is_for_files_in_order() {
     });
     // With checks for overflow it panics, without it reads on.
     assert!(read_beyond_the_chunk.unwrap_or(true), "it is refused");
+}
+
+/// A schema in a syntax that the reader of descriptors does not know: no fields, and no panic.
+#[test]
+fn schemas_of_unknown_syntax_are_compared_as_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    // A FileDescriptorSet with one file: its name, a message M, its syntax.
+    let schema = b"\x0a\x16\x0a\x02.p\x22\x03\x0a\x01Mb\x08editionsp\xe8\x07";
+    let [a, b] = [1u8, 2].map(|value| {
+        let path = folder.path().join(format!("{value}.mcap"));
+        let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
+        let schema = writer.add_schema("M", "protobuf", schema).unwrap();
+        let channel = writer.add_channel(schema, "/x", "protobuf", &BTreeMap::new());
+        let header = mcap::records::MessageHeader {
+            channel_id: channel.unwrap(),
+            sequence: 0,
+            log_time: 1,
+            publish_time: 1,
+        };
+        writer.write_to_known_channel(&header, &[8, value]).unwrap();
+        writer.finish().unwrap();
+        path
+    });
+    let report = diff(&a, &b, &DiffOptions::default()).unwrap();
+    assert!(!report.identical);
+    assert!(report.to_string().contains("/x"), "{report}");
 }

@@ -7,7 +7,7 @@ use kameo::actor::{ActorRef, Spawn};
 use super::seat::{Round, Seats};
 use super::{Helper, Share, lost_worker};
 use crate::commit::Committer;
-use crate::engine::{Action, Engine, InFlight, Outgoing};
+use crate::engine::{Action, Engine, InFlight, Outgoing, SampleNames};
 use crate::executor::Ending;
 use crate::fault::Fault;
 use crate::ids::EntityId;
@@ -27,6 +27,7 @@ pub(super) struct Coordinator {
     schedule: Schedule,
     committer: Committer,
     look_ahead: SimDuration,
+    sample_names: SampleNames,
     /// Reused from window to window: which record of which engine comes next.
     order: Vec<(EventKey, usize, usize)>,
 }
@@ -51,6 +52,7 @@ impl Coordinator {
             schedule,
             committer,
             look_ahead,
+            sample_names: SampleNames::default(),
             order: Vec::new(),
         }
     }
@@ -165,8 +167,15 @@ impl Coordinator {
     /// Commits what the engines did, in key order, up to the first fault.
     fn settle(&mut self, finished: &[usize], undone: &mut Vec<InFlight>) -> Option<Ending> {
         let mut done: Vec<_> = finished.iter().map(|at| self.seats.take(*at)).collect();
+        let samples = done
+            .iter_mut()
+            .map(|seat| std::mem::take(&mut seat.batch.first_samples));
+        let samples: Vec<_> = samples.flatten().collect();
+        let name = |actor| self.plan.name(actor).to_owned();
+        let clash = self.sample_names.take(samples, name);
         let fault = done.iter().filter_map(|seat| seat.fault.as_ref());
-        let fault: Option<Box<Fault>> = fault.min_by_key(|fault| fault.key).cloned();
+        let fault = fault.chain(&clash).min_by_key(|fault| fault.key);
+        let fault: Option<Box<Fault>> = fault.cloned();
         self.order.clear();
         for (place, seat) in done.iter().enumerate() {
             let keys = (0..).map_while(|at| seat.batch.key(at).map(|key| (key, place, at)));

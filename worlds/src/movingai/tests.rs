@@ -4,7 +4,8 @@
 mod properties;
 
 use super::*;
-use crate::roadmap::{MAX_VERTICES, VertexId};
+use crate::ids::VertexId;
+use crate::roadmap::MAX_VERTICES;
 use crate::{RoadmapError, SensorNetwork};
 
 const HEADER: &str = "type octile\nheight 2\nwidth 3\nmap\n";

@@ -7,7 +7,8 @@ use nalgebra::Point2;
 use super::error::{End, GridError, GridProblem};
 use super::regions::Regions;
 use super::{Cell, GridMap, GridTask};
-use crate::roadmap::{Blocked, MAX_COORDINATE_M, MAX_VERTICES, Roadmap, VertexId, well_formed};
+use crate::ids::VertexId;
+use crate::roadmap::{Blocked, MAX_COORDINATE_M, MAX_VERTICES, Roadmap, well_formed};
 
 /// A roadmap made of a map's cells, with tasks over it.
 ///

@@ -2,8 +2,9 @@
 
 use nalgebra::Point2;
 
-use super::{MAX_COORDINATE_M, MAX_VERTICES, VertexId};
+use super::{MAX_COORDINATE_M, MAX_VERTICES};
 use crate::error::RoadmapError;
+use crate::ids::VertexId;
 
 /// Checks counts, ranges and duplicates. `edges` are (lower, higher), sorted.
 pub(super) fn graph(

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::Roadmap;
 use super::distances::{Distances, NO_WAY};
-use super::{Roadmap, VertexId};
+use crate::ids::VertexId;
 
 impl Roadmap {
     /// What [`Roadmap::distance`] says of two vertices between which no path leads.

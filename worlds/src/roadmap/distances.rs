@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 
-use super::VertexId;
 use crate::error::RoadmapError;
+use crate::ids::VertexId;
 
 /// The most vertices for which there is a table: two bytes for each pair then take 32 MiB.
 const TABLE_VERTICES: usize = 4096;

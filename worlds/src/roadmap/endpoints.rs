@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Roadmap, VertexId};
+use super::Roadmap;
+use crate::ids::VertexId;
 
 /// How the boundary is divided into entries and exits. The paper places "constraints on the
 /// selection of these points so that vehicle interactions are likely" (*network-guided*,

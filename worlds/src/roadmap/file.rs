@@ -14,8 +14,9 @@ use std::fmt::Write;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use super::{Roadmap, VertexId};
+use super::Roadmap;
 use crate::error::{RoadmapError, WorldError};
+use crate::ids::VertexId;
 
 /// The most bytes of a roadmap file that are read.
 const MAX_FILE_BYTES: usize = 1 << 20;

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::{Roadmap, VertexId};
+use super::Roadmap;
+use crate::ids::VertexId;
 
 /// A task that keeps an instance from being well-formed: every path from its start to its goal
 /// leads over the start or goal of another task.

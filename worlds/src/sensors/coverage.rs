@@ -3,7 +3,8 @@
 
 use super::SensorNetwork;
 use crate::error::SensorError;
-use crate::roadmap::{Roadmap, VertexId};
+use crate::ids::VertexId;
+use crate::roadmap::Roadmap;
 
 impl SensorNetwork {
     /// The same network with nodes that reach rovers as far as `coverage_m` \[m\], and each other as far

@@ -9,8 +9,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{NodeId, SensorNetwork};
-use crate::roadmap::{Roadmap, VertexId};
+use super::SensorNetwork;
+use crate::ids::{NodeId, VertexId};
+use crate::roadmap::Roadmap;
 
 /// Vertices looked at over all steps, which bounds the time that large maps take.
 const MOST_WORK: usize = 20_000_000;

@@ -8,8 +8,9 @@ use farside::random::{RandomKey, Stream};
 use nalgebra::Point2;
 
 use super::coverage::check_coverage;
-use super::{NodeId, SensorNetwork, check_request, nearest};
+use super::{SensorNetwork, check_request, nearest};
 use crate::error::SensorError;
+use crate::ids::NodeId;
 use crate::roadmap::Roadmap;
 
 /// Placements tried before the search gives up, and fewer where each is dear.

@@ -133,6 +133,7 @@ fn any_params() -> impl Strategy<Value = LinkParams> {
         timeout: more.1.filter(|timeout| !timeout.is_zero()),
         radio: None,
         tx_power_w: more.2,
+        rx_power_w: more.2 / 4.0,
         outage: more.3 && way.5,
     })
 }

@@ -50,8 +50,10 @@ pub struct Attempt {
     pub failed: Option<&'static str>,
     /// Whether anything went on the air.
     pub sent: bool,
-    /// What it took from the sender.
+    /// What it took from the sender \[J\].
     pub energy_j: f64,
+    /// What it takes from the receiver, if it gets through \[J\].
+    pub receive_j: f64,
     /// The time that an answer takes to come back.
     pub(super) answer: SimDuration,
 }
@@ -72,6 +74,7 @@ impl Attempt {
             jitter_ns: difference(way, self.propagation),
             attempts: u32::from(self.sent),
             energy_j: self.energy_j,
+            receive_j: self.receive_j,
             ..Carriage::default()
         }
     }

@@ -23,9 +23,9 @@ const COLUMNS: [&str; 15] = [
     "p_holm",
 ];
 
-/// One row for each cell, metric that is a curve, and index: the mean with its interval, and how much
-/// more it is than in the baseline with the same seeds. `p` is for the index alone, `p_holm` for all
-/// indices of the curve together. None if the study has no curves.
+/// One row for each cell, metric that is a curve, and index: the mean with its interval, and how
+/// much more it is than in the baseline with the same seeds. `p` is for the index alone, `p_holm`
+/// for all indices of the curve together. None if the study has no curves.
 pub fn series_csv(results: &Results, summary: &Summary) -> Option<String> {
     let manifest = &results.manifest;
     let mut header = vec!["cell".to_owned()];

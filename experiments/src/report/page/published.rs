@@ -41,6 +41,7 @@ pub(super) fn section(study: &Study<'_>) -> Markup {
                      marks published figures that our interval allows, ✗ those that it does not. The \
                      tables are in published.csv, too."
                 }
+                (comparisons::note(study))
                 @for (index, table) in tables.iter().enumerate() { (of_table(study, index, table)) }
             }
         }

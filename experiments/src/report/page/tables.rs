@@ -20,15 +20,15 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
         .collect();
     html! {
         p class="note" {
-                    "Means (numbers), rates (true or false) and medians (lists), each with its 95 % \
-                     interval"
+                    "Means (numbers), rates (true or false) and medians (lists), each with its 95 \
+                     % interval"
                     @if study.baseline().is_some() {
                         ", and the difference to the baseline over the same seeds. ▲ and ▼ mark \
                          differences whose interval leaves out 0: of twenty that are none, about \
                          one is marked. Differences of rates are in percentage points (pp)."
                         @if shown.iter().any(|measure| measure.kind == Kind::Series) {
-                            " Of curves it is said from which index on they differ, if they do at the \
-                             last."
+                            " Of curves it is said from which index on they differ, if they do at \
+                             the last."
                         }
                     } @else { "." }
                 }
@@ -88,8 +88,8 @@ fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) 
     }
 }
 
-/// From so many blocks of runs on a difference is marked: with five, chance alone has all of them on one side
-/// of 0 in one case of sixteen, and a bootstrap of values on one side is sure of it.
+/// From so many blocks of runs on a difference is marked: with five, chance alone has all of them
+/// on one side of 0 in one case of sixteen, and a bootstrap of values on one side is sure of it.
 const MARKED_FROM: usize = 6;
 
 /// A difference, marked if its interval leaves out 0.

@@ -1,4 +1,5 @@
-//! Curves over an index: the mean of each cell with its band, and how it differs from the baseline's.
+//! Curves over an index: the mean of each cell with its band, and how it differs from the
+//! baseline's.
 
 use maud::{Markup, html};
 
@@ -106,13 +107,19 @@ fn curve(
         }
         Shown::Difference => {
             let difference = summary.difference.as_ref()?;
-            let points = difference.points.iter();
+            // An index without pairs is a gap in the line, as one without values is.
+            let points = summary.points.iter().map(|at| {
+                let mut points = difference.points.iter();
+                let found = points.find(|one| one.index == at.index);
+                let unknown = Estimate::unknown(f64::NAN);
+                let estimate = found.map_or(unknown, |one| one.difference.estimate());
+                (at.index, estimate)
+            });
             let from = difference.holds_from.map(|from| {
                 let (cell, from_told) = (study.cell_name(cell), measure.index_told(from));
                 (from, format!("{cell}: holds from {from_told} on"))
             });
-            let estimates = points.map(|one| (one.index, one.difference.estimate()));
-            (estimates.collect(), from)
+            (points.collect(), from)
         }
     };
     Some(Curve {
@@ -238,7 +245,8 @@ impl Plot<'_> {
                 @for (index, one) in curve.points.iter().filter(|(_, one)| one.value.is_finite()) {
                     @let (x, y) = at(*index, one.value);
                     @let told = self.measure.told(one);
-                    @let says = format!("{} {}: {told}", curve.name, self.measure.index_told(*index));
+                    @let index_told = self.measure.index_told(*index);
+                    @let says = format!("{} {index_told}: {told}", curve.name);
                     (marker(curve.series, x, y, says.trim_start()))
                 }
             }

@@ -33,8 +33,9 @@ fn skewed() -> Blocks {
     blocks.into()
 }
 
-/// Thirty problems of five runs each, with a correlation of 0.8 among the runs of a problem: bootstraps
-/// of problems hold the true mean nearly as often as they say, and bootstraps of runs do not.
+/// Thirty problems of five runs each, with a correlation of 0.8 among the runs of a problem:
+/// bootstraps of problems hold the true mean nearly as often as they say, and bootstraps of runs do
+/// not.
 #[test]
 fn blocks_hold_the_truth_where_runs_do_not() {
     const REPETITIONS: u64 = 2000;
@@ -67,8 +68,8 @@ fn blocks_hold_the_truth_where_runs_do_not() {
     assert!(runs < 0.75, "{runs}");
 }
 
-/// `scipy.stats.bootstrap` with method BCa over the means that were drawn here; see `blocks.py`, beside
-/// this file, for this and the next values.
+/// `scipy.stats.bootstrap` with method BCa over the means that were drawn here; see `blocks.py`,
+/// beside this file, for this and the next values.
 #[test]
 fn intervals_of_blocks_are_those_of_scipy() {
     close(
@@ -138,8 +139,8 @@ fn pairs() -> Vec<Vec<(bool, bool)>> {
     ]
 }
 
-/// `scipy.stats.permutation_test` over the blocks' differences, all of them, and Wilson's interval of
-/// statsmodels for as many runs as the design effect leaves.
+/// `scipy.stats.permutation_test` over the blocks' differences, all of them, and Wilson's interval
+/// of statsmodels for as many runs as the design effect leaves.
 #[test]
 fn rates_in_blocks_are_those_of_scipy() {
     let test = mcnemar_in_blocks(&pairs());

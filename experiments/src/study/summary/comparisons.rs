@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::figures::{number_difference, rate_difference, rate_test};
-use super::series::{self, ALPHA, DifferencePoint, Pairs};
+use super::series::{self, ALPHA, DifferencePoint};
 use super::values::Kind;
 use super::{Difference, Estimate};
 use crate::stats::{bootstrap, paired};
@@ -219,9 +219,9 @@ fn judge(
     }
 }
 
-/// A claim for all indices from one on. It holds if it does at each of them: that needs no correction
-/// for their number, since one that does not hold is enough against it. That one of many does not
-/// hold may be chance, and is corrected for.
+/// A claim for all indices from one on. It holds if it does at each of them: that needs no
+/// correction for their number, since one that does not hold is enough against it. That one of many
+/// does not hold may be chance, and is corrected for.
 fn judge_curve(
     results: &Results,
     name: &str,
@@ -239,12 +239,12 @@ fn judge_curve(
         .iter()
         .map(|point| bounds.judge(&point.difference.estimate()))
         .collect();
-    let pairs = Pairs::new(results, cells, name).0.into_iter();
-    let pairs = pairs.filter(|(index, _)| *index >= from);
+    let pairs = series::pairs(results, cells, name).into_iter();
+    let pairs = pairs.filter(|pairs| pairs.index >= from);
     let p: Vec<f64> = pairs
         .zip(&verdicts)
-        .map(|((_, pairs), verdict)| {
-            let differences = bootstrap::differences(&pairs);
+        .map(|(pairs, verdict)| {
+            let differences = bootstrap::differences(&pairs.blocks);
             let means = differences.means();
             let mean = means.iter().sum::<f64>() / means.len() as f64;
             match verdict {

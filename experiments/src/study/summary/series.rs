@@ -40,14 +40,14 @@ pub struct SeriesPoint {
     pub ci_high: f64,
 }
 
-/// How a cell's curves differ from those of another cell: here minus there, over the seeds that both
-/// have, at the indices that both have.
+/// How a cell's curves differ from those of another cell: here minus there, over the seeds that
+/// both have, at the indices that both have.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeriesDifference {
     /// The difference at each index.
     pub points: Vec<DifferencePoint>,
-    /// The family of tests that Holm's method holds together: how many indices of this curve, against
-    /// this one other cell, have a p.
+    /// The family of tests that Holm's method holds together: how many indices of this curve,
+    /// against this one other cell, have a p.
     pub family: usize,
     /// The index from which on to the last the difference holds: each interval leaves out 0 on the
     /// same side, and each p, adjusted, is at most [`ALPHA`]. None if it does not hold at the last
@@ -113,13 +113,13 @@ pub(super) fn difference(
     name: &str,
 ) -> SeriesDifference {
     let key = difference_key(results, (here, there), name);
-    let pairs = Pairs::new(results, (here, there), name);
-    let points = pairs.0.into_iter().map(|(index, pairs)| {
-        let n = pairs.iter().map(Vec::len).sum();
-        let p = tests::student(&bootstrap::differences(&pairs), 0.0);
+    let pairs = pairs(results, (here, there), name).into_iter();
+    let points = pairs.map(|Pairs { index, blocks }| {
+        let n = blocks.iter().map(Vec::len).sum();
+        let p = tests::student(&bootstrap::differences(&blocks), 0.0);
         DifferencePoint {
             index,
-            difference: Difference::new(n, bootstrap::paired_difference(&pairs, key)),
+            difference: Difference::new(n, bootstrap::paired_difference(&blocks, key)),
             p,
             p_holm: f64::NAN,
         }
@@ -147,18 +147,25 @@ pub(super) fn difference(
     }
 }
 
-/// What two cells say with the same seeds, by block, at each index that both have.
-pub(super) struct Pairs(pub(super) Vec<(f64, Vec<Vec<(f64, f64)>>)>);
+/// What two cells say with the same seeds at an index.
+pub(super) struct Pairs {
+    pub(super) index: f64,
+    /// Here and there, by block.
+    pub(super) blocks: Vec<Vec<(f64, f64)>>,
+}
 
-impl Pairs {
-    pub(super) fn new(results: &Results, (here, there): (usize, usize), name: &str) -> Self {
-        let [here, there] = [here, there].map(|cell| curves(results, cell, name));
-        let shared = indices(here.values()).into_iter();
-        let pairs = shared.map(|index| (index, paired(&at(&here, index), &at(&there, index))));
-        let pairs = pairs.filter(|(_, pairs)| !pairs.is_empty());
-        let in_blocks = |(index, pairs)| (index, in_blocks(&results.manifest, pairs));
-        Pairs(pairs.map(in_blocks).collect())
-    }
+/// The pairs of two cells at each index at which there are any.
+pub(super) fn pairs(results: &Results, (here, there): (usize, usize), name: &str) -> Vec<Pairs> {
+    let [here, there] = [here, there].map(|cell| curves(results, cell, name));
+    let all = indices(here.values()).into_iter();
+    let pairs = all.map(|index| Pairs {
+        index,
+        blocks: in_blocks(
+            &results.manifest,
+            paired(&at(&here, index), &at(&there, index)),
+        ),
+    });
+    pairs.filter(|pairs| !pairs.blocks.is_empty()).collect()
 }
 
 /// The values of curves at an index, by seed.

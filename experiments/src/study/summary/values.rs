@@ -81,8 +81,8 @@ pub fn number_of(run: &RunRecord, name: &str) -> Option<f64> {
     number.filter(|number| number.is_finite())
 }
 
-/// The kind of a metric, from what all runs say. One list makes it lists, one curve curves, one word
-/// makes it words; numbers and truth values together are numbers.
+/// The kind of a metric, from what all runs say. One list makes it lists, one curve curves, one
+/// word makes it words; numbers and truth values together are numbers.
 pub fn kind_of(results: &Results, name: &str) -> Kind {
     let mut kind = Kind::Absent;
     for run in &results.runs {
@@ -103,8 +103,8 @@ pub fn kind_of(results: &Results, name: &str) -> Kind {
 
 /// What the runs of a cell say under the name of a list, as things that were watched: rovers, say,
 /// until they arrived. A `null` in a run whose time was over is censored at its end. In a run that
-/// ended otherwise it never happens: it is watched for ever. What one run lists shares its fate, and so
-/// do runs of one block.
+/// ended otherwise it never happens: it is watched for ever. What one run lists shares its fate,
+/// and so do runs of one block.
 pub fn observations(results: &Results, cell: usize, name: &str) -> Vec<Observation> {
     let mut observations = Vec::new();
     let manifest = &results.manifest;

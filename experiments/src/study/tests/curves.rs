@@ -1,4 +1,5 @@
-//! Curves, blocks of seeds, and claims that one cell exceeds another, from the study's text to its page.
+//! Curves, blocks of seeds, and claims that one cell exceeds another, from the study's text to its
+//! page.
 
 mod learner;
 
@@ -24,9 +25,10 @@ const STUDY: &str = "question = 'From when on does searching pay?'\nscenario = '
     [[factor]]\nname = 'planner'\nvariants = [{ name = 'greedy' }, \
     { name = 'search', set = { learner.gain = 0.2 } }]\n";
 
-const CLAIMS: &str = "[[published]]\nmetric = 'reward'\ntitle = 'Figure 3'\nsource = 'A. N. Other'\n\
-    values = [\n\
-    { planner = 'search', exceeds = { planner = 'greedy' }, from_index = 15, quote = 'soon more' },\n\
+const CLAIMS: &str = "[[published]]\nmetric = 'reward'\ntitle = 'Figure 3'\nsource = 'A. N. \
+    Other'\nvalues = [\n\
+    { planner = 'search', exceeds = { planner = 'greedy' }, from_index = 15, quote = 'soon \
+    more' },\n\
     { planner = 'search', exceeds = { planner = 'greedy' }, from_index = 25, by_at_most = 1 },\n\
     { planner = 'search', exceeds = { planner = 'greedy' }, from_index = 0 },\n]\n\
     [[published]]\nmetric = 'last'\ntitle = 'In the end'\nsource = 'A. N. Other'\nvalues = [\n\
@@ -177,7 +179,7 @@ fn a_block_of_seeds_shares_a_problem() {
     };
     for at in 0..30 {
         assert_eq!(problem(at), problem(at - at % 5), "{at}");
-        assert_eq!(problem(at) == problem((at + 5) % 30), false, "{at}");
+        assert!(problem(at) != problem((at + 5) % 30), "{at}");
     }
     let curves: Vec<_> = (0..5)
         .map(|at| &metrics(&results.of_cell(0)[at])["reward"])

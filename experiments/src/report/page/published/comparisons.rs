@@ -8,6 +8,24 @@ use crate::stats::Estimate;
 use crate::study::summary::comparisons::{ComparisonSummary, Verdict};
 use farside_actors::figure::numbers::{as_written, plain};
 
+/// How comparisons are to be read; nothing if there are none.
+pub(super) fn note(study: &Study<'_>) -> Markup {
+    let all = &study.summary.comparisons;
+    html! {
+        @if !all.is_empty() {
+            p class="note" {
+                "Where a cell is said to be more than another, the difference is paired by seed. \
+                 The claim holds if the whole 95 % interval is where it says, and does not hold if \
+                 the whole interval is elsewhere."
+                @if all.iter().any(|one| one.index.is_some()) {
+                    " Of curves it is for each index from the first on, and the one is shown that \
+                     speaks most against it."
+                }
+            }
+        }
+    }
+}
+
 /// The comparisons of a published table; nothing if it has none.
 pub(super) fn of_table(study: &Study<'_>, index: usize) -> Markup {
     let all = study.summary.comparisons.iter();
@@ -21,19 +39,10 @@ pub(super) fn of_table(study: &Study<'_>, index: usize) -> Markup {
     html! {
         div class="scroll" tabindex="0" {
             table {
-                caption {
-                    "The difference is paired by seed, with its 95 % interval. A claim holds if the \
-                     whole interval is where it says, and does not hold if the whole interval is not."
-                    @if of_curves {
-                        " Of curves the index is shown that speaks most against the claim, which is for \
-                         each index from the first on."
-                    }
-                }
                 thead {
                     tr {
                         th class="name" { "cell" }
                         th class="text" { "published" }
-                        th class="narrow" { "verdict" }
                         th class="narrow" { "difference" }
                         th class="narrow" { "95 % interval" }
                         @if of_curves { th class="narrow" { "at" } }
@@ -72,12 +81,13 @@ fn row(
     html! {
         tr {
             th scope="row" { (study.cell_name(one.cell)) }
+            // On a phone the other columns are out of sight.
             td class="text" {
+                span class=(class) { (words) }
                 (claimed(study, one))
                 @if let Some(from) = one.from_index { ", from " (index_told(from)) " on" }
                 @if !one.quote.is_empty() { small { "“" (one.quote) "”" } }
             }
-            td { span class=(class) { (words) } }
             @if difference.value.is_finite() {
                 td { (with_unit(Style::Plain.signed(&difference), unit)) }
                 td { (Style::Plain.interval(&difference)) }

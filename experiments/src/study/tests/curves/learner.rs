@@ -35,7 +35,9 @@ impl Actor for Planner {
 
 impl Handler<Step> for Planner {
     fn handle(&mut self, _step: Step, ctx: &mut Context<'_, Self>) -> Outcome {
-        let chance = ctx.random("reward").normal(0.0, 0.3);
+        // Planners draw from streams of their own: they share the problem, and no luck.
+        let planner = if self.gain > 0.0 { "search" } else { "greedy" };
+        let chance = ctx.random(planner).normal(0.0, 0.3);
         let mut rewards = self.rewards.lock().expect("nobody panics with it");
         let step = rewards.len() as f64;
         rewards.push(Some(

@@ -1,0 +1,231 @@
+//! `farside explain`: what there is to know of each key of scenarios and each metric, from the
+//! declarations that they are read and reported by.
+
+use farside::suggest::{did_you_mean, nearest};
+use farside_actors::system::{Better, Key, Metric, MetricKind, Section};
+use serde_json::{Value, json};
+
+use super::Exit;
+use super::{CommandError, print, print_json};
+use crate::registry::Registry;
+use crate::scenario::shared_sections;
+use crate::study::KERNEL_METRICS;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// A key (links.default.loss, loss), a table (links.default) or a metric (arrived); all of them
+    /// are listed unless given
+    #[arg(value_name = "KEY|METRIC")]
+    name: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Something that can be explained.
+enum Entry<'a> {
+    Key {
+        section: &'a Section,
+        key: &'a Key,
+    },
+    Metric {
+        /// The system that has it; none if every run has.
+        system: Option<&'a str>,
+        metric: &'a Metric,
+    },
+}
+
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let shared = shared_sections();
+    let own: Vec<Section> = registry.systems().flat_map(|s| s.sections()).collect();
+    let sections: Vec<&Section> = shared.iter().chain(&own).collect();
+    let all = entries(&sections, registry);
+    let Some(name) = &args.name else {
+        return list(&sections, registry, &all, args.json);
+    };
+    let section = sections.iter().find(|section| section.name == *name);
+    let found: Vec<&Entry<'_>> = match section {
+        Some(section) => all.iter().filter(|entry| entry.is_in(section)).collect(),
+        None => all.iter().filter(|entry| entry.is_called(name)).collect(),
+    };
+    if found.is_empty() && section.is_none() {
+        let full: Vec<String> = all.iter().map(Entry::name).collect();
+        let last = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
+        let short: Vec<String> = full.iter().map(|name| last(name)).collect();
+        let names = full.iter().chain(&short).map(String::as_str);
+        let hint = did_you_mean(nearest(name, names).as_deref());
+        return Err(CommandError::Arguments(format!(
+            "{name}: no such key, table or metric{hint}; `farside explain` lists them all"
+        )));
+    }
+    if args.json {
+        print_json(&found.iter().map(|entry| entry.json()).collect::<Vec<_>>())?;
+        return Ok(Exit::Done);
+    }
+    let mut texts: Vec<String> = Vec::new();
+    if let Some(section) = section.filter(|section| !section.about.is_empty()) {
+        texts.push(prose(section.about, ""));
+    }
+    texts.extend(found.iter().map(|entry| entry.text()));
+    print(texts.join("\n\n"))?;
+    Ok(Exit::Done)
+}
+
+fn entries<'a>(sections: &[&'a Section], registry: &'a Registry) -> Vec<Entry<'a>> {
+    let mut all = Vec::new();
+    for section in sections {
+        all.extend(section.keys.iter().map(|key| Entry::Key { section, key }));
+    }
+    let every = KERNEL_METRICS.iter();
+    all.extend(every.map(|metric| Entry::Metric {
+        system: None,
+        metric,
+    }));
+    for system in registry.systems() {
+        let metrics = system.metrics().iter();
+        all.extend(metrics.map(|metric| Entry::Metric {
+            system: Some(system.name()),
+            metric,
+        }));
+    }
+    all
+}
+
+impl Entry<'_> {
+    /// The dotted key, or the metric's name.
+    fn name(&self) -> String {
+        match self {
+            Entry::Key { section, key } if section.name.is_empty() => key.name.to_owned(),
+            Entry::Key { section, key } => format!("{}.{}", section.name, key.name),
+            Entry::Metric { metric, .. } => metric.name.to_owned(),
+        }
+    }
+
+    fn is_in(&self, of: &Section) -> bool {
+        matches!(self, Entry::Key { section, .. } if section.name == of.name)
+    }
+
+    /// Whether somebody who writes `name` may mean it: the whole name, or the last part of a key.
+    fn is_called(&self, name: &str) -> bool {
+        let last = matches!(self, Entry::Key { key, .. } if key.name == name);
+        last || self.name() == name
+    }
+
+    fn text(&self) -> String {
+        let mut text = self.name();
+        match self {
+            Entry::Key { section, key } => {
+                text += &format!("\n{}", prose(key.about, "  "));
+                if !key.expected.is_empty() {
+                    text += &format!("\n  expected: {}", key.expected);
+                }
+                if let Some(default) = section.defaults.get(key.name).and_then(shown) {
+                    text += &format!("\n  default: {default}");
+                }
+            }
+            Entry::Metric { system, metric } => {
+                let unit = match metric.unit {
+                    "" => String::new(),
+                    unit => format!(" [{unit}]"),
+                };
+                text += &format!("\n  metric: {}{unit}", metric.label);
+                if !metric.about.is_empty() {
+                    text += &format!("\n  {}", metric.about);
+                }
+                text += &format!("\n  {}; {}", kind(metric), better(metric));
+                let whose = system.map_or("of every run".to_owned(), |name| {
+                    format!("of runs of the system {name}")
+                });
+                text += &format!("\n  {whose}");
+            }
+        }
+        text
+    }
+
+    fn json(&self) -> Value {
+        match self {
+            Entry::Key { section, key } => json!({
+                "key": self.name(),
+                "about": prose(key.about, ""),
+                "expected": key.expected,
+                "default": section.defaults.get(key.name),
+            }),
+            Entry::Metric { system, metric } => json!({
+                "metric": metric.name,
+                "label": metric.label,
+                "unit": metric.unit,
+                "about": metric.about,
+                "kind": kind(metric),
+                "better": better(metric),
+                "system": system,
+            }),
+        }
+    }
+}
+
+/// Lines of documentation as a paragraph of lines, without the blank before each and without
+/// examples.
+fn prose(lines: &[&str], indent: &str) -> String {
+    let lines = lines.iter().map(|line| line.trim());
+    let lines = lines.take_while(|line| !line.starts_with("```") && !line.starts_with('|'));
+    let mut lines: Vec<String> = lines.map(|line| format!("{indent}{line}")).collect();
+    while lines.last().is_some_and(|line| line.trim().is_empty()) {
+        lines.pop();
+    }
+    lines.join("\n")
+}
+
+/// A default as a scenario writes it; none of a table of its own.
+fn shown(value: &toml::Value) -> Option<String> {
+    (!value.is_table()).then(|| value.to_string())
+}
+
+fn kind(metric: &Metric) -> &'static str {
+    match metric.kind {
+        MetricKind::Number => "a number for each run",
+        MetricKind::Rate => "true or false for each run",
+        MetricKind::Word => "a word for each run",
+        MetricKind::Sample => "a list of numbers for each run",
+        MetricKind::Series(_) => "a curve for each run",
+    }
+}
+
+fn better(metric: &Metric) -> &'static str {
+    match metric.better {
+        Better::Higher => "higher is better",
+        Better::Lower => "lower is better",
+        Better::Neither => "neither way is better",
+    }
+}
+
+fn list(
+    sections: &[&Section],
+    registry: &Registry,
+    all: &[Entry<'_>],
+    as_json: bool,
+) -> Result<Exit, CommandError> {
+    if as_json {
+        print_json(&all.iter().map(Entry::json).collect::<Vec<_>>())?;
+        return Ok(Exit::Done);
+    }
+    let mut lines = Vec::new();
+    for section in sections {
+        let name = match section.name.as_str() {
+            "" => "at the top",
+            name => name,
+        };
+        let keys: Vec<&str> = section.keys.iter().map(|key| key.name).collect();
+        lines.push(format!("{name}: {}", keys.join(", ")));
+    }
+    let names = |metrics: &[Metric]| {
+        let names: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
+        names.join(", ")
+    };
+    lines.push(format!("metrics of every run: {}", names(&KERNEL_METRICS)));
+    for system in registry.systems() {
+        let (name, metrics) = (system.name(), names(system.metrics()));
+        lines.push(format!("metrics of the system {name}: {metrics}"));
+    }
+    print(lines.join("\n\n"))?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,55 @@
+//! What there is to know of the keys that every system shares.
+
+use farside_actors::link::LinkParams;
+use farside_actors::system::settings::Table;
+use farside_actors::system::{Key, Section};
+
+use super::crash::Crash;
+use super::{LogSettings, Shared};
+
+/// The tables that every scenario may have, each with its keys. The first, without a name, holds
+/// those at the top of the file.
+///
+/// ```
+/// use farside_experiments::scenario::shared_sections;
+/// let sections = shared_sections();
+/// let links = sections.iter().find(|section| section.name == "links.default").unwrap();
+/// assert!(links.keys.iter().any(|key| key.name == "loss"));
+/// assert_eq!(links.defaults["latency"].as_str(), Some("5ms"));
+/// ```
+pub fn shared_sections() -> Vec<Section> {
+    let mut all = Shared::sections("");
+    all.push(Section {
+        name: "links.default".to_owned(),
+        about: &["The parameters of all links; [links.PATTERN] has the same for some of them."],
+        keys: LinkParams::keys(),
+        defaults: toml::Table::try_from(LinkParams::default()).unwrap_or_default(),
+    });
+    all.push(Section {
+        name: "degrade".to_owned(),
+        about: &["Links whose names match a pattern have other parameters for a while."],
+        keys: degrade_keys(),
+        defaults: toml::Table::new(),
+    });
+    all.extend(Crash::sections("crash"));
+    all.extend(LogSettings::sections("log"));
+    all
+}
+
+/// The keys of a `[[degrade]]` entry: when, which, and what of a link's.
+fn degrade_keys() -> Vec<Key> {
+    let key = |name, about| Key {
+        name,
+        about,
+        expected: String::new(),
+    };
+    let own = [
+        key("at", &["When it begins, from the start of the run."][..]),
+        key(
+            "until",
+            &["When it ends; without, it lasts as long as the run."],
+        ),
+        key("links", &["Which links: a pattern over their names."]),
+    ];
+    own.into_iter().chain(LinkParams::keys()).collect()
+}

@@ -1,0 +1,52 @@
+//! Breaks a real log: the input overwrites, cuts out and puts in bytes. What is recovered is a
+//! whole file, and every message in it is one that the log had.
+#![no_main]
+
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+
+use farside_fuzz::{each_record, log};
+use farside_logs::{info, recover};
+use libfuzzer_sys::fuzz_target;
+use mcap::records::Record;
+
+static MESSAGES: OnceLock<BTreeSet<(u64, Vec<u8>)>> = OnceLock::new();
+
+fn messages(bytes: &[u8]) -> BTreeSet<(u64, Vec<u8>)> {
+    let mut messages = BTreeSet::new();
+    each_record(bytes, |record| {
+        if let Record::Message { header, data } = record {
+            messages.insert((header.log_time, data.into_owned()));
+        }
+    });
+    messages
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut broken = log().to_vec();
+    for edit in bytes.chunks_exact(5).take(32) {
+        let place = usize::from(u16::from_le_bytes([edit[1], edit[2]]));
+        // The magic bytes stay, or nothing is read at all.
+        let place = 8 + place % (broken.len() - 8).max(1);
+        let end = (place + usize::from(edit[3])).min(broken.len());
+        match edit[0] % 4 {
+            0 if place < broken.len() => broken[place] = edit[4],
+            1 => drop(broken.drain(place.min(end)..end)),
+            2 => broken.splice(place..place, (0..edit[3]).map(|_| edit[4])).for_each(drop),
+            3 if edit[4] == 0 => broken.truncate(place),
+            _ => {}
+        }
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, out) = (folder.path().join("in"), folder.path().join("out"));
+    std::fs::write(&path, &broken).expect("a file");
+    let report = recover(&path, &out).expect("it starts like a log");
+    assert!(!report.to_string().is_empty());
+    let saved = std::fs::read(&out).expect("a file");
+    let known = MESSAGES.get_or_init(|| messages(log()));
+    assert!(messages(&saved).is_subset(known), "a message that nobody wrote");
+    if broken == log() {
+        assert_eq!((report.losses, messages(&saved).len()), (0, known.len()));
+    }
+    let _ = info(&out);
+});

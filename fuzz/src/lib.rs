@@ -1,0 +1,144 @@
+//! What the fuzz targets share: a small real log, and ways in which bytes change it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use farside::Executor;
+use farside_experiments::scenario::Scenario;
+use farside_experiments::system::Registry;
+use farside_logs::{LogOptions, LogWriter};
+use mcap::records::{Metadata, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader};
+
+/// A log of a second of traffic, with losses, timers and a crash.
+pub fn log() -> &'static [u8] {
+    static LOG: OnceLock<Vec<u8>> = OnceLock::new();
+    LOG.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.mcap");
+        let sets = [
+            "until=1200ms",
+            "links.default.loss=0.2",
+            "crash=[{ actor = 'rover_2', at = '500ms', restart = '900ms' }]",
+        ];
+        let sets = sets.map(str::to_owned);
+        let scenario = Scenario::open("traffic/open-loop", &sets, &Registry::builtin());
+        let scenario = scenario.expect("the scenario is one");
+        let mut assembled = scenario.assemble().expect("it can be built");
+        let options = LogOptions {
+            scenario: scenario.name().to_owned(),
+            resolved: scenario.resolved().expect("it can be written"),
+            ..LogOptions::default()
+        };
+        assembled.sim.observe(LogWriter::create(&path, options).expect("a log"));
+        assembled.sim.run(Executor::Inline).expect("a run");
+        std::fs::read(&path).expect("the log is there")
+    })
+}
+
+/// One change of a message of the log, by seven bytes of a target's input.
+struct Edit {
+    message: usize,
+    what: u8,
+    place: usize,
+    value: u8,
+}
+
+/// Writes the log to two files, each message as it is but for the edits that `input` makes in one
+/// file or the other. Chunks and checksums are in order: what is read is what was changed.
+pub fn write_edited(input: &[u8], paths: [&Path; 2]) {
+    let mut edits: [Vec<Edit>; 2] = [Vec::new(), Vec::new()];
+    for bytes in input.chunks_exact(7).take(64) {
+        edits[usize::from(bytes[0] & 1)].push(Edit {
+            what: bytes[0] >> 1,
+            message: usize::from(u16::from_le_bytes([bytes[1], bytes[2]])),
+            place: usize::from(u16::from_le_bytes([bytes[3], bytes[4]])),
+            value: bytes[5],
+        });
+    }
+    for (path, edits) in paths.into_iter().zip(edits) {
+        std::fs::write(path, rewritten(&edits)).expect("a file");
+    }
+}
+
+/// The log, record by record, with edits.
+fn rewritten(edits: &[Edit]) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().compression(None).profile("farside");
+    let mut writer = options.create(&mut out).expect("a writer");
+    let (mut schemas, mut channels) = (BTreeMap::new(), BTreeMap::new());
+    let mut number = 0;
+    each_record(log(), |record| match record {
+        Record::Schema { header, data } => {
+            let id = writer.add_schema(&header.name, &header.encoding, &data);
+            schemas.insert(header.id, id.expect("a schema"));
+        }
+        Record::Channel(channel) => {
+            let schema = schemas.get(&channel.schema_id).copied().unwrap_or(0);
+            let encoding = &channel.message_encoding;
+            let id = writer.add_channel(schema, &channel.topic, encoding, &channel.metadata);
+            channels.insert(channel.id, id.expect("a channel"));
+        }
+        Record::Message { mut header, data } => {
+            header.channel_id = channels[&header.channel_id];
+            let mut data = data.into_owned();
+            let mut times = 1;
+            for edit in edits.iter().filter(|edit| edit.message == number) {
+                times = edited(edit, &mut data, &mut header.log_time, times);
+            }
+            for _ in 0..times {
+                writer.write_to_known_channel(&header, &data).expect("a message");
+            }
+            number += 1;
+        }
+        Record::Attachment { header, data, .. } => {
+            let attachment = mcap::Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data,
+            };
+            writer.attach(&attachment).expect("an attachment");
+        }
+        Record::Metadata(Metadata { name, metadata }) => {
+            writer.write_metadata(&Metadata { name, metadata }).expect("metadata");
+        }
+        _ => {}
+    });
+    writer.finish().expect("an end");
+    drop(writer);
+    out.into_inner()
+}
+
+/// Changes a message; how often it is to be written.
+fn edited(edit: &Edit, data: &mut Vec<u8>, log_time: &mut u64, times: usize) -> usize {
+    let place = edit.place.min(data.len().saturating_sub(1));
+    match edit.what % 6 {
+        0 if !data.is_empty() => data[place] = edit.value,
+        1 => data.truncate(place),
+        2 => data.insert(place, edit.value),
+        3 => *log_time = log_time.saturating_add(u64::from(edit.value) << (edit.place % 56)),
+        4 => return 0,
+        5 => return times * 2,
+        _ => {}
+    }
+    times
+}
+
+/// Calls `each` with the records of a whole log in front of its summary, chunks opened.
+pub fn each_record(bytes: &[u8], mut each: impl FnMut(Record<'_>)) {
+    let mut reader = LinearReader::new();
+    reader.insert(bytes.len()).copy_from_slice(bytes);
+    reader.notify_read(bytes.len());
+    while let Some(event) = reader.next_event() {
+        let LinearReadEvent::Record { opcode, data } = event.expect("the log is whole") else {
+            panic!("the log is whole");
+        };
+        if opcode == mcap::records::op::DATA_END {
+            return;
+        }
+        each(mcap::parse_record(opcode, data).expect("the log is in order"));
+    }
+}

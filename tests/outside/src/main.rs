@@ -1,0 +1,223 @@
+//! A system of somebody else's: beacons call, a lander counts. Demonstrates in particular that a
+//! system brings all that is its own, settings, metrics, a curve, a scenario, a study, a picture, a
+//! scene and what must never happen, in one file, and that the `farside` command speaks of it.
+//!
+//! ```text
+//!   beacon_1 ──beacon_1-lander──▶ lander        Call, every interval
+//!   beacon_2 ──beacon_2-lander──▶
+//! ```
+
+use std::sync::{Arc, Mutex};
+
+use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside::scene::{Drawing, Level, Scene};
+use farside::RunInfo;
+use farside_actors::figure::{Figure, svg};
+use farside_actors::link::Wiring;
+use farside_actors::system::settings::{Table, over};
+use farside_actors::system::{
+    Assembly, Better, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
+    Results, Section, Series, SeriesIndex, Settings, Setup, SetupError, System,
+};
+use farside_actors::{settings, units};
+use farside_experiments::{cli, registry::Registry};
+use serde::{Deserialize, Serialize};
+
+settings! {
+    /// The `[beacons]` table: who calls, and how often.
+    struct Beacons {
+        /// How many beacons there are.
+        count: u32 = 2, 1..=100;
+        /// How many times each calls.
+        calls: u32 = 10, 1..=1000;
+        /// The time between two calls.
+        interval: SimDuration [with = "units::duration"] = SimDuration::from_secs(1),
+            over(SimDuration::ZERO);
+    }
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct BeaconScenario {
+    beacons: Beacons,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Call {
+    number: u32,
+}
+
+struct Beacon(Beacons);
+
+impl Actor for Beacon {
+    type Accepts = (Call,);
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.timer(self.0.interval, Call { number: 0 });
+        Ok(())
+    }
+}
+
+impl Handler<Call> for Beacon {
+    fn handle(&mut self, Call { number }: Call, ctx: &mut Context<'_, Self>) -> Outcome {
+        let lander = ctx.lookup::<Lander>("lander")?;
+        ctx.send(lander, Call { number });
+        if number + 1 < self.0.calls {
+            ctx.timer(self.0.interval, Call { number: number + 1 });
+        }
+        Ok(())
+    }
+}
+
+struct Lander;
+
+impl Actor for Lander {
+    type Accepts = (Call,);
+}
+
+impl Handler<Call> for Lander {
+    fn handle(&mut self, _: Call, _: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+/// When calls were heard \[s\], from the committed records.
+#[derive(Clone, Default)]
+struct Heard(Arc<Mutex<Vec<f64>>>);
+
+impl Observer for Heard {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        if record.class == RecordClass::Delivered {
+            let mut heard = self.0.lock().expect("nobody panics with it");
+            heard.push(record.key.time.as_secs_f64());
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+#[derive(Debug)]
+struct Calls;
+
+impl Scene for Calls {
+    fn record(&mut self, record: &Record<'_>, run: &RunInfo, out: &mut Vec<Drawing>) {
+        if record.class == RecordClass::Delivered {
+            let (level, message) = (Level::Info, "calls".to_owned());
+            let name = run.name(record.sender).to_owned();
+            out.push(Drawing::Text { level, name, message });
+        }
+    }
+}
+
+struct BeaconSystem;
+
+impl System for BeaconSystem {
+    fn name(&self) -> &str {
+        "beacons"
+    }
+
+    fn about(&self) -> &str {
+        "beacons call a lander"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        Beacons::sections("beacons")
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        const CALL: SeriesIndex = SeriesIndex::new("call", "");
+        const ALL: [Metric; 2] = [
+            Metric::number("heard", "calls heard", "calls", Better::Higher),
+            Metric::series("heard_over_calls", "calls heard so far", "calls", CALL, Better::Higher),
+        ];
+        &ALL
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        const TEXT: &str = include_str!("../files/quiet.toml");
+        &[Builtin { name: "beacons/quiet", text: TEXT }]
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        const TEXT: &str = include_str!("../files/loss.toml");
+        &[Builtin { name: "beacons/loss", text: TEXT }]
+    }
+
+    fn pictures(&self) -> &[PictureInfo] {
+        &[PictureInfo { name: "calls", about: "when calls were heard", takes: &[] }]
+    }
+
+    fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(BeaconScenario::deserialize(keys)?))
+    }
+}
+
+impl Settings for BeaconScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        self.beacons.check("beacons")
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        let (lander, mut wiring) = (setup.sim.host("lander"), Wiring::default());
+        setup.sim.actor(lander, "lander", |_| Lander);
+        for name in (1..=self.beacons.count).map(|number| format!("beacon_{number}")) {
+            let (host, settings) = (setup.sim.host(&name), self.beacons.clone());
+            setup.sim.actor(host, &name, move |_| Beacon(settings.clone()));
+            wiring.link((host, &name), (lander, "lander"));
+        }
+        setup.link(&wiring)?;
+        let heard = Heard::default();
+        setup.sim.observe(heard.clone());
+        let settings = self.beacons.clone();
+        let conclude = move |_: &Report| {
+            let times = heard.0.lock().expect("the run is over").clone();
+            let mut results = Results::default();
+            results.metrics.insert("heard".to_owned(), times.len().into());
+            let until = |call: u32| settings.interval.as_secs_f64() * f64::from(call + 2);
+            let by = |call| times.iter().filter(|time| **time < until(call)).count() as f64;
+            let index = (0..settings.calls).map(f64::from).collect();
+            let values = (0..settings.calls).map(|call| Some(by(call))).collect();
+            let curve = Series::new(index, values).expect("as many of both, and they rise");
+            results.metrics.insert("heard_over_calls".to_owned(), curve.into());
+            results.line("calls heard", times.len().to_string());
+            if times.is_empty() {
+                results.violations.push("no call was heard".to_owned());
+            }
+            results
+        };
+        Ok(Assembly::new(conclude).with_scene(Calls))
+    }
+
+    fn draw(
+        &self,
+        _picture: &str,
+        run: &dyn Recording,
+        _request: &PictureRequest,
+        _files: &mut Files,
+    ) -> Result<Figure, PictureError> {
+        let mut times = Vec::new();
+        let end = run.for_each(&mut |record| {
+            let heard = record.class == RecordClass::Delivered;
+            times.extend(heard.then_some(record.time_ns as f64));
+            Ok(())
+        })?;
+        let scale = 400.0 / end.time_ns.unwrap_or(1).max(1) as f64;
+        let points = times.iter().enumerate();
+        let points = points.map(|(row, time)| (time * scale, 200.0 - 4.0 * row as f64));
+        Ok(Figure {
+            file: "calls.svg".to_owned(),
+            title: format!("{} calls heard", times.len()),
+            description: "Each call heard, over the time of the run.".to_owned(),
+            width: 400.0,
+            height: 200.0,
+            body: maud::html! { path class="axis" d=(svg::path(points)) {} },
+        })
+    }
+}
+
+fn main() -> std::process::ExitCode {
+    cli::main(Registry::empty().with(BeaconSystem))
+}
