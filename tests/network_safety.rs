@@ -50,9 +50,9 @@ fn any_policy() -> impl Strategy<Value = Case> {
             true => rigid(),
             false => NetworkConfig::default(),
         };
-        case.network.acceleration_chains = chains;
-        case.network.entry_gates = gates;
-        case.network.junction_resolution = resolution;
+        case.network.max_plus.acceleration_chains = chains;
+        case.network.max_plus.entry_gates = gates;
+        case.network.max_plus.junction_resolution = resolution;
         with_policy(case, policy)
     })
 }
@@ -182,9 +182,9 @@ proptest! {
     ) {
         let mut case = with_policy(case, Policy::Paper);
         case.world.ownership = ownership;
-        case.network.outsourcing = true;
-        case.network.processor = Processor::PairsPerS(500);
-        (case.network.congestion_weight, case.network.congestion_spread) = (weight, 0.5);
+        case.network.max_plus.outsourcing = true;
+        case.network.max_plus.processor = Processor::PairsPerS(500);
+        (case.network.max_plus.congestion_weight, case.network.max_plus.congestion_spread) = (weight, 0.5);
         no_collision(&case)?;
     }
 }

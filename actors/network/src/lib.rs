@@ -48,9 +48,9 @@
 //! # Starved processors
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
-//! asks for (`network.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
+//! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
 //! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
-//! 2006. With one constant for all cells, `network.processor = "paper"` ([`Processor::PAPER`], the
+//! 2006. With one constant for all cells, `network.max_plus.processor = "paper"` ([`Processor::PAPER`], the
 //! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
@@ -121,15 +121,17 @@ mod world;
 
 pub use assemble::{Missions, Network, Parts, assemble, assemble_over};
 pub use config::{
-    ConfigError, Gaps, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage,
-    TeamConfig, WorldConfig,
+    ConfigError, Gaps, Motion, NetworkConfig, Policy, RoadmapSource, Sabotage, TeamConfig,
+    WorldConfig,
 };
 pub use error::NetworkError;
 pub use max_plus::candidates::{CandidatePath, Destination, FirstStep};
+pub use max_plus::config::{MaxPlusConfig, Priority};
 pub use max_plus::processor::Processor;
 pub use metrics::{Costs, Deadlock, NetworkMetrics};
 pub use missions::missions;
 pub use node::Node;
+pub use reservation::config::CompleteConfig;
 pub use rover::Rover;
 pub use system::NetworkSystem;
 pub use timing::Timing;

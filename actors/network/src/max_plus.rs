@@ -5,6 +5,7 @@
 pub(crate) mod aids;
 pub(crate) mod assignment;
 pub(crate) mod candidates;
+pub(crate) mod config;
 pub(crate) mod lng;
 pub(crate) mod loads;
 pub(crate) mod messages;

@@ -100,9 +100,9 @@ pub struct NetworkMetrics {
     /// still at work when the time was over.
     pub late_optimisations: f64,
     /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
-    /// neighbours; 0 without `network.outsourcing`.
+    /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
-    /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
+    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
     pub last_confirmed: Option<String>,

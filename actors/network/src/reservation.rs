@@ -53,6 +53,7 @@
 
 mod atlas;
 mod book;
+pub(crate) mod config;
 pub mod messages;
 mod registries;
 mod registry;

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use farside::Report;
 use farside_actors::figure::Figure;
+use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Builtin, Files, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Results, Section, Settings, Setup, SetupError, System,
+    Renamed, Results, Section, Settings, Setup, SetupError, System,
 };
 use farside_worlds::SensorNetwork;
 use serde::Deserialize;
@@ -16,12 +17,9 @@ use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
 use crate::world::{Ground, crater, ground, in_crater, place};
 use crate::{
-    ConfigError, Missions, Network, NetworkError, NetworkMetrics, Parts, assemble, builtin,
-    metrics, missions, picture,
+    CompleteConfig, ConfigError, MaxPlusConfig, Missions, Network, NetworkConfig, NetworkError,
+    NetworkMetrics, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics, missions, picture,
 };
-
-/// The most rovers: each has a link to and from each node, and memory is finite.
-const MAX_ROVERS: u32 = 10_000;
 
 /// The network-guided system.
 pub struct NetworkSystem;
@@ -36,7 +34,30 @@ impl System for NetworkSystem {
     }
 
     fn sections(&self) -> Vec<Section> {
-        ["world", "team", "network"].map(Section::named).to_vec()
+        [
+            WorldConfig::sections("world"),
+            TeamConfig::sections("team"),
+            NetworkConfig::sections("network"),
+        ]
+        .concat()
+    }
+
+    fn renamed(&self) -> Vec<Renamed> {
+        // Keys of one policy stood in `[network]` itself.
+        let tables = [
+            MaxPlusConfig::sections("network.max_plus"),
+            CompleteConfig::sections("network.complete"),
+        ];
+        let sections = tables.iter().flatten();
+        let keys = sections.flat_map(|section| section.keys.iter().map(move |key| (section, key)));
+        let moved = keys.map(|(section, key)| {
+            let (old, new) = (
+                format!("network.{}", key.name),
+                format!("{}.{}", section.name, key.name),
+            );
+            Renamed { old, new }
+        });
+        moved.collect()
     }
 
     fn metrics(&self) -> &[Metric] {
@@ -69,11 +90,8 @@ impl Settings for NetworkScenario {
     }
 
     fn check(&self) -> Result<(), SetupError> {
-        if !(1..=MAX_ROVERS).contains(&self.team.rovers) {
-            let found = self.team.rovers;
-            let message = format!("{found}: expected from 1 to {MAX_ROVERS}");
-            return Err(SetupError::value("team.rovers", message));
-        }
+        Table::check(&self.world, "world")?;
+        Table::check(&self.team, "team")?;
         let checked = self.network.check();
         checked.map_err(|error| blame(NetworkError::Config(error)))
     }
@@ -152,6 +170,9 @@ impl Settings for NetworkScenario {
 fn blame(error: NetworkError) -> SetupError {
     match error {
         NetworkError::Links(error) => error.into(),
+        NetworkError::Config(ConfigError::Value { key, message }) => {
+            SetupError::value(&key, message)
+        }
         error => SetupError::value(key_of(&error), error),
     }
 }
@@ -201,43 +222,13 @@ fn key_of(error: &NetworkError) -> &'static str {
         | NetworkError::CannotCross
         | NetworkError::Refused { .. } => "world.gaps",
         NetworkError::UnknownSource { .. } => "network.roadmap_from",
-        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::Planned { key }) => KEYS
-            .iter()
-            .find(|known| known.ends_with(&format!(".{key}")))
-            .unwrap_or(&"network"),
+        NetworkError::Config(ConfigError::Planned { key }) => key,
         _ => "network",
     }
 }
 
 /// The most collisions that are named where a run is called wrong.
 const NAMED_IN_A_LINE: usize = 3;
-
-/// The keys of `[network]` that have ranges.
-const KEYS: [&str; 23] = [
-    "network.cycle",
-    "network.exchange",
-    "network.iteration_timeout",
-    "network.traverse",
-    "network.speed",
-    "network.location_sigma",
-    "network.location_clearance",
-    "network.location_fix",
-    "network.acceleration_limit",
-    "network.longest_path_factor",
-    "network.backtrack_penalty",
-    "network.collision_penalty_factor",
-    "network.noise",
-    "network.convergence",
-    "network.congestion_weight",
-    "network.congestion_spread",
-    "network.damping",
-    "network.processor",
-    "network.takeover_after",
-    "network.passive_window",
-    "network.active_window",
-    "network.cycle_limit",
-    "network.sabotage",
-];
 
 /// How many collisions there were, and the first of them by name.
 fn violation(metrics: &NetworkMetrics) -> String {

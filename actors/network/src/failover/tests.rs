@@ -367,7 +367,7 @@ fn only_nodes_that_decide_as_they_go_are_replaced() {
     );
     network.takeover_after = Some(0);
     let text = network.check().unwrap_err().to_string();
-    assert_eq!(text, "network.takeover_after is 0, must be at least 1");
+    assert_eq!(text, "network.takeover_after: 0: expected at least 1");
 }
 
 /// By brute force: each in line hears all before it, none of those left out does, and the first reaches

@@ -6,9 +6,9 @@
 
 use farside_worlds::VertexId;
 
-use crate::config::Priority;
 use crate::ids::RoverId;
 use crate::max_plus::candidates::FirstStep;
+use crate::max_plus::config::Priority;
 use crate::max_plus::messages::Assignment;
 
 /// What an assigned path asks of the owner of the vertex that it enters next.

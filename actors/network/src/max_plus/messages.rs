@@ -50,11 +50,11 @@ pub struct MaxPlus {
     pub settled: bool,
     /// The vectors.
     pub vectors: Vec<Vector>,
-    /// With `network.outsourcing`: what the receiver is to make vectors of, from and to the same rovers.
+    /// With `network.max_plus.outsourcing`: what the receiver is to make vectors of, from and to the same rovers.
     /// The values are of the speaker's paths: what each is worth to it, the receiver's vector to it
     /// left out.
     pub bases: Vec<Vector>,
-    /// With `network.anytime`: what the node's rovers would do as things stood before this iteration.
+    /// With `network.max_plus.anytime`: what the node's rovers would do as things stood before this iteration.
     pub choices: Vec<Choice>,
 }
 

@@ -35,12 +35,12 @@ impl Payoffs {
             Policy::Paper => roadmap.diameter(),
             _ => 0,
         };
-        let longest = config.longest_path_factor * f64::from(diameter.max(1));
+        let longest = config.max_plus.longest_path_factor * f64::from(diameter.max(1));
         Payoffs {
             longest,
-            backtrack: config.backtrack_penalty,
-            leaf_wait: config.leaf_wait_penalty,
-            imminent: -config.collision_penalty_factor * longest,
+            backtrack: config.max_plus.backtrack_penalty,
+            leaf_wait: config.max_plus.leaf_wait_penalty,
+            imminent: -config.max_plus.collision_penalty_factor * longest,
         }
     }
 

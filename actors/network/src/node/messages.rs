@@ -15,9 +15,9 @@ pub struct Locations {
     pub cycle: u32,
     /// One for each of the node's vertices that is not free.
     pub holdings: Vec<Holding>,
-    /// With `network.outsourcing`: how much the node has to compute.
+    /// With `network.max_plus.outsourcing`: how much the node has to compute.
     pub load: Option<Load>,
-    /// With `network.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
+    /// With `network.max_plus.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
     pub crowding: Option<f64>,
     /// With `network.takeover_after`: the nodes for whose vertices it answers.
     pub answers: Vec<NodeId>,

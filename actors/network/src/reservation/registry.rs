@@ -290,7 +290,7 @@ impl Registry {
             &site.roadmap,
             &site.sensors,
             (entry, goal),
-            site.config.routes,
+            site.config.complete.routes,
         );
         let elder = match &self.applicants[at].aim {
             Aim::Aside(aside) => aside.elder,

@@ -59,7 +59,7 @@ impl MaxPlusPolicy {
         while ledger.occupant(vertex).is_none() {
             let asks = |r: &&Request| r.vertex == vertex && (follows || !r.follows);
             let all = self.requests.iter().filter(asks);
-            let Some(best) = winner(all, base.site.config.priority).copied() else {
+            let Some(best) = winner(all, base.site.config.max_plus.priority).copied() else {
                 return false;
             };
             self.requests.retain(|r| *r != best);
@@ -79,7 +79,7 @@ impl MaxPlusPolicy {
         if self.phase != Phase::Admit {
             return;
         }
-        let followed = base.site.config.acceleration && self.leaving.contains(&vertex);
+        let followed = base.site.config.max_plus.acceleration && self.leaving.contains(&vertex);
         self.admit_one(base, ctx, vertex, followed);
     }
 

@@ -72,7 +72,7 @@ impl MaxPlusPolicy {
     /// How many pairs of candidate paths an iteration may have so that there is time for enough of them;
     /// none if the processor takes no time.
     fn pairs_limit(&self, base: &Base) -> Option<u64> {
-        let pairs = base.site.config.processor;
+        let pairs = base.site.config.max_plus.processor;
         let pairs = pairs.pairs_in(base.site.timing.optimisation);
         // The payoffs take as long as an iteration.
         pairs.map(|pairs| pairs / (ITERATIONS + 1))
@@ -82,7 +82,7 @@ impl MaxPlusPolicy {
     pub(super) fn told_load(&self, base: &Base) -> Option<Load> {
         let limit = self
             .pairs_limit(base)
-            .filter(|_| base.site.config.outsourcing)?;
+            .filter(|_| base.site.config.max_plus.outsourcing)?;
         let recent = |told: u32| base.cycle.saturating_sub(told) <= 1;
         let heard = base
             .neighbors
@@ -103,7 +103,7 @@ impl MaxPlusPolicy {
     ) -> Vec<(NodeId, u64)> {
         let limit = self
             .pairs_limit(base)
-            .filter(|_| base.site.config.outsourcing);
+            .filter(|_| base.site.config.max_plus.outsourcing);
         let Some(limit) = limit.filter(|&limit| self.load > limit) else {
             return Vec::new();
         };
@@ -129,8 +129,8 @@ impl MaxPlusPolicy {
     /// How crowded it is here and behind, for neighbours that want to know more than the holdings.
     pub(super) fn told_crowding(&self, base: &Base, ctx: &mut Context<'_, Node>) -> Option<f64> {
         let config = &base.site.config;
-        let spread = config.congestion_spread;
-        if config.congestion_weight == 0.0 || spread == 0.0 {
+        let spread = config.max_plus.congestion_spread;
+        if config.max_plus.congestion_weight == 0.0 || spread == 0.0 {
             return None;
         }
         let own = self.occupancy(base, ctx.durable::<Ledger>().occupied().count(), base.id);
@@ -157,7 +157,7 @@ impl MaxPlusPolicy {
     /// What a path loses because it leads where others are \[edges\]. `here` are the rovers at this
     /// node, the path's own one among them. Who stays where it is adds to no crowd.
     pub(super) fn congestion(&self, base: &Base, path: &CandidatePath, here: usize) -> f64 {
-        let weight = base.site.config.congestion_weight;
+        let weight = base.site.config.max_plus.congestion_weight;
         if weight == 0.0 || path.destination != Destination::Leaf || path.length() == 0 {
             return 0.0;
         }

@@ -120,7 +120,7 @@ impl MaxPlusPolicy {
         let here_now = ctx.durable::<Ledger>().occupied().count();
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
-            let noise = draws.uniform_in(0.0, base.site.config.noise);
+            let noise = draws.uniform_in(0.0, base.site.config.max_plus.noise);
             let (roadmap, payoffs) = (&base.site.roadmap, &base.site.payoffs);
             path.payoff = payoffs.unary(roadmap, path, goal, previous, noise);
             path.payoff -= self.congestion(base, path, here_now) as f32;
@@ -150,7 +150,7 @@ impl MaxPlusPolicy {
         for assignment in &rovers {
             let first = assignment.path.first_step();
             let follows = matches!(first, FirstStep::Follow(_));
-            if !follows || base.site.config.acceleration_chains {
+            if !follows || base.site.config.max_plus.acceleration_chains {
                 self.leaving.push(assignment.path.vertices[0]);
             }
             self.file(base, assignment);

@@ -24,12 +24,16 @@ impl MaxPlusPolicy {
     /// Whether one more rover may come in here.
     pub(super) fn gate_is_open(&self, base: &Base, ctx: &mut Context<'_, Node>) -> bool {
         let config = &base.site.config;
-        if !config.entry_gates {
+        if !config.max_plus.entry_gates {
             return true;
         }
         let own = ctx.durable::<Ledger>().occupied().count();
         let theirs: usize = base.neighbors.iter().map(|n| n.holdings.len()).sum();
-        may_enter(own + theirs, self.graph.len(), config.entry_gate_occupancy)
+        may_enter(
+            own + theirs,
+            self.graph.len(),
+            config.max_plus.entry_gate_occupancy,
+        )
     }
 }
 

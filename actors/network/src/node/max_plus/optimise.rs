@@ -7,7 +7,7 @@
 //! Over links with a bit rate it sends nothing before the last is on the air, and nothing that comes
 //! too late: see [`pacing`].
 //!
-//! With a finite `network.processor` all this takes time. A node compares candidate paths as they
+//! With a finite `network.max_plus.processor` all this takes time. A node compares candidate paths as they
 //! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
 //! as it begins, and its messages go out when it is done. What is not done when the optimisation
 //! is over was in vain. A node may have neighbours make vectors for it: see `balance`.
@@ -131,9 +131,9 @@ impl MaxPlusPolicy {
     ) {
         let config = &base.site.config;
         let rules = Rules {
-            tolerance: config.convergence as f32,
-            damping: config.damping as f32,
-            anytime: config.anytime,
+            tolerance: config.max_plus.convergence as f32,
+            damping: config.max_plus.damping as f32,
+            anytime: config.max_plus.anytime,
         };
         let payoffs: Payoffs = base.site.payoffs;
         self.optimiser.quotas = self.quotas(base, &rovers);
@@ -152,7 +152,7 @@ impl MaxPlusPolicy {
         let pairs = optimiser.problem.as_mut().map_or(0, Problem::take_compared);
         optimiser.pairs += pairs;
         let begins = optimiser.payoffs_done.max(ctx.now());
-        optimiser.payoffs_done = begins + base.site.config.processor.time_for(pairs);
+        optimiser.payoffs_done = begins + base.site.config.max_plus.processor.time_for(pairs);
     }
 
     /// The optimisation begins.
@@ -191,13 +191,13 @@ impl MaxPlusPolicy {
         let Some(problem) = &mut optimiser.problem else {
             return;
         };
-        if optimiser.iteration >= config.max_iterations || problem.is_trivial() {
+        if optimiser.iteration >= config.max_plus.max_iterations || problem.is_trivial() {
             optimiser.running = false;
             return;
         }
         let cycle = base.cycle;
         let pairs = problem.pairs();
-        let takes = config.processor.time_for(pairs);
+        let takes = config.max_plus.processor.time_for(pairs);
         let left = |until: SimTime| until.since(until.min(ctx.now()));
         // Its messages are to go out when the last are on the air, and not to be older than that.
         let idle = left(optimiser.sent).saturating_sub(takes);
@@ -338,7 +338,7 @@ impl MaxPlusPolicy {
         }
         // Who was silent, or late, joins the iteration that the others have reached.
         let reached = iteration.saturating_sub(u32::from(!settled));
-        let limit = base.site.config.max_iterations;
+        let limit = base.site.config.max_plus.max_iterations;
         optimiser.iteration = optimiser.iteration.max(reached).min(limit);
         self.advance(base, ctx);
     }

@@ -1,7 +1,7 @@
 //! Wait-for probes: who waits for whom in a ring, found with messages of one hop (after Chandy,
 //! Misra and Haas, *Distributed Deadlock Detection*, 1983, for a single resource each).
 //!
-//! A rover that has come no nearer to its goal for `network.probe_after` cycles waits for whoever
+//! A rover that has come no nearer to its goal for `network.max_plus.probe_after` cycles waits for whoever
 //! holds the vertex that comes first on its shortest way there. Its node sends a probe to the owner
 //! of that vertex, which adds the occupant, if that one waits too, and passes the probe on. The one
 //! that comes back to its initiator confirms a deadlock, and names it. Every rover waits for at most
@@ -91,7 +91,7 @@ pub(super) fn wanted(roadmap: &Roadmap, here: VertexId, goal: VertexId) -> Optio
 
 impl MaxPlusPolicy {
     pub(super) fn probes_are_on(&self, base: &Base) -> bool {
-        base.site.config.deadlock_probes || base.site.config.junction_resolution
+        base.site.config.max_plus.deadlock_probes || base.site.config.max_plus.junction_resolution
     }
 
     /// Once a cycle, when neighbours have told who is where: looks for rovers that wait, and asks.
@@ -108,7 +108,7 @@ impl MaxPlusPolicy {
                 self.probes.see(holding.rover, distance, cycle);
             }
         }
-        let after = site.config.probe_after;
+        let after = site.config.max_plus.probe_after;
         for holding in own {
             let due = self.probes.kept(holding.rover, cycle).is_multiple_of(after);
             if let Some(waiting) = self.waiting(base, ctx, holding.vertex).filter(|_| due) {
@@ -127,7 +127,7 @@ impl MaxPlusPolicy {
         let held = *ctx.durable::<Ledger>().occupant(vertex)?;
         let goal = held.goal.filter(|&goal| held.arrived && goal != vertex)?;
         let kept = self.probes.kept(held.rover, base.cycle);
-        (kept >= base.site.config.probe_after).then_some(Waiting {
+        (kept >= base.site.config.max_plus.probe_after).then_some(Waiting {
             rover: held.rover,
             vertex,
             goal,
@@ -176,7 +176,7 @@ impl MaxPlusPolicy {
             self.probes.confirmed += 1;
             self.probes.named = named;
         }
-        if base.site.config.junction_resolution {
+        if base.site.config.max_plus.junction_resolution {
             self.resolve(base, ctx, members, 0);
         }
     }

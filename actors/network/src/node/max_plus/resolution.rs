@@ -173,7 +173,7 @@ impl MaxPlusPolicy {
         ways: Vec<(RoverId, Vec<VertexId>)>,
     ) {
         let (node, cycle) = (base.id, base.cycle);
-        let hold = base.site.config.aside_hold;
+        let hold = base.site.config.max_plus.aside_hold;
         let longest = ways.iter().map(|(_, way)| way.len() as u32).max();
         let until = cycle + longest.unwrap_or(0) + hold;
         for (rover, path) in ways {
@@ -232,7 +232,7 @@ impl MaxPlusPolicy {
 
 impl MaxPlusPolicy {
     fn take_resolve(&mut self, base: &Base, ctx: &mut Context<'_, Node>, message: Resolve) {
-        if base.site.config.junction_resolution {
+        if base.site.config.max_plus.junction_resolution {
             self.resolve(base, ctx, message.ring, message.tried);
         }
     }
@@ -250,7 +250,7 @@ impl Handler<Resolve> for Node {
 impl MaxPlusPolicy {
     fn take_order(&mut self, base: &Base, _ctx: &mut Context<'_, Node>, order: Aside) {
         let known = base.is_rover(order.rover);
-        if base.site.config.junction_resolution && known && order.until >= base.cycle {
+        if base.site.config.max_plus.junction_resolution && known && order.until >= base.cycle {
             self.resolution.take(order, base.cycle);
         }
     }

@@ -7,7 +7,7 @@ use farside_worlds::{Endpoints, Roadmap};
 use nalgebra::Point2;
 
 use crate::testing::{assembled, v};
-use crate::{Deadlock, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
+use crate::{Deadlock, MaxPlusConfig, NetworkConfig, NetworkMetrics, TeamConfig, WorldConfig};
 
 /// 0 to 8 in a row, 10 m apart, and the branch 9 beside 2.
 fn line_with_a_branch() -> Roadmap {
@@ -32,7 +32,10 @@ fn head_on(seed: u64, network: &NetworkConfig) -> Option<NetworkMetrics> {
     let roadmap = Arc::new(line_with_a_branch());
     let sensors = Arc::new(world.place(&roadmap, seed).ok()?);
     let network = NetworkConfig {
-        max_iterations: 0,
+        max_plus: MaxPlusConfig {
+            max_iterations: 0,
+            ..network.max_plus.clone()
+        },
         cycle_limit: 400,
         ..network.clone()
     };
@@ -51,8 +54,11 @@ fn two_rovers_head_on_are_named_and_one_goes_aside() {
     let mut met = 0;
     for seed in 1..=24 {
         let on = |deadlock_probes, junction_resolution| NetworkConfig {
-            deadlock_probes,
-            junction_resolution,
+            max_plus: MaxPlusConfig {
+                deadlock_probes,
+                junction_resolution,
+                ..MaxPlusConfig::default()
+            },
             ..NetworkConfig::default()
         };
         let Some(off) = head_on(seed, &on(true, false)) else {
