@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! cargo bench -p farside-actors --bench planning
-//! cargo bench -p farside-actors --bench planning -- paper 28 unlimited 1     # one run of 250 cycles
+//! cargo bench -p farside-network --bench mapf -- max-plus 28 unlimited 1     # one run of 250 cycles
 //! ```
 
 // A benchmark measures real time.
@@ -23,7 +23,7 @@ use farside_worlds::Roadmap;
 
 const ROVERS: u32 = 100;
 
-/// From here on teams that come to a standstill do the same cycle again and again.
+/// From here on teams that come to a deadlock do the same cycle again and again.
 const CYCLES: u32 = 250;
 
 const SEEDS: u64 = 4;
@@ -100,13 +100,13 @@ fn row(nodes: u32, policy: Policy, processor: Processor, cycle_limit: Option<u32
     );
 }
 
-/// `paper 28 unlimited 1`: one run, for a profiler.
+/// `max-plus 28 unlimited 1`: one run, for a profiler.
 fn one(arguments: &[String]) -> Option<Cost> {
     let [policy, nodes, processor, seed] = arguments else {
         return None;
     };
     let policy = match policy.as_str() {
-        "paper" => Policy::Paper,
+        "max-plus" => Policy::MaxPlus,
         "complete" => Policy::Complete,
         _ => return None,
     };
@@ -134,12 +134,12 @@ fn main() {
     println!("at most {CYCLES} cycles:");
     for nodes in [14, 21, 28] {
         for processor in [Processor::Unlimited, Processor::PAPER] {
-            row(nodes, Policy::Paper, processor, Some(CYCLES));
+            row(nodes, Policy::MaxPlus, processor, Some(CYCLES));
         }
     }
     println!("whole runs:");
     for processor in [Processor::Unlimited, Processor::PAPER] {
-        row(28, Policy::Paper, processor, None);
+        row(28, Policy::MaxPlus, processor, None);
     }
     row(28, Policy::Complete, Processor::Unlimited, None);
 }

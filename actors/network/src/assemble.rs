@@ -16,7 +16,7 @@ use super::gaps::{self, Refused};
 use super::ids;
 use super::metrics::NetworkMetrics;
 use super::monitor::{Monitor, Score};
-use super::motion::Ways;
+use super::motion::EdgeTimes;
 use super::node::Node;
 use super::rover::Rover;
 use super::shared::Shared;
@@ -131,13 +131,13 @@ pub fn assemble(
     config.check()?;
     missions.check(&parts.roadmap)?;
     parts.world.gaps.check(sensors, config.policy)?;
-    let stays = matches!(missions, Missions::Standing(_));
+    let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all().to_vec();
     let roadmap = parts.world.open_part(&parts.roadmap, sensors);
     let refused = gaps::refused(&roadmap, sensors, &missions);
     let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
     let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    if !stays {
+    if !stay_at_target {
         let all = (0..).map(RoverId).zip(&missions);
         for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
             queues.entry(*entry).or_default().push(id);
@@ -145,7 +145,7 @@ pub fn assemble(
     }
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
-    gaps::check_refused(&refused, &rover_names, stays)?;
+    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
     let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
     let places = places_m(&roadmap, sensors, &missions);
     for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
@@ -163,13 +163,13 @@ pub fn assemble(
         .zip(missions.iter().copied())
         .filter(|(id, _)| has_way(id))
         .collect();
-    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stays);
-    let lines = match config.takeover_after {
-        Some(_) => failover::lines(&roadmap, sensors),
+    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stay_at_target);
+    let backup_lists = match config.failover_after {
+        Some(_) => failover::backup_lists(&roadmap, sensors),
         None => Vec::new(),
     };
     let site = Arc::new(Shared {
-        lines,
+        backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: config.patience(links.0, &timing),
@@ -184,7 +184,7 @@ pub fn assemble(
         roadmap,
         sensors: sensors.clone(),
         missions,
-        stays,
+        stay_at_target,
     });
     let nodes = declare_nodes(sim, &site);
     let rovers = declare_rovers(sim, &site);
@@ -228,7 +228,7 @@ fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, Ne
     Ok(Some(NodeId(at as u32)))
 }
 
-/// The parts of a cycle. The paper's policy moves rovers within its cycles: where nothing is said, they
+/// The parts of a cycle. The policy `max-plus` moves rovers within its cycles: where nothing is said, they
 /// are long enough for the longest edge.
 fn timing(
     roadmap: &Roadmap,
@@ -236,8 +236,8 @@ fn timing(
     (latency, rate_bit_per_s): (SimDuration, Option<u64>),
 ) -> Result<Timing, ConfigError> {
     let mut config = config.clone();
-    if config.policy == Policy::Paper && config.motion == Motion::Continuous {
-        let longest = Ways {
+    if config.policy == Policy::MaxPlus && config.motion == Motion::Continuous {
+        let longest = EdgeTimes {
             roadmap,
             config: &config,
         }
@@ -250,23 +250,23 @@ fn timing(
 /// The longest that a step is planned to take.
 ///
 /// # Errors
-/// When an edge takes so long that a cycle of the paper's policy has no time for it, or that driving
+/// When an edge takes so long that a cycle of the policy `max-plus` has no time for it, or that driving
 /// along it would look like a deadlock.
 fn longest_step(
     roadmap: &Roadmap,
     config: &NetworkConfig,
     timing: &Timing,
 ) -> Result<SimDuration, NetworkError> {
-    let ways = Ways { roadmap, config };
+    let ways = EdgeTimes { roadmap, config };
     let longest = ways
         .longest()
         .filter(|_| config.motion == Motion::Continuous);
     let Some((edge, time)) = longest else {
         return Ok(timing.cycle);
     };
-    let window = timing.cycle * u64::from(config.passive_window);
-    let mut limits = vec![("network.passive_window", window)];
-    if config.policy == Policy::Paper {
+    let window = timing.cycle * u64::from(config.deadlock_window);
+    let mut limits = vec![("network.deadlock_window", window)];
+    if config.policy == Policy::MaxPlus {
         // What a rover is granted at the end of a cycle's phases it has done before the next cycle.
         let left = timing.cycle.saturating_sub(timing.decided_after());
         limits.insert(0, ("what network.cycle leaves after its phases", left));
@@ -374,9 +374,9 @@ impl Network {
         self.site.timing
     }
 
-    /// Whether rovers are coordinated by max-plus, as those of the policy `paper` are.
+    /// Whether rovers are coordinated by max-plus, as those of the policy `max-plus` are.
     pub fn coordinates(&self) -> bool {
-        self.site.config.policy == Policy::Paper
+        self.site.config.policy == Policy::MaxPlus
     }
 
     /// The length of a planning cycle, stretched if links are slow.

@@ -21,10 +21,11 @@ pub use world::{Gaps, RoadmapSource, TeamConfig, WorldConfig};
 #[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
-    /// The paper's: candidate paths, payoffs, max-plus.
+    /// The paper's: candidate paths, payoffs, max-plus. Its old name is `paper`.
     #[default]
-    Paper,
-    /// The reservation walk: no rover enters before its whole way is reserved. See
+    #[serde(rename = "max-plus", alias = "paper")]
+    MaxPlus,
+    /// The reservation request: no rover enters before its whole way is reserved. See
     /// [`reservation`](super::reservation).
     Complete,
     /// A baseline that knows everything and never fails: revised prioritised planning, in the order of
@@ -70,8 +71,8 @@ settings! {
     /// ```
     pub struct NetworkConfig {
         /// Who decides which rover asks for which vertex.
-        pub policy: Policy = Policy::Paper,
-            one_of(&["paper", "complete", "reference", "prioritised", "coupled"]);
+        pub policy: Policy = Policy::MaxPlus,
+            one_of(&["max-plus", "complete", "reference", "prioritised", "coupled"]);
         /// What only the policy `max-plus` reads.
         pub max_plus: MaxPlusConfig, Within;
         /// What only the policy `complete` reads.
@@ -127,16 +128,16 @@ settings! {
         pub grants_ahead: u32 = 2;
         /// `coupled`: the most nodes that the search may expand.
         pub max_expansions: u64 = 1_000_000;
-        /// `paper`, `complete`: a node that was not heard for so many cycles, at least 1, is replaced by a
+        /// `max-plus`, `complete`: a node that was not heard for so many cycles, at least 1, is replaced by a
         /// neighbour, for the rest of the run. Without it (the default) its vertices stay closed until it
         /// is back.
-        pub takeover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
+        pub failover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
             if_set(1..);
-        /// Passive deadlock: no move and no entry for so many cycles.
-        pub passive_window: u32 = 20,
+        /// Deadlock: no move and no entry for so many cycles.
+        pub deadlock_window: u32 = 20,
             1..;
-        /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
-        pub active_window: u32 = 300,
+        /// Livelock: no new minimum of the sum of remaining distances for so many cycles.
+        pub livelock_window: u32 = 300,
             1..;
         /// The run ends after so many cycles, arrived or not.
         pub cycle_limit: u32 = 5000,
@@ -167,7 +168,7 @@ pub enum Sabotage {
     /// None: the protocol as it is.
     #[default]
     None,
-    /// Owners grant an occupied vertex with this probability (the `paper` policy only).
+    /// Owners grant an occupied vertex with this probability (the policy `max-plus` only).
     GrantOccupied(f64),
     /// Rovers move on without a grant, at each cycle with this probability.
     MoveUnbidden(f64),
@@ -175,8 +176,9 @@ pub enum Sabotage {
     /// should count as occupied until its occupant is heard to leave.
     FreeOnGrant,
     /// Rovers obey nodes that are replaced.
-    IgnoreFences,
-    /// Deputies take the vertices that they take over as free.
+    #[serde(alias = "ignore_fences")]
+    IgnoreFencing,
+    /// Backups take the vertices that they take over as free.
     ForgetAccounts,
 }
 
@@ -205,7 +207,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A key for policies whose nodes decide as they go.
-    #[error("{key} is for the policies paper and complete; leave it out")]
+    #[error("{key} is for the policies max-plus and complete; leave it out")]
     Planned {
         /// The key.
         key: &'static str,
@@ -236,9 +238,10 @@ impl NetworkConfig {
             let key = key.join(".");
             ConfigError::Value { key, message }
         })?;
-        if self.takeover_after.is_some() && !matches!(self.policy, Policy::Paper | Policy::Complete)
+        if self.failover_after.is_some()
+            && !matches!(self.policy, Policy::MaxPlus | Policy::Complete)
         {
-            let key = "network.takeover_after";
+            let key = "network.failover_after";
             return Err(ConfigError::Planned { key });
         }
         Ok(())

@@ -124,9 +124,9 @@ pub(super) fn refused(
 pub(super) fn check_refused(
     refused: &[Refused],
     rover_names: &[String],
-    stays: bool,
+    stay_at_target: bool,
 ) -> Result<(), NetworkError> {
-    let too_many = if stays { 1 } else { rover_names.len() };
+    let too_many = if stay_at_target { 1 } else { rover_names.len() };
     if refused.len() < too_many {
         return Ok(());
     }

@@ -36,7 +36,7 @@
 //! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
 //! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
 //! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
-//! team of 50 comes to a standstill. And a rover that stands on a leaf of its node's local
+//! team of 50 comes to a deadlock. And a rover that stands on a leaf of its node's local
 //! neighbourhood graph has a path of length 0 to that leaf
 //! ([`leaf_wait_penalty`](NetworkConfig::leaf_wait_penalty)): without it two rovers that meet at a
 //! pocket push each other in and out of it for ever, because the zero path is worth nothing.
@@ -49,9 +49,9 @@
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
 //! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
-//! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
+//! deadlock on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
 //! 2006. With one constant for all cells, `network.max_plus.processor = "paper"` ([`Processor::PAPER`], the
-//! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
+//! default), its pattern appears: teams come to a deadlock sooner with fewer nodes,
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
 //!
@@ -61,8 +61,8 @@
 //! computing. Three answers can be switched on. A node with more than it can compute has neighbours
 //! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
 //! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
-//! ([`ownership`](WorldConfig::ownership)). Standstills in 16 teams each, in per cent; dense roadmap,
-//! links of 5 ms, `active_window = 150`:
+//! ([`ownership`](WorldConfig::ownership)). Deadlocks in 16 teams each, in per cent; dense roadmap,
+//! links of 5 ms, `livelock_window = 150`:
 //!
 //! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
 //! |---|---|---|---|---|---|---|---|---|
@@ -82,7 +82,7 @@
 //! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
 //! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long
 //! an edge takes: `motion`. The protocol: [`messages`], `safety` (what owners and rovers keep, and why
-//! no two rovers meet), `takeover` (who answers for a node that has fallen silent), `gaps` (where
+//! no two rovers meet), `failover` (who answers for a node that has fallen silent), `gaps` (where
 //! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;

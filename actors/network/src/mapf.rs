@@ -14,7 +14,7 @@
 //! let map = Roadmap::builtin("crater-dense")?;
 //! let rim = map.boundary();
 //! let missions = (0..10).map(|i| Mission::new(rim[i % 3], rim[rim.len() - 1 - i])).collect();
-//! let problem = Problem::new(&map, missions, Rules::Queues)?;
+//! let problem = Problem::new(&map, missions, Rules::DisappearAtTarget)?;
 //! let outcome = reference(&problem, &Order::QueuePosition);
 //! assert!(outcome.failures.is_empty());
 //! assert_eq!(outcome.plan.conflicts(&problem), []);
@@ -36,10 +36,10 @@
 //!   once, each into the vertex that the next one leaves. The real system cannot do it: an owner
 //!   grants a vertex when its occupant is committed to leaving, so in a rotation each grant
 //!   would wait for the one before it, all the way round.
-//! - With [`Rules::Queues`] rovers wait in first-in-first-out queues outside their entries, all
+//! - With [`Rules::DisappearAtTarget`] rovers wait in first-in-first-out queues outside their entries, all
 //!   present in cycle 0 and occupying nothing. A rover that reaches its goal in cycle t occupies it
 //!   in t and is gone in t + 1.
-//! - With [`Rules::OnMap`], for grid maps, rovers stand at their entries in cycle 0 and stay at
+//! - With [`Rules::StayAtTarget`], for grid maps, rovers stand at their entries in cycle 0 and stay at
 //!   their goals for ever.
 
 mod check;

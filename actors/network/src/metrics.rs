@@ -10,17 +10,17 @@ use farside_actors::invariants::{Collision, WaitCycle};
 
 pub(crate) use catalogue::ALL;
 
-/// How a team came to a standstill.
+/// How a team came to a stop before its goals.
 #[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Deadlock {
     /// It did not.
     #[default]
     None,
-    /// No rover moved or entered for `network.passive_window` cycles.
+    /// A deadlock: no rover moved or entered for `network.deadlock_window` cycles.
     Passive,
-    /// Rovers moved, and came no nearer to their goals for `network.active_window` cycles.
-    Active,
+    /// Rovers moved, and came no nearer to their goals for `network.livelock_window` cycles.
+    Livelock,
 }
 
 /// The result of a run. Means are over the rovers that arrived, and 0 if none did.
@@ -43,7 +43,7 @@ pub struct NetworkMetrics {
     pub refused_missions: Vec<String>,
     /// Every rover reached its goal.
     pub completed: bool,
-    /// The team came to a standstill, see `deadlock`.
+    /// The team came to a deadlock or a livelock, see `deadlock`.
     pub deadlocked: bool,
     /// When each rover reached its goal, in seconds of virtual time, rover by rover; none for those
     /// that had not when the run ended.
@@ -55,7 +55,7 @@ pub struct NetworkMetrics {
     pub collisions: u32,
     /// The first of them: when, who, where.
     pub collided: Vec<Collision<VertexId>>,
-    /// How the team came to a standstill, if it did.
+    /// How the team came to a deadlock, if it did.
     pub deadlock: Deadlock,
     /// Cycles in which at least one rover was kept from a vertex that its path entered.
     pub interventions: u32,
@@ -113,15 +113,15 @@ pub struct NetworkMetrics {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadmap_known_s: Option<f64>,
     /// Times a neighbour took over the vertices of a node that had fallen silent.
-    pub takeovers: u32,
+    pub failovers: u32,
     /// Which node was replaced by which, and in which cycle, in order.
-    pub taken_over: Vec<String>,
-    /// Why rovers are still out, for a team that came to a standstill: how many, and where the
+    pub failed_over: Vec<String>,
+    /// Why rovers are still out, for a team that came to a deadlock: how many, and where the
     /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
     /// move in vain.
-    pub standstill: Option<String>,
-    /// The circles of rovers that wait for each other when a team of the `paper` policy, or one that
-    /// stays on the map, came to a standstill: no rover on one can come nearer to its goal before the
+    pub deadlock_reason: Option<String>,
+    /// The circles of rovers that wait for each other when a team of the policy `max-plus`, or one that
+    /// stays on the map, came to a deadlock: no rover on one can come nearer to its goal before the
     /// next one moves. The shortest first. Pictures of the run name the same.
     pub wait_cycles: Vec<WaitCycle<VertexId>>,
     /// What published solvers are compared by; only where rovers stay at their goals.

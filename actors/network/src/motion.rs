@@ -119,12 +119,12 @@ fn duration(seconds: f64) -> SimDuration {
 }
 
 /// Edges and how they are driven along.
-pub(super) struct Ways<'a> {
+pub(super) struct EdgeTimes<'a> {
     pub(super) roadmap: &'a Roadmap,
     pub(super) config: &'a NetworkConfig,
 }
 
-impl Ways<'_> {
+impl EdgeTimes<'_> {
     fn limits(&self) -> Limits {
         Limits {
             speed: self.config.speed,
@@ -248,7 +248,7 @@ mod tests {
             let profile = limits.profile(length_m, start, end);
             let expected = integrate(&limits, length_m, start, end, share * length_m);
             let actual = profile.time_at_s(share * length_m);
-            // Close to a standstill at the end a millimetre takes long.
+            // Close to a deadlock at the end a millimetre takes long.
             prop_assert!((actual - expected).abs() < 0.03, "{} and {}", actual, expected);
         }
 
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn a_rover_rolls_straight_on_and_stops_for_a_corner() {
         let (roadmap, config) = (grid(4, 2, &[]), config());
-        let ways = Ways {
+        let ways = EdgeTimes {
             roadmap: &roadmap,
             config: &config,
         };
@@ -318,7 +318,7 @@ mod tests {
     fn in_cycles_every_edge_takes_the_same() {
         let roadmap = grid(3, 1, &[]);
         let config = NetworkConfig::default();
-        let ways = Ways {
+        let ways = EdgeTimes {
             roadmap: &roadmap,
             config: &config,
         };

@@ -24,7 +24,7 @@ use crate::max_plus::aids::messages::{Aside, Resolve, WaitProbe};
 use crate::max_plus::lng::LocalGraph;
 use crate::max_plus::messages::{Assignments, CandidatePaths, MaxPlus};
 use crate::reservation::messages::{ItineraryAnswer, Relay};
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 use crate::safety::messages::{Beacon, Departed, DepartedAck};
 use crate::shared::Shared;
 use base::Base;
@@ -46,7 +46,7 @@ pub struct Node {
 /// The state machine of the policy that is configured.
 fn policy_of(base: &Base, graph: Arc<LocalGraph>) -> Box<dyn NodePolicy> {
     match base.site.config.policy {
-        Policy::Paper => Box::new(MaxPlusPolicy::new(base, graph)),
+        Policy::MaxPlus => Box::new(MaxPlusPolicy::new(base, graph)),
         Policy::Complete => Box::new(CompletePolicy::default()),
         Policy::Reference | Policy::Prioritised | Policy::Coupled => {
             Box::new(PlannedPolicy::default())
@@ -105,13 +105,13 @@ impl Actor for Node {
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         let base = &mut self.base;
         base.look_up(ctx)?;
-        base.open_wards(ctx);
+        base.open_failover(ctx);
         // A node that was replaced has no vertices of its own any more.
         let owned: &[VertexId] = match base.answers_for(base.id) {
             true => base.site.sensors.owned(base.id),
             false => &[],
         };
-        let ledger = ctx.durable::<Ledger>();
+        let ledger = ctx.durable::<OccupancyTable>();
         let is_new = ledger.is_new();
         ledger.open(owned, base.rovers.len());
         for (rover, vertex) in base.site.standing().filter(|_| is_new) {

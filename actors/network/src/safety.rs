@@ -56,7 +56,7 @@ pub(crate) struct Duty {
     pub(crate) whereabouts: Whereabouts,
 }
 
-/// What a fact changed in a [`Ledger`].
+/// What a fact changed in a [`OccupancyTable`].
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct News {
     /// Vertices that are free now.
@@ -70,7 +70,7 @@ pub(crate) struct News {
 
 /// An owner's durable record of its vertices.
 #[derive(Debug, Default)]
-pub(crate) struct Ledger {
+pub(crate) struct OccupancyTable {
     /// In the order of the vertices.
     slots: Vec<Slot>,
     /// The latest step heard of each rover.
@@ -78,7 +78,7 @@ pub(crate) struct Ledger {
     duties: Vec<Duty>,
 }
 
-impl Ledger {
+impl OccupancyTable {
     /// Makes a new ledger ready; leaves one that has survived a crash as it is.
     pub(crate) fn open(&mut self, owned: &[VertexId], rovers: usize) {
         if self.slots.is_empty() {
@@ -422,8 +422,8 @@ mod tests {
     const R: RoverId = RoverId(0);
     const Q: RoverId = RoverId(1);
 
-    fn ledger() -> Ledger {
-        let mut ledger = Ledger::default();
+    fn ledger() -> OccupancyTable {
+        let mut ledger = OccupancyTable::default();
         ledger.open(&[v(1), v(2), v(5)], 2);
         ledger
     }

@@ -7,7 +7,7 @@ use farside_actors::link::transmission_time;
 
 /// How long the parts of a planning cycle last, the same for all nodes.
 ///
-/// What [`NetworkConfig`] leaves open follows, for the paper's policy, from the slowest link's latency L and
+/// What [`NetworkConfig`] leaves open follows, for the policy `max-plus`, from the slowest link's latency L and
 /// from S(n), how long n bytes are on the air at the lowest bit rate (no time without rates), so
 /// that what is sent in a part is there when the next begins. The paper's messages take no time; up to 10 ms these
 /// are its values, and ours, and those of the other policy always:
@@ -80,14 +80,14 @@ impl Timing {
 }
 
 impl NetworkConfig {
-    /// By how many cycles the windows of a standstill are longer over links of this latency and rate. The phases
-    /// of the paper's policy stretch, and with them its cycles; of other policies cycles do not, while
+    /// By how many cycles the windows of a deadlock are longer over links of this latency and rate. The phases
+    /// of the policy `max-plus` stretch, and with them its cycles; of other policies cycles do not, while
     /// a walk is some tens of messages, one after the other, and some of them twice. And a node that fails
     /// is replaced only when it has been silent for long enough.
     pub(crate) fn patience(&self, latency: SimDuration, timing: &Timing) -> u32 {
         const MESSAGES: u64 = 150;
-        let silence = self.takeover_after.unwrap_or(0).min(u32::MAX / 4);
-        if self.policy == Policy::Paper {
+        let silence = self.failover_after.unwrap_or(0).min(u32::MAX / 4);
+        if self.policy == Policy::MaxPlus {
             return silence;
         }
         let message = latency + timing.sending(WALK_BYTES);
@@ -110,7 +110,7 @@ impl NetworkConfig {
         let sending = |bytes| sending(bytes, rate_bit_per_s);
         let half = SimDuration::from_nanos(latency.as_nanos() / 2);
         let exchange = latency + half + sending(PATHS_BYTES) + SimDuration::from_millis(20);
-        if self.policy != Policy::Paper {
+        if self.policy != Policy::MaxPlus {
             // No phases: a cycle is what a move takes, however slow links are.
             let cycle = self.cycle.unwrap_or(SimDuration::from_secs(1));
             return Ok(Timing {

@@ -36,10 +36,10 @@ pub(crate) enum WaitRule {
 
 impl WaitRule {
     /// That of a policy whose rovers stay on the map, or queue at entries and leave it.
-    pub(crate) fn of(policy: Policy, stays: bool) -> WaitRule {
-        match (policy, stays) {
+    pub(crate) fn of(policy: Policy, stay_at_target: bool) -> WaitRule {
+        match (policy, stay_at_target) {
             (Policy::Complete, true) => WaitRule::AndRoom,
-            (Policy::Paper, _) | (_, true) => WaitRule::ShortestPaths,
+            (Policy::MaxPlus, _) | (_, true) => WaitRule::ShortestPaths,
             _ => WaitRule::Unknown,
         }
     }

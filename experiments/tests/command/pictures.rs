@@ -112,7 +112,7 @@ fn a_run_and_its_pictures_name_the_same_circle() {
         "--set",
         "network.max_plus.max_iterations=1",
         "--set",
-        "network.active_window=60",
+        "network.livelock_window=60",
         "--until",
         "300s",
         "--out",

@@ -56,11 +56,11 @@ pub struct TimedVisit {
 }
 
 /// The part of a roadmap that a search may enter, and who is there when.
-pub struct Ground<'a> {
+pub struct SearchSpace<'a> {
     /// The roadmap.
     pub roadmap: &'a Roadmap,
     /// The least time between one rover's leaving and the next one's coming \[ns\].
-    pub gap: u64,
+    pub headway: u64,
     /// How long a rover takes from setting out to being ready to set out again \[ns\]; at least 1.
     pub travel: &'a dyn Fn(VertexId, VertexId) -> u64,
     /// The visits planned at a vertex, as (start, end), disjoint and in order; none for a vertex
@@ -70,7 +70,7 @@ pub struct Ground<'a> {
     pub covers: &'a dyn Fn(VertexId) -> bool,
 }
 
-/// What a search for one place looks for; [`Ground::expand`] looks for nothing and finds all.
+/// What a search for one place looks for; [`SearchSpace::expand`] looks for nothing and finds all.
 pub(super) struct Aim<'a> {
     /// No less than this long is left from a vertex on \[ns\], and no more than an edge's time and
     /// what is left at its end.
@@ -90,22 +90,22 @@ pub(super) struct Aim<'a> {
 /// let safe: Vec<_> = safe_intervals(&[(10, 20), (22, 30)], 2).collect();
 /// assert_eq!(safe, [(0, 8), (32, FOREVER)]);
 /// ```
-pub fn safe_intervals(busy: &[(u64, u64)], gap: u64) -> impl Iterator<Item = (u64, u64)> + '_ {
+pub fn safe_intervals(busy: &[(u64, u64)], headway: u64) -> impl Iterator<Item = (u64, u64)> + '_ {
     (0..=busy.len()).filter_map(move |i| {
         let from = if i == 0 {
             0
         } else {
-            busy[i - 1].1.saturating_add(gap)
+            busy[i - 1].1.saturating_add(headway)
         };
         let to = match busy.get(i) {
-            Some((start, _)) => start.saturating_sub(gap),
+            Some((start, _)) => start.saturating_sub(headway),
             None => FOREVER,
         };
         (from < to).then_some((from, to))
     })
 }
 
-impl Ground<'_> {
+impl SearchSpace<'_> {
     /// Labels for a rover that comes to `vertex` from outside the roadmap, at `earliest` or later,
     /// and needs `dwell` \[ns\] to come in.
     pub fn enter(&self, vertex: VertexId, earliest: u64, dwell: u64) -> Vec<Label> {
@@ -121,12 +121,14 @@ impl Ground<'_> {
                 parent: None,
             })
         };
-        safe_intervals(&busy, self.gap).filter_map(label).collect()
+        safe_intervals(&busy, self.headway)
+            .filter_map(label)
+            .collect()
     }
 
     /// Expands the labels at `open` (places in `labels`) and all that come of them, earliest first;
     /// appends what is found to `labels`. Labels lead on from any vertex, but only to vertices that
-    /// [`Ground::busy`] knows.
+    /// [`SearchSpace::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
         let all = Aim {
             left: &|_| 0,
@@ -136,7 +138,7 @@ impl Ground<'_> {
         self.search(labels, open, &all);
     }
 
-    /// As [`Ground::expand`], but the most promising label first (A*), and only until one is the end:
+    /// As [`SearchSpace::expand`], but the most promising label first (A*), and only until one is the end:
     /// its place. No other end is ready sooner.
     pub(super) fn search(
         &self,
@@ -175,7 +177,7 @@ impl Ground<'_> {
                 }
                 let travel = (self.travel)(from.vertex, to);
                 let in_time = |safe: &(u64, u64)| course.sets_out(safe.0).is_some();
-                for safe in safe_intervals(&busy, self.gap).take_while(in_time) {
+                for safe in safe_intervals(&busy, self.headway).take_while(in_time) {
                     let parent = Some(at);
                     let label = course.label(to, travel, safe, (self.covers)(to));
                     let Some(label) = label.map(|label| Label { parent, ..label }) else {
@@ -272,10 +274,10 @@ pub(super) mod tests {
     fn ground<'a>(
         roadmap: &'a Roadmap,
         busy: &'a dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
-    ) -> Ground<'a> {
-        Ground {
+    ) -> SearchSpace<'a> {
+        SearchSpace {
             roadmap,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy,
             covers: &|_| true,

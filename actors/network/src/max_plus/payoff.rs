@@ -32,7 +32,7 @@ impl Payoffs {
     pub(crate) fn new(config: &NetworkConfig, roadmap: &Roadmap) -> Self {
         // On a large roadmap the diameter takes a while, and other policies have no payoffs.
         let diameter = match config.policy {
-            Policy::Paper => roadmap.diameter(),
+            Policy::MaxPlus => roadmap.diameter(),
             _ => 0,
         };
         let longest = config.max_plus.longest_path_factor * f64::from(diameter.max(1));

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use farside::SimDuration;
 use farside_worlds::VertexId;
 
-use super::Ways;
+use super::EdgeTimes;
 
 /// A rover that is about to drive along the edge from `here` to `next`.
 struct Start {
@@ -16,7 +16,7 @@ struct Start {
     speed: f64,
 }
 
-impl Ways<'_> {
+impl EdgeTimes<'_> {
     /// The least time from standing at `from` to standing at `to`: on the fastest way, rolling through
     /// each vertex where the rover may. One that is not certain where it is never rolls.
     ///
@@ -105,7 +105,9 @@ mod tests {
         let roadmap = grid(4, 2, &[]);
         let time = |config: &NetworkConfig, from, to| {
             let roadmap = &roadmap;
-            Ways { roadmap, config }.alone(v(from), v(to)).as_nanos()
+            EdgeTimes { roadmap, config }
+                .alone(v(from), v(to))
+                .as_nanos()
         };
         let config = config();
         // Up to 2 m/s and down again takes 2 s over 2 m each: 2 + 26 / 2 + 2.
@@ -123,7 +125,7 @@ mod tests {
     }
 
     /// Tries every simple way, driven as a rover drives that always holds the next grant.
-    fn walk(ways: &Ways<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
+    fn walk(ways: &EdgeTimes<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
         let here = path[path.len() - 1];
         if here == to {
             let (mut speed, mut time) = (0.0, SimDuration::ZERO);
@@ -157,7 +159,7 @@ mod tests {
             let edges = even.edges().to_vec();
             let roadmap = Roadmap::new("shaken", places, edges, even.boundary().to_vec()).unwrap();
             let config = config();
-            let ways = Ways { roadmap: &roadmap, config: &config };
+            let ways = EdgeTimes { roadmap: &roadmap, config: &config };
             for from in roadmap.vertices() {
                 for to in roadmap.vertices().filter(|to| *to != from) {
                     let mut best = SimDuration::from_secs(1_000_000);

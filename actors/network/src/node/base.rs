@@ -9,7 +9,7 @@ use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 
 use super::Node;
-use super::failover::Wards;
+use super::failover::FailoverState;
 use super::messages::Locations;
 use crate::config::Sabotage;
 use crate::failover::messages::Content;
@@ -18,7 +18,7 @@ use crate::max_plus::messages::Load;
 use crate::reservation::Atlas;
 use crate::rover::Rover;
 use crate::safety::messages::{Departed, Grant, Holding, Whereabouts};
-use crate::safety::{Duty, Ledger};
+use crate::safety::{Duty, OccupancyTable};
 use crate::shared::Shared;
 
 /// A node without its policy.
@@ -29,8 +29,8 @@ pub(super) struct Base {
     pub(super) rovers: Vec<Address<Rover>>,
     /// The planning cycle.
     pub(super) cycle: u32,
-    /// Who answers for which node's vertices, with `network.takeover_after`.
-    pub(super) wards: Option<Wards>,
+    /// Who answers for which node's vertices, with `network.failover_after`.
+    pub(super) failover: Option<FailoverState>,
 }
 
 /// What a node knows of a neighbour.
@@ -54,7 +54,7 @@ impl Base {
             neighbors: Vec::new(),
             rovers: Vec::new(),
             cycle: 0,
-            wards: None,
+            failover: None,
         }
     }
 
@@ -121,7 +121,7 @@ impl Base {
         let message = Locations {
             node: self.id,
             cycle: self.cycle,
-            holdings: ctx.durable::<Ledger>().holdings(),
+            holdings: ctx.durable::<OccupancyTable>().holdings(),
             load,
             crowding,
             answers: self.told_answers(),
@@ -165,7 +165,7 @@ impl Base {
             self.tell_departure(ctx, self.site.sensors.owner(from), presumed);
             return Vec::new();
         }
-        ctx.durable::<Ledger>()
+        ctx.durable::<OccupancyTable>()
             .hear(&presumed, None, self.cycle)
             .freed
     }
@@ -195,7 +195,8 @@ impl Base {
         to: NodeId,
         whereabouts: Whereabouts,
     ) {
-        ctx.durable::<Ledger>().take_on(Duty { to, whereabouts });
+        ctx.durable::<OccupancyTable>()
+            .take_on(Duty { to, whereabouts });
         let (node, acting) = (self.id, self.acting(to));
         if acting != node {
             let message = Departed { node, whereabouts };

@@ -19,7 +19,7 @@ pub struct Locations {
     pub load: Option<Load>,
     /// With `network.max_plus.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
     pub crowding: Option<f64>,
-    /// With `network.takeover_after`: the nodes for whose vertices it answers.
+    /// With `network.failover_after`: the nodes for whose vertices it answers.
     pub answers: Vec<NodeId>,
 }
 

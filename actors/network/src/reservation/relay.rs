@@ -152,17 +152,17 @@ impl Line {
 mod tests {
     use super::*;
     use crate::ids::RoverId;
-    use crate::reservation::messages::{Settle, Verdict, Walk};
+    use crate::reservation::messages::{ReservationRequest, Settle, Verdict};
     use proptest::prelude::*;
 
     fn item(attempt: u32) -> Item {
-        let walk = Walk {
+        let request = ReservationRequest {
             rover: RoverId(0),
             attempt,
             since: 0,
         };
         Item::Settle(Settle {
-            walk,
+            request,
             verdict: Verdict::Confirmed,
             route: Vec::new(),
             at: 0,
@@ -217,7 +217,7 @@ mod tests {
                 }
             }
             let number = |item: &Item| match item {
-                Item::Settle(settle) => settle.walk.attempt,
+                Item::Settle(settle) => settle.request.attempt,
                 _ => u32::MAX,
             };
             let mut numbers: Vec<u32> = taken.iter().map(number).collect();

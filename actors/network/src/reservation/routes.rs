@@ -1,5 +1,5 @@
-//! Which nodes a walk passes: a few different ways from one vertex to another, each as the owners of
-//! the vertices on it. Known from the roadmap alone; who is where when is found on the walk.
+//! Which nodes a request passes: a few different ways from one vertex to another, each as the owners of
+//! the vertices on it. Known from the roadmap alone; who is where when is found on the request.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

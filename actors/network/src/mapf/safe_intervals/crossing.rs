@@ -186,7 +186,7 @@ fn is_as_good(a: &Label, b: &Label) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{Busy, STEP, brute_force, busy};
-    use super::super::{Ground, TimedVisit, prune, way_to};
+    use super::super::{SearchSpace, TimedVisit, prune, way_to};
     use super::*;
     use crate::testing::{grid, v};
     use farside_worlds::Roadmap;
@@ -242,7 +242,7 @@ mod tests {
         fn the_earliest_way_through_gaps_is_found(busy in busy(9), gaps in any::<u32>()) {
             let (map, covers) = (map(), covered(gaps));
             let look = |u: VertexId| Some(busy[u.0 as usize].clone());
-            let ground = Ground { roadmap: &map, gap: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+            let ground = SearchSpace { roadmap: &map, headway: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
             let mut labels = ground.enter(v(0), 0, STEP);
             let open: Vec<u32> = (0..labels.len() as u32).collect();
             ground.expand(&mut labels, &open);
@@ -265,7 +265,7 @@ mod tests {
             for round in 0..9 {
                 let is_mine = |u: VertexId| parts >> u.0 & 1 == round % 2;
                 let look = |u: VertexId| is_mine(u).then(|| busy[u.0 as usize].clone());
-                let ground = Ground { roadmap: &map, gap: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+                let ground = SearchSpace { roadmap: &map, headway: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
                 if round < 2 && is_mine(v(0)) {
                     labels.extend(ground.enter(v(0), 0, STEP));
                 }
@@ -292,9 +292,9 @@ mod tests {
         let map = grid(2, 1, &[]);
         let covers = |u: VertexId| u != v(1);
         let look = |_| Some(Vec::new());
-        let ground = Ground {
+        let ground = SearchSpace {
             roadmap: &map,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy: &look,
             covers: &covers,
@@ -313,9 +313,9 @@ mod tests {
         // Vertex 3, beyond the gap, is busy until 50: all of the crossing waits for that, before it.
         let look = |u: VertexId| Some(if u == v(3) { vec![(0, 50)] } else { Vec::new() });
         let covers = |u: VertexId| u != v(1) && u != v(2);
-        let ground = Ground {
+        let ground = SearchSpace {
             roadmap: &map,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy: &look,
             covers: &covers,

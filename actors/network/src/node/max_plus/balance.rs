@@ -24,7 +24,7 @@ use crate::max_plus::candidates::{CandidatePath, Destination};
 use crate::max_plus::messages::Load;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 /// How many iterations a node should have time for: max-plus needs about so many to converge.
 const ITERATIONS: u64 = 10;
@@ -133,7 +133,11 @@ impl MaxPlusPolicy {
         if config.max_plus.congestion_weight == 0.0 || spread == 0.0 {
             return None;
         }
-        let own = self.occupancy(base, ctx.durable::<Ledger>().occupied().count(), base.id);
+        let own = self.occupancy(
+            base,
+            ctx.durable::<OccupancyTable>().occupied().count(),
+            base.id,
+        );
         let theirs = base.neighbors.iter().map(|n| self.crowding(base, n.id));
         let mean = theirs.sum::<f64>() / base.neighbors.len().max(1) as f64;
         Some((1.0 - spread) * own + spread * mean)

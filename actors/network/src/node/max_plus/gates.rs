@@ -18,7 +18,7 @@ use farside::prelude::*;
 use super::MaxPlusPolicy;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 impl MaxPlusPolicy {
     /// Whether one more rover may come in here.
@@ -27,7 +27,7 @@ impl MaxPlusPolicy {
         if !config.max_plus.entry_gates {
             return true;
         }
-        let own = ctx.durable::<Ledger>().occupied().count();
+        let own = ctx.durable::<OccupancyTable>().occupied().count();
         let theirs: usize = base.neighbors.iter().map(|n| n.holdings.len()).sum();
         may_enter(
             own + theirs,

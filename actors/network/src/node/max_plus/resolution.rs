@@ -26,7 +26,7 @@ use crate::max_plus::candidates::{CandidatePath, Destination};
 use crate::max_plus::lng::LocalGraph;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::{Ledger, Occupant};
+use crate::safety::{OccupancyTable, Occupant};
 
 /// The orders a node knows of. Lost in a crash.
 #[derive(Default)]
@@ -126,7 +126,10 @@ impl MaxPlusPolicy {
             if base.cycle < self.resolution.quiet_until {
                 return;
             }
-            let held = ctx.durable::<Ledger>().occupant(member.vertex).copied();
+            let held = ctx
+                .durable::<OccupancyTable>()
+                .occupant(member.vertex)
+                .copied();
             if held.is_none_or(|held| held.rover != member.rover) {
                 return;
             }
@@ -149,7 +152,7 @@ impl MaxPlusPolicy {
         let needed: Vec<_> = others
             .flat_map(|(_, other)| roadmap.shortest_path(other.vertex, other.goal))
             .collect();
-        let ledger = ctx.durable::<Ledger>();
+        let ledger = ctx.durable::<OccupancyTable>();
         let holder = |v| {
             if base.owns(v) {
                 return ledger.occupant(v).map(|held| held.rover);
