@@ -1,10 +1,11 @@
-//! What planning costs: wall time of one core for a cycle of all nodes together, and for whole runs, with
-//! 100 rovers on the dense roadmap over perfect links, everything else that happens in a run included,
-//! without digest and log. Beside times it says what was done, which no other load on the machine
-//! changes: cycles and messages; for instructions run it under `valgrind --tool=callgrind`.
+//! What planning costs: wall time of one core for a cycle of all nodes together, and for whole
+//! runs, with 100 rovers on the dense roadmap over perfect links, everything else that happens in a
+//! run included, without digest and log. Beside times it says what was done, which no other load on
+//! the machine changes: cycles and messages; for instructions run it under `valgrind
+//! --tool=callgrind`.
 //!
 //! ```text
-//! cargo bench -p farside-actors --bench planning
+//! cargo bench -p farside-network --bench mapf
 //! cargo bench -p farside-network --bench mapf -- max-plus 28 unlimited 1     # one run of 250 cycles
 //! ```
 

@@ -1,16 +1,18 @@
-//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside it:
-//! 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that lose
-//! nothing unless told to.
+//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside
+//! it: 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that
+//! lose nothing unless told to.
 //!
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
-//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
-//! `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight), `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains` (true, false), `cycle_limit`, `livelock_window`, `motion` (cycles, continuous),
-//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
-//! `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate` (occupancy),
-//! `probe_after`, `hold` (cycles).
+//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`,
+//! `jitter_ms`, `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations),
+//! `processor` (`unlimited`, `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight),
+//! `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating,
+//! any-to-any, west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains`
+//! (true, false), `cycle_limit`, `livelock_window`, `motion` (cycles, continuous), `speed`,
+//! `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`,
+//! `backtrack`, `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate`
+//! (occupancy), `probe_after`, `hold` (cycles).
 
 use std::sync::Arc;
 

@@ -77,8 +77,8 @@ impl<'a> Parts<'a> {
 pub enum Missions {
     /// Rovers queue at their entries, and leave the map at their goals: each one's entry and goal.
     Queued(Vec<(VertexId, VertexId)>),
-    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal, no
-    /// two starts and no two goals alike.
+    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal,
+    /// no two starts and no two goals alike.
     Standing(Vec<(VertexId, VertexId)>),
 }
 
@@ -114,13 +114,14 @@ impl Missions {
 }
 
 /// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
-/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions between
-/// neighbouring nodes and between each node and each rover; and the monitor, which ends the run.
+/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions
+/// between neighbouring nodes and between each node and each rover; and the monitor, which ends the
+/// run.
 ///
 /// # Errors
 /// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, two
-/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be; and
-/// those of `wire`.
+/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be;
+/// and those of `wire`.
 pub fn assemble(
     sim: &mut Simulation,
     parts: &Parts<'_>,
@@ -198,8 +199,8 @@ pub fn assemble(
     })
 }
 
-/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the one
-/// from one host to another, by their names.
+/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the
+/// one from one host to another, by their names.
 ///
 /// # Errors
 /// Those of [`assemble`].
@@ -228,8 +229,8 @@ fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, Ne
     Ok(Some(NodeId(at as u32)))
 }
 
-/// The parts of a cycle. The policy `max-plus` moves rovers within its cycles: where nothing is said, they
-/// are long enough for the longest edge.
+/// The parts of a cycle. The policy `max-plus` moves rovers within its cycles: where nothing is
+/// said, they are long enough for the longest edge.
 fn timing(
     roadmap: &Roadmap,
     config: &NetworkConfig,
@@ -250,8 +251,8 @@ fn timing(
 /// The longest that a step is planned to take.
 ///
 /// # Errors
-/// When an edge takes so long that a cycle of the policy `max-plus` has no time for it, or that driving
-/// along it would look like a deadlock.
+/// When an edge takes so long that a cycle of the policy `max-plus` has no time for it, or that
+/// driving along it would look like a deadlock.
 fn longest_step(
     roadmap: &Roadmap,
     config: &NetworkConfig,

@@ -21,8 +21,8 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that have
-    /// a way.
+    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that
+    /// have a way.
     ///
     /// # Errors
     /// When there is no plan, or it would take too long to find, or the policy cannot plan for this
@@ -101,8 +101,8 @@ impl Schedule {
     }
 }
 
-/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards it
-/// at that instant.
+/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards
+/// it at that instant.
 fn in_ns(mut ways: Vec<Vec<TimedVisit>>, tick_ns: u64) -> Vec<Vec<TimedVisit>> {
     let scale = |tick: u64| match tick {
         FOREVER => FOREVER,

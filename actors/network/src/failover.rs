@@ -1,39 +1,39 @@
-//! Failover: who answers for the vertices of a node that has fallen silent, and what makes that safe
-//! (*network-guided*, section 5, asks "how should the network adapt when a node fails").
+//! Failover: who answers for the vertices of a node that has fallen silent, and what makes that
+//! safe (*network-guided*, section 5, asks "how should the network adapt when a node fails").
 //!
-//! **Backup lists.** Each node, as the *region* of its vertices, has a backup list that follows from the
-//! map alone ([`backup_lists`]): itself at rank 0, then backups that are radio neighbours of it and of each
-//! other. Whoever has rank k may take the region over when all of lower rank that could still answer for
-//! it are silent.
+//! **Backup lists.** The vertices of each node are a *region*, which is called by that node. Each
+//! region has a backup list that follows from the map alone ([`backup_lists`]): its own node at
+//! rank 0, then backups that are radio neighbours of it and of each other. The node at rank k may
+//! take the region over when all of lower rank that could still answer for it are silent.
 //!
-//! **Fencing.** A backup of rank k asks every rover, again and again until each has answered. A rover
-//! that is asked durably raises its fence for this region to k, and answers where it is; from then on
-//! it obeys grants of this region's vertices from the backup of rank k only ([`FencingTokens`]). FencingTokens only
-//! rise.
+//! **Fencing.** A backup of rank k asks every rover, again and again until each has answered. A
+//! rover that is asked durably raises its fencing token for this region to k, and answers where it
+//! is. From then on it obeys grants of this region's vertices from the backup of rank k only
+//! ([`FencingTokens`]). The tokens, often called epochs, only rise.
 //!
-//! **Why no two rovers meet.** Let v be a vertex of the region, and let the backup of rank k open it when
-//! all rovers have answered at rank k. A grant of v by a lower rank was obeyed before the rover
-//! answered, or never will be. If it was obeyed before, then at its answer the rover was at v, or on
-//! its way there, or had left v for good: its account says which, because what a rover obeys is
-//! durable before it moves. So the rovers that are, or may ever again come, to v by grants of lower
-//! ranks are those that the accounts name, and v is opened as theirs; there is at most one, because
-//! up to then one ledger at a time admitted to v. A grant that was sent and not obeyed is void. A
-//! backup of higher rank opens only when all fencing_tokens are above k, and the same holds for it. Suspicion
-//! plays no part in this: a node that lives and is only unheard is fenced like one that is dead, and
-//! two backups that ask at the same time cannot both be answered by all at their rank and still be
-//! obeyed.
+//! **Why no two rovers meet.** Let v be a vertex of the region, and let the backup of rank k open
+//! it when all rovers have answered at rank k. A grant of v by a lower rank was obeyed before the
+//! rover answered, or never will be. If it was obeyed before, then at its answer the rover was at
+//! v, or on its way there, or had left v for good: its account says which, because what a rover
+//! obeys is durable before it moves. So the rovers that are, or may ever again come, to v by grants
+//! of lower ranks are those that the accounts name, and v is opened as theirs; there is at most
+//! one, because up to then one occupancy table at a time admitted to v. A grant that was sent and
+//! not obeyed is void. A backup of higher rank opens only when all tokens are above k, and the same
+//! holds for it. Suspicion plays no part in this: a node that lives and is only unheard is fenced
+//! like one that is dead, and two backups that ask at the same time cannot both be answered by all
+//! at their rank and still be obeyed.
 //!
-//! A second failure is the same case: when the backup falls silent, the next in line goes on for the
-//! same region, with rovers' accounts anew; and the backup's own vertices have a line of their own. Nodes
-//! say whom they answer for, so that a region is not left that was given up to a backup that then
-//! failed. When
-//! a line is at its end, or a rover never answers, nothing happens and the vertices stay closed. A node
-//! that was replaced stays out for the rest of the run.
+//! A second failure is the same case. When the backup falls silent, the next in the list goes on
+//! for the same region, with rovers' accounts anew; and the backup's own vertices have a list of
+//! their own. Nodes say for whom they answer, so that a region is not left that was given up to a
+//! backup that then failed. When a list is at its end, or a rover never answers, nothing happens
+//! and the vertices stay closed. A node that was replaced stays out for the rest of the run.
 //!
-//! **Reserved ways**, of the policy `complete`, are told with the accounts; what else becomes of them is
-//! in `reservation::registry::failover`. A backup and the neighbours of its regions need not hear each
-//! other: what they say is passed on by others, one hop after the other, each of which may lose it. Over
-//! links that lose much that takes its time: with a fifth lost and four hops between them, minutes.
+//! **Reserved paths**, of the policy `complete`, are told with the accounts; what else becomes of
+//! them is in `reservation::registry::failover`. A backup and the neighbours of its regions need
+//! not hear each other: what they say is passed on by others, one hop after the other, each of
+//! which may lose it. Over links that lose much that takes its time: with a fifth lost and four
+//! hops between them, minutes.
 
 pub(crate) mod messages;
 pub(crate) mod rank;
@@ -74,8 +74,8 @@ pub(crate) fn backup_lists(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Ve
     sensors.nodes().map(line).collect()
 }
 
-/// A rover's durable memory of who may still grant it which vertices: a rank for each region that was
-/// ever asked about. Without an entry it is 0, the region itself.
+/// A rover's durable memory of who may still grant it which vertices: a rank for each region that
+/// was ever asked about. Without an entry it is 0, the region itself.
 #[derive(Debug, Default)]
 pub(crate) struct FencingTokens {
     ranks: Vec<(NodeId, u32)>,
@@ -87,7 +87,7 @@ impl FencingTokens {
         known.map_or(0, |&(_, rank)| rank)
     }
 
-    /// Raises the fence to `rank`, if it is lower.
+    /// Raises the token to `rank`, if it is lower.
     pub(crate) fn raise(&mut self, region: NodeId, rank: u32) {
         match self.ranks.iter_mut().find(|(node, _)| *node == region) {
             Some((_, known)) => *known = (*known).max(rank),
@@ -150,8 +150,8 @@ impl FailoverRecord {
         *self.facts.get(rover.0 as usize)?
     }
 
-    /// Gives a region up, and whatever was asked about it at `rank` or below. False if this node did
-    /// not answer for it.
+    /// Gives a region up, and whatever was asked about it at `rank` or below. False if this node
+    /// did not answer for it.
     pub(crate) fn resign(&mut self, region: NodeId, rank: u32) -> bool {
         self.pending
             .retain(|pending| pending.region != region || pending.rank > rank);
@@ -175,8 +175,8 @@ impl FailoverRecord {
         pending.missing().next().is_none()
     }
 
-    /// Ends an pending that all have answered, and takes the region on. Each rover's latest account,
-    /// with later facts in their place.
+    /// Ends an pending that all have answered, and takes the region on. Each rover's latest
+    /// account, with later facts in their place.
     pub(crate) fn take_on(&mut self, region: NodeId, rank: u32) -> Vec<Account> {
         let asked = |i: &PendingFailover| i.region == region && i.rank == rank;
         let Some(at) = self.pending.iter().position(asked) else {
@@ -207,7 +207,8 @@ fn age(fact: &Whereabouts) -> (u32, bool) {
     (fact.step, fact.moving_to.is_some())
 }
 
-/// Who holds `vertex` by rovers' accounts: the one that is there and not leaving, or on its way there.
+/// Who holds `vertex` by rovers' accounts: the one that is there and not leaving, or on its way
+/// there.
 pub(crate) fn holder(accounts: &[Account], vertex: VertexId, cycle: u32) -> Option<Occupant> {
     let claims = |account: &&Account| {
         let fact = &account.whereabouts;
@@ -226,8 +227,8 @@ pub(crate) fn holder(accounts: &[Account], vertex: VertexId, cycle: u32) -> Opti
     })
 }
 
-/// How many of a queue have entered, by their accounts. A vertex is granted to the next in the queue
-/// only when the one before has gone on, so they are the first.
+/// How many of a queue have entered, by their accounts. A vertex is granted to the next in the
+/// queue only when the one before has gone on, so they are the first.
 pub(crate) fn released(accounts: &[Account], queue: &[RoverId]) -> u32 {
     let entered = |rover: &&RoverId| {
         accounts

@@ -1,6 +1,7 @@
 //! Planning on roadmaps in space and time, without messages: the baselines that the network-guided
-//! system is held against, centralised, in whole cycles or by what each edge takes ([`Pace`]). They plan
-//! one rover after the other with the search that nodes share among them, too: [`safe_intervals`].
+//! system is held against, centralised, in whole cycles or by what each edge takes ([`Pace`]). They
+//! plan one rover after the other with the search that nodes share among them, too:
+//! [`safe_intervals`].
 //!
 //! | planner | what it is |
 //! |---|---|
@@ -24,10 +25,11 @@
 //!
 //! # The model
 //!
-//! In time a plan is a list of [visits](safe_intervals). Else time is counted in cycles, from 0; *in cycle t* a rover is at one vertex, and from one cycle to
-//! the next it moves along one edge or waits. That is the distributed system's model with the
-//! instants at which its cycles begin: what a rover does during a cycle of the simulator lies
-//! between two cycles here, so that a lone rover needs as many cycles as its path has edges in both.
+//! In time a plan is a list of [visits](safe_intervals). Else time is counted in cycles, from 0;
+//! *in cycle t* a rover is at one vertex, and from one cycle to the next it moves along one edge or
+//! waits. That is the distributed system's model with the instants at which its cycles begin: what
+//! a rover does during a cycle of the simulator lies between two cycles here, so that a lone rover
+//! needs as many cycles as its path has edges in both.
 //!
 //! - Two rovers may not be at one vertex in one cycle, nor swap along an edge.
 //! - **Following closely is allowed**: a rover may enter a vertex in the very cycle in which its

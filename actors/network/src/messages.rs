@@ -1,6 +1,6 @@
 //! Everything that nodes and rovers of the network-guided system say to each other, and what they
-//! record of their state. Plain serde types: the log describes them field by field. Each is declared
-//! with the part of the system that it belongs to.
+//! record of their state. Plain serde types: the log describes them field by field. Each is
+//! declared with the part of the system that it belongs to.
 
 pub use crate::failover::messages::{Account, Content, Inquiry, Passed, Replaced, TakenOver};
 pub use crate::failover::rank::Replacement;

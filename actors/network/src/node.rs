@@ -1,5 +1,5 @@
-//! The sensor node: plans for the rovers on its vertices and admits rovers to them. What all nodes do
-//! is here and in [`base`], [`ownership`] and [`failover`]; what a policy does, in [`max_plus`],
+//! The sensor node: plans for the rovers on its vertices and admits rovers to them. What all nodes
+//! do is here and in [`base`], [`ownership`] and [`failover`]; what a policy does, in [`max_plus`],
 //! [`complete`] and [`planned`], of which a node has one ([`policy`]).
 
 mod base;
@@ -34,8 +34,8 @@ use planned::PlannedPolicy;
 use policy::{NodePolicy, Phase, PhaseBegins};
 use reservations::RegistryDue;
 
-/// A sensor node of the network-guided system: owns vertices by the safety protocol, and grants them
-/// as its policy says.
+/// A sensor node of the network-guided system: owns vertices by the safety protocol, and grants
+/// them as its policy says.
 ///
 /// Its record of who holds its vertices is durable; what it plans is not.
 pub struct Node {
@@ -111,12 +111,12 @@ impl Actor for Node {
             true => base.site.sensors.owned(base.id),
             false => &[],
         };
-        let ledger = ctx.durable::<OccupancyTable>();
-        let is_new = ledger.is_new();
-        ledger.open(owned, base.rovers.len());
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let is_new = occupancy.is_new();
+        occupancy.open(owned, base.rovers.len());
         for (rover, vertex) in base.site.standing().filter(|_| is_new) {
             let goal = base.site.missions[rover.0 as usize].1;
-            ledger.stand(vertex, rover, goal);
+            occupancy.stand(vertex, rover, goal);
         }
         self.policy.started(&self.base, ctx);
         // The first cycle begins at once; after a restart, the next.

@@ -304,7 +304,8 @@ mod motion {
         }
     }
 
-    /// Rovers that roll are ahead of their plan; what keeps one behind it is the way of messages only.
+    /// Rovers that roll are ahead of their plan; what keeps one behind it is the way of messages
+    /// only.
     #[test]
     fn the_references_plan_in_time_is_driven() {
         for seed in 1..=3 {
@@ -351,8 +352,8 @@ mod location {
         }
     }
 
-    /// Nobody says LEAVING before it is off the vertex by the clearance, nor that it has come before it
-    /// has; and all arrive all the same.
+    /// Nobody says LEAVING before it is off the vertex by the clearance, nor that it has come
+    /// before it has; and all arrive all the same.
     #[test]
     fn what_is_said_is_certain() {
         for (policy, sigma_m, loss) in [
@@ -501,8 +502,8 @@ mod gaps {
         (sensors, seen)
     }
 
-    /// From setting out into a gap to coming out nobody hears a rover but for LEAVING, and it goes on
-    /// as fast as it can.
+    /// From setting out into a gap to coming out nobody hears a rover but for LEAVING, and it goes
+    /// on as fast as it can.
     #[test]
     fn who_crosses_is_silent_and_does_not_wait() {
         let mut crossings = 0;

@@ -155,7 +155,8 @@ impl Drawn {
         Waits::of(&self.site.roadmap, self.site.wait_rule, &rovers)
     }
 
-    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without one.
+    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without
+    /// one.
     fn shortest_circle(&self, waits: &Waits, rovers: &[Sighting]) -> String {
         let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
         let name = |rover: u32| ids::name("rover", rover, self.site.rovers);

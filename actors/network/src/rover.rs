@@ -33,8 +33,8 @@ pub struct Rover {
     nodes: Vec<NodeContact>,
     /// What must know where it is.
     radios: Vec<LinkId<RadioChange>>,
-    /// How fast it is at the end of the edge under way, or at the vertex that it rolls through \[m/s\];
-    /// a crash stops it.
+    /// How fast it is at the end of the edge under way, or at the vertex that it rolls through
+    /// \[m/s\]; a crash stops it.
     speed: f64,
     /// It may say that it is leaving: it is off the vertex for certain.
     off: bool,
@@ -135,8 +135,8 @@ impl Rover {
         }
     }
 
-    /// How far from the vertex it is when it says that it has left: as soon as its estimate is that it is
-    /// off it by the clearance and three standard deviations. Errors beyond that it notices.
+    /// How far from the vertex it is when it says that it has left: as soon as its estimate is that
+    /// it is off it by the clearance and three standard deviations. Errors beyond that it notices.
     fn leaves_at_m(&self, ctx: &Context<'_, Self>, step: u32) -> f64 {
         let config = &self.site.config;
         let most_m = 3.0 * config.location_sigma_m;
@@ -274,7 +274,8 @@ impl Actor for Rover {
             memory.vertex = Some(self.entry);
             memory.step = 1;
         }
-        // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
+        // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound
+        // to.
         if ctx.durable::<RoverMemory>().moving_to.is_some() {
             self.drive(ctx);
         }
@@ -348,7 +349,8 @@ impl Handler<Inquiry> for Rover {
             .durable::<RoverMemory>()
             .granted_beyond(|v| site.sensors.covers(v));
         if is_higher && beyond.is_some_and(of_home) && self.speed > 0.0 {
-            // It cannot stop before a vertex that it is about to roll on to. It answers when it is there.
+            // It cannot stop before a vertex that it is about to roll on to. It answers when it is
+            // there.
             return Ok(());
         }
         ctx.durable::<FencingTokens>().raise(region, rank);
@@ -395,8 +397,8 @@ impl Handler<Itinerary> for Rover {
 
 impl Rover {
     /// Takes the next step if it was granted ahead, and no sooner than a cycle after the last move
-    /// began; in continuous motion at once, but for a cycle at the entry. Into a gap only with the grants
-    /// for the way through.
+    /// began; in continuous motion at once, but for a cycle at the entry. Into a gap only with the
+    /// grants for the way through.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
         let memory = ctx.durable::<RoverMemory>();

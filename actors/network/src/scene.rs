@@ -1,5 +1,5 @@
-//! The network-guided system as viewers draw it: the roadmap in the colours of its nodes, the nodes,
-//! rovers that drive, and which of them are coordinated.
+//! The network-guided system as viewers draw it: the roadmap in the colours of its nodes, the
+//! nodes, rovers that drive, and which of them are coordinated.
 //!
 //! All of it is told by committed samples: a rover's frame is placed when it sets out and when it
 //! arrives, and viewers move it in between. The coordination graph is told as it is when a planning

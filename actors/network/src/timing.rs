@@ -7,10 +7,10 @@ use farside_actors::link::transmission_time;
 
 /// How long the parts of a planning cycle last, the same for all nodes.
 ///
-/// What [`NetworkConfig`] leaves open follows, for the policy `max-plus`, from the slowest link's latency L and
-/// from S(n), how long n bytes are on the air at the lowest bit rate (no time without rates), so
-/// that what is sent in a part is there when the next begins. The paper's messages take no time; up to 10 ms these
-/// are its values, and ours, and those of the other policy always:
+/// What [`NetworkConfig`] leaves open follows, for the policy `max-plus`, from the slowest link's
+/// latency L and from S(n), how long n bytes are on the air at the lowest bit rate (no time without
+/// rates), so that what is sent in a part is there when the next begins. The paper's messages take
+/// no time; up to 10 ms these are its values, and ours, and those of the other policy always:
 ///
 /// | part | lasts | because |
 /// |---|---|---|
@@ -19,8 +19,8 @@ use farside_actors::link::transmission_time;
 /// | `optimisation` | 10 (L + S(600)), at least 500 ms | max-plus needs about ten iterations, each L + S |
 /// | `cycle` | 4 `exchange` + `optimisation` + `traverse` + 5 (L + S(64)) + 50 ms, at least 1 s | grant, LEAVING, its report, the follower's grant and its drive come after the decision |
 ///
-/// The sizes are those of common messages of 50 rovers and 28 nodes: candidate paths, vectors, grants. Larger
-/// ones take longer, and are used if they come in time.
+/// The sizes are those of common messages of 50 rovers and 28 nodes: candidate paths, vectors,
+/// grants. Larger ones take longer, and are used if they come in time.
 ///
 /// Rates are those of links that two hosts have to themselves. Who shares a radio has to say how
 /// long its parts last.
@@ -80,10 +80,10 @@ impl Timing {
 }
 
 impl NetworkConfig {
-    /// By how many cycles the windows of a deadlock are longer over links of this latency and rate. The phases
-    /// of the policy `max-plus` stretch, and with them its cycles; of other policies cycles do not, while
-    /// a walk is some tens of messages, one after the other, and some of them twice. And a node that fails
-    /// is replaced only when it has been silent for long enough.
+    /// By how many cycles the windows of a deadlock are longer over links of this latency and rate.
+    /// The phases of the policy `max-plus` stretch, and with them its cycles; of other policies
+    /// cycles do not, while a walk is some tens of messages, one after the other, and some of them
+    /// twice. And a node that fails is replaced only when it has been silent for long enough.
     pub(crate) fn patience(&self, latency: SimDuration, timing: &Timing) -> u32 {
         const MESSAGES: u64 = 150;
         let silence = self.failover_after.unwrap_or(0).min(u32::MAX / 4);

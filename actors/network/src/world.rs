@@ -1,5 +1,5 @@
-//! Where rovers drive, as scenarios name it: a built-in roadmap, one in a file, a map of cells; and the
-//! nodes over it.
+//! Where rovers drive, as scenarios name it: a built-in roadmap, one in a file, a map of cells; and
+//! the nodes over it.
 
 use farside_actors::system::{Files, SetupError};
 use farside_worlds::movingai::{self, Builtin as BuiltinMap, GridMap, GridWorld, TaskList};

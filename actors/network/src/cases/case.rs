@@ -18,8 +18,8 @@ use farside_actors::units;
 /// A scenario of the network-guided system: what [`crate::assemble`] takes, with its links,
 /// degradations and crashes.
 ///
-/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with nothing
-/// in it that is as by default: read there it gives the same run, to the last event.
+/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with
+/// nothing in it that is as by default: read there it gives the same run, to the last event.
 ///
 /// ```
 /// use farside::SimDuration;
@@ -172,9 +172,9 @@ impl Case {
 
     /// The same case with this seed, the next one, and so on.
     ///
-    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of the
-    /// larger one, because seeds decide missions, placement and losses, but it fails with some. So it
-    /// shrinks on.
+    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of
+    /// the larger one, because seeds decide missions, placement and losses, but it fails with some.
+    /// So it shrinks on.
     pub fn seeds(&self, count: u64) -> impl Iterator<Item = Case> + '_ {
         (0..count).map(|more| Case {
             seed: self.seed.wrapping_add(more),

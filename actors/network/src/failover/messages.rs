@@ -9,8 +9,8 @@ use crate::node::messages::Locations;
 use crate::reservation::messages::{Relay, TimedPath};
 use crate::safety::messages::{Departed, DepartedAck, Whereabouts};
 
-/// Node to rover, with `network.failover_after`: the vertices of `region` are mine from now on. Where
-/// are you? Repeated each cycle until answered.
+/// Node to rover, with `network.failover_after`: the vertices of `region` are mine from now on.
+/// Where are you? Repeated each cycle until answered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Inquiry {
     /// The backup that asks.
@@ -21,8 +21,8 @@ pub struct Inquiry {
     pub rank: u32,
 }
 
-/// Rover to node: the answer to an [`Inquiry`], and to a grant by a node that is replaced. From now on
-/// the rover obeys grants of this region's vertices from the backup of this rank only.
+/// Rover to node: the answer to an [`Inquiry`], and to a grant by a node that is replaced. From now
+/// on the rover obeys grants of this region's vertices from the backup of this rank only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Account {
     /// Whose vertices this is about.

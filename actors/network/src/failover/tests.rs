@@ -71,7 +71,8 @@ struct Trial {
     /// Columns and rows of a grid; without, the dense crater.
     grid: Option<(u32, u32)>,
     link: Bad,
-    /// Nodes that hear no other node, and are not heard by any, between two seconds; rovers they hear.
+    /// Nodes that hear no other node, and are not heard by any, between two seconds; rovers they
+    /// hear.
     unheard: Vec<(u32, (u64, u64))>,
     /// Who crashes, when, and for how long: nodes by number, then rovers \[ms\].
     crashes: Vec<(u32, u64, Option<u64>)>,
@@ -165,7 +166,8 @@ fn run_on(
         policy: trial.policy,
         failover_after: trial.after,
         cycle_limit: trial.cycle_limit,
-        // These links do not say how late they may be: what is passed round a failure takes many of them.
+        // These links do not say how late they may be: what is passed round a failure takes many of
+        // them.
         deadlock_window: trial.cycle_limit / 5,
         livelock_window: trial.cycle_limit,
         sabotage: trial.sabotage,
@@ -237,8 +239,8 @@ fn all_arrive(trial: &Trial, failovers: u32) {
     assert_eq!(metrics.failed_over.len(), failovers as usize);
 }
 
-/// A node with rovers on its vertices is gone for good: with failover all rovers arrive, and without
-/// some never do.
+/// A node with rovers on its vertices is gone for good: with failover all rovers arrive, and
+/// without some never do.
 #[test]
 fn a_neighbour_takes_over_for_a_node_that_is_gone_for_good() {
     for (policy, seed) in POLICIES
@@ -370,8 +372,8 @@ fn only_nodes_that_decide_as_they_go_are_replaced() {
     assert_eq!(text, "network.failover_after: 0: expected at least 1");
 }
 
-/// By brute force: each in line hears all before it, none of those left out does, and the first reaches
-/// as many of the owners around as any could.
+/// By brute force: each in line hears all before it, none of those left out does, and the first
+/// reaches as many of the owners around as any could.
 #[test]
 fn a_line_is_a_clique_and_its_first_reaches_the_most() {
     for seed in 1..=5 {
@@ -451,10 +453,11 @@ proptest! {
     }
 }
 
-/// A team of the crater of which nodes fail for good, or are unheard for a while, in the middle of requests:
-/// over links that lose and delay.
+/// A team of the crater of which nodes fail for good, or are unheard for a while, in the middle of
+/// requests: over links that lose and delay.
 fn failures() -> impl Strategy<Value = Trial> {
-    // Round a failure messages take many hops: with more loss than this they do get through, in hours.
+    // Round a failure messages take many hops: with more loss than this they do get through, in
+    // hours.
     let link = (0.0..0.15, 0..600u64, 0.0..0.2);
     let crashes = prop::collection::vec((0..28u32, 300..20_000u64), 1..4);
     let unheard = prop::collection::vec((0..28u32, (1..25u64, 5..30u64)), 0..3);
@@ -479,8 +482,8 @@ fn failures() -> impl Strategy<Value = Trial> {
     )
 }
 
-/// Whether every region has somebody left to answer for it, and all who are left hear each other by way of
-/// others: who failed or was replaced is out.
+/// Whether every region has somebody left to answer for it, and all who are left hear each other by
+/// way of others: who failed or was replaced is out.
 fn can_go_on(trial: &Trial, metrics: &NetworkMetrics) -> bool {
     let (_, map, sensors) = world(trial);
     let replaced = metrics.failed_over.iter().map(|text| {
@@ -505,7 +508,8 @@ fn can_go_on(trial: &Trial, metrics: &NetworkMetrics) -> bool {
 }
 
 proptest! {
-    // The same cases each time: what holds after ever rarer coincidences is for longer searches than this.
+    // The same cases each time: what holds after ever rarer coincidences is for longer searches
+    // than this.
     #![proptest_config(ProptestConfig {
         cases: 32,
         failure_persistence: None,
@@ -513,8 +517,8 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all arrive,
-    /// as long as somebody is left to answer for each vertex.
+    /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all
+    /// arrive, as long as somebody is left to answer for each vertex.
     #[test]
     fn all_arrive_whoever_fails(trial in failures()) {
         let (metrics, report) = run(&trial);
@@ -526,8 +530,8 @@ proptest! {
     }
 }
 
-/// Whether one of many small runs with this fault shows a collision: a node that others do not hear,
-/// and rovers do.
+/// Whether one of many small runs with this fault shows a collision: a node that others do not
+/// hear, and rovers do.
 fn collides_with(policy: Policy, sabotage: Sabotage) -> bool {
     (1..=200).any(|seed| {
         let trial = Trial {
@@ -576,8 +580,8 @@ fn forgetting_accounts_is_noticed() {
     );
 }
 
-/// A node is unheard for so long that a backup begins to ask for its vertices, and gives them up; but the
-/// backup crashes before all have answered. Somebody else takes them.
+/// A node is unheard for so long that a backup begins to ask for its vertices, and gives them up;
+/// but the backup crashes before all have answered. Somebody else takes them.
 #[test]
 fn a_home_is_not_left_that_was_given_up_to_nobody() {
     let trial = Trial {
@@ -614,7 +618,8 @@ fn no_attempt_gets_two_ways() {
     assert_eq!(metrics.arrived, 35, "{detail} {:?}", metrics.failed_over);
 }
 
-/// A backup that hears nobody for a while and is replaced does not keep the next in line from its turn.
+/// A backup that hears nobody for a while and is replaced does not keep the next in line from its
+/// turn.
 #[test]
 fn a_backup_that_was_replaced_is_passed_over() {
     let trial = Trial {

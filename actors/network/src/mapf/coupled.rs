@@ -14,8 +14,8 @@ use super::problem::{CoupledError, Objective, Problem};
 pub struct CoupledConfig {
     /// What is to be least.
     pub objective: Objective,
-    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and an
-    /// expansion adds up to as many nodes as a vertex has neighbours, and two.
+    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and
+    /// an expansion adds up to as many nodes as a vertex has neighbours, and two.
     pub max_expansions: u64,
     /// Plans rovers apart for as long as their plans do not meet (independence detection, Standley
     /// 2010). Off: all are planned as one from the start.
@@ -74,8 +74,8 @@ pub struct Coupled {
 /// ```
 ///
 /// # Errors
-/// When the limit of expansions is reached, or, with [`Rules::StayAtTarget`](super::Rules::StayAtTarget), when
-/// there is no plan.
+/// When the limit of expansions is reached, or, with
+/// [`Rules::StayAtTarget`](super::Rules::StayAtTarget), when there is no plan.
 pub fn coupled(problem: &Problem<'_>, config: &CoupledConfig) -> Result<Coupled, CoupledError> {
     let rovers = problem.missions().len();
     let mut plan = Plan {

@@ -98,8 +98,8 @@ pub struct Failure {
     pub rover: usize,
     /// Who stands or drives in its way when nothing is left to it, sorted.
     pub blockers: Vec<usize>,
-    /// When that is, in ticks of the plan (cycles, if it is in cycles): the last instant at which it
-    /// could still be anywhere; or at which somebody moves, if that is before.
+    /// When that is, in ticks of the plan (cycles, if it is in cycles): the last instant at which
+    /// it could still be anywhere; or at which somebody moves, if that is before.
     pub at: u64,
 }
 
@@ -143,9 +143,9 @@ impl Plan {
             .is_some_and(|trip| trip.end() == goal)
     }
 
-    /// The plan as a timetable in cycles: each rover's stays, one after the other; empty for a rover
-    /// without a trip. The last stay has no end with [`Rules::StayAtTarget`], and one cycle with
-    /// [`Rules::DisappearAtTarget`].
+    /// The plan as a timetable in cycles: each rover's stays, one after the other; empty for a
+    /// rover without a trip. The last stay has no end with [`Rules::StayAtTarget`], and one cycle
+    /// with [`Rules::DisappearAtTarget`].
     pub fn visits(&self, problem: &Problem<'_>) -> Vec<Vec<TimedVisit>> {
         let visits = |trip: &Option<Trip>| {
             let trip = trip.as_ref();

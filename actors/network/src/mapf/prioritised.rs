@@ -13,11 +13,12 @@ use super::timetable::{Pace, Timetable};
 /// Plans one rover after the other, each round those before it. With several orders to try it stops
 /// at the first in which all find a way.
 ///
-/// With [`Rules::DisappearAtTarget`](super::Rules::DisappearAtTarget) a rover enters in the first cycle in which nobody planned before it is at
-/// its entry, its predecessors among them; it may not wait outside for a clear way. With
-/// [`Rules::StayAtTarget`](super::Rules::StayAtTarget) it starts in cycle 0, where somebody planned before it may already be driving
-/// through. A rover that finds no way is named as a failure, has no trip, and is in nobody's way:
-/// the others are planned as if it were not there.
+/// With [`Rules::DisappearAtTarget`](super::Rules::DisappearAtTarget) a rover enters in the first
+/// cycle in which nobody planned before it is at its entry, its predecessors among them; it may not
+/// wait outside for a clear way. With [`Rules::StayAtTarget`](super::Rules::StayAtTarget) it starts
+/// in cycle 0, where somebody planned before it may already be driving through. A rover that finds
+/// no way is named as a failure, has no trip, and is in nobody's way: the others are planned as if
+/// it were not there.
 ///
 /// ```
 /// use farside_network::mapf::{Mission, Order, Problem, Rules, prioritised};

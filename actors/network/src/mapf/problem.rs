@@ -116,8 +116,8 @@ impl<'a> Problem<'a> {
     /// The problem of `missions` on `roadmap`. Entries and goals need not be on its boundary.
     ///
     /// # Errors
-    /// When a mission leaves the roadmap; with [`Rules::StayAtTarget`] also when two rovers have the same
-    /// entry or the same goal.
+    /// When a mission leaves the roadmap; with [`Rules::StayAtTarget`] also when two rovers have
+    /// the same entry or the same goal.
     pub fn new(
         roadmap: &'a Roadmap,
         missions: Vec<Mission>,
@@ -184,8 +184,8 @@ impl<'a> Problem<'a> {
         self.rules
     }
 
-    /// Who waits at each entry, first to last, by the entries' numbers. With [`Rules::StayAtTarget`]
-    /// each rover is a queue of its own.
+    /// Who waits at each entry, first to last, by the entries' numbers. With
+    /// [`Rules::StayAtTarget`] each rover is a queue of its own.
     pub fn queues(&self) -> &[Vec<usize>] {
         &self.queues
     }
@@ -203,8 +203,8 @@ impl<'a> Problem<'a> {
 
     /// The rovers that have no way to their goals round the entries and goals of all others. None:
     /// the problem is *well-formed* (Cap, Vokrinek and Kleiner 2015, section 3), and
-    /// [`reference`](fn@super::reference) is certain to solve it. With [`Rules::DisappearAtTarget`] every problem
-    /// is: a rover that has not entered, or has left, is in nobody's way.
+    /// [`reference`](fn@super::reference) is certain to solve it. With [`Rules::DisappearAtTarget`]
+    /// every problem is: a rover that has not entered, or has left, is in nobody's way.
     ///
     /// ```
     /// use farside_network::mapf::{Mission, Problem, Rules};

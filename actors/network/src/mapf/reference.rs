@@ -12,12 +12,12 @@ use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it, so that it is sure of a way.
 ///
-/// With [`Rules::DisappearAtTarget`] a rover waits in its queue for as long as need be. Nobody can be without
-/// a way: when all planned before it have left the roadmap it is empty, and the queue's
+/// With [`Rules::DisappearAtTarget`] a rover waits in its queue for as long as need be. Nobody can
+/// be without a way: when all planned before it have left the roadmap it is empty, and the queue's
 /// predecessor has entered by then. So there are no failures.
 ///
-/// With [`Rules::StayAtTarget`] each rover keeps clear of the places where those planned after it still
-/// stand, and those keep clear of where it stays. On well-formed problems
+/// With [`Rules::StayAtTarget`] each rover keeps clear of the places where those planned after it
+/// still stand, and those keep clear of where it stays. On well-formed problems
 /// ([`Problem::ill_formed`] is empty) that leaves a way to everybody: to wait until all before have
 /// arrived, and to drive round all entries and goals. On others failures are named; a rover that
 /// fails stands at its entry for ever, and has a trip that ends there.

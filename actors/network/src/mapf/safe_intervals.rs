@@ -1,19 +1,21 @@
 //! Safe-interval path planning (Phillips and Likhachev, 2011) in continuous time, over any part of
 //! a roadmap, so that a search can be handed from one part to the next.
 //!
-//! A rover's way is a list of visits. A **visit** of a vertex begins when the rover sets out towards
-//! it, and ends when it sets out towards the next: from then on the vertex is free. Between two
-//! visits of one vertex by different rovers there is a gap, the time that it takes to learn of the
-//! one and to permit the other. A **safe interval** of a vertex is a time in which a visit may lie.
+//! A rover's way is a list of visits. A **visit** of a vertex begins when the rover sets out
+//! towards it, and ends when it sets out towards the next: from then on the vertex is free. Between
+//! two visits of one vertex by different rovers there is a gap, the time that it takes to learn of
+//! the one and to permit the other. A **safe interval** of a vertex is a time in which a visit may
+//! lie.
 //!
-//! Of two ways into the same safe interval the one that is there first is as good as the other in all
-//! that follows, since it may wait. So a search keeps one [`Label`] for each vertex and interval.
-//! Swapping along an edge needs no rule of its own: each of the two rovers would have to begin its
-//! visit after the other one has ended. Only where there is no gap at all, as in whole cycles, can both
-//! happen at one instant.
+//! Of two ways into the same safe interval the one that is there first is as good as the other in
+//! all that follows, since it may wait. So a search keeps one [`Label`] for each vertex and
+//! interval. Swapping along an edge needs no rule of its own: each of the two rovers would have to
+//! begin its visit after the other one has ended. Only where there is no gap at all, as in whole
+//! cycles, can both happen at one instant.
 //!
-//! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up to
-//! that of the covered vertex beyond, begin when it sets out into it. How that is searched: `crossing`.
+//! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up
+//! to that of the covered vertex beyond, begin when it sets out into it. How that is searched:
+//! `crossing`.
 
 mod crossing;
 
@@ -37,8 +39,8 @@ pub struct Label {
     pub start: u64,
     /// When the rover then stands there \[ns\].
     pub ready: u64,
-    /// When the visit must have ended \[ns\]: the safe interval's end. At a vertex that is not covered the
-    /// latest time to pass it, as the crossing goes so far.
+    /// When the visit must have ended \[ns\]: the safe interval's end. At a vertex that is not
+    /// covered the latest time to pass it, as the crossing goes so far.
     pub until: u64,
     /// The label it comes from, by its place in the same list; none where the way begins.
     pub parent: Option<u32>,
@@ -77,9 +79,9 @@ pub(super) struct Aim<'a> {
     pub(super) left: &'a dyn Fn(VertexId) -> u64,
     /// Whether a label is the end of the search.
     pub(super) is_end: &'a dyn Fn(&Label) -> bool,
-    /// Whether there is no setting out from the first vertex to the second at this instant, the only
-    /// one at which one safe interval is left for the other. Without a gap rovers can change places,
-    /// in twos and in rings, at such an instant and at no other.
+    /// Whether there is no setting out from the first vertex to the second at this instant, the
+    /// only one at which one safe interval is left for the other. Without a gap rovers can change
+    /// places, in twos and in rings, at such an instant and at no other.
     pub(super) is_barred: &'a dyn Fn(VertexId, VertexId, u64) -> bool,
 }
 
@@ -138,8 +140,8 @@ impl SearchSpace<'_> {
         self.search(labels, open, &all);
     }
 
-    /// As [`SearchSpace::expand`], but the most promising label first (A*), and only until one is the end:
-    /// its place. No other end is ready sooner.
+    /// As [`SearchSpace::expand`], but the most promising label first (A*), and only until one is
+    /// the end: its place. No other end is ready sooner.
     pub(super) fn search(
         &self,
         labels: &mut Vec<Label>,
@@ -198,8 +200,8 @@ impl SearchSpace<'_> {
 
 /// The way that ends with the label at `last`: each visit begins as early as can be, but the first
 /// one as late as the second allows, so that a rover that comes from outside waits there and not in
-/// the way of others. The last visit ends at `end`. Vertices that `covers` does not say are covered are
-/// driven through.
+/// the way of others. The last visit ends at `end`. Vertices that `covers` does not say are covered
+/// are driven through.
 pub fn way_to(
     labels: &[Label],
     last: u32,
@@ -284,10 +286,10 @@ pub(super) mod tests {
         }
     }
 
-    /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits one
-    /// instant or sets out, and may be nowhere within a gap of another's visit. Through vertices
-    /// that are not covered it drives without a stop, and claims all of them, and the one beyond, as it
-    /// sets out.
+    /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits
+    /// one instant or sets out, and may be nowhere within a gap of another's visit. Through
+    /// vertices that are not covered it drives without a stop, and claims all of them, and the one
+    /// beyond, as it sets out.
     pub(super) fn brute_force(
         roadmap: &Roadmap,
         busy: &Busy,
@@ -308,7 +310,8 @@ pub(super) mod tests {
                 let zero = &mut open[at as usize][start.0 as usize];
                 *zero = (*zero).max(Some(0));
             }
-            // Those who set out now have not been on their way for any time: no move leads to another.
+            // Those who set out now have not been on their way for any time: no move leads to
+            // another.
             for u in roadmap.vertices() {
                 if open[at as usize][u.0 as usize] == Some(STEP) {
                     if u == goal {
@@ -378,8 +381,8 @@ pub(super) mod tests {
     }
 
     proptest! {
-        /// The search finds the earliest arrival, its way keeps clear of all visits, and a search in
-        /// two parts finds no less than one that is told to pass through them in that order.
+        /// The search finds the earliest arrival, its way keeps clear of all visits, and a search
+        /// in two parts finds no less than one that is told to pass through them in that order.
         #[test]
         fn the_earliest_way_is_found(busy in busy(6), goal in 0u32..6) {
             let map = grid(3, 2, &[(1, 4)]);

@@ -15,9 +15,9 @@ use super::timetable::Pace;
 /// When a rover may come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
-    /// At this tick or any later one, as late as the rest of its way allows: so that it waits in its
-    /// queue, where it is in nobody's way, and not at its entry. With [`Rules::StayAtTarget`] it stands
-    /// there from the start all the same.
+    /// At this tick or any later one, as late as the rest of its way allows: so that it waits in
+    /// its queue, where it is in nobody's way, and not at its entry. With [`Rules::StayAtTarget`]
+    /// it stands there from the start all the same.
     From(u64),
     /// As soon as its entry is free: it may not wait outside for a clear way.
     AtOnce,
@@ -26,8 +26,8 @@ pub(crate) enum Entry {
 /// The way of `rover` that ends first. With [`Rules::StayAtTarget`] it stays at its goal for ever.
 ///
 /// # Errors
-/// When there is none: with [`Rules::DisappearAtTarget`] and [`Entry::From`] only if somebody stays on the map
-/// for ever.
+/// When there is none: with [`Rules::DisappearAtTarget`] and [`Entry::From`] only if somebody stays
+/// on the map for ever.
 pub(crate) fn search(
     problem: &Problem<'_>,
     pace: &Pace<'_>,

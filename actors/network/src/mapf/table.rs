@@ -101,9 +101,9 @@ impl Table {
         (tick < visit.end).then_some(visit.vertex)
     }
 
-    /// Who leaves `to` at `tick`, if a chain of rovers that follow one another at that instant leads
-    /// from there back to `from`. A chain of one is a swap. Rovers can only do so without a gap between
-    /// them. Nobody may be at `to` then.
+    /// Who leaves `to` at `tick`, if a chain of rovers that follow one another at that instant
+    /// leads from there back to `from`. A chain of one is a swap. Rovers can only do so without a
+    /// gap between them. Nobody may be at `to` then.
     pub(crate) fn closes_ring(&self, from: VertexId, to: VertexId, tick: u64) -> Option<usize> {
         let last = self.occupant(from, tick)?;
         let ahead = self.occupant(to, tick.checked_sub(1)?)?;
@@ -147,8 +147,7 @@ mod tests {
 
     #[test]
     fn rings_are_seen_whoever_closes_them() {
-        // 0 1 2
-        // 3 4 5
+        // 0 1 2 3 4 5
         let mut table = Table::new(&grid(3, 2, &[]), 4);
         table.insert(0, trip(4, &[0, 1], Rules::DisappearAtTarget));
         table.insert(1, trip(4, &[1, 4], Rules::DisappearAtTarget));

@@ -124,9 +124,9 @@ fn place(trip: &Trip, rules: Rules, cycle: Option<u32>) -> Option<VertexId> {
     }
 }
 
-/// The first cycle in which a rover can be at its goal for good, in the midst of `others`: the set of
-/// all vertices where it can be is followed from cycle to cycle. It enters in `ready` or later if
-/// it may wait outside, else in `ready`.
+/// The first cycle in which a rover can be at its goal for good, in the midst of `others`: the set
+/// of all vertices where it can be is followed from cycle to cycle. It enters in `ready` or later
+/// if it may wait outside, else in `ready`.
 pub(crate) fn first_arrival(
     roadmap: &Roadmap,
     others: &[Trip],
@@ -225,13 +225,14 @@ struct Pawn {
     rests: u32,
 }
 
-/// The least sum of costs or the least makespan, by uniform-cost search over all joint moves; none if
-/// there is no plan. A rover that rests at its goal pays nothing until it leaves it again, and then
-/// for all the time.
+/// The least sum of costs or the least makespan, by uniform-cost search over all joint moves; none
+/// if there is no plan. A rover that rests at its goal pays nothing until it leaves it again, and
+/// then for all the time.
 pub(crate) fn brute_force(problem: &Problem<'_>, makespan: bool) -> Option<u64> {
     let stays = problem.rules() == Rules::StayAtTarget;
     let missions = problem.missions();
-    // Where there is no plan rests would grow for ever; without them there are finitely many states.
+    // Where there is no plan rests would grow for ever; without them there are finitely many
+    // states.
     if stays && !makespan && brute_force(problem, true).is_none() {
         return None;
     }

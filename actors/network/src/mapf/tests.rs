@@ -267,8 +267,7 @@ proptest! {
 #[test]
 fn a_full_ring_cannot_turn_and_one_with_a_gap_can() {
     let map = grid(2, 2, &[]);
-    // 0 1
-    // 2 3
+    // 0 1 2 3
     let turn = [(0, 1), (1, 3), (3, 2), (2, 0)].map(|(a, b)| Mission::new(v(a), v(b)));
     let config = CoupledConfig::default();
     let full = Problem::new(&map, turn.to_vec(), Rules::StayAtTarget).unwrap();

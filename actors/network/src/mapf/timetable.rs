@@ -6,7 +6,8 @@ use super::plan::{Failure, Outcome, Plan, Trip};
 use super::problem::{Problem, Rules};
 use super::safe_intervals::{FOREVER, TimedVisit};
 
-/// How time passes for a rover on a roadmap, counted in ticks: cycles, nanoseconds, or what one likes.
+/// How time passes for a rover on a roadmap, counted in ticks: cycles, nanoseconds, or what one
+/// likes.
 ///
 /// ```
 /// use farside_network::mapf::Pace;
@@ -19,11 +20,12 @@ use super::safe_intervals::{FOREVER, TimedVisit};
 pub struct Pace<'a> {
     /// From setting out along an edge to being ready to set out again; at least 1.
     pub travel: &'a dyn Fn(VertexId, VertexId) -> u64,
-    /// From coming in at the entry to being ready to set out. With [`Rules::StayAtTarget`] it counts from the
-    /// start.
+    /// From coming in at the entry to being ready to set out. With [`Rules::StayAtTarget`] it
+    /// counts from the start.
     pub enter: u64,
-    /// The least time between one rover's leaving a vertex and the next one's setting out for it. With
-    /// none a rover may follow at once; but still no two may change places, nor several in a ring.
+    /// The least time between one rover's leaving a vertex and the next one's setting out for it.
+    /// With none a rover may follow at once; but still no two may change places, nor several in a
+    /// ring.
     pub headway: u64,
 }
 

@@ -36,9 +36,10 @@ pub enum Processor {
 }
 
 impl Processor {
-    /// The speed at which the paper's Table 1 comes out well; `"paper"` in a scenario. Fitted to it by
-    /// eye, on the dense roadmap with perfect links and few seeds: at 300k/s it fits less well, at
-    /// 500k/s about as well, and at 800k/s nothing deadlocks at 28 nodes. The paper gave each node a core of 2.6 GHz and does not say what its program did with it.
+    /// The speed at which the paper's Table 1 comes out well; `"paper"` in a scenario. Fitted to it
+    /// by eye, on the dense roadmap with perfect links and few seeds: at 300k/s it fits less well,
+    /// at 500k/s about as well, and at 800k/s nothing deadlocks at 28 nodes. The paper gave each
+    /// node a core of 2.6 GHz and does not say what its program did with it.
     pub const PAPER: Processor = Processor::PairsPerS(400_000);
 
     /// How many pairs it can look at in `time`; none if it can look at any number.

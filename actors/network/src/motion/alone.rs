@@ -17,8 +17,8 @@ struct Start {
 }
 
 impl EdgeTimes<'_> {
-    /// The least time from standing at `from` to standing at `to`: on the fastest way, rolling through
-    /// each vertex where the rover may. One that is not certain where it is never rolls.
+    /// The least time from standing at `from` to standing at `to`: on the fastest way, rolling
+    /// through each vertex where the rover may. One that is not certain where it is never rolls.
     ///
     /// Of two rovers that set out along the same edge the one that is not later and not slower has
     /// no more time before it. So of those that are neither, all are followed.
@@ -100,8 +100,7 @@ mod tests {
 
     #[test]
     fn straight_on_it_stops_only_at_the_end() {
-        // 0 1 2 3
-        // 4 5 6 7, 10 m apart.
+        // 0 1 2 3 4 5 6 7, 10 m apart.
         let roadmap = grid(4, 2, &[]);
         let time = |config: &NetworkConfig, from, to| {
             let roadmap = &roadmap;
@@ -149,8 +148,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-        /// On grids that were shaken, so that ways turn by all angles: the way that comes to an edge
-        /// first need not be the one that comes to its end first.
+        /// On grids that were shaken, so that ways turn by all angles: the way that comes to an
+        /// edge first need not be the one that comes to its end first.
         #[test]
         fn no_way_is_faster(shifts_m in prop::collection::vec((-4.0..4.0f64, -4.0..4.0f64), 9)) {
             let even = grid(3, 3, &[]);

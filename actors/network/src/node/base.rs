@@ -1,5 +1,5 @@
-//! What every node has, whatever its policy: its vertices and neighbours, and the ways to say something.
-//! What it says and hears of failover is in [`failover`](super::failover).
+//! What every node has, whatever its policy: its vertices and neighbours, and the ways to say
+//! something. What it says and hears of failover is in [`failover`](super::failover).
 
 use std::sync::Arc;
 
@@ -81,8 +81,8 @@ impl Base {
         self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
     }
 
-    /// Whether it may take part: where nodes are given the roadmap over the network, only with all of
-    /// it.
+    /// Whether it may take part: where nodes are given the roadmap over the network, only with all
+    /// of it.
     pub(super) fn knows_roadmap(&self, ctx: &mut Context<'_, Node>) -> bool {
         let source = self.site.roadmap_from;
         source.is_none() || ctx.durable::<Atlas>().is_known(source)
@@ -136,16 +136,16 @@ impl Base {
         self.tell_partners(ctx, &Content::Locations(message));
     }
 
-    /// The same, for policies that have no exchange of locations: with failover, silence tells, and who
-    /// has lost a report is told again.
+    /// The same, for policies that have no exchange of locations: with failover, silence tells, and
+    /// who has lost a report is told again.
     pub(super) fn locate_for_failover(&self, ctx: &mut Context<'_, Node>) {
         if self.takes_over() {
             self.locate(ctx, None, None);
         }
     }
 
-    /// Takes the grant of a step for proof that it is being taken: what [`Sabotage::FreeOnGrant`] is
-    /// for. Returns what is free because of that: the vertex left, if it is one of this node's.
+    /// Takes the grant of a step for proof that it is being taken: what [`Sabotage::FreeOnGrant`]
+    /// is for. Returns what is free because of that: the vertex left, if it is one of this node's.
     pub(super) fn presume_left(
         &self,
         ctx: &mut Context<'_, Node>,

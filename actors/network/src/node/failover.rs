@@ -1,5 +1,5 @@
-//! A node's part in failovers: whom it suspects, whom it asks, for whose vertices it answers, and how
-//! it reaches those beside them that are no radio neighbours of it. Why this is safe:
+//! A node's part in failovers: whom it suspects, whom it asks, for whose vertices it answers, and
+//! how it reaches those beside them that are no radio neighbours of it. Why this is safe:
 //! [`failover`](crate::failover).
 
 use farside::prelude::*;
@@ -20,7 +20,8 @@ use crate::safety::messages::{Departed, DepartedAck, Holding, Whereabouts};
 /// By how many ways a message to a node out of radio range sets out: one of them may be lost.
 const WAYS: usize = 2;
 
-/// What a node knows of failovers between two crashes; what must outlive one is in its [`FailoverRecord`].
+/// What a node knows of failovers between two crashes; what must outlive one is in its
+/// [`FailoverRecord`].
 pub(super) struct FailoverState {
     /// A node is silent that was not heard for more cycles than this.
     after: u32,
@@ -30,7 +31,8 @@ pub(super) struct FailoverState {
     pub(super) regions: Vec<NodeId>,
     /// Who answers for each region.
     pub(super) acting: Vec<NodeId>,
-    /// For how many cycles each region's node, or who replaced it, was heard and did not answer for it.
+    /// For how many cycles each region's node, or who replaced it, was heard and did not answer for
+    /// it.
     vacant: Vec<u32>,
     /// Nodes to coordinate with that are no radio neighbours.
     partners: Vec<Partner>,
@@ -147,8 +149,9 @@ impl Base {
         at.is_some_and(|n| n.located.is_some() && !n.answers.contains(&region))
     }
 
-    /// Whether somebody in the line of `region` can be reckoned with no more: it is silent; or it has given
-    /// the region up to somebody who does not take it; or, as a backup, it was replaced itself.
+    /// Whether somebody in the line of `region` can be reckoned with no more: it is silent; or it
+    /// has given the region up to somebody who does not take it; or, as a backup, it was replaced
+    /// itself.
     fn is_out(&self, id: NodeId, region: NodeId) -> bool {
         let Some(failover) = &self.failover else {
             return false;
@@ -265,16 +268,16 @@ impl Base {
 
     /// A report was acknowledged by who answers for the region that it was about.
     pub(super) fn acknowledged(&self, ctx: &mut Context<'_, Node>, ack: &DepartedAck) {
-        let ledger = ctx.durable::<OccupancyTable>();
-        let mut regions: Vec<NodeId> = ledger.duties().iter().map(|duty| duty.to).collect();
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let mut regions: Vec<NodeId> = occupancy.duties().iter().map(|duty| duty.to).collect();
         regions.retain(|&region| self.acting(region) == ack.node);
         for region in regions {
-            ledger.acknowledged(region, ack.rover, ack.step);
+            occupancy.acknowledged(region, ack.rover, ack.step);
         }
     }
 
-    /// Tells a node of rovers that it takes to be where they are not any more: of a node that failed,
-    /// nobody knows what it still had to tell.
+    /// Tells a node of rovers that it takes to be where they are not any more: of a node that
+    /// failed, nobody knows what it still had to tell.
     pub(super) fn correct(&self, ctx: &mut Context<'_, Node>, message: &Locations) {
         for held in &message.holdings {
             let known = ctx.durable::<FailoverRecord>().fact(held.rover);
@@ -363,10 +366,10 @@ impl Node {
         if site.config.sabotage == Sabotage::ForgetAccounts {
             accounts.retain(|account| account.whereabouts.step == 0);
         }
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         for &vertex in site.sensors.owned(region) {
             let entered = released(&accounts, site.queue(vertex));
-            ledger.adopt(vertex, holder(&accounts, vertex, self.base.cycle), entered);
+            occupancy.adopt(vertex, holder(&accounts, vertex, self.base.cycle), entered);
         }
         self.base.mirror(ctx);
         if let Some(reservations) = self.policy.reservations() {

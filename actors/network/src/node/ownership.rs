@@ -1,5 +1,5 @@
-//! The safety protocol's side of a node, the same for all policies: beacons, departures, and what has to
-//! be said again until it is heard.
+//! The safety protocol's side of a node, the same for all policies: beacons, departures, and what
+//! has to be said again until it is heard.
 
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
@@ -34,12 +34,16 @@ impl Node {
             self.base
                 .send_grant(ctx, held.rover, held.step, Some(vertex));
         }
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let stay_at_target = self.base.site.stay_at_target;
         let at_goal = |(v, held): &(VertexId, Occupant)| {
             !stay_at_target && held.arrived && held.goal == Some(*v)
         };
-        let leaving: Vec<_> = ledger.occupied().filter(at_goal).map(|(_, h)| h).collect();
+        let leaving: Vec<_> = occupancy
+            .occupied()
+            .filter(at_goal)
+            .map(|(_, h)| h)
+            .collect();
         for held in leaving {
             self.base.send_grant(ctx, held.rover, held.step + 1, None);
         }
@@ -71,10 +75,12 @@ impl Handler<Beacon> for Node {
         // A rover's first beacon from here may already say that it leaves again: the duty to the
         // node that it came from arises all the same.
         let here = fact.vertex.filter(|&v| self.base.owns(v));
-        let ledger = ctx.durable::<OccupancyTable>();
-        let expected = here.and_then(|v| ledger.occupant(v)).is_some_and(|held| {
-            held.rover == fact.rover && held.step == fact.step && !held.arrived
-        });
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let expected = here
+            .and_then(|v| occupancy.occupant(v))
+            .is_some_and(|held| {
+                held.rover == fact.rover && held.step == fact.step && !held.arrived
+            });
         self.hear(ctx, &fact, Some(goal));
         if expected {
             self.base.report_departure(ctx, fact, beacon.previous);

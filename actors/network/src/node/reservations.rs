@@ -336,8 +336,8 @@ impl Handler<Relay> for Node {
 }
 
 impl Node {
-    /// The regions between which a relay goes; none if it is not for this node, or one of the regions was
-    /// replaced since. What it says of replacements is learned.
+    /// The regions between which a relay goes; none if it is not for this node, or one of the
+    /// regions was replaced since. What it says of replacements is learned.
     fn between(&mut self, ctx: &mut Context<'_, Self>, relay: &Relay) -> Option<(NodeId, NodeId)> {
         let Some(between) = relay.between.filter(|_| self.base.takes_over()) else {
             return Some((relay.node, self.base.id));

@@ -11,8 +11,8 @@ use crate::waits::Waits;
 
 /// Every corridor of a roadmap: a maximal chain of vertices with two neighbours each, and the
 /// vertices at its ends, which are junctions or dead ends. A chain that begins and ends at one
-/// junction, or has no junction at all, has its first vertex once. Sorted, each from the end with the
-/// lower number.
+/// junction, or has no junction at all, has its first vertex once. Sorted, each from the end with
+/// the lower number.
 pub(crate) fn corridors(roadmap: &Roadmap) -> Vec<Vec<VertexId>> {
     let inner = |v: VertexId| roadmap.neighbors(v).len() == 2;
     let mut done = BTreeSet::new();

@@ -1,5 +1,5 @@
-//! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1), rovers,
-//! and who stands in whose way.
+//! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1),
+//! rovers, and who stands in whose way.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -395,8 +395,8 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// Whether rovers that hold these vertices share an edge of the coordination graph: their owners are
-/// the same node or neighbours.
+/// Whether rovers that hold these vertices share an edge of the coordination graph: their owners
+/// are the same node or neighbours.
 pub(crate) fn coordinated(
     sensors: &farside_worlds::SensorNetwork,
     u: VertexId,
@@ -484,8 +484,8 @@ fn exit_mark((x, y): (f64, f64)) -> String {
     format!("{}Z", path((0..6).map(corner)))
 }
 
-/// What the ends of a rover's way are called: on a map of cells it stands at the one from the start,
-/// and stays at the other.
+/// What the ends of a rover's way are called: on a map of cells it stands at the one from the
+/// start, and stays at the other.
 fn ends_of(ground: &Surroundings) -> (&'static str, &'static str) {
     match ground {
         Surroundings::Walls { .. } => ("start", "goal"),

@@ -202,7 +202,8 @@ pub(super) fn figure(
     })
 }
 
-/// When the last rover came to stand as it does in a circle on the line, and stood there to the end.
+/// When the last rover came to stand as it does in a circle on the line, and stood there to the
+/// end.
 fn locked(run: &Drawn, line: &[VertexId], waits: &Waits, to_ns: u64) -> Option<u64> {
     let rovers = run.tracks.at(to_ns);
     let on_line = |rover: &u32| {

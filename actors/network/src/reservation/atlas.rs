@@ -1,5 +1,6 @@
-//! A roadmap that nodes are given over the network: one knows it and passes it on in parts, over the same
-//! lines as requests, each node to its neighbours. Who does not know all of it takes no part.
+//! A roadmap that nodes are given over the network: one knows it and passes it on in parts, over
+//! the same lines as requests, each node to its neighbours. Who does not know all of it takes no
+//! part.
 
 use std::collections::BTreeMap;
 
@@ -113,8 +114,8 @@ impl Atlas {
         }
     }
 
-    /// Takes an item that came from a neighbour of `desk`'s region. Returns it if it is the step of a request
-    /// and the roadmap is known; keeps it until then.
+    /// Takes an item that came from a neighbour of `desk`'s region. Returns it if it is the step of
+    /// a request and the roadmap is known; keeps it until then.
     pub(crate) fn receive(
         &mut self,
         registry: &mut Registry,

@@ -8,7 +8,8 @@ use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{Label, TimedVisit};
 
-/// Node to neighbour: items, each to be taken once, and a receipt for those that came the other way.
+/// Node to neighbour: items, each to be taken once, and a receipt for those that came the other
+/// way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Relay {
     /// The node.
@@ -27,8 +28,8 @@ pub struct Relay {
     pub between: Option<Between>,
 }
 
-/// The two regions that a [`Relay`] goes between, each with the rank that answers for it: numbers begin
-/// anew when one of them is replaced.
+/// The two regions that a [`Relay`] goes between, each with the rank that answers for it: numbers
+/// begin anew when one of them is replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Between {
     /// For whose vertices the sender speaks.
@@ -41,17 +42,17 @@ pub struct Between {
     pub to_rank: u32,
 }
 
-/// Node to rover, with `network.failover_after`: a way could be reserved for you. It is yours once you
-/// have taken it, which you do unless one of its vertices has been taken over since. Repeated each
-/// cycle until answered.
+/// Node to rover, with `network.failover_after`: a way could be reserved for you. It is yours once
+/// you have taken it, which you do unless one of its vertices has been taken over since. Repeated
+/// each cycle until answered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Itinerary {
     /// The node that answers for where the way begins.
     pub node: NodeId,
     /// The path.
     pub way: TimedPath,
-    /// Who answered for the way's vertices as it was reserved: the nodes that were replaced by then. All
-    /// others by themselves.
+    /// Who answered for the way's vertices as it was reserved: the nodes that were replaced by
+    /// then. All others by themselves.
     pub replaced: Vec<Replacement>,
 }
 
@@ -138,8 +139,8 @@ pub struct Displace {
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
-    /// For whom way is made: when the first attempt of its request began \[ns\], and the rover. This one,
-    /// or, where this one is to make room itself, the one it makes room for.
+    /// For whom way is made: when the first attempt of its request began \[ns\], and the rover.
+    /// This one, or, where this one is to make room itself, the one it makes room for.
     pub priority: (u64, RoverId),
 }
 

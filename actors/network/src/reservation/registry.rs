@@ -1,7 +1,7 @@
-//! What is kept for the vertices of one region with the `complete` policy, all of it durable, and who
-//! seeks a way from where. A node keeps a registry for itself, and one for each region that it takes over.
-//! Pure: items go to `lines`, grants to the caller. What is done with items is in [`requests`], what
-//! becomes of it when a node is replaced in [`failover`].
+//! What is kept for the vertices of one region with the `complete` policy, all of it durable, and
+//! who seeks a way from where. A node keeps a registry for itself, and one for each region that it
+//! takes over. Pure: items go to `lines`, grants to the caller. What is done with items is in
+//! [`requests`], what becomes of it when a node is replaced in [`failover`].
 
 mod displacement;
 mod failover;

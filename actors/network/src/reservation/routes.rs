@@ -1,5 +1,6 @@
-//! Which nodes a request passes: a few different ways from one vertex to another, each as the owners of
-//! the vertices on it. Known from the roadmap alone; who is where when is found on the request.
+//! Which nodes a request passes: a few different ways from one vertex to another, each as the
+//! owners of the vertices on it. Known from the roadmap alone; who is where when is found on the
+//! request.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -7,8 +8,8 @@ use std::collections::BinaryHeap;
 use farside_worlds::{DistancesTo, NodeId, Roadmap, SensorNetwork, VertexId};
 
 /// Up to `count` different sequences of owners, each of which has a way from `from` to `to` through
-/// its vertices in that order; the shortest way first. Each further one is a shortest way where edges
-/// already used cost more.
+/// its vertices in that order; the shortest way first. Each further one is a shortest way where
+/// edges already used cost more.
 pub(crate) fn routes(
     roadmap: &Roadmap,
     sensors: &SensorNetwork,

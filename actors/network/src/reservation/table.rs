@@ -105,8 +105,8 @@ impl ReservationTable {
         }
     }
 
-    /// Whether `visits` (with their vertices) may all be entered: apart in time from all others, and
-    /// after those that were granted.
+    /// Whether `visits` (with their vertices) may all be entered: apart in time from all others,
+    /// and after those that were granted.
     pub(crate) fn check(
         &self,
         request: &ReservationRequest,

@@ -1,5 +1,5 @@
-//! What a rover keeps of the paths that it has taken, with `network.failover_after`: whoever takes over for a
-//! node asks for them.
+//! What a rover keeps of the paths that it has taken, with `network.failover_after`: whoever takes
+//! over for a node asks for them.
 
 use super::messages::{ReservationRequest, TimedPath};
 

@@ -55,8 +55,8 @@ impl MaxPlusPolicy {
         vertex: VertexId,
         follows: bool,
     ) -> bool {
-        let ledger = ctx.durable::<OccupancyTable>();
-        while ledger.occupant(vertex).is_none() {
+        let occupancy = ctx.durable::<OccupancyTable>();
+        while occupancy.occupant(vertex).is_none() {
             let asks = |r: &&Request| r.vertex == vertex && (follows || !r.follows);
             let all = self.requests.iter().filter(asks);
             let Some(best) = winner(all, base.site.config.max_plus.priority).copied() else {
@@ -64,7 +64,7 @@ impl MaxPlusPolicy {
             };
             self.requests.retain(|r| *r != best);
             let (rover, step) = (best.rover, best.step);
-            if ledger.grant(vertex, rover, step, Some(best.from), base.cycle) {
+            if occupancy.grant(vertex, rover, step, Some(best.from), base.cycle) {
                 base.send_grant(ctx, rover, step, Some(vertex));
                 self.presume_left(base, ctx, (rover, step), (best.from, vertex));
                 return true;
@@ -108,8 +108,8 @@ impl MaxPlusPolicy {
                 rover, step, from, ..
             }) = asks
             {
-                let ledger = ctx.durable::<OccupancyTable>();
-                ledger.force(vertex, rover, step, Some(from), base.cycle);
+                let occupancy = ctx.durable::<OccupancyTable>();
+                occupancy.force(vertex, rover, step, Some(from), base.cycle);
                 base.send_grant(ctx, rover, step, Some(vertex));
             }
         }
@@ -142,8 +142,8 @@ impl MaxPlusPolicy {
                 vertex,
                 ..
             } = request;
-            let ledger = ctx.durable::<OccupancyTable>();
-            if ledger.grant(vertex, rover, step, Some(from), base.cycle) {
+            let occupancy = ctx.durable::<OccupancyTable>();
+            if occupancy.grant(vertex, rover, step, Some(from), base.cycle) {
                 base.send_grant(ctx, rover, step, Some(vertex));
                 self.presume_left(base, ctx, (rover, step), (from, vertex));
             }

@@ -83,14 +83,14 @@ impl MaxPlusPolicy {
         base: &Base,
         ctx: &mut Context<'_, Node>,
     ) -> Vec<(VertexId, Occupant, VertexId)> {
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let mut movable = Vec::new();
-        for (here, held) in ledger.occupied() {
+        for (here, held) in occupancy.occupied() {
             let Some(goal) = held.goal.filter(|&goal| held.arrived && goal != here) else {
                 continue;
             };
             let is_next = |rover, step| rover == held.rover && step > held.step;
-            let granted_here = ledger.occupied().any(|(_, o)| is_next(o.rover, o.step));
+            let granted_here = occupancy.occupied().any(|(_, o)| is_next(o.rover, o.step));
             let mut theirs = base.reports();
             if !granted_here && !theirs.any(|h| is_next(h.rover, h.step)) {
                 movable.push((here, held, goal));
@@ -108,10 +108,10 @@ impl MaxPlusPolicy {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let occupied = |v| {
             if base.owns(v) {
-                return ledger.occupant(v).is_some();
+                return occupancy.occupant(v).is_some();
             }
             base.reports().any(|holding| holding.vertex == v)
         };
@@ -135,12 +135,12 @@ impl MaxPlusPolicy {
 
     /// Step 5: the best paths as things stand.
     pub(super) fn assign(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let mut rovers = Vec::new();
         for (rover, path) in self.optimiser.best() {
             let here = path.vertices[0];
             let still_here = |o: &&Occupant| o.rover == rover && o.arrived;
-            let Some(held) = ledger.occupant(here).filter(still_here) else {
+            let Some(held) = occupancy.occupant(here).filter(still_here) else {
                 continue;
             };
             if path.first_step() != FirstStep::Stay {

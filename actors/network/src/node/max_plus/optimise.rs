@@ -4,13 +4,13 @@
 //! when they are overdue; vectors that did not come stay as they were last heard, at first zero. A
 //! node whose vectors no longer change says so once and falls silent until something new comes in.
 //!
-//! Over links with a bit rate it sends nothing before the last is on the air, and nothing that comes
-//! too late: see [`pacing`].
+//! Over links with a bit rate it sends nothing before the last is on the air, and nothing that
+//! comes too late: see [`pacing`].
 //!
-//! With a finite `network.max_plus.processor` all this takes time. A node compares candidate paths as they
-//! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
-//! as it begins, and its messages go out when it is done. What is not done when the optimisation
-//! is over was in vain. A node may have neighbours make vectors for it: see `balance`.
+//! With a finite `network.max_plus.processor` all this takes time. A node compares candidate paths
+//! as they come in, one neighbour's after the other's, and then iterates; an iteration takes what
+//! is there as it begins, and its messages go out when it is done. What is not done when the
+//! optimisation is over was in vain. A node may have neighbours make vectors for it: see `balance`.
 
 use farside::MatchKey;
 use farside::prelude::*;

@@ -1,5 +1,5 @@
-//! Max-plus over links with a bit rate. What a node says in one iteration is better than what it said in
-//! the one before, and vectors that queue behind each other are old when they come, while
+//! Max-plus over links with a bit rate. What a node says in one iteration is better than what it
+//! said in the one before, and vectors that queue behind each other are old when they come, while
 //! grants and beacons queue behind them. So a node computes no iteration before the vectors of the
 //! last are on the air, by its own reckoning with the slowest link's rate, and does not send what
 //! would not be on the air when the optimisation is over. Nothing changes where links have no rate.

@@ -1,12 +1,12 @@
 //! Wait-for probes: who waits for whom in a ring, found with messages of one hop (after Chandy,
 //! Misra and Haas, *Distributed Deadlock Detection*, 1983, for a single resource each).
 //!
-//! A rover that has come no nearer to its goal for `network.max_plus.probe_after` cycles waits for whoever
-//! holds the vertex that comes first on its shortest way there. Its node sends a probe to the owner
-//! of that vertex, which adds the occupant, if that one waits too, and passes the probe on. The one
-//! that comes back to its initiator confirms a deadlock, and names it. Every rover waits for at most
-//! one, so that a ring is entered by many but closed only by its members; of these the one with
-//! the lowest number finds it, and the others' probes are dropped.
+//! A rover that has come no nearer to its goal for `network.max_plus.probe_after` cycles waits for
+//! whoever holds the vertex that comes first on its shortest way there. Its node sends a probe to
+//! the owner of that vertex, which adds the occupant, if that one waits too, and passes the probe
+//! on. The one that comes back to its initiator confirms a deadlock, and names it. Every rover
+//! waits for at most one, so that a ring is entered by many but closed only by its members; of
+//! these the one with the lowest number finds it, and the others' probes are dropped.
 //!
 //! "No nearer" and not "standing still", because most teams of the policy `max-plus` do not freeze:
 //! rovers push each other to and fro. A node knows it of each rover that it or its neighbours held.
@@ -134,8 +134,8 @@ impl MaxPlusPolicy {
         })
     }
 
-    /// Asks for the occupant of the vertex that the last member wants: here if it is the node's own,
-    /// else its owner, a neighbour.
+    /// Asks for the occupant of the vertex that the last member wants: here if it is the node's
+    /// own, else its owner, a neighbour.
     fn pass_probe_on(
         &mut self,
         base: &Base,

@@ -4,11 +4,11 @@
 //!
 //! The node of the ring's lowest rover looks in its local neighbourhood graph for the nearest free
 //! vertex off the others' ways and sends its rover there; rovers that stand on the way, off the
-//! others' ways too, are pushed ahead. If there is no such place it hands the ring to the node of the
-//! next rover, one hop away, and so on once round. What is sent are orders to plan by: the rover's
-//! only paths are then the one aside, at no penalty for going back, and the zero path. Vertices
-//! are asked for and granted as ever, so that no collision can come of it, nor of two nodes that
-//! judge differently; a lost or late order is one that nobody follows.
+//! others' ways too, are pushed ahead. If there is no such place it hands the ring to the node of
+//! the next rover, one hop away, and so on once round. What is sent are orders to plan by: the
+//! rover's only paths are then the one aside, at no penalty for going back, and the zero path.
+//! Vertices are asked for and granted as ever, so that no collision can come of it, nor of two
+//! nodes that judge differently; a lost or late order is one that nobody follows.
 //!
 //! Two resolutions would push each other's rovers about. A node that has sent or heard orders does
 //! not begin another while they hold, and for a random time longer.
@@ -52,9 +52,9 @@ impl Resolution {
     }
 }
 
-/// Where each rover goes so that the one at `from` gets off the ways that others `need`: its own path
-/// first, then those of the rovers that it pushes. `holder` says who holds a vertex. `None` if no
-/// place in the graph is free for it.
+/// Where each rover goes so that the one at `from` gets off the ways that others `need`: its own
+/// path first, then those of the rovers that it pushes. `holder` says who holds a vertex. `None` if
+/// no place in the graph is free for it.
 pub(super) fn make_way(
     graph: &LocalGraph,
     from: VertexId,
@@ -152,10 +152,10 @@ impl MaxPlusPolicy {
         let needed: Vec<_> = others
             .flat_map(|(_, other)| roadmap.shortest_path(other.vertex, other.goal))
             .collect();
-        let ledger = ctx.durable::<OccupancyTable>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let holder = |v| {
             if base.owns(v) {
-                return ledger.occupant(v).map(|held| held.rover);
+                return occupancy.occupant(v).map(|held| held.rover);
             }
             let mut theirs = base.neighbors.iter().flat_map(|n| &n.holdings);
             theirs.find(|h| h.vertex == v).map(|h| h.rover)
@@ -322,8 +322,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever stands where: each goes to a place of its own off the others' ways, along edges,
-        /// and nobody is pushed who is not asked.
+        /// Whatever stands where: each goes to a place of its own off the others' ways, along
+        /// edges, and nobody is pushed who is not asked.
         #[test]
         fn ways_aside_end_at_places_of_their_own(
             cuts in prop::collection::vec((0..20u32, 0..2u32), 0..6),

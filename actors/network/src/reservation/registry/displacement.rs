@@ -2,14 +2,15 @@
 //!
 //! A rover that finds no way asks what its way would be if nobody stood still, and then those who
 //! stand on it to make room. Who began earlier goes first: a rover that is on its way to its goal
-//! itself makes room for older requests only, one that stands at its goal for all. It takes the nearest
-//! place where it may stay; where all are taken, it asks in turn, in the name of whom it makes room
-//! for. What was asked for is **claimed** for a while: nobody younger comes to stay there. So the
-//! oldest request's way gets free, and stays free until it is reserved.
+//! itself makes room for older requests only, one that stands at its goal for all. It takes the
+//! nearest place where it may stay; where all are taken, it asks in turn, in the name of whom it
+//! makes room for. What was asked for is **claimed** for a while: nobody younger comes to stay
+//! there. So the oldest request's way gets free, and stays free until it is reserved.
 //!
-//! This is the order of priority inheritance with backtracking (Okumura et al., *Priority inheritance
-//! with backtracking for iterative multi-agent path finding*, AIJ 310, 2022), over reserved paths.
-//! It guarantees nothing: a rover in a dead end behind another one's goal may still be stuck.
+//! This is the order of priority inheritance with backtracking (Okumura et al., *Priority
+//! inheritance with backtracking for iterative multi-agent path finding*, AIJ 310, 2022), over
+//! reserved paths. It guarantees nothing: a rover in a dead end behind another one's goal may still
+//! be stuck.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -56,8 +57,8 @@ impl Claims {
 }
 
 impl Registry {
-    /// When and for whom the vertex is taken, as far as who asks would have to put up with it: those
-    /// who stand there for ever make room, unless they go before.
+    /// When and for whom the vertex is taken, as far as who asks would have to put up with it:
+    /// those who stand there for ever make room, unless they go before.
     pub(crate) fn busy_for_priority(
         &self,
         v: VertexId,
@@ -133,9 +134,9 @@ impl Registry {
         }
     }
 
-    /// Begins an attempt of a rover that may have been asked to step aside, from where it stands. None
-    /// if it goes to its goal; where else it is to try to go; nothing more if it has found a place or
-    /// need not go.
+    /// Begins an attempt of a rover that may have been asked to step aside, from where it stands.
+    /// None if it goes to its goal; where else it is to try to go; nothing more if it has found a
+    /// place or need not go.
     pub(crate) fn step_aside(
         &mut self,
         desk: &Desk<'_>,
@@ -231,8 +232,8 @@ impl Applicant {
         matches!(self.origin, Origin::Stand { rover: mine, .. } if mine == rover)
     }
 
-    /// Whether it need not make room for who asks: it is on its way to its goal, and began before; or
-    /// makes room already, for one that did.
+    /// Whether it need not make room for who asks: it is on its way to its goal, and began before;
+    /// or makes room already, for one that did.
     fn goes_before(&self, asked: (u64, RoverId)) -> bool {
         let request = self.request.or(self.again).map(|(request, _)| request);
         match &self.aim {

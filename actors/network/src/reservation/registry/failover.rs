@@ -1,18 +1,20 @@
-//! What becomes of requests and of tables when a node is replaced (`network.failover_after`). That backups
-//! admit to vertices safely is the affair of [`failover`](crate::failover); here it is that no
-//! reserved path is lost, and none is left that nobody settles.
+//! What becomes of requests and of tables when a node is replaced (`network.failover_after`). That
+//! backups admit to vertices safely is the affair of [`failover`](crate::failover); here it is that
+//! no reserved path is lost, and none is left that nobody settles.
 //!
-//! **A path counts once its rover has taken it.** Where nodes may be replaced, the first node of a way does
-//! not confirm it by itself: it proposes it to the rover ([`Itinerary`]), which keeps it durably,
-//! unless a fence of its own is higher than the rank that one of the way's vertices was reserved at.
-//! A backup opens a region only when all rovers have answered at its rank, and they answer with the ways
-//! that they have taken. So the table that it makes of their accounts has just those ways through the
-//! region that count, or ever will, of all that lower ranks entered, in the order of the old table.
+//! **A path counts once its rover has taken it.** Where nodes may be replaced, the first node of a
+//! way does not confirm it by itself: it proposes it to the rover ([`Itinerary`]), which keeps it
+//! durably, unless a fencing token of its own is higher than the rank that one of the way's
+//! vertices was reserved at. A backup opens a region only when all rovers have answered at its
+//! rank, and they answer with the ways that they have taken. So the table that it makes of their
+//! accounts has just those ways through the region that count, or ever will, of all that lower
+//! ranks entered, in the order of the old table.
 //!
-//! **All else is asked for again.** Whoever has entered a part and passed it on to the region keeps it until
-//! it is settled, and passes it on once more when the region is replaced. It comes to the first node again,
-//! which says what became of the request: taken, or not. The first nodes of requests that are under way begin
-//! them anew, because what they wait for may have been lost with the region.
+//! **All else is asked for again.** Whoever has entered a part and passed it on to the region keeps
+//! it until it is settled, and passes it on once more when the region is replaced. It comes to the
+//! first node again, which says what became of the request: taken, or not. The first nodes of
+//! requests that are under way begin them anew, because what they wait for may have been lost with
+//! the region.
 
 use farside_worlds::NodeId;
 
@@ -58,8 +60,9 @@ impl RegionFailover {
         self.proposals.iter().any(|(r, _)| r.request == *request)
     }
 
-    /// Whether who answered for the region before may have chosen a way for an attempt that began then. A
-    /// second one must not be: it would pass for the first. The attempt is begun anew, if it has to be.
+    /// Whether who answered for the region before may have chosen a way for an attempt that began
+    /// then. A second one must not be: it would pass for the first. The attempt is begun anew, if
+    /// it has to be.
     pub(crate) fn is_stale(&self, attempt_began: u64) -> bool {
         attempt_began < self.since
     }
@@ -72,8 +75,8 @@ impl RegionFailover {
 }
 
 impl Registry {
-    /// Whether a way that is to be reserved was taken already: then that is said again, to whom it was
-    /// lost on.
+    /// Whether a way that is to be reserved was taken already: then that is said again, to whom it
+    /// was lost on.
     pub(crate) fn is_taken(&mut self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
         if !self.failover.taken.contains(&reserve.request) {
             return false;

@@ -1,5 +1,5 @@
-//! How requests proceed: what a node does with a probe, a way to be reserved, and the news of what became
-//! of it.
+//! How requests proceed: what a node does with a probe, a way to be reserved, and the news of what
+//! became of it.
 
 use std::collections::BTreeMap;
 
@@ -362,9 +362,9 @@ impl Registry {
     }
 }
 
-/// The labels from which to go on: the earliest of each vertex and interval, not too many, and always
-/// one of those that can be kept up for ever; with gaps all of these, since what lies within one need
-/// not lead out of it.
+/// The labels from which to go on: the earliest of each vertex and interval, not too many, and
+/// always one of those that can be kept up for ever; with gaps all of these, since what lies within
+/// one need not lead out of it.
 fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) -> Vec<u32> {
     let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
     for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
