@@ -370,23 +370,23 @@ impl Handler<Itinerary> for Rover {
         }
         let Itinerary {
             node,
-            way,
+            path,
             replaced,
         } = itinerary;
-        let request = way.request;
+        let request = path.request;
         let reserved_at = |region| {
             let of = replaced.iter().find(|r| r.region == region);
             of.map_or(0, |r| r.rank)
         };
         let site = self.site.clone();
         let fencing_tokens = ctx.durable::<FencingTokens>();
-        let mut regions = way.visits.iter().map(|v| site.sensors.owner(v.vertex));
+        let mut regions = path.visits.iter().map(|v| site.sensors.owner(v.vertex));
         let holds = regions.all(|region| fencing_tokens.rank(region) == reserved_at(region))
             || site.config.sabotage == Sabotage::IgnoreFencing;
-        let ways = ctx.durable::<TimedPaths>();
-        let known = ways.has(&request);
+        let paths = ctx.durable::<TimedPaths>();
+        let known = paths.has(&request);
         if holds && !known {
-            ways.take(way);
+            paths.take(path);
         }
         let taken = holds || known;
         let to = self.nodes[node.0 as usize].itinerary_answers;

@@ -59,7 +59,7 @@ const PATHS_BYTES: u64 = 700;
 const VECTORS_BYTES: u64 = 600;
 /// The same of a grant, a beacon, a departure.
 const GRANT_BYTES: u64 = 64;
-/// The same of a walk of the `complete` policy.
+/// The same of a request of the `complete` policy.
 const WALK_BYTES: u64 = 500;
 
 /// How long `bytes` are on the air; no time without a rate.
@@ -82,8 +82,8 @@ impl Timing {
 impl NetworkConfig {
     /// By how many cycles the windows of a deadlock are longer over links of this latency and rate.
     /// The phases of the policy `max-plus` stretch, and with them its cycles; of other policies
-    /// cycles do not, while a walk is some tens of messages, one after the other, and some of them
-    /// twice. And a node that fails is replaced only when it has been silent for long enough.
+    /// cycles do not, while a request is some tens of messages, one after the other, and some of
+    /// them twice. And a node that fails is replaced only when it has been silent for long enough.
     pub(crate) fn patience(&self, latency: SimDuration, timing: &Timing) -> u32 {
         const MESSAGES: u64 = 150;
         let silence = self.failover_after.unwrap_or(0).min(u32::MAX / 4);

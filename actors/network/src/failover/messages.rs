@@ -35,7 +35,7 @@ pub struct Account {
     pub previous: Option<VertexId>,
     /// Where it wants to go.
     pub goal: VertexId,
-    /// The ways reserved for it that it has not driven to their ends, with the policy `complete`.
+    /// The paths reserved for it that it has not driven to their ends, with the policy `complete`.
     pub paths: Vec<TimedPath>,
 }
 

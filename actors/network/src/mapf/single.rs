@@ -42,7 +42,7 @@ pub(crate) fn search(
         headway: pace.headway,
         travel: pace.travel,
         busy: &|v| Some(table.busy(v)),
-        // Closed gaps are no part of the map; only the reservation walk crosses open ones.
+        // Closed gaps are no part of the map; only a reservation request crosses open ones.
         covers: &|_| true,
     };
     let mut labels = first_labels(&ground, pace, rules, mission, entry);

@@ -43,7 +43,7 @@ impl Reservations {
         });
     }
 
-    /// A cycle begins: rovers that wait without a way apply for one.
+    /// A cycle begins: rovers that wait without a path apply for one.
     pub(super) fn apply(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
         self.with_registries(base, ctx, |registry, _, desk| registry.apply(desk));
     }
@@ -178,7 +178,7 @@ impl Reservations {
                 false => None,
             };
             for itinerary in registry.proposals_due(&desk(*region), base.id) {
-                let RoverId(rover) = itinerary.way.request.rover;
+                let RoverId(rover) = itinerary.path.request.rover;
                 ctx.send(base.rovers[rover as usize], itinerary);
             }
             send_items(base, ctx, *region, registry, &ranks);

@@ -42,21 +42,21 @@ pub struct Between {
     pub to_rank: u32,
 }
 
-/// Node to rover, with `network.failover_after`: a way could be reserved for you. It is yours once
+/// Node to rover, with `network.failover_after`: a path could be reserved for you. It is yours once
 /// you have taken it, which you do unless one of its vertices has been taken over since. Repeated
 /// each cycle until answered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Itinerary {
-    /// The node that answers for where the way begins.
+    /// The node that answers for where the path begins.
     pub node: NodeId,
     /// The path.
-    pub way: TimedPath,
-    /// Who answered for the way's vertices as it was reserved: the nodes that were replaced by
+    pub path: TimedPath,
+    /// Who answered for the path's vertices as it was reserved: the nodes that were replaced by
     /// then. All others by themselves.
     pub replaced: Vec<Replacement>,
 }
 
-/// Rover to node: whether it has taken the way of an [`Itinerary`].
+/// Rover to node: whether it has taken the path of an [`Itinerary`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ItineraryAnswer {
     /// The rover's request.
@@ -128,7 +128,7 @@ pub struct MapVertex {
     pub owner: NodeId,
 }
 
-/// A rover that stays at its goal would have a way if nobody stood on it.
+/// A rover that stays at its goal would have a path if nobody stood on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Displace {
     /// The request that found no other way.
@@ -144,7 +144,7 @@ pub struct Displace {
     pub priority: (u64, RoverId),
 }
 
-/// One attempt to reserve a way for a rover.
+/// One attempt to reserve a path for a rover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReservationRequest {
     /// The rover.
@@ -187,9 +187,9 @@ pub struct Probe {
     pub at: u32,
     /// Where the rover wants to go.
     pub goal: VertexId,
-    /// The step with which the way begins.
+    /// The step with which the path begins.
     pub first_step: u32,
-    /// Only asks what the way would be if nobody stood still for ever.
+    /// Only asks what the path would be if nobody stood still for ever.
     pub wishful: bool,
     /// Where the rover can be, and when.
     pub labels: Vec<Label>,
@@ -197,7 +197,7 @@ pub struct Probe {
     pub frontier: Vec<u32>,
 }
 
-/// A probe that only asks what the way would be if nobody stood still for ever.
+/// A probe that only asks what the path would be if nobody stood still for ever.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wish {
     /// The probe.
@@ -206,7 +206,7 @@ pub struct Wish {
     pub priority: (u64, RoverId),
 }
 
-/// The backward half: the way is entered in the tables of all that own a part of it.
+/// The backward half: the path is entered in the tables of all that own a part of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reserve {
     /// The request.
@@ -214,7 +214,7 @@ pub struct Reserve {
     /// The step of the first visit; each further one is one step on.
     pub first_step: u32,
     /// All visits, from the rover's place to its goal.
-    pub way: Vec<TimedVisit>,
+    pub path: Vec<TimedVisit>,
     /// The last visit that is not entered yet.
     pub at: u32,
     /// With `network.failover_after`: the ranks of those who have entered a part as backups.
@@ -223,11 +223,11 @@ pub struct Reserve {
 
 impl Reserve {
     /// The path, for its rover.
-    pub(crate) fn into_way(self) -> TimedPath {
+    pub(crate) fn into_path(self) -> TimedPath {
         TimedPath {
             request: self.request,
             first_step: self.first_step,
-            visits: self.way,
+            visits: self.path,
         }
     }
 }
@@ -239,7 +239,7 @@ pub struct Settle {
     pub request: ReservationRequest,
     /// What became of it.
     pub verdict: Verdict,
-    /// The nodes along its way.
+    /// The nodes along its path.
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
@@ -248,12 +248,12 @@ pub struct Settle {
 /// What became of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
-    /// All of the way is reserved: it is irrevocable. Goes forward.
+    /// All of the path is reserved: it is irrevocable. Goes forward.
     Confirmed,
     /// A part could not be had: what was entered is struck out. Goes forward.
     Released,
     /// The same, for the node that began: it tries again. Goes backward.
     Failed,
-    /// There is no way as things stand. Goes backward.
-    NoWay,
+    /// There is no path as things stand. Goes backward.
+    NoPath,
 }

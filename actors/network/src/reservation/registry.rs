@@ -1,5 +1,5 @@
 //! What is kept for the vertices of one region with the `complete` policy, all of it durable, and
-//! who seeks a way from where. A node keeps a registry for itself, and one for each region that it
+//! who seeks a path from where. A node keeps a registry for itself, and one for each region that it
 //! takes over. Pure: items go to `lines`, grants to the caller. What is done with items is in
 //! [`requests`], what becomes of it when a node is replaced in [`failover`].
 
@@ -31,7 +31,7 @@ struct Applicant {
     request: Option<(ReservationRequest, u64)>,
     /// The next attempt, and when it begins.
     again: Option<(ReservationRequest, u64)>,
-    /// Attempts that found no way at all.
+    /// Attempts that found no path at all.
     in_vain: u32,
 }
 
@@ -50,13 +50,13 @@ enum Aim {
     Aside(Aside),
 }
 
-/// Where a way begins.
+/// Where a path begins.
 #[derive(Clone, Copy, Debug)]
 enum Origin {
     /// At an entry; the rovers of its queue follow each other.
     Queue {
         entry: VertexId,
-        /// How many have a way.
+        /// How many have a path.
         served: usize,
         /// When the last of these is planned to come in.
         last_entry: u64,
@@ -175,20 +175,20 @@ impl Registry {
     /// Enters what was planned before the start.
     fn preload(&mut self, desk: &Desk<'_>) {
         let schedule = desk.site.schedule.iter().flat_map(|s| &s.visits);
-        for &(rover, ref way) in schedule {
+        for &(rover, ref path) in schedule {
             let request = ReservationRequest {
                 rover,
                 attempt: 0,
                 since: 0,
             };
-            for (i, timed) in way.iter().enumerate() {
+            for (i, timed) in path.iter().enumerate() {
                 if desk.site.sensors.owner(timed.vertex) != desk.region {
                     continue;
                 }
                 let visit = Visit {
                     request,
                     step: i as u32 + 1,
-                    from: i.checked_sub(1).map(|before| way[before].vertex),
+                    from: i.checked_sub(1).map(|before| path[before].vertex),
                     start: timed.start,
                     end: timed.end,
                     confirmed: true,
@@ -283,7 +283,7 @@ impl Registry {
             Origin::Done => return,
         };
         let site = desk.site;
-        // Every second time that there is no way it asks what the way would be without those who
+        // Every second time that there is no path it asks what the path would be without those who
         // stand still.
         let wishful = site.stay_at_target && in_vain % 2 == 1;
         let routes = routes(
@@ -355,7 +355,7 @@ impl Registry {
         }
     }
 
-    /// The rover of this request has its way: the next one of the queue is served.
+    /// The rover of this request has its path: the next one of the queue is served.
     fn served(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
         let current = |a: &Applicant| a.is_on(&reserve.request);
         let Some(at) = self.applicants.iter().position(current) else {
@@ -372,7 +372,7 @@ impl Registry {
             Origin::Queue { entry, served, .. } => Origin::Queue {
                 entry,
                 served: served + 1,
-                last_entry: reserve.way[0].start,
+                last_entry: reserve.path[0].start,
             },
             Origin::Stand { .. } | Origin::Done => Origin::Done,
         };
@@ -399,9 +399,9 @@ impl Registry {
 /// The gap before anything was measured [ns].
 const FIRST_HEADWAY: u64 = 10_000_000;
 
-/// The owners of the vertices of a way, in order, without repeats in a row.
-fn owners(desk: &Desk<'_>, way: &[TimedVisit]) -> Vec<NodeId> {
-    let mut owners: Vec<NodeId> = way
+/// The owners of the vertices of a path, in order, without repeats in a row.
+fn owners(desk: &Desk<'_>, path: &[TimedVisit]) -> Vec<NodeId> {
+    let mut owners: Vec<NodeId> = path
         .iter()
         .map(|visit| desk.site.sensors.owner(visit.vertex))
         .collect();

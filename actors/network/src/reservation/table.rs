@@ -17,7 +17,7 @@ pub(crate) struct Visit {
     pub(crate) from: Option<VertexId>,
     pub(crate) start: u64,
     pub(crate) end: u64,
-    /// The whole way is reserved.
+    /// The whole path is reserved.
     pub(crate) confirmed: bool,
     /// The vertex was given to the rover: nothing may come before.
     pub(crate) granted: bool,
@@ -149,7 +149,7 @@ impl ReservationTable {
         visits.insert(at, visit);
     }
 
-    /// The whole way is reserved.
+    /// The whole path is reserved.
     pub(crate) fn confirm(&mut self, request: &ReservationRequest) {
         for visit in self.of(request) {
             visit.confirmed = true;

@@ -1,6 +1,6 @@
 //! Local resolution on maps where rovers stay: who stands in another's way steps aside for a while.
 //!
-//! A rover that finds no way asks what its way would be if nobody stood still, and then those who
+//! A rover that finds no path asks what its path would be if nobody stood still, and then those who
 //! stand on it to make room. Who began earlier goes first: a rover that is on its way to its goal
 //! itself makes room for older requests only, one that stands at its goal for all. It takes the
 //! nearest place where it may stay; where all are taken, it asks in turn, in the name of whom it
@@ -50,7 +50,7 @@ impl Claims {
         }
     }
 
-    /// The rover has its way.
+    /// The rover has its path.
     pub(crate) fn give_up(&mut self, rover: RoverId) {
         self.0.retain(|_, ((_, by), _)| *by != rover);
     }
@@ -126,7 +126,7 @@ impl Registry {
                 desk,
                 Settle {
                     request,
-                    verdict: Verdict::NoWay,
+                    verdict: Verdict::NoPath,
                     route,
                     at: 0,
                 },
@@ -172,12 +172,12 @@ impl Registry {
         };
         let places = (0..).zip(&labels).filter(|(_, label)| may_stay(label));
         if let Some((last, _)) = places.min_by_key(|(at, label)| (label.ready, *at)) {
-            let way = way_to(&labels, last, FOREVER, |v| desk.site.sensors.covers(v));
+            let path = way_to(&labels, last, FOREVER, |v| desk.site.sensors.covers(v));
             let reserve = Reserve {
                 request,
                 first_step: step,
-                at: way.len() as u32 - 1,
-                way,
+                at: path.len() as u32 - 1,
+                path,
                 replaced: Vec::new(),
             };
             self.reserve(desk, reserve);

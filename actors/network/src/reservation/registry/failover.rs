@@ -4,9 +4,9 @@
 //!
 //! **A path counts once its rover has taken it.** Where nodes may be replaced, the first node of a
 //! way does not confirm it by itself: it proposes it to the rover ([`Itinerary`]), which keeps it
-//! durably, unless a fencing token of its own is higher than the rank that one of the way's
+//! durably, unless a fencing token of its own is higher than the rank that one of the path's
 //! vertices was reserved at. A backup opens a region only when all rovers have answered at its
-//! rank, and they answer with the ways that they have taken. So the table that it makes of their
+//! rank, and they answer with the paths that they have taken. So the table that it makes of their
 //! accounts has just those ways through the region that count, or ever will, of all that lower
 //! ranks entered, in the order of the old table.
 //!
@@ -60,7 +60,7 @@ impl RegionFailover {
         self.proposals.iter().any(|(r, _)| r.request == *request)
     }
 
-    /// Whether who answered for the region before may have chosen a way for an attempt that began
+    /// Whether who answered for the region before may have chosen a path for an attempt that began
     /// then. A second one must not be: it would pass for the first. The attempt is begun anew, if
     /// it has to be.
     pub(crate) fn is_stale(&self, attempt_began: u64) -> bool {
@@ -75,7 +75,7 @@ impl RegionFailover {
 }
 
 impl Registry {
-    /// Whether a way that is to be reserved was taken already: then that is said again, to whom it
+    /// Whether a path that is to be reserved was taken already: then that is said again, to whom it
     /// was lost on.
     pub(crate) fn is_taken(&mut self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
         if !self.failover.taken.contains(&reserve.request) {
@@ -85,8 +85,8 @@ impl Registry {
         let confirmed = Settle {
             request: reserve.request,
             verdict: Verdict::Confirmed,
-            route: owners(desk, &reserve.way),
-            at: owners(desk, &reserve.way[..=reserve.at as usize]).len() as u32 - 1,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=reserve.at as usize]).len() as u32 - 1,
         };
         self.forward(confirmed);
         true
@@ -106,14 +106,14 @@ impl Registry {
             *due = again;
             Itinerary {
                 node,
-                way: reserve.clone().into_way(),
+                path: reserve.clone().into_path(),
                 replaced: reserve.replaced.clone(),
             }
         })
         .collect()
     }
 
-    /// A rover has taken its way, or will not.
+    /// A rover has taken its path, or will not.
     pub(crate) fn answered(&mut self, desk: &Desk<'_>, answer: ItineraryAnswer) {
         let proposals = &mut self.failover.proposals;
         let Some(at) = proposals
@@ -143,8 +143,15 @@ impl Registry {
         if let Some(line) = self.lines.get_mut(&region) {
             line.renew();
         }
-        let to_home = |r: &&Reserve| desk.site.sensors.owner(r.way[r.at as usize].vertex) == region;
-        let lost: Vec<Reserve> = self.failover.open.iter().filter(to_home).cloned().collect();
+        let to_region =
+            |r: &&Reserve| desk.site.sensors.owner(r.path[r.at as usize].vertex) == region;
+        let lost: Vec<Reserve> = self
+            .failover
+            .open
+            .iter()
+            .filter(to_region)
+            .cloned()
+            .collect();
         for reserve in lost {
             self.post(region, Item::Reserve(reserve));
         }
@@ -177,7 +184,7 @@ impl Registry {
             let found = |&rover| accounts.iter().find(of(rover)).filter(has_way);
             let served: Vec<&Account> = queue.iter().map_while(found).collect();
             let entries = served.iter().filter_map(|a| a.paths.first());
-            let last_entry = entries.map(|way| way.visits[0].start).max();
+            let last_entry = entries.map(|path| path.visits[0].start).max();
             registry.seek(Origin::Queue {
                 entry: *entry,
                 served: served.len(),
@@ -192,14 +199,14 @@ impl Registry {
         let (site, fact) = (desk.site, &account.whereabouts);
         let own = |v| site.sensors.owner(v) == desk.region;
         let (mut from, mut last) = (None, None);
-        for way in &account.paths {
-            self.failover.take(way.request);
-            for (step, timed) in (way.first_step..).zip(&way.visits) {
+        for path in &account.paths {
+            self.failover.take(path.request);
+            for (step, timed) in (path.first_step..).zip(&path.visits) {
                 let comes = fact.moving_to.is_some();
                 let is_over = step < fact.step || step == fact.step && comes;
                 if own(timed.vertex) && !is_over {
                     let visit = Visit {
-                        request: way.request,
+                        request: path.request,
                         step,
                         from,
                         start: timed.start,

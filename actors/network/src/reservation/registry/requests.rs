@@ -1,4 +1,4 @@
-//! How requests proceed: what a node does with a probe, a way to be reserved, and the news of what
+//! How requests proceed: what a node does with a probe, a path to be reserved, and the news of what
 //! became of it.
 
 use std::collections::BTreeMap;
@@ -137,23 +137,23 @@ impl Registry {
         offers.decided = true;
         let (request, first_step, priority) = (offers.request, offers.first_step, offers.priority);
         match offers.best.take() {
-            Some((_, way)) if offers.wishful => {
-                let route = owners(desk, &way);
+            Some((_, path)) if offers.wishful => {
+                let route = owners(desk, &path);
                 let ask = Displace {
                     request,
                     priority,
-                    path: way.iter().map(|visit| visit.vertex).collect(),
+                    path: path.iter().map(|visit| visit.vertex).collect(),
                     at: route.len() as u32 - 1,
                     route,
                 };
                 self.displace(desk, ask);
             }
-            Some((_, way)) => {
-                let at = way.len() as u32 - 1;
+            Some((_, path)) => {
+                let at = path.len() as u32 - 1;
                 let reserve = Reserve {
                     request,
                     first_step,
-                    way,
+                    path,
                     at,
                     replaced: Vec::new(),
                 };
@@ -163,7 +163,7 @@ impl Registry {
                 let route = offers.route.clone();
                 let settle = Settle {
                     request,
-                    verdict: Verdict::NoWay,
+                    verdict: Verdict::NoPath,
                     at: route.len() as u32 - 1,
                     route,
                 };
@@ -182,7 +182,7 @@ impl Registry {
         self.claims.give_up(reserve.request.rover);
         let hi = reserve.at as usize;
         let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.region;
-        let part = reserve.way[..=hi]
+        let part = reserve.path[..=hi]
             .iter()
             .rev()
             .take_while(|visit| mine(visit))
@@ -203,8 +203,8 @@ impl Registry {
         let stands = lo == 0 && desk.site.stay_at_target;
         let first = lo + usize::from(stands);
         // What was passed on to a region that is replaced may come a second time.
-        let again = desk.may_be_replaced() && self.table.has(&request, &reserve.way[first..=hi]);
-        match self.table.check(&request, &reserve.way[first..=hi]) {
+        let again = desk.may_be_replaced() && self.table.has(&request, &reserve.path[first..=hi]);
+        match self.table.check(&request, &reserve.path[first..=hi]) {
             _ if again => {}
             Ok(()) => self.enter(&reserve, first, hi),
             Err(Clash::Younger) => {
@@ -222,7 +222,7 @@ impl Registry {
             if desk.may_be_replaced() {
                 self.failover.pass(&reserve);
             }
-            let to = desk.site.sensors.owner(reserve.way[lo - 1].vertex);
+            let to = desk.site.sensors.owner(reserve.path[lo - 1].vertex);
             self.post(to, Item::Reserve(reserve));
         } else if desk.may_be_replaced() {
             self.propose(reserve);
@@ -231,14 +231,14 @@ impl Registry {
         }
     }
 
-    /// Enters visits `first` to `last` of a way, tentatively.
+    /// Enters visits `first` to `last` of a path, tentatively.
     fn enter(&mut self, reserve: &Reserve, first: usize, last: usize) {
         for i in first..=last {
-            let TimedVisit { vertex, start, end } = reserve.way[i];
+            let TimedVisit { vertex, start, end } = reserve.path[i];
             let visit = Visit {
                 request: reserve.request,
                 step: reserve.first_step + i as u32,
-                from: i.checked_sub(1).map(|before| reserve.way[before].vertex),
+                from: i.checked_sub(1).map(|before| reserve.path[before].vertex),
                 start,
                 end,
                 confirmed: false,
@@ -248,11 +248,11 @@ impl Registry {
         }
     }
 
-    /// The whole way is entered: from here on it holds.
+    /// The whole path is entered: from here on it holds.
     pub(crate) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
         self.settled(desk, &reserve.request, Verdict::Confirmed);
         if desk.site.stay_at_target {
-            let TimedVisit { vertex, end, .. } = reserve.way[0];
+            let TimedVisit { vertex, end, .. } = reserve.path[0];
             self.table.leave_by(vertex, end);
         }
         self.served(desk, reserve);
@@ -260,7 +260,7 @@ impl Registry {
         let settle = Settle {
             request: reserve.request,
             verdict: Verdict::Confirmed,
-            route: owners(desk, &reserve.way),
+            route: owners(desk, &reserve.path),
             at: 0,
         };
         self.forward(settle);
@@ -281,13 +281,13 @@ impl Registry {
         }
     }
 
-    /// Strikes out all of a way that was entered, from visit `lo` on.
+    /// Strikes out all of a path that was entered, from visit `lo` on.
     pub(crate) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         let released = Settle {
             request: reserve.request,
             verdict: Verdict::Released,
-            route: owners(desk, &reserve.way),
-            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
         };
         self.forward(released);
         // A route may pass this region twice.
@@ -295,14 +295,14 @@ impl Registry {
         self.unpark(desk);
     }
 
-    /// The first part of the way, from visit `lo` on, cannot be entered.
+    /// The first part of the path, from visit `lo` on, cannot be entered.
     pub(crate) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         self.release(desk, reserve, lo);
         let failed = Settle {
             request: reserve.request,
             verdict: Verdict::Failed,
-            route: owners(desk, &reserve.way),
-            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
         };
         self.fail(desk, failed);
     }
@@ -343,7 +343,7 @@ impl Registry {
 
     pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
         match settle.verdict {
-            Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
+            Verdict::Failed | Verdict::NoPath => return self.fail(desk, settle),
             Verdict::Confirmed => {
                 self.settled(desk, &settle.request, Verdict::Confirmed);
                 self.return_later(desk, &settle.request);
