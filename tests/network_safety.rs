@@ -33,7 +33,7 @@ fn config(cases: u32) -> ProptestConfig {
 /// A case as it comes, but with this policy, and with an end.
 fn with_policy(mut case: Case, policy: Policy) -> Case {
     case.network.policy = policy;
-    (case.network.passive_window, case.network.cycle_limit) = match policy {
+    (case.network.deadlock_window, case.network.cycle_limit) = match policy {
         // A walk over links that are seconds late takes its time before the first rover enters.
         Policy::Complete => (60, 200),
         _ => (20, 120),
@@ -42,18 +42,17 @@ fn with_policy(mut case: Case, policy: Policy) -> Case {
 }
 
 fn any_policy() -> impl Strategy<Value = Case> {
-    let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
-    let all = (cases(Bounds::default()), policy, any::<[bool; 5]>());
+    let policy = prop_oneof![Just(Policy::MaxPlus), Just(Policy::Complete)];
+    let all = (cases(Bounds::default()), policy, any::<[bool; 4]>());
     all.prop_map(|(mut case, policy, switches)| {
-        let [chains, is_rigid, gates, tokens, resolution] = switches;
+        let [chains, is_rigid, gates, resolution] = switches;
         case.network = match is_rigid {
             true => rigid(),
             false => NetworkConfig::default(),
         };
-        case.network.acceleration_chains = chains;
-        case.network.entry_gates = gates;
-        case.network.corridor_tokens = tokens;
-        case.network.junction_resolution = resolution;
+        case.network.max_plus.acceleration_chains = chains;
+        case.network.max_plus.entry_gates = gates;
+        case.network.max_plus.junction_resolution = resolution;
         with_policy(case, policy)
     })
 }
@@ -62,8 +61,8 @@ fn any_policy() -> impl Strategy<Value = Case> {
 fn patient() -> NetworkConfig {
     NetworkConfig {
         policy: Policy::Complete,
-        passive_window: 2000,
-        active_window: 4000,
+        deadlock_window: 2000,
+        livelock_window: 4000,
         cycle_limit: 20_000,
         ..NetworkConfig::default()
     }
@@ -137,7 +136,7 @@ fn any_gaps() -> impl Strategy<Value = Case> {
         cases.prop_map(move |case| with_policy(case, policy))
     };
     prop_oneof![
-        with(Gaps::Close, Policy::Paper),
+        with(Gaps::Close, Policy::MaxPlus),
         with(Gaps::Close, Policy::Complete),
         with(Gaps::Cross, Policy::Complete),
     ]
@@ -181,11 +180,11 @@ proptest! {
         ownership in prop_oneof![Just(Ownership::Balanced), Just(Ownership::Traffic)],
         weight in prop_oneof![Just(0.0), Just(30.0)],
     ) {
-        let mut case = with_policy(case, Policy::Paper);
+        let mut case = with_policy(case, Policy::MaxPlus);
         case.world.ownership = ownership;
-        case.network.outsourcing = true;
-        case.network.processor = Processor::PairsPerS(500);
-        (case.network.congestion_weight, case.network.congestion_spread) = (weight, 0.5);
+        case.network.max_plus.outsourcing = true;
+        case.network.max_plus.processor = Processor::PairsPerS(500);
+        (case.network.max_plus.congestion_weight, case.network.max_plus.congestion_spread) = (weight, 0.5);
         no_collision(&case)?;
     }
 }
@@ -227,7 +226,7 @@ proptest! {
 /// have left". The cases are the first of a fixed sequence, so that this does not depend on luck.
 #[test]
 fn freeing_a_vertex_before_it_is_heard_free_is_found_and_shrinks() {
-    for policy in [Policy::Paper, Policy::Complete] {
+    for policy in [Policy::MaxPlus, Policy::Complete] {
         let broken = any_policy().prop_map(move |case| {
             let mut case = with_policy(case, policy);
             case.network.sabotage = Sabotage::FreeOnGrant;
@@ -333,7 +332,7 @@ fn a_latency_of_several_cycles_slows_down_and_does_not_stop() {
     case.team.rovers = 2;
     case.link.latency = SimDuration::from_millis(2700);
     case.link.jitter = SimDuration::from_millis(450);
-    case.network.passive_window = 40;
+    case.network.deadlock_window = 40;
     let (slow, report) = run(&case);
     let found = (slow.arrived, slow.collisions);
     assert_eq!(found, (2, 0), "{}", report.end.detail());
@@ -399,24 +398,24 @@ fn collides_with(sabotage: Sabotage) -> bool {
 }
 
 /// The circles that the report names are circles: each rover stands where it is said to stand, and
-/// the next one stands on the next vertex of its shortest way to its goal.
+/// the next one stands on a vertex that would bring it nearer to its goal.
 #[test]
 fn rovers_that_wait_in_a_circle_are_named() {
     let mut circles = 0;
     for seed in 1..=40 {
         let mut case = plain(seed);
         case.team.rovers = 14;
-        case.network.active_window = 60;
+        case.network.livelock_window = 60;
         let mut sim = Simulation::new(seed);
         let system = case.assemble(&mut sim).expect("the case makes sense");
         let report = sim.run(Executor::Inline).expect("it starts");
         let metrics = system.metrics();
-        let standstill = metrics.standstill.unwrap_or_default();
+        let deadlock = metrics.deadlock_reason.unwrap_or_default();
         if metrics.deadlock == Deadlock::None {
             assert!(metrics.wait_cycles.is_empty());
             continue;
         }
-        assert!(standstill.starts_with(report.end.detail().trim_start_matches("@control: ")));
+        assert!(deadlock.starts_with(report.end.detail().trim_start_matches("@control: ")));
         let map = case.roadmap().expect("a roadmap");
         for cycle in &metrics.wait_cycles {
             let waiters = &cycle.0;
@@ -424,15 +423,17 @@ fn rovers_that_wait_in_a_circle_are_named() {
                 let next = &waiters[(i + 1) % waiters.len()];
                 let number: usize = waiter.agent["rover_".len()..].parse().expect("a number");
                 let goal = system.missions()[number - 1].1;
-                let way = map.shortest_path(waiter.at.expect("on the map"), goal);
-                assert_eq!(Some(way[1]), next.at, "{standstill}");
+                let (here, there) = (waiter.at.expect("on the map"), next.at.expect("there too"));
+                assert!(map.are_adjacent(here, there), "{deadlock}");
+                let is_nearer = map.distance(there, goal) < map.distance(here, goal);
+                assert!(is_nearer, "{deadlock}");
             }
             circles += 1;
         }
         match metrics.wait_cycles.first() {
-            Some(shortest) => assert!(standstill.ends_with(&format!("; {shortest}"))),
-            None if metrics.deadlock == Deadlock::Active => {
-                assert!(standstill.ends_with("rovers moved without coming nearer to their goals"));
+            Some(shortest) => assert!(deadlock.ends_with(&format!("; {shortest}"))),
+            None if metrics.deadlock == Deadlock::Livelock => {
+                assert!(deadlock.ends_with("rovers moved without coming nearer to their goals"));
             }
             None => {}
         }

@@ -1,16 +1,18 @@
-//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside it:
-//! 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that lose
-//! nothing unless told to.
+//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside
+//! it: 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that
+//! lose nothing unless told to.
 //!
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
-//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
-//! `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight), `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
-//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
-//! `leaf_wait`, `noise`. Aids: `gates`, `tokens`, `probes`, `resolution` (true, false), `gate` (occupancy),
-//! `probe_after`, `hold` (cycles).
+//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`,
+//! `jitter_ms`, `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations),
+//! `processor` (`unlimited`, `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight),
+//! `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating,
+//! any-to-any, west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains`
+//! (true, false), `cycle_limit`, `livelock_window`, `motion` (cycles, continuous), `speed`,
+//! `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`,
+//! `backtrack`, `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate`
+//! (occupancy), `probe_after`, `hold` (cycles).
 
 use std::sync::Arc;
 
@@ -96,10 +98,10 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
                     "complete" => Policy::Complete,
                     "reference" => Policy::Reference,
                     "prioritised" => Policy::Prioritised,
-                    _ => Policy::Paper,
+                    _ => Policy::MaxPlus,
                 }
             }
-            "routes" => network.routes = value.parse()?,
+            "routes" => network.complete.routes = value.parse()?,
             "ahead" => network.grants_ahead = value.parse()?,
             "motion" => {
                 network.motion = match value {
@@ -111,7 +113,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "acceleration_limit" => network.acceleration_limit = value.parse()?,
             "roadmap_from" => network.roadmap_from = Some(value.to_owned()),
             "sigma" => network.location_sigma_m = value.parse()?,
-            "passive" => network.passive_window = value.parse()?,
+            "passive" => network.deadlock_window = value.parse()?,
             "first_seed" => options.first_seed = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
@@ -120,33 +122,32 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "latency_ms" => options.radio.latency = SimDuration::from_millis(value.parse()?),
             "jitter_ms" => options.radio.jitter = SimDuration::from_millis(value.parse()?),
             "digest" => options.digest = value.parse()?,
-            "processor" => network.processor = value.parse()?,
-            "damping" => network.damping = value.parse()?,
-            "outsourcing" => network.outsourcing = value.parse()?,
-            "congestion" => network.congestion_weight = value.parse()?,
-            "spread" => network.congestion_spread = value.parse()?,
-            "anytime" => network.anytime = value.parse()?,
+            "processor" => network.max_plus.processor = value.parse()?,
+            "damping" => network.max_plus.damping = value.parse()?,
+            "outsourcing" => network.max_plus.outsourcing = value.parse()?,
+            "congestion" => network.max_plus.congestion_weight = value.parse()?,
+            "spread" => network.max_plus.congestion_spread = value.parse()?,
+            "anytime" => network.max_plus.anytime = value.parse()?,
             "cycle" => network.cycle = Some(parse_duration(value)?),
             "optimisation" => network.optimisation = Some(parse_duration(value)?),
             "iteration_timeout" => network.iteration_timeout = Some(parse_duration(value)?),
-            "iterations" => network.max_iterations = value.parse()?,
+            "iterations" => network.max_plus.max_iterations = value.parse()?,
             "cycle_limit" => network.cycle_limit = value.parse()?,
-            "active_window" => network.active_window = value.parse()?,
-            "chains" => network.acceleration_chains = value.parse()?,
-            "gates" => network.entry_gates = value.parse()?,
-            "gate" => network.entry_gate_occupancy = value.parse()?,
-            "tokens" => network.corridor_tokens = value.parse()?,
-            "probes" => network.deadlock_probes = value.parse()?,
-            "probe_after" => network.probe_after = value.parse()?,
-            "resolution" => network.junction_resolution = value.parse()?,
-            "hold" => network.aside_hold = value.parse()?,
-            "acceleration" => network.acceleration = value.parse()?,
-            "factor" => network.longest_path_factor = value.parse()?,
-            "backtrack" => network.backtrack_penalty = value.parse()?,
-            "leaf_wait" => network.leaf_wait_penalty = value.parse()?,
-            "noise" => network.noise = value.parse()?,
-            "priority" if value == "lowest_id" => network.priority = Priority::LowestId,
-            "priority" => network.priority = Priority::LongestWait,
+            "livelock_window" => network.livelock_window = value.parse()?,
+            "chains" => network.max_plus.acceleration_chains = value.parse()?,
+            "gates" => network.max_plus.entry_gates = value.parse()?,
+            "gate" => network.max_plus.entry_gate_occupancy = value.parse()?,
+            "probes" => network.max_plus.deadlock_probes = value.parse()?,
+            "probe_after" => network.max_plus.probe_after = value.parse()?,
+            "resolution" => network.max_plus.junction_resolution = value.parse()?,
+            "hold" => network.max_plus.aside_hold = value.parse()?,
+            "acceleration" => network.max_plus.acceleration = value.parse()?,
+            "factor" => network.max_plus.longest_path_factor = value.parse()?,
+            "backtrack" => network.max_plus.backtrack_penalty = value.parse()?,
+            "leaf_wait" => network.max_plus.leaf_wait_penalty = value.parse()?,
+            "noise" => network.max_plus.noise = value.parse()?,
+            "priority" if value == "lowest_id" => network.max_plus.priority = Priority::LowestId,
+            "priority" => network.max_plus.priority = Priority::LongestWait,
             "ownership" => {
                 options.ownership = match value {
                     "balanced" => Ownership::Balanced,
@@ -239,7 +240,7 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}  {:5.1}  {:6.2}  {:4.1}",
         percent(&|m| m.deadlock != Deadlock::None),
         percent(&|m| m.deadlock == Deadlock::Passive),
-        percent(&|m| m.deadlock == Deadlock::Active),
+        percent(&|m| m.deadlock == Deadlock::Livelock),
         percent(&|m| m.deadlock == Deadlock::None && m.arrived < m.rovers),
         all(&|(m, _)| f64::from(m.arrived)),
         mean(&|m| m.path_ratio),

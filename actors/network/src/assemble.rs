@@ -1,39 +1,34 @@
 //! Assembling the network-guided system: hosts, actors, links, missions, the monitor.
 
-mod error;
-mod site;
-
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::carrier::Carrier;
 use farside::prelude::*;
-use farside::random::RandomKey;
 use farside_actors::wiring::{Links, Wire, Wiring};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
-use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
-use super::corridors::Corridors;
+use super::config::{ConfigError, Motion, NetworkConfig, Policy, WorldConfig};
+use super::error::NetworkError;
+use super::failover;
 use super::gaps::{self, Refused};
-use super::lng::LocalGraph;
-use super::messages::RoverId;
+use super::ids;
 use super::metrics::NetworkMetrics;
 use super::monitor::{Monitor, Score};
-use super::motion::Ways;
+use super::motion::EdgeTimes;
 use super::node::Node;
-use super::payoff::Payoffs;
 use super::rover::Rover;
-use super::schedule::Schedule;
-use super::takeover;
+use super::shared::Shared;
 use super::timing::Timing;
-
-pub use error::NetworkError;
-pub(crate) use site::Site;
+use crate::baseline::Schedule;
+use crate::ids::RoverId;
+use crate::max_plus::lng::LocalGraph;
+use crate::max_plus::payoff::Payoffs;
 
 /// An assembled system: its actors by name, and its score.
 pub struct Network {
-    site: Arc<Site>,
+    site: Arc<Shared>,
     nodes: Vec<Address<Node>>,
     rovers: Vec<Address<Rover>>,
     score: Arc<Mutex<Score>>,
@@ -82,8 +77,8 @@ impl<'a> Parts<'a> {
 pub enum Missions {
     /// Rovers queue at their entries, and leave the map at their goals: each one's entry and goal.
     Queued(Vec<(VertexId, VertexId)>),
-    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal, no
-    /// two starts and no two goals alike.
+    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal,
+    /// no two starts and no two goals alike.
     Standing(Vec<(VertexId, VertexId)>),
 }
 
@@ -119,13 +114,14 @@ impl Missions {
 }
 
 /// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
-/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions between
-/// neighbouring nodes and between each node and each rover; and the monitor, which ends the run.
+/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions
+/// between neighbouring nodes and between each node and each rover; and the monitor, which ends the
+/// run.
 ///
 /// # Errors
 /// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, two
-/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be; and
-/// those of `wire`.
+/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be;
+/// and those of `wire`.
 pub fn assemble(
     sim: &mut Simulation,
     parts: &Parts<'_>,
@@ -136,13 +132,13 @@ pub fn assemble(
     config.check()?;
     missions.check(&parts.roadmap)?;
     parts.world.gaps.check(sensors, config.policy)?;
-    let stays = matches!(missions, Missions::Standing(_));
+    let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all().to_vec();
     let roadmap = parts.world.open_part(&parts.roadmap, sensors);
     let refused = gaps::refused(&roadmap, sensors, &missions);
     let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
     let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    if !stays {
+    if !stay_at_target {
         let all = (0..).map(RoverId).zip(&missions);
         for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
             queues.entry(*entry).or_default().push(id);
@@ -150,7 +146,7 @@ pub fn assemble(
     }
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
-    gaps::check_refused(&refused, &rover_names, stays)?;
+    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
     let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
     let places = places_m(&roadmap, sensors, &missions);
     for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
@@ -168,18 +164,14 @@ pub fn assemble(
         .zip(missions.iter().copied())
         .filter(|(id, _)| has_way(id))
         .collect();
-    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stays);
-    let lines = match config.takeover_after {
-        Some(_) => takeover::lines(&roadmap, sensors),
+    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stay_at_target);
+    let backup_lists = match config.failover_after {
+        Some(_) => failover::backup_lists(&roadmap, sensors),
         None => Vec::new(),
     };
-    let site = Arc::new(Site {
-        lines,
+    let site = Arc::new(Shared {
+        backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
-        corridors: match config.corridor_tokens {
-            true => Corridors::new(&roadmap, 2),
-            false => Corridors::default(),
-        },
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: config.patience(links.0, &timing),
         timing,
@@ -193,7 +185,7 @@ pub fn assemble(
         roadmap,
         sensors: sensors.clone(),
         missions,
-        stays,
+        stay_at_target,
     });
     let nodes = declare_nodes(sim, &site);
     let rovers = declare_rovers(sim, &site);
@@ -207,8 +199,8 @@ pub fn assemble(
     })
 }
 
-/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the one
-/// from one host to another, by their names.
+/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the
+/// one from one host to another, by their names.
 ///
 /// # Errors
 /// Those of [`assemble`].
@@ -237,16 +229,16 @@ fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, Ne
     Ok(Some(NodeId(at as u32)))
 }
 
-/// The parts of a cycle. The paper's policy moves rovers within its cycles: where nothing is said, they
-/// are long enough for the longest edge.
+/// The parts of a cycle. The policy `max-plus` moves rovers within its cycles: where nothing is
+/// said, they are long enough for the longest edge.
 fn timing(
     roadmap: &Roadmap,
     config: &NetworkConfig,
     (latency, rate_bit_per_s): (SimDuration, Option<u64>),
 ) -> Result<Timing, ConfigError> {
     let mut config = config.clone();
-    if config.policy == Policy::Paper && config.motion == Motion::Continuous {
-        let longest = Ways {
+    if config.policy == Policy::MaxPlus && config.motion == Motion::Continuous {
+        let longest = EdgeTimes {
             roadmap,
             config: &config,
         }
@@ -259,23 +251,23 @@ fn timing(
 /// The longest that a step is planned to take.
 ///
 /// # Errors
-/// When an edge takes so long that a cycle of the paper's policy has no time for it, or that driving
-/// along it would look like a deadlock.
+/// When an edge takes so long that a cycle of the policy `max-plus` has no time for it, or that
+/// driving along it would look like a deadlock.
 fn longest_step(
     roadmap: &Roadmap,
     config: &NetworkConfig,
     timing: &Timing,
 ) -> Result<SimDuration, NetworkError> {
-    let ways = Ways { roadmap, config };
+    let ways = EdgeTimes { roadmap, config };
     let longest = ways
         .longest()
         .filter(|_| config.motion == Motion::Continuous);
     let Some((edge, time)) = longest else {
         return Ok(timing.cycle);
     };
-    let window = timing.cycle * u64::from(config.passive_window);
-    let mut limits = vec![("network.passive_window", window)];
-    if config.policy == Policy::Paper {
+    let window = timing.cycle * u64::from(config.deadlock_window);
+    let mut limits = vec![("network.deadlock_window", window)];
+    if config.policy == Policy::MaxPlus {
         // What a rover is granted at the end of a cycle's phases it has done before the next cycle.
         let left = timing.cycle.saturating_sub(timing.decided_after());
         limits.insert(0, ("what network.cycle leaves after its phases", left));
@@ -292,69 +284,14 @@ fn longest_step(
     }
 }
 
-/// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of
-/// names is that of numbers.
 fn names(kind: &str, count: usize) -> Vec<String> {
-    let digits = count.to_string().len().max(2);
-    (1..=count)
-        .map(|i| format!("{kind}_{i:0digits$}"))
+    let count = count as u32;
+    (0..count)
+        .map(|number| ids::name(kind, number, count))
         .collect()
 }
 
-/// An entry and a goal for each rover, at random. Of `world` only the endpoints are read.
-///
-/// ```
-/// use farside_network::{TeamConfig, WorldConfig, missions};
-/// use farside_worlds::Roadmap;
-/// let map = Roadmap::builtin("crater-dense")?;
-/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
-/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// When the team is empty, or the roadmap's boundary has no two places to drive between.
-pub fn missions(
-    world: &WorldConfig,
-    roadmap: &Roadmap,
-    team: &TeamConfig,
-    seed: u64,
-) -> Result<Vec<(VertexId, VertexId)>, NetworkError> {
-    if team.rovers == 0 {
-        return Err(NetworkError::NoRovers);
-    }
-    let (entries, exits) = world.endpoints.split(roadmap);
-    // With one entry that is the only exit there is nowhere to go.
-    let pairs = entries
-        .iter()
-        .flat_map(|a| exits.iter().map(move |b| (a, b)));
-    let starts: Vec<_> = entries
-        .iter()
-        .filter(|&&entry| exits.iter().any(|&exit| exit != entry))
-        .copied()
-        .collect();
-    if !pairs.into_iter().any(|(a, b)| a != b) {
-        return Err(NetworkError::Endpoints {
-            roadmap: roadmap.name().to_owned(),
-            entries: entries.len(),
-            exits: exits.len(),
-        });
-    }
-    let mission = |rover: u32| {
-        let key = RandomKey::new(seed).text("mission");
-        let mut draws = key.number(u64::from(rover)).stream();
-        let entry = *draws.choose(&starts).expect("there is a pair");
-        loop {
-            let goal = *draws.choose(&exits).expect("there is a pair");
-            if goal != entry {
-                return (entry, goal);
-            }
-        }
-    };
-    Ok((0..team.rovers).map(mission).collect())
-}
-
-fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Node>> {
     let declare = |(id, name): (NodeId, &String)| {
         let host = sim.host(name);
         sim.heavy(host);
@@ -370,7 +307,7 @@ fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
         .collect()
 }
 
-fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>> {
+fn declare_rovers(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Rover>> {
     let declare = |(id, name): (RoverId, &String)| {
         let host = sim.host(name);
         let site = site.clone();
@@ -438,9 +375,9 @@ impl Network {
         self.site.timing
     }
 
-    /// Whether rovers are coordinated by max-plus, as those of the policy `paper` are.
+    /// Whether rovers are coordinated by max-plus, as those of the policy `max-plus` are.
     pub fn coordinates(&self) -> bool {
-        self.site.config.policy == Policy::Paper
+        self.site.config.policy == Policy::MaxPlus
     }
 
     /// The length of a planning cycle, stretched if links are slow.

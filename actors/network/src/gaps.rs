@@ -1,49 +1,32 @@
-//! Gaps in the coverage of the roadmap: vertices at which no node reaches a rover. *Network-guided*,
-//! section 5, asks "what should be the network's behavior if there are gaps in the coverage of the
-//! workspace". Here it closes them or lets rovers cross them, as [`Gaps`] says.
+//! Gaps in the coverage of the roadmap: vertices at which no node reaches a rover.
+//! *Network-guided*, section 5, asks "what should be the network's behavior if there are gaps in
+//! the coverage of the workspace". Here it closes them or lets rovers cross them, as
+//! [`Gaps`](crate::Gaps) says.
 //!
-//! **Closed**, a vertex has no edges left, so that no path, route or reservation leads there, whatever
-//! the policy.
+//! **Closed**, a vertex has no edges left, so that no path, route or reservation leads there,
+//! whatever the policy.
 //!
 //! **Crossed**, a gap is driven through in one go: a *crossing* leads from a covered vertex through
 //! uncovered ones to the next covered one. From when it has said that it sets out until it has come
-//! out a rover neither speaks nor listens: what is sent to it meanwhile is as good as lost, also where
-//! links know of no distance. So it sets out only when it holds the grants for all vertices of the
-//! crossing, the covered one beyond included, and then needs to hear nothing. The crossing's owners
-//! learn of it when it has come out, each from the next one's owner. Why no rover waits for ever
-//! before a gap: [`reservation`](super::reservation).
+//! out a rover neither speaks nor listens: what is sent to it meanwhile is as good as lost, also
+//! where links know of no distance. So it sets out only when it holds the grants for all vertices
+//! of the crossing, the covered one beyond included, and then needs to hear nothing. The crossing's
+//! owners learn of it when it has come out, each from the next one's owner. Why no rover waits for
+//! ever before a gap: [`reservation`](super::reservation).
 //!
-//! A rover whose entry or goal lies in a gap, or that has no way to its goal where gaps are closed, is
-//! refused: it never enters.
+//! A rover whose entry or goal lies in a gap, or that has no way to its goal where gaps are closed,
+//! is refused: it never enters.
 
 use std::sync::Arc;
 
 use farside_worlds::{Roadmap, SensorNetwork, VertexId};
-use serde::{Deserialize, Serialize};
 
-use super::assemble::NetworkError;
-use super::config::{Policy, WorldConfig};
-use super::messages::RoverId;
+use super::config::{Gaps, Policy, WorldConfig};
 use super::safety::RoverMemory;
-
-/// What becomes of vertices at which no node reaches a rover.
-#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum Gaps {
-    /// There must be none.
-    #[default]
-    Refuse,
-    /// They are closed: nothing leads there.
-    Close,
-    /// Rovers cross them out of everybody's hearing (the `complete` policy only).
-    Cross,
-}
+use crate::error::NetworkError;
+use crate::ids::RoverId;
 
 impl Gaps {
-    pub(super) fn is_refuse(&self) -> bool {
-        *self == Gaps::Refuse
-    }
-
     /// Whether a world with these gaps can be.
     ///
     /// # Errors
@@ -142,9 +125,9 @@ pub(super) fn refused(
 pub(super) fn check_refused(
     refused: &[Refused],
     rover_names: &[String],
-    stays: bool,
+    stay_at_target: bool,
 ) -> Result<(), NetworkError> {
-    let too_many = if stays { 1 } else { rover_names.len() };
+    let too_many = if stay_at_target { 1 } else { rover_names.len() };
     if refused.len() < too_many {
         return Ok(());
     }

@@ -11,8 +11,6 @@ mod map;
 mod relief;
 mod site;
 mod spacetime;
-pub(crate) mod tracks;
-mod waits;
 
 use farside::SimDuration;
 use farside_actors::figure::Figure;
@@ -22,11 +20,13 @@ use farside_actors::system::{
 use farside_worlds::VertexId;
 use thiserror::Error;
 
-pub(crate) use site::{Ground, Site};
+pub(crate) use site::{Site, Surroundings};
 
-use crate::system::NetworkScenario;
+use crate::ids;
+use crate::scenario::NetworkScenario;
+use crate::tracks::{Sighting, Tracks, TracksError};
+use crate::waits::{Standing, Waits};
 pub(crate) use map::coordinated;
-use tracks::Tracks;
 
 /// The style of pictures, beside that of all figures.
 const STYLE: &str = include_str!("picture/picture.css");
@@ -57,14 +57,17 @@ pub(crate) fn draw(
     let site = ground::site(scenario, run.seeds().problem, files)?;
     let drawn = Drawn {
         site,
-        tracks: Tracks::read(run)?,
+        tracks: Tracks::read(run).map_err(PictureError::from)?,
         scenario: run.scenario().to_owned(),
         seed: run.seeds().run,
     };
     let figure = match picture {
         "map" => drawn.map(request.at),
         "corridor" => {
-            let line = request.along.as_deref().map_or(Ok(Line::Auto), Line::read);
+            let line = request
+                .along
+                .as_deref()
+                .map_or(Ok(VertexLine::Auto), VertexLine::read);
             let line = line.map_err(Failure::NotDrawn)?;
             drawn.time_space(&line, request.from, request.at)
         }
@@ -79,7 +82,7 @@ pub(crate) fn draw(
 impl From<PictureError> for Failure {
     fn from(error: PictureError) -> Failure {
         match error {
-            PictureError::Recording(error) => error,
+            PictureError::Tracks(TracksError::Recording(error)) => error,
             error => Failure::NotDrawn(error.to_string()),
         }
     }
@@ -98,25 +101,25 @@ pub(crate) struct Drawn {
 
 /// Which line of vertices a time-space diagram is of.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Line {
+pub(crate) enum VertexLine {
     /// Where rovers are most in each other's way.
     Auto,
     /// The corridor of one vertex, or the shortest ways between several.
     Through(Vec<VertexId>),
 }
 
-impl Line {
+impl VertexLine {
     /// A line as people write it: `auto`, `12` or `12,40`.
-    fn read(text: &str) -> Result<Line, String> {
+    fn read(text: &str) -> Result<VertexLine, String> {
         if text == "auto" {
-            return Ok(Line::Auto);
+            return Ok(VertexLine::Auto);
         }
         let vertex = |part: &str| {
             let number = part.trim().parse::<u32>().map(VertexId);
             number.map_err(|_| format!("along {part:?}: expected auto, or vertices as in 12,40"))
         };
         let vertices = text.split(',').map(vertex).collect::<Result<_, _>>();
-        vertices.map(Line::Through)
+        vertices.map(VertexLine::Through)
     }
 }
 
@@ -130,7 +133,7 @@ impl Drawn {
     /// The time-space diagram of a line, from a time to another; of the whole run unless given.
     pub(crate) fn time_space(
         &self,
-        line: &Line,
+        line: &VertexLine,
         from: Option<SimDuration>,
         to: Option<SimDuration>,
     ) -> Result<Figure, PictureError> {
@@ -146,13 +149,30 @@ impl Drawn {
         spacetime::figure(self, line, from_ns, to_ns)
     }
 
+    /// Who waits for whom, of rovers at an instant.
+    fn waits(&self, rovers: &[Sighting]) -> Waits {
+        let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
+        Waits::of(&self.site.roadmap, self.site.wait_rule, &rovers)
+    }
+
+    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without
+    /// one.
+    fn shortest_circle(&self, waits: &Waits, rovers: &[Sighting]) -> String {
+        let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
+        let name = |rover: u32| ids::name("rover", rover, self.site.rovers);
+        let named = waits.named(name, &rovers);
+        named
+            .first()
+            .map_or_else(String::new, |circle| format!(" {circle}."))
+    }
+
     fn time_ns(&self, at: Option<SimDuration>) -> Result<u64, PictureError> {
         let highest = self.tracks.highest_vertex();
-        if highest >= self.site.roadmap.len() as u32 {
-            return Err(PictureError::States(format!(
-                "a rover is at vertex {highest}, and the roadmap has {} vertices",
-                self.site.roadmap.len()
-            )));
+        if highest as usize >= self.site.roadmap.len() {
+            return Err(PictureError::OffTheMap {
+                vertex: highest,
+                count: self.site.roadmap.len(),
+            });
         }
         let end_ns = self.tracks.end_ns;
         match at {
@@ -168,18 +188,15 @@ impl Drawn {
 /// Why there is no picture.
 #[derive(Debug, Error)]
 pub(crate) enum PictureError {
-    /// The recording cannot be read.
+    /// Where rovers were cannot be read.
     #[error(transparent)]
-    Recording(#[from] Failure),
-    /// There are no rovers in it.
+    Tracks(#[from] TracksError),
+    /// A rover is where there is no vertex.
     #[error(
-        "it holds no states of rovers: expected samples of RoverState on /state/**{}",
-        excluded_note(.excluded)
+        "its states of rovers cannot be used: a rover is at vertex {vertex}, and the roadmap has \
+         {count} vertices"
     )]
-    NoStates { excluded: String },
-    /// The rovers' states are none.
-    #[error("its states of rovers cannot be used: {0}")]
-    States(String),
+    OffTheMap { vertex: u32, count: usize },
     /// A time beyond the end.
     #[error("the run ended at {end}: expected a time up to that, found {at}")]
     AfterEnd { at: SimDuration, end: SimDuration },
@@ -207,12 +224,4 @@ pub(crate) enum PictureError {
         "{roadmap} has no corridor, and no rovers wait in a circle: name vertices to go through"
     )]
     NoCorridor { roadmap: String },
-}
-
-fn excluded_note(excluded: &str) -> String {
-    if excluded.is_empty() {
-        String::new()
-    } else {
-        format!("; left out of it were {excluded}")
-    }
 }

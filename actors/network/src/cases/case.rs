@@ -19,8 +19,8 @@ use farside_actors::wiring::LinkBuilder;
 /// A scenario of the network-guided system: what [`crate::assemble`] takes, with its links,
 /// degradations and crashes.
 ///
-/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with nothing
-/// in it that is as by default: read there it gives the same run, to the last event.
+/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with
+/// nothing in it that is as by default: read there it gives the same run, to the last event.
 ///
 /// ```
 /// use farside::SimDuration;
@@ -173,9 +173,9 @@ impl Case {
 
     /// The same case with this seed, the next one, and so on.
     ///
-    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of the
-    /// larger one, because seeds decide missions, placement and losses, but it fails with some. So it
-    /// shrinks on.
+    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of
+    /// the larger one, because seeds decide missions, placement and losses, but it fails with some.
+    /// So it shrinks on.
     pub fn seeds(&self, count: u64) -> impl Iterator<Item = Case> + '_ {
         (0..count).map(|more| Case {
             seed: self.seed.wrapping_add(more),
@@ -242,6 +242,12 @@ fn table<T: Serialize>(value: &T) -> Result<toml::Table, fmt::Error> {
 fn without<T: Serialize>(value: &T, usual: &T) -> Result<toml::Table, fmt::Error> {
     let (mut all, usual) = (table(value)?, table(usual)?);
     all.retain(|key, value| usual.get(key) != Some(value));
+    for (key, value) in &mut all {
+        let usual = usual.get(key).and_then(toml::Value::as_table);
+        if let (Some(below), Some(usual)) = (value.as_table_mut(), usual) {
+            below.retain(|key, value| usual.get(key) != Some(value));
+        }
+    }
     Ok(all)
 }
 
@@ -251,7 +257,14 @@ fn write_table(f: &mut fmt::Formatter<'_>, header: &str, table: &toml::Table) ->
         writeln!(f, "\n{header}")?;
     }
     for (key, value) in table {
-        writeln!(f, "{key} = {value}")?;
+        match value {
+            toml::Value::Table(below) => {
+                for (name, value) in below {
+                    writeln!(f, "{key}.{name} = {value}")?;
+                }
+            }
+            value => writeln!(f, "{key} = {value}")?,
+        }
     }
     Ok(())
 }

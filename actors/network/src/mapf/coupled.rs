@@ -3,22 +3,7 @@
 
 use super::joint;
 use super::plan::Plan;
-use super::problem::Problem;
-
-/// What the best plan is.
-///
-/// ```
-/// use farside_network::mapf::Objective;
-/// assert_eq!(Objective::default(), Objective::SumOfCosts);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Objective {
-    /// The least sum of the cycles in which rovers arrive for good, time in queues included.
-    #[default]
-    SumOfCosts,
-    /// The least cycle in which all have arrived.
-    Makespan,
-}
+use super::problem::{CoupledError, Objective, Problem};
 
 /// How to search.
 ///
@@ -29,8 +14,8 @@ pub enum Objective {
 pub struct CoupledConfig {
     /// What is to be least.
     pub objective: Objective,
-    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and an
-    /// expansion adds up to as many nodes as a vertex has neighbours, and two.
+    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and
+    /// an expansion adds up to as many nodes as a vertex has neighbours, and two.
     pub max_expansions: u64,
     /// Plans rovers apart for as long as their plans do not meet (independence detection, Standley
     /// 2010). Off: all are planned as one from the start.
@@ -45,29 +30,6 @@ impl Default for CoupledConfig {
             independence: true,
         }
     }
-}
-
-/// Why there is no best plan to show.
-///
-/// ```
-/// use farside_network::mapf::CoupledError;
-/// let error = CoupledError::Exhausted { expansions: 500 };
-/// assert_eq!(error.to_string(), "no plan found within 500 expansions");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CoupledError {
-    /// The limit was reached: there may be a plan.
-    #[error("no plan found within {expansions} expansions")]
-    Exhausted {
-        /// Nodes expanded.
-        expansions: u64,
-    },
-    /// There is no plan. Never with [`Rules::Queues`](super::Rules::Queues).
-    #[error("there is no plan: all of {expansions} expansions lead nowhere")]
-    Unsolvable {
-        /// Nodes expanded.
-        expansions: u64,
-    },
 }
 
 /// The best plan for a team, and what it took to find it.
@@ -104,7 +66,7 @@ pub struct Coupled {
 /// let map = Roadmap::from_toml(text)?;
 /// // Two change places by way of the siding: 4 cycles for one, 3 for the other.
 /// let missions = [(0, 2), (2, 0)].map(|(a, b)| Mission::new(V(a), V(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::OnMap)?;
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::StayAtTarget)?;
 /// let best = coupled(&problem, &CoupledConfig::default())?;
 /// assert_eq!(best.cost, 7);
 /// assert_eq!(best.plan.conflicts(&problem), []);
@@ -112,8 +74,8 @@ pub struct Coupled {
 /// ```
 ///
 /// # Errors
-/// When the limit of expansions is reached, or, with [`Rules::OnMap`](super::Rules::OnMap), when
-/// there is no plan.
+/// When the limit of expansions is reached, or, with
+/// [`Rules::StayAtTarget`](super::Rules::StayAtTarget), when there is no plan.
 pub fn coupled(problem: &Problem<'_>, config: &CoupledConfig) -> Result<Coupled, CoupledError> {
     let rovers = problem.missions().len();
     let mut plan = Plan {

@@ -5,7 +5,7 @@ use farside_actors::system::Metric;
 use farside_actors::system::MetricKind::{Number, Rate, Sample, Word};
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 38] = [
+pub(crate) const ALL: [Metric; 39] = [
     Metric::new("arrival_s", "time to the goal", "s", Sample, Lower),
     Metric::new("arrived", "rovers at their goals", "rovers", Number, Higher),
     Metric::new(
@@ -40,7 +40,8 @@ pub(crate) const ALL: [Metric; 38] = [
     ),
     Metric::new("cycles", "planning cycles", "cycles", Number, Lower),
     Metric::new("deadlock", "deadlock", "", Word, Neither),
-    Metric::new("deadlocked", "standstill", "", Rate, Lower),
+    Metric::new("deadlocked", "deadlock or livelock", "", Rate, Lower),
+    Metric::new("failovers", "failovers", "", Number, Neither),
     Metric::new(
         "intervention_rate",
         "cycles with an intervention",
@@ -147,7 +148,7 @@ pub(crate) const ALL: [Metric; 38] = [
         Number,
         Neither,
     ),
-    Metric::new("takeovers", "takeovers", "", Number, Neither),
+    Metric::new("takeovers", "failovers (the old name)", "", Number, Neither),
     Metric::new(
         "time_ratio",
         "time of those that arrived over the shortest path",

@@ -1,0 +1,393 @@
+//! How requests proceed: what a node does with a probe, a path to be reserved, and the news of what
+//! became of it.
+
+use std::collections::BTreeMap;
+
+use farside_worlds::VertexId;
+
+use super::{Desk, Offers, Registry, owners};
+use crate::ids::RoverId;
+use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
+use crate::reservation::messages::{
+    Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
+};
+use crate::reservation::table::{Clash, Visit};
+
+/// The most labels that a probe hands on from one node to the next, so that messages stay small.
+const MAX_FRONTIER: usize = 24;
+
+impl Registry {
+    /// Works out where the rover could be in this node's part, and hands that on.
+    ///
+    /// A wish is in the name of a request that began with `priority`.
+    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, priority: (u64, RoverId)) {
+        let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
+        if probe.wishful {
+            let busy = |v| self.busy_for_priority(v, priority);
+            self.search_in(desk, &busy, |ground| ground.expand(&mut labels, open));
+        } else {
+            self.search(desk, |ground| ground.expand(&mut labels, open));
+        }
+        let Some(&next) = probe.route.get(probe.at as usize + 1) else {
+            self.offer(desk, &probe, &labels, priority);
+            return;
+        };
+        let site = desk.site;
+        let borders = |label: &Label| {
+            let onward = site.roadmap.neighbors(label.vertex);
+            site.sensors.owner(label.vertex) == desk.region
+                && onward.iter().any(|&v| site.sensors.owner(v) == next)
+        };
+        let has_gaps = !site.sensors.gaps().is_empty();
+        let frontier = frontier(&labels, has_gaps, borders);
+        probe.frontier = prune(&mut labels, &frontier);
+        probe.labels = labels;
+        probe.at += 1;
+        let item = match probe.wishful {
+            true => Item::Wish(Wish { probe, priority }),
+            false => Item::Probe(probe),
+        };
+        self.post(next, item);
+    }
+
+    /// A probe has come to the owner of its goal.
+    pub(crate) fn offer(
+        &mut self,
+        desk: &Desk<'_>,
+        probe: &Probe,
+        mut labels: &[Label],
+        priority: (u64, RoverId),
+    ) {
+        if self.failover.is_stale(probe.started) {
+            return;
+        }
+        let rover = probe.request.rover;
+        // Of a rover's requests, and of their attempts, only the last counts.
+        let age = |request: &ReservationRequest| Some((request.since, request.attempt));
+        let known = self.offers.get(&rover).and_then(|o| age(&o.request));
+        if known > age(&probe.request) {
+            return;
+        }
+        if known < age(&probe.request) {
+            let offers = Offers {
+                request: probe.request,
+                heard: 0,
+                probes: probe.probes,
+                first_step: probe.first_step,
+                wishful: probe.wishful,
+                priority,
+                route: probe.route.clone(),
+                best: None,
+                decided: false,
+                // Other routes may be much slower, or lead past a node that is down.
+                deadline: desk.now + 2 * (desk.now - probe.started) + self.headway(),
+            };
+            self.offers.insert(rover, offers);
+        }
+        let headway = self.headway();
+        let Some(offers) = self.offers.get_mut(&rover) else {
+            return;
+        };
+        offers.heard += 1;
+        // Who stays needs the goal for ever, and leaves it to who has asked for it before.
+        let stay_at_target = desk.site.stay_at_target;
+        if !offers.wishful
+            && self
+                .claims
+                .is_claimed(probe.goal, offers.priority, desk.now)
+        {
+            labels = &[];
+        }
+        let arrivals = (0..).zip(labels).filter(|(_, label)| {
+            label.vertex == probe.goal && (!stay_at_target || label.until == FOREVER)
+        });
+        if let Some((at, label)) = arrivals.min_by_key(|(_, label)| label.ready)
+            && offers
+                .best
+                .as_ref()
+                .is_none_or(|(ready, _)| label.ready < *ready)
+        {
+            let leaves = label.ready.saturating_add(headway).min(label.until);
+            let end = if stay_at_target { FOREVER } else { leaves };
+            let covers = |v| desk.site.sensors.covers(v);
+            offers.best = Some((label.ready, way_to(labels, at, end, covers)));
+        }
+        if offers.heard >= offers.probes {
+            self.decide(desk, rover);
+        }
+    }
+
+    /// Decides what has waited for long enough.
+    pub(crate) fn decide_overdue(&mut self, desk: &Desk<'_>) {
+        let overdue = |o: &Offers| !o.decided && o.deadline <= desk.now && o.best.is_some();
+        let rovers = self
+            .offers
+            .iter()
+            .filter(|(_, o)| overdue(o))
+            .map(|(&r, _)| r);
+        for rover in rovers.collect::<Vec<_>>() {
+            self.decide(desk, rover);
+        }
+    }
+
+    pub(crate) fn decide(&mut self, desk: &Desk<'_>, rover: RoverId) {
+        let Some(offers) = self.offers.get_mut(&rover).filter(|o| !o.decided) else {
+            return;
+        };
+        offers.decided = true;
+        let (request, first_step, priority) = (offers.request, offers.first_step, offers.priority);
+        match offers.best.take() {
+            Some((_, path)) if offers.wishful => {
+                let route = owners(desk, &path);
+                let ask = Displace {
+                    request,
+                    priority,
+                    path: path.iter().map(|visit| visit.vertex).collect(),
+                    at: route.len() as u32 - 1,
+                    route,
+                };
+                self.displace(desk, ask);
+            }
+            Some((_, path)) => {
+                let at = path.len() as u32 - 1;
+                let reserve = Reserve {
+                    request,
+                    first_step,
+                    path,
+                    at,
+                    replaced: Vec::new(),
+                };
+                self.reserve(desk, reserve);
+            }
+            None => {
+                let route = offers.route.clone();
+                let settle = Settle {
+                    request,
+                    verdict: Verdict::NoPath,
+                    at: route.len() as u32 - 1,
+                    route,
+                };
+                self.fail(desk, settle);
+            }
+        }
+    }
+
+    /// Enters this region's part of a path, from the back.
+    pub(crate) fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
+        if desk.may_be_replaced() && self.is_taken(desk, &reserve) {
+            return;
+        }
+        self.table.strike_earlier(&reserve.request);
+        self.failover.close(|open| open.is_before(&reserve.request));
+        self.claims.give_up(reserve.request.rover);
+        let hi = reserve.at as usize;
+        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.region;
+        let part = reserve.path[..=hi]
+            .iter()
+            .rev()
+            .take_while(|visit| mine(visit))
+            .count();
+        let lo = hi + 1 - part;
+        let request = reserve.request;
+        if lo == 0 && desk.may_be_replaced() {
+            if self.failover.is_proposed(&request) {
+                return;
+            }
+            // Given up meanwhile, because somebody was replaced.
+            if !self.applicants.iter().any(|a| a.is_on(&request)) {
+                self.release(desk, &reserve, lo);
+                return;
+            }
+        }
+        // A rover that stands on the map has its first vertex already.
+        let stands = lo == 0 && desk.site.stay_at_target;
+        let first = lo + usize::from(stands);
+        // What was passed on to a region that is replaced may come a second time.
+        let again = desk.may_be_replaced() && self.table.has(&request, &reserve.path[first..=hi]);
+        match self.table.check(&request, &reserve.path[first..=hi]) {
+            _ if again => {}
+            Ok(()) => self.enter(&reserve, first, hi),
+            Err(Clash::Younger) => {
+                self.parked.push(reserve);
+                return;
+            }
+            Err(Clash::Firm) => {
+                self.refuse(desk, &reserve, lo);
+                return;
+            }
+        }
+        reserve.replaced.extend(desk.replacement());
+        if lo > 0 {
+            reserve.at = lo as u32 - 1;
+            if desk.may_be_replaced() {
+                self.failover.pass(&reserve);
+            }
+            let to = desk.site.sensors.owner(reserve.path[lo - 1].vertex);
+            self.post(to, Item::Reserve(reserve));
+        } else if desk.may_be_replaced() {
+            self.propose(reserve);
+        } else {
+            self.confirm(desk, &reserve);
+        }
+    }
+
+    /// Enters visits `first` to `last` of a path, tentatively.
+    fn enter(&mut self, reserve: &Reserve, first: usize, last: usize) {
+        for i in first..=last {
+            let TimedVisit { vertex, start, end } = reserve.path[i];
+            let visit = Visit {
+                request: reserve.request,
+                step: reserve.first_step + i as u32,
+                from: i.checked_sub(1).map(|before| reserve.path[before].vertex),
+                start,
+                end,
+                confirmed: false,
+                granted: false,
+            };
+            self.table.enter(vertex, visit);
+        }
+    }
+
+    /// The whole path is entered: from here on it holds.
+    pub(crate) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
+        self.settled(desk, &reserve.request, Verdict::Confirmed);
+        if desk.site.stay_at_target {
+            let TimedVisit { vertex, end, .. } = reserve.path[0];
+            self.table.leave_by(vertex, end);
+        }
+        self.served(desk, reserve);
+        self.return_later(desk, &reserve.request);
+        let settle = Settle {
+            request: reserve.request,
+            verdict: Verdict::Confirmed,
+            route: owners(desk, &reserve.path),
+            at: 0,
+        };
+        self.forward(settle);
+        self.unpark(desk);
+    }
+
+    /// What this region has of a request holds, or is struck out.
+    fn settled(&mut self, desk: &Desk<'_>, request: &ReservationRequest, verdict: Verdict) {
+        match verdict {
+            Verdict::Confirmed => self.table.confirm(request),
+            _ => self.table.strike(request),
+        }
+        if desk.may_be_replaced() {
+            self.failover.close(|open| open == request);
+            if verdict == Verdict::Confirmed {
+                self.failover.take(*request);
+            }
+        }
+    }
+
+    /// Strikes out all of a path that was entered, from visit `lo` on.
+    pub(crate) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+        let released = Settle {
+            request: reserve.request,
+            verdict: Verdict::Released,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
+        };
+        self.forward(released);
+        // A route may pass this region twice.
+        self.settled(desk, &reserve.request, Verdict::Released);
+        self.unpark(desk);
+    }
+
+    /// The first part of the path, from visit `lo` on, cannot be entered.
+    pub(crate) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+        self.release(desk, reserve, lo);
+        let failed = Settle {
+            request: reserve.request,
+            verdict: Verdict::Failed,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
+        };
+        self.fail(desk, failed);
+    }
+
+    pub(crate) fn forward(&mut self, settle: Settle) {
+        let at = settle.at + 1;
+        if let Some(&to) = settle.route.get(at as usize) {
+            self.post(to, Item::Settle(Settle { at, ..settle }));
+        }
+    }
+
+    /// Tells the node that began; if that is this one, it begins again.
+    pub(crate) fn fail(&mut self, desk: &Desk<'_>, settle: Settle) {
+        if let Some(at) = settle.at.checked_sub(1) {
+            let to = settle.route[at as usize];
+            self.post(to, Item::Settle(Settle { at, ..settle }));
+            return;
+        }
+        let request = settle.request;
+        let Some(at) = self.applicants.iter().position(|a| a.is_on(&request)) else {
+            return;
+        };
+        let attempt = request.attempt + 1;
+        let next = ReservationRequest { attempt, ..request };
+        // Where it failed at once, at this node, it would fail in the same way again.
+        let began = self.applicants[at].request.map(|(_, began)| began);
+        if settle.verdict == Verdict::Failed && began != Some(desk.now) {
+            self.begin(desk, at, next);
+            return;
+        }
+        // Nothing leads there as things stand: other rovers have to go first.
+        let applicant = &mut self.applicants[at];
+        applicant.request = None;
+        let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(1);
+        applicant.in_vain += 1;
+        applicant.again = Some((next, desk.now + pause));
+    }
+
+    pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
+        match settle.verdict {
+            Verdict::Failed | Verdict::NoPath => return self.fail(desk, settle),
+            Verdict::Confirmed => {
+                self.settled(desk, &settle.request, Verdict::Confirmed);
+                self.return_later(desk, &settle.request);
+            }
+            Verdict::Released => self.settled(desk, &settle.request, Verdict::Released),
+        }
+        self.forward(settle);
+        self.unpark(desk);
+    }
+
+    /// Something was settled: who waited for it may go on.
+    pub(crate) fn unpark(&mut self, desk: &Desk<'_>) {
+        for reserve in std::mem::take(&mut self.parked) {
+            self.reserve(desk, reserve);
+        }
+    }
+}
+
+/// The labels from which to go on: the earliest of each vertex and interval, not too many, and
+/// always one of those that can be kept up for ever; with gaps all of these, since what lies within
+/// one need not lead out of it.
+fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) -> Vec<u32> {
+    let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
+    for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
+        let found = best
+            .entry((label.vertex, label.until))
+            .or_insert((label.ready, at));
+        *found = (*found).min((label.ready, at));
+    }
+    let mut all: Vec<(u64, u32)> = best.into_values().collect();
+    all.sort_unstable();
+    if has_gaps {
+        let ends = |&(_, at): &(u64, u32)| labels[at as usize].until != FOREVER;
+        let lasting = all.iter().filter(|found| !ends(found)).count();
+        all.sort_by_key(ends);
+        all.truncate(lasting.max(MAX_FRONTIER));
+        return all.into_iter().map(|(_, at)| at).collect();
+    }
+    let last = all
+        .iter()
+        .position(|&(_, at)| labels[at as usize].until == FOREVER);
+    if let Some(last) = last.filter(|&last| last >= MAX_FRONTIER) {
+        all.swap(MAX_FRONTIER - 1, last);
+    }
+    all.truncate(MAX_FRONTIER);
+    all.into_iter().map(|(_, at)| at).collect()
+}
