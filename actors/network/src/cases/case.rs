@@ -23,7 +23,7 @@ use farside_actors::units;
 ///
 /// ```
 /// use farside::SimDuration;
-/// use farside_actors::invariants::{Case, Downtime};
+/// use farside_network::cases::{Case, Downtime};
 /// let mut case = Case::default();
 /// case.team.rovers = 2;
 /// case.link.loss = 0.3;
