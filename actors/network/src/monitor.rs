@@ -14,7 +14,7 @@ use farside_worlds::{NodeId, VertexId};
 use super::config::Motion;
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use super::waits::{Standing, WaitRule, Waits};
-use crate::failover::messages::TakenOver;
+use crate::failover::messages::FailedOver;
 use crate::ids::RoverId;
 use crate::max_plus::loads::Loads;
 use crate::max_plus::messages::NodeState;
@@ -63,7 +63,7 @@ pub(crate) struct Score {
     deadlock: Deadlock,
     deadlock_reason: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
-    failed_over: Vec<TakenOver>,
+    failed_over: Vec<FailedOver>,
     confirmed_deadlocks: u32,
     last_confirmed: Vec<RoverId>,
     ended: bool,
@@ -154,7 +154,7 @@ impl Observer for Monitor {
                 score.count(&state);
             } else if kind.name() == "RoadmapKnown" {
                 score.informed.push(record.time());
-            } else if kind.name() == "TakenOver" {
+            } else if kind.name() == "FailedOver" {
                 let taken = kind.schema().decode(record.body).map_err(failed)?;
                 score.failed_over.push(taken);
             }
@@ -250,10 +250,10 @@ impl Score {
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
         let reason = if still(self.last_move, config.deadlock_window + site.patience) {
             self.deadlock = Deadlock::Passive;
-            "passive deadlock"
+            "deadlock"
         } else if still(self.nearest.1, config.livelock_window + site.patience) {
             self.deadlock = Deadlock::Livelock;
-            "active deadlock"
+            "livelock"
         } else if self.cycle >= config.cycle_limit {
             "cycle limit"
         } else {
@@ -356,7 +356,7 @@ impl Score {
             metrics.roadmap_known_s = Some(last.as_secs_f64());
         }
         let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
-        let sentence = |t: &TakenOver| {
+        let sentence = |t: &FailedOver| {
             let (region, backup) = (name(t.region), name(t.backup));
             format!("{region} by {backup} in cycle {}", t.cycle)
         };

@@ -8,7 +8,7 @@ use farside_worlds::NodeId;
 use super::Node;
 use super::base::{Base, Neighbor};
 use crate::config::Sabotage;
-use crate::failover::messages::{Account, Content, Inquiry, Passed, Replaced, TakenOver};
+use crate::failover::messages::{Account, Content, FailedOver, Inquiry, Passed, Replaced};
 use crate::failover::rank::Replacement;
 use crate::failover::{FailoverRecord, PendingFailover, holder, released};
 use crate::ids::RoverId;
@@ -375,7 +375,7 @@ impl Node {
         if let Some(reservations) = self.policy.reservations() {
             reservations.succeed(&self.base, ctx, region, Some(&accounts));
         }
-        ctx.sample(&TakenOver {
+        ctx.sample(&FailedOver {
             region,
             backup: self.base.id,
             cycle: self.base.cycle,
