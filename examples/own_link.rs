@@ -128,8 +128,8 @@ fn main() {
     sim.stop_at(SimTime::from_secs(24 * 3_600), "a day");
     let report = sim.run(Executor::Inline).expect("the simulation can start");
     println!("{:?}", report.counts);
-    // Six samples in each period: one during the contact; of the five that have to wait, at 16 bytes
-    // each, four fit.
+    // Six samples in each period: one during the contact; of the five that have to wait, at 16
+    // bytes each, four fit.
     assert_eq!((report.counts.sent, report.counts.lost), (72, 12));
     assert_eq!(report.counts.lost_by_reason["memory_full"], 12);
     // The last four wait for a contact that the run does not see.

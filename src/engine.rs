@@ -228,8 +228,9 @@ impl Engine {
         self.run_handler(class, record, key, &head, letter, sink)
     }
 
-    /// Charges a host for receiving a message, which its radio does whether or not the actor is there
-    /// to take it.
+    /// Charges a host for receiving a message, which its radio does whether or not the actor is
+    /// there to take it. Kept out of the way of the many messages that nobody pays for.
+    #[inline(never)]
     fn charge_receiver(&mut self, receiver: EntityId, side: Option<Side>) {
         let carriage = side.and_then(|side| side.carriage);
         let charge_j = carriage.map_or(0.0, |carriage| carriage.receive_j);

@@ -213,7 +213,7 @@ pub enum BuildError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LookupError {
     /// No actor has the name.
-    #[error("no actor is called {name:?}{}", .nearest.as_ref().map(|near| format!("; did you mean {near:?}?")).unwrap_or_default())]
+    #[error("no actor is called {name:?}{}", suggestion(.nearest.as_deref()))]
     Unknown {
         /// The name.
         name: String,
@@ -251,6 +251,10 @@ impl LookupError {
             nearest: nearest(name, actors),
         }
     }
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
 }
 
 fn listed(accepts: &[&str]) -> String {

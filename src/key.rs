@@ -15,8 +15,8 @@ use crate::time::SimTime;
 ///
 /// ```
 /// use farside::{EntityId, key::EventKey, time::SimTime};
-/// let first = EventKey { time: SimTime::ZERO, step: 0, tie: 0, source: EntityId::CONTROL, count: 0 };
-/// let hop = EventKey { step: 1, ..first };
+/// let first = EventKey { time: SimTime::ZERO, step: 0, tie: 0, source: EntityId::CONTROL, count: 0
+/// }; let hop = EventKey { step: 1, ..first };
 /// assert!(first < hop);
 /// ```
 // The derived order is the order of the run: the fields' order is part of the contract.

@@ -102,11 +102,16 @@
 //! - [`Context`]: everything a handler can do: keyed messages, timers, durable memory, samples.
 //! - [`Carrier`]: a link of your own; it sees size, kind, sender and receiver of each message and
 //!   decides when it arrives, how often, or why not.
-//! - [`Simulation::crash_at`] and the other control events, which come before anything else at
-//!   their instant.
+//! - [`Simulation::crash_at`], [`Simulation::tell_at`] and the other control events, which come
+//!   before anything else at their instant.
+//! - [`Context::recipient`]: an actor looked up by what it accepts, whatever its type.
+//! - [`Context::host_transmit_energy_j`]: what links charged all actors of a host.
 //! - [`record::Observer`]: watch a run. What observes changes nothing.
 //! - [`Executor`]: inline, or on threads; one result.
 //! - [`Fault`]: what went wrong, where, when, with which message.
+//! - [`scene::Scene`]: what viewers draw of a run.
+//!
+//! Small programs that show one thing each are in the folder `examples`.
 
 pub mod actor;
 pub mod carrier;

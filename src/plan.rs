@@ -72,8 +72,8 @@ impl KindEntry {
 #[doc(hidden)]
 pub struct Accepted {
     pub(crate) kind: KindEntry,
-    /// How a message of this type is sealed for the actor: a function whose type only those know who
-    /// know the message's.
+    /// How a message of this type is sealed for the actor: a function whose type only those know
+    /// who know the message's.
     pub(crate) seal: Box<dyn Any + Send + Sync>,
 }
 

@@ -1,5 +1,6 @@
-//! The event queue: small keys here, payloads elsewhere. The earliest events stand sorted, the others
-//! in a quaternary heap; the events of the present instant pass through a FIFO and touch neither.
+//! The event queue: small keys here, payloads elsewhere. The earliest events stand sorted, the
+//! others in a quaternary heap; the events of the present instant pass through a FIFO and touch
+//! neither.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;

@@ -11,9 +11,9 @@ use crate::record::Record;
 
 /// Draws a run: for each committed record, what changes in the picture.
 ///
-/// The log writer of `farside-logs` asks it as it writes, and puts what it draws between the records
-/// in order of time, in Foxglove's published schemas. It is shown records of excluded topics too,
-/// state samples among them, but not what is under way at the end.
+/// The log writer of `farside-logs` asks it as it writes, and puts what it draws between the
+/// records in order of time, in Foxglove's published schemas. It is shown records of excluded
+/// topics too, state samples among them, but not what is under way at the end.
 ///
 /// ```
 /// use farside::RunInfo;
@@ -100,8 +100,8 @@ pub enum Drawing {
 pub struct Pose {
     /// Where \[m\].
     pub position_m: [f64; 3],
-    /// The direction it faces, east and north. Only the direction counts; none is east. A vector and
-    /// not an angle, because angles differ by platform in their last digit, and logs must not.
+    /// The direction it faces, east and north. Only the direction counts; none is east. A vector
+    /// and not an angle, because angles differ by platform in their last digit, and logs must not.
     pub heading: [f64; 2],
 }
 
@@ -134,8 +134,8 @@ pub enum Form {
     Lines {
         /// The ends, relative to the shape's place \[m\].
         points_m: Vec<[f64; 3]>,
-        /// Numbers of points, from 0: where many lines meet in few points, less to write. Empty: the
-        /// points in their order.
+        /// Numbers of points, from 0: where many lines meet in few points, less to write. Empty:
+        /// the points in their order.
         indices: Vec<u32>,
         /// How thick \[m\].
         thickness_m: f64,

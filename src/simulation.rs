@@ -283,8 +283,8 @@ impl Simulation {
         self.links.iter().map(|link| link.name.as_str())
     }
 
-    /// The greatest [`Carrier::min_delay`] of all links declared so far, zero if there are none: what
-    /// a protocol has to reckon with, as far as links can tell before the start.
+    /// The greatest [`Carrier::min_delay`] of all links declared so far, zero if there are none:
+    /// what a protocol has to reckon with, as far as links can tell before the start.
     ///
     /// ```
     /// use farside::prelude::*;
@@ -299,8 +299,8 @@ impl Simulation {
         delays.max().unwrap_or(SimDuration::ZERO)
     }
 
-    /// The least [`Carrier::rate_bit_per_s`] of all links declared so far \[bit/s\]; none if no link
-    /// has a rate.
+    /// The least [`Carrier::rate_bit_per_s`] of all links declared so far \[bit/s\]; none if no
+    /// link has a rate.
     ///
     /// ```
     /// use farside::prelude::*;
@@ -388,8 +388,8 @@ impl Simulation {
     /// ```
     ///
     /// # Errors
-    /// When no actor declared so far has the name, with the nearest that one has; or when it does not
-    /// accept messages of this type, with those that it accepts.
+    /// When no actor declared so far has the name, with the nearest that one has; or when it does
+    /// not accept messages of this type, with those that it accepts.
     pub fn tell_named_at<M: Message>(
         &mut self,
         time: SimTime,

@@ -7,3 +7,4 @@ pub mod link;
 pub mod radio;
 pub mod system;
 pub mod units;
+pub mod wiring;

@@ -2,7 +2,7 @@
 //!
 //! A [`Link`] joins two hosts, one way. What it does with a message is decided by a [`Transmitter`]
 //! from a [`Timeline`] of [`LinkParams`]; which link has which is the affair of [`LinksConfig`], and
-//! when they change, of [`Degrade`]; both are what scenario files hold, and [`LinkBuilder`] turns
+//! when they change, of [`Degrade`]; both are what scenario files hold, and [`LinkBuilder`](crate::wiring::LinkBuilder) turns
 //! them into links.
 //!
 //! # What happens to a message
@@ -76,7 +76,6 @@
 //! assert_eq!(Link::new(params).min_delay(), SimDuration::from_millis(1280));
 //! ```
 
-mod build;
 mod burst;
 mod change;
 mod config;
@@ -90,7 +89,6 @@ mod stage;
 mod timeline;
 mod trace;
 mod transmit;
-mod wiring;
 
 use std::sync::Arc;
 
@@ -99,7 +97,6 @@ use farside::{SimDuration, SimTime};
 
 use stage::{Draws, Purpose};
 
-pub use build::LinkBuilder;
 pub use burst::Burst;
 pub use change::LinkChange;
 pub use config::{Degrade, LinkConfigError, LinksConfig};
@@ -113,7 +110,6 @@ pub use timeline::Timeline;
 pub use trace::Trace;
 pub(crate) use transmit::difference;
 pub use transmit::{Attempt, Path, Sent, Transmitter};
-pub use wiring::{Links, Wire, Wiring};
 
 /// Why a link loses a message by chance.
 pub const LOSS: &str = "loss";

@@ -30,8 +30,8 @@ use serde::{Deserialize, Serialize};
 use crate::link::{Attempt, LinkChange, Path, Timeline, Transmitter};
 pub(crate) use build::RadioBuilder;
 use channel::{Channel, Station, Transmission};
-pub use config::{Access, RadioConfig, Sharing};
-pub use path::{LIGHT_M_PER_S, OCCLUDED, PathLoss, RANGE};
+pub use config::{Access, PathLoss, RadioConfig, Sharing};
+pub use path::{LIGHT_M_PER_S, OCCLUDED, RANGE};
 pub use track::Track;
 
 /// Why a message is lost whose transmissions all met others.

@@ -17,7 +17,9 @@ use farside::{Report, SimDuration, Simulation};
 use serde_json::{Map, Value};
 use thiserror::Error;
 
-use crate::link::{LinkBuilder, LinkConfigError, Links, Wire, Wiring};
+use crate::link::LinkConfigError;
+
+use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
 pub use files::{Files, no_file};
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};

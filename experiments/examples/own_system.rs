@@ -23,11 +23,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
-use farside_actors::link::Wiring;
 use farside_actors::system::{
     Assembly, Goal, Results, Section, Settings, Setup, SetupError, System,
 };
 use farside_actors::units;
+use farside_actors::wiring::Wiring;
 use farside_experiments::cli;
 use farside_experiments::registry::Registry;
 use serde::{Deserialize, Serialize};

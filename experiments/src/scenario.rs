@@ -19,13 +19,14 @@ use std::path::{Path, PathBuf};
 use farside::suggest::nearest;
 use farside::{End, SimDuration, SimTime, Simulation};
 use farside_actors::figure::Figure;
-use farside_actors::link::{Degrade, LinkBuilder, LinksConfig};
+use farside_actors::link::{Degrade, LinksConfig};
 use farside_actors::radio::RadioConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Files, PictureError, PictureRequest, Recording, Seeds, Settings, Setup, SetupError,
     System, no_file,
 };
+use farside_actors::wiring::LinkBuilder;
 use farside_actors::{settings, units};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};

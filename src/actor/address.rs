@@ -84,7 +84,8 @@ impl<A: Actor> Address<A> {
 }
 
 impl<M: Message> Recipient<M> {
-    /// The actor with this number in its address, of this type and called so, as one that accepts `M`.
+    /// The actor with this number in its address, of this type and called so, as one that accepts
+    /// `M`.
     pub(crate) fn of(
         declared: u32,
         actor_type: &ActorType,

@@ -70,8 +70,8 @@ impl<'a, A: Actor> Context<'a, A> {
         Ok(Address::new(declared))
     }
 
-    /// The actor called `name`, whatever its type, as one that accepts `M`: so a planner of one's own
-    /// takes the place of another under the same name.
+    /// The actor called `name`, whatever its type, as one that accepts `M`: so a planner of one's
+    /// own takes the place of another under the same name.
     ///
     /// ```
     /// use farside::prelude::*;
@@ -109,7 +109,8 @@ impl<'a, A: Actor> Context<'a, A> {
     /// ```
     ///
     /// # Errors
-    /// When no actor has that name, or its `Accepts` does not list `M`; the error names what it lists.
+    /// When no actor has that name, or its `Accepts` does not list `M`; the error names what it
+    /// lists.
     pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
         let (declared, actor_type) = self.parts.plan.actor(name)?;
         Recipient::of(declared, actor_type, name)
@@ -328,7 +329,8 @@ impl<'a, A: Actor> Context<'a, A> {
         durable[at].downcast_mut().expect("found by its type")
     }
 
-    /// True if someone watches state samples; for skipping work that only [`Context::sample`] needs.
+    /// True if someone watches state samples; for skipping work that only [`Context::sample`]
+    /// needs.
     pub fn samples_wanted(&self) -> bool {
         self.parts.plan.samples
     }

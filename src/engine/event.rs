@@ -1,4 +1,5 @@
-//! What waits in an engine's queue, and what is known of it: the heads of messages, timers and starts.
+//! What waits in an engine's queue, and what is known of it: the heads of messages, timers and
+//! starts.
 
 use std::num::NonZeroU64;
 

@@ -249,6 +249,7 @@ impl Parts {
 
     /// What links have charged this host, to be charged more. It outlives crashes, as spent energy
     /// does.
+    #[inline(never)]
     pub(crate) fn energy(&mut self, host: HostIndex) -> &mut HostEnergy {
         let at = host as usize;
         if self.energies.len() <= at {

@@ -81,7 +81,8 @@ impl Crate {
         crate_
     }
 
-    /// Takes out the files that are there for tests only, `#[cfg(test)] mod tests;`, and their parts.
+    /// Takes out the files that are there for tests only, `#[cfg(test)] mod tests;`, and their
+    /// parts.
     fn drop_test_files(&mut self, sources: &[(String, String)]) {
         let mut dropped: Vec<Module> = Vec::new();
         for (module, file) in &self.files {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::carrier::Carrier;
 use farside::prelude::*;
-use farside_actors::link::{Links, Wire, Wiring};
+use farside_actors::wiring::{Links, Wire, Wiring};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
 use nalgebra::Point3;
 

@@ -39,7 +39,7 @@ impl LinkChange {
     }
 
     /// A change that the link's timeline has already.
-    pub(super) fn planned(from: &LinkParams, to: &LinkParams) -> Self {
+    pub(crate) fn planned(from: &LinkParams, to: &LinkParams) -> Self {
         LinkChange {
             planned: true,
             ..LinkChange::from(&from.changes_to(to))

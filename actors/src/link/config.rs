@@ -99,7 +99,7 @@ pub struct Degrade {
 }
 
 impl Degrade {
-    pub(super) fn is_active(&self, at: SimDuration) -> bool {
+    pub(crate) fn is_active(&self, at: SimDuration) -> bool {
         self.at <= at && self.until.is_none_or(|until| at < until)
     }
 }

@@ -2,6 +2,7 @@
 //! `[links]` and `[[degrade]]`, and what a change writes to the log.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use farside::SimDuration;
 use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, Visitor};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::form::{
     DataRate, DataSize, Duration, Form, Fraction, OrOff, Plain, Power, Retries, Span,
 };
-use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace};
+use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace, preset};
 
 /// Whether a parameter of `LinkParams` is written when it is off, as a resolved scenario is.
 enum Shown {
@@ -276,7 +277,7 @@ impl LinkParams {
 
     /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace says
     /// when to transmit.
-    pub(super) fn fastest_bit_per_s(&self) -> Option<u64> {
+    pub(crate) fn fastest_bit_per_s(&self) -> Option<u64> {
         let windows = self.contacts.iter().flat_map(Contacts::windows);
         let fastest = windows
             .map(|window| window.rate.or(self.rate))
@@ -427,5 +428,26 @@ impl<'de> Deserialize<'de> for LinkParams {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let over = LinkOverrides::deserialize(from)?;
         Ok(LinkParams::default().with(&over))
+    }
+}
+
+/// The parameters of each preset, read once.
+fn presets() -> &'static [LinkParams] {
+    static ALL: OnceLock<Vec<LinkParams>> = OnceLock::new();
+    ALL.get_or_init(|| {
+        let table = preset::TEXT.parse::<toml::Table>().unwrap_or_default();
+        let read = |name: &&str| {
+            let over = table.get(*name).cloned();
+            let over = over.map(LinkOverrides::deserialize).and_then(Result::ok);
+            LinkParams::default().with(&over.unwrap_or_default())
+        };
+        preset::NAMES.iter().map(read).collect()
+    })
+}
+
+impl Preset {
+    /// Its parameters.
+    pub fn params(self) -> LinkParams {
+        presets()[self.0].clone()
     }
 }

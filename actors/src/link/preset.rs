@@ -1,11 +1,7 @@
 //! Links of known places, by name.
 
-use std::sync::OnceLock;
-
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-use super::{LinkOverrides, LinkParams};
 
 /// A named set of parameters; `presets.toml` beside this file has the figures, each with its
 /// source or marked as an estimate.
@@ -19,12 +15,13 @@ use super::{LinkOverrides, LinkParams};
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Preset(usize);
+pub struct Preset(pub(super) usize);
 
-const TEXT: &str = include_str!("presets.toml");
+/// The figures, a table for each name.
+pub(super) const TEXT: &str = include_str!("presets.toml");
 
 /// The names, in the file's order. The test holds them to the file.
-const NAMES: [&str; 7] = [
+pub(super) const NAMES: [&str; 7] = [
     "perfect",
     "lunar-surface-wifi",
     "lunar-relay",
@@ -33,20 +30,6 @@ const NAMES: [&str; 7] = [
     "mars-direct",
     "subsurface-mesh",
 ];
-
-/// The parameters of each preset, read once.
-fn all() -> &'static [LinkParams] {
-    static ALL: OnceLock<Vec<LinkParams>> = OnceLock::new();
-    ALL.get_or_init(|| {
-        let table = TEXT.parse::<toml::Table>().unwrap_or_default();
-        let read = |name: &&str| {
-            let over = table.get(*name).cloned();
-            let over = over.map(LinkOverrides::deserialize).and_then(Result::ok);
-            LinkParams::default().with(&over.unwrap_or_default())
-        };
-        NAMES.iter().map(read).collect()
-    })
-}
 
 impl Preset {
     /// The preset of this name.
@@ -62,11 +45,6 @@ impl Preset {
     /// Its name.
     pub fn name(self) -> &'static str {
         NAMES[self.0]
-    }
-
-    /// Its parameters.
-    pub fn params(self) -> LinkParams {
-        all()[self.0].clone()
     }
 }
 
@@ -99,6 +77,7 @@ impl<'de> Deserialize<'de> for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::{LinkOverrides, LinkParams};
 
     #[test]
     fn every_preset_of_the_file_can_be_named_and_read() {

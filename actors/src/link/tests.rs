@@ -11,6 +11,7 @@ use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::*;
+use crate::wiring::{LinkBuilder, Wiring};
 
 mod air;
 mod loss;

@@ -125,7 +125,7 @@ impl Timeline {
 
     /// What the log is told of contacts: when each opens and closes, as a planned change of
     /// `contact`. Contacts that repeat are told until `until`, and without it once.
-    pub(super) fn contact_changes(&self, until: Option<SimDuration>) -> Vec<(SimTime, LinkChange)> {
+    pub(crate) fn contact_changes(&self, until: Option<SimDuration>) -> Vec<(SimTime, LinkChange)> {
         let horizon = until.map_or(SimTime::MAX, |until| SimTime::ZERO + until);
         let mut changes = Vec::new();
         for (index, span) in self.spans.iter().enumerate() {

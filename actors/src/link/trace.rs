@@ -50,7 +50,7 @@ impl From<CapacityTrace> for Trace {
 }
 
 impl Trace {
-    /// A trace in a file that is still to be read: see [`super::LinkBuilder::read_traces`].
+    /// A trace in a file that is still to be read: see [`crate::wiring::LinkBuilder::read_traces`].
     pub fn named(name: &str) -> Self {
         Trace {
             name: Some(name.into()),
@@ -68,7 +68,7 @@ impl Trace {
         self.capacity.as_deref()
     }
 
-    pub(super) fn read(&mut self, capacity: Arc<CapacityTrace>) {
+    pub(crate) fn read(&mut self, capacity: Arc<CapacityTrace>) {
         self.capacity = Some(capacity);
     }
 }

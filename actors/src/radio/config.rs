@@ -3,7 +3,6 @@
 use farside::SimDuration;
 use serde::{Deserialize, Serialize};
 
-use super::path::PathLoss;
 use crate::units;
 
 /// Who may transmit when.
@@ -186,6 +185,46 @@ impl RadioConfig {
         match numbers.iter().find(|(_, x)| !x.is_finite() || *x < 0.0) {
             Some((key, found)) => Err((key, format!("{found}: expected zero or more, finite"))),
             None => Ok(()),
+        }
+    }
+}
+
+/// How the signal fades with distance: the log-distance model. See the module's table.
+///
+/// ```
+/// use farside_actors::radio::PathLoss;
+/// let loss = PathLoss { shadowing_db: 0.0, ..PathLoss::default() };
+/// // 27 dBm less 40 dB at a metre and 25 dB for each factor of ten.
+/// assert_eq!(loss.received_dbm(100.0, 0.0), 27.0 - 40.0 - 50.0);
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PathLoss {
+    /// The transmitter's power with its antenna's gain, in dBm; 27 unless given.
+    pub tx_power_dbm: f64,
+    /// The loss at one metre, in dB; 40 unless given, which is 2.4 GHz in free space.
+    pub reference_db: f64,
+    /// The exponent n; 2 in free space, 2.5 unless given.
+    pub exponent: f64,
+    /// The standard deviation of shadowing, in dB; 10 unless given, 0 for none.
+    pub shadowing_db: f64,
+    /// For how long a pair of stations keeps one draw of shadowing; 1 s unless given.
+    #[serde(with = "units::duration")]
+    pub shadowing_every: SimDuration,
+    /// The noise at the receiver, in dBm; -90 unless given.
+    pub noise_dbm: f64,
+}
+
+impl Default for PathLoss {
+    /// Those of Gazebo's RF communications model.
+    fn default() -> Self {
+        PathLoss {
+            tx_power_dbm: 27.0,
+            reference_db: 40.0,
+            exponent: 2.5,
+            shadowing_db: 10.0,
+            shadowing_every: SimDuration::from_secs(1),
+            noise_dbm: -90.0,
         }
     }
 }

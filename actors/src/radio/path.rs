@@ -13,11 +13,9 @@ use farside::carrier::Parcel;
 use farside::{SimDuration, SimTime};
 use farside_worlds::HeightField;
 use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
 
-use super::config::RadioConfig;
+use super::config::{PathLoss, RadioConfig};
 use crate::link::Path;
-use crate::units;
 
 /// The speed of light in vacuum, in metres a second.
 pub const LIGHT_M_PER_S: f64 = 299_792_458.0;
@@ -26,46 +24,6 @@ pub const LIGHT_M_PER_S: f64 = 299_792_458.0;
 pub const RANGE: &str = "range";
 /// Why a message is lost when the ground is between the antennas.
 pub const OCCLUDED: &str = "occluded";
-
-/// How the signal fades with distance: the log-distance model. See the module's table.
-///
-/// ```
-/// use farside_actors::radio::PathLoss;
-/// let loss = PathLoss { shadowing_db: 0.0, ..PathLoss::default() };
-/// // 27 dBm less 40 dB at a metre and 25 dB for each factor of ten.
-/// assert_eq!(loss.received_dbm(100.0, 0.0), 27.0 - 40.0 - 50.0);
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PathLoss {
-    /// The transmitter's power with its antenna's gain, in dBm; 27 unless given.
-    pub tx_power_dbm: f64,
-    /// The loss at one metre, in dB; 40 unless given, which is 2.4 GHz in free space.
-    pub reference_db: f64,
-    /// The exponent n; 2 in free space, 2.5 unless given.
-    pub exponent: f64,
-    /// The standard deviation of shadowing, in dB; 10 unless given, 0 for none.
-    pub shadowing_db: f64,
-    /// For how long a pair of stations keeps one draw of shadowing; 1 s unless given.
-    #[serde(with = "units::duration")]
-    pub shadowing_every: SimDuration,
-    /// The noise at the receiver, in dBm; -90 unless given.
-    pub noise_dbm: f64,
-}
-
-impl Default for PathLoss {
-    /// Those of Gazebo's RF communications model.
-    fn default() -> Self {
-        PathLoss {
-            tx_power_dbm: 27.0,
-            reference_db: 40.0,
-            exponent: 2.5,
-            shadowing_db: 10.0,
-            shadowing_every: SimDuration::from_secs(1),
-            noise_dbm: -90.0,
-        }
-    }
-}
 
 impl PathLoss {
     /// The power that arrives over `distance_m`, in dBm; `shadowing_db` is what shadows take.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::{HostId, SimTime, Simulation};
-use farside_actors::link::{Wire, Wiring};
+use farside_actors::wiring::{Wire, Wiring};
 
 use crate::config::{TrafficConfig, TrafficError};
 use crate::metrics::TrafficMetrics;

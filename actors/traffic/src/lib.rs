@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use farside::{Executor, FixedDelay, SimDuration, Simulation};
-//! use farside_actors::link::Links;
+//! use farside_actors::wiring::Links;
 //! use farside_traffic::{TrafficConfig, assemble};
 //!
 //! let config: TrafficConfig = toml::from_str("

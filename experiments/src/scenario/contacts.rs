@@ -12,8 +12,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use farside::{SimDuration, SimTime, Simulation};
-use farside_actors::link::{Contacts, LinkBuilder};
+use farside_actors::link::Contacts;
 use farside_actors::units;
+use farside_actors::wiring::LinkBuilder;
 use farside_worlds::contacts::{
     Builtin, CapacityTrace, ContactFormat, ContactPlan, ContactWindow, MAX_FILE_BYTES, PlanSummary,
 };

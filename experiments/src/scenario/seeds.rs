@@ -37,3 +37,52 @@ impl Scenario {
         self.shared.tie_seed = Some(tie_seed);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Scenario, Seeds};
+    use crate::registry::Registry;
+
+    fn scenario(sets: &[&str]) -> Scenario {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        Scenario::open("network/crater-dense", &sets, &Registry::builtin()).unwrap()
+    }
+
+    #[test]
+    fn a_problem_is_the_same_under_another_seed() {
+        let (own, given) = (scenario(&[]), scenario(&["problem_seed=1"]));
+        let seeds = |run, problem| Seeds { run, problem };
+        assert_eq!(own.seeds_of(5, None), seeds(5, 5));
+        assert_eq!(given.seeds_of(5, None), seeds(5, 1));
+        assert_eq!(given.seeds_of(5, Some(3)), seeds(5, 3));
+    }
+
+    /// What is built is the problem that pictures show: the places of nodes decide where none
+    /// hears.
+    #[test]
+    fn what_is_built_is_the_problem() {
+        let scenario = Scenario::open("network/crater-gaps", &[], &Registry::builtin()).unwrap();
+        let notes = |run, problem| {
+            let assembled = scenario.assemble_seeded(Seeds { run, problem }).unwrap();
+            assert!(!assembled.notes.is_empty());
+            assembled.notes
+        };
+        assert_eq!(notes(1, 1), notes(2, 1));
+        assert_ne!(notes(1, 1), notes(1, 2));
+    }
+
+    /// A run whose problem is its own says nothing of one, and its scenario is as it always was.
+    #[test]
+    fn seeds_are_written_where_they_say_something() {
+        let mut scenario = scenario(&["seed=4"]);
+        let before = scenario.resolved().unwrap();
+        assert!(!before.contains("problem_seed") && !before.contains("tie_seed"));
+        scenario.set_seeds(Seeds { run: 4, problem: 4 });
+        assert_eq!(scenario.resolved().unwrap(), before);
+        scenario.set_seeds(Seeds { run: 4, problem: 2 });
+        scenario.set_tie_seed(9);
+        let resolved = scenario.resolved().unwrap();
+        assert!(resolved.contains("problem_seed = 2\n") && resolved.contains("tie_seed = 9\n"));
+        assert_eq!(scenario.seeds(), Seeds { run: 4, problem: 2 });
+    }
+}

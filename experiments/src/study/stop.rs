@@ -128,4 +128,24 @@ mod tests {
         assert_eq!(target(&stop(10.0), 40, 1, &failed), 40);
         assert_eq!(target(&stop(10.0), 3, 1, &noisy), 3);
     }
+
+    #[test]
+    fn whole_blocks_are_looked_at_and_counted() {
+        let mut noisy: Vec<_> = (0..40)
+            .map(|i| Some(Sample::Number(f64::from(i % 2))))
+            .collect();
+        noisy[13] = None;
+        let wide = |block| Stop {
+            min_seeds: 8,
+            ..stop(if block == 1 { 1e-9 } else { -1.0 })
+        };
+        // 8, 12 and then 18, or whole blocks of 4.
+        assert_eq!(target(&wide(1), 40, 1, &noisy), 18);
+        assert_eq!(target(&wide(4), 40, 4, &noisy), 20);
+        // Twelve runs that say three things are three witnesses.
+        let shared: Vec<Sample> = (0..12).map(|i| Sample::Number(f64::from(i / 4))).collect();
+        assert!(width(&shared, 4) > 2.0 * width(&shared, 1));
+        let flags: Vec<Sample> = (0..12).map(|i| Sample::Flag(i < 4)).collect();
+        assert!(width(&flags, 4) > 1.4 * width(&flags, 1));
+    }
 }

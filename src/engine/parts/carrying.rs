@@ -1,5 +1,5 @@
-//! Messages and links: a link is shown a message, and what it decides becomes events; an actor tells
-//! a link something.
+//! Messages and links: a link is shown a message, and what it decides becomes events; an actor
+//! tells a link something.
 
 use std::any::Any;
 use std::cell::Cell;

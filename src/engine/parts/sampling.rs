@@ -2,8 +2,8 @@
 //!
 //! A log knows samples by the serde names of their types. Two types of one name would be written
 //! under one schema, so that the second is a fault, whether anyone watches or not: what observes
-//! changes nothing. Each engine notices what its own hosts do; what several engines do in one window
-//! is compared, in key order, before it is committed.
+//! changes nothing. Each engine notices what its own hosts do; what several engines do in one
+//! window is compared, in key order, before it is committed.
 
 use std::any::TypeId;
 use std::sync::Arc;

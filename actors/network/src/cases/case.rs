@@ -12,8 +12,9 @@ use crate::{
     Missions, Network, NetworkConfig, NetworkError, NetworkMetrics, Parts, RoadmapSource,
     TeamConfig, WorldConfig, assemble, missions,
 };
-use farside_actors::link::{Degrade, LinkBuilder, LinkConfigError, LinkParams, LinksConfig};
+use farside_actors::link::{Degrade, LinkConfigError, LinkParams, LinksConfig};
 use farside_actors::units;
+use farside_actors::wiring::LinkBuilder;
 
 /// A scenario of the network-guided system: what [`crate::assemble`] takes, with its links,
 /// degradations and crashes.

@@ -35,10 +35,10 @@ pub(super) fn told(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
         @if let Some(family) = family {
             p class="note" {
                 "Compared with " (study.cell_name(baseline)) ", over the same seeds. A difference \
-                 holds from an index on if at it and at all later ones the 95 % interval leaves out \
-                 0 on the same side, and p, adjusted by Holm, is at most 0.05. The family that is \
-                 held together are the indices of one curve: " (family) " tests. Several curves are \
-                 several families."
+                 holds from an index on if at it and at all later ones the 95 % interval leaves \
+                 out 0 on the same side, and p, adjusted by Holm, is at most 0.05. The family that \
+                 is held together are the indices of one curve: " (family) " tests. Several \
+                 curves are several families."
             }
         }
     }

@@ -220,3 +220,30 @@ proptest! {
         prop_assert_eq!(student(&differences(&sides), 0.0), 1.0);
     }
 }
+
+/// Families of twenty tests that hang together and in which nothing differs: Holm's method finds
+/// something in one of twenty at most, where each test alone finds something in every third.
+#[test]
+fn families_are_held_together() {
+    let families = 1000;
+    let (mut alone, mut together) = (0, 0);
+    for family in 0..families {
+        let mut stream = RandomKey::new(14).number(family).stream();
+        let shared: Vec<f64> = (0..30).map(|_| stream.normal(0.0, 1.0)).collect();
+        let p: Vec<f64> = (0..20)
+            .map(|_| {
+                let values = shared
+                    .iter()
+                    .map(|shared| 0.5 * shared + stream.normal(0.0, 1.0));
+                student(&Blocks::from(&values.collect::<Vec<_>>()), 0.0)
+            })
+            .collect();
+        let found = |p: &[f64]| u32::from(p.iter().any(|p| *p <= 0.05));
+        alone += found(&p);
+        together += found(&holm(&p));
+    }
+    assert!(
+        alone > 300 && (10..=60).contains(&together),
+        "{alone} {together}"
+    );
+}

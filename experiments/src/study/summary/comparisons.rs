@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::figures::{number_difference, rate_difference, rate_test};
+use super::figures::{number_difference, rate_test};
 use super::series::{self, ALPHA, DifferencePoint};
 use super::values::Kind;
 use super::{Difference, Estimate};
@@ -18,7 +18,8 @@ pub enum Verdict {
     /// The whole interval is where the claim says that it is not. Of a curve, some index's is, and
     /// Student's p against the broken bound is small, too, when all indices are looked at (Holm).
     DoesNotHold,
-    /// The interval reaches to both sides, or there is none.
+    /// The interval reaches to both sides, there is none, or it is of too few blocks to be sure of
+    /// ([`super::SURE_FROM`]).
     Undecided,
 }
 
@@ -99,6 +100,14 @@ impl Bounds {
         }
     }
 
+    fn verdict(&self, difference: &Difference) -> Verdict {
+        if difference.has_blocks_enough() {
+            self.judge(&difference.estimate())
+        } else {
+            Verdict::Undecided
+        }
+    }
+
     fn judge(&self, difference: &Estimate) -> Verdict {
         if !difference.is_known() {
             return Verdict::Undecided;
@@ -172,6 +181,7 @@ fn summary(
         mean,
         ci_low,
         ci_high,
+        ..
     } = judged.difference;
     ComparisonSummary {
         table: index,
@@ -206,13 +216,15 @@ fn judge(
     let name = &table.metric;
     let difference = match kind {
         Kind::Series => return judge_curve(results, name, cells, claim, bounds),
-        Kind::Rate => rate_difference(&rate_test(results, cells, name)),
+        Kind::Rate => rate_test(results, cells, name).1,
         Kind::Number => number_difference(results, cells, name),
         // Refused when the study is planned; a folder of other making has no verdict.
-        Kind::List | Kind::Text | Kind::Absent => Difference::new(0, Estimate::unknown(f64::NAN)),
+        Kind::List | Kind::Text | Kind::Absent => {
+            Difference::new(0, 0, Estimate::unknown(f64::NAN))
+        }
     };
     Judged {
-        verdict: bounds.judge(&difference.estimate()),
+        verdict: bounds.verdict(&difference),
         cells,
         difference,
         at: None,
@@ -237,7 +249,7 @@ fn judge_curve(
         .collect();
     let verdicts: Vec<Verdict> = points
         .iter()
-        .map(|point| bounds.judge(&point.difference.estimate()))
+        .map(|point| bounds.verdict(&point.difference))
         .collect();
     let pairs = series::pairs(results, cells, name).into_iter();
     let pairs = pairs.filter(|pairs| pairs.index >= from);
@@ -266,10 +278,109 @@ fn judge_curve(
     Judged {
         cells,
         difference: worst.map_or_else(
-            || Difference::new(0, Estimate::unknown(f64::NAN)),
+            || Difference::new(0, 0, Estimate::unknown(f64::NAN)),
             |worst| worst.difference.clone(),
         ),
         at: worst.map(|worst| (worst.index, points.len())),
         verdict,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::fabricated::{self, loss, with_curves};
+    use crate::study::results::PublishedFigure;
+    use crate::study::summary::{MetricSummary, summarise};
+
+    fn claim(least: Option<f64>, most: Option<f64>, within: Option<f64>) -> Comparison {
+        Comparison {
+            others: vec![0],
+            from_index: None,
+            by_at_least: least,
+            by_at_most: most,
+            equal_within: within,
+        }
+    }
+
+    #[test]
+    fn an_interval_is_inside_outside_or_neither() {
+        use Verdict::{DoesNotHold, Holds, Undecided};
+        let more = claim(None, None, None);
+        let between = claim(Some(10.0), Some(30.0), None);
+        let equal = claim(None, None, Some(20.0));
+        for (claim, ends, verdict) in [
+            (&more, (0.1, 0.5), Holds),
+            (&more, (0.0, 0.5), Undecided),
+            (&more, (-0.5, 0.0), DoesNotHold),
+            (&more, (0.0, 0.0), DoesNotHold),
+            (&more, (f64::NEG_INFINITY, f64::INFINITY), Undecided),
+            (&between, (0.1, 0.3), Holds),
+            (&between, (0.05, 0.1), Undecided),
+            (&between, (0.01, 0.09), DoesNotHold),
+            (&between, (0.2, 0.4), Undecided),
+            (&between, (0.31, 0.4), DoesNotHold),
+            (&equal, (-0.2, 0.2), Holds),
+            (&equal, (0.1, 0.3), Undecided),
+            (&equal, (0.21, 0.3), DoesNotHold),
+            (&equal, (-0.3, -0.21), DoesNotHold),
+        ] {
+            let (low, high) = ends;
+            let value = if low == high { low } else { (low + high) / 2.0 };
+            // In percent, as it was published.
+            let bounds = Bounds::new(claim, 100.0);
+            let found = bounds.judge(&Estimate { value, low, high });
+            assert_eq!(found, verdict, "{claim:?} {ends:?}");
+        }
+    }
+
+    /// Against the baseline, a comparison is the difference that the cell's summary has.
+    #[test]
+    fn one_difference_is_one_figure() {
+        let mut results = fabricated::study("one", vec![loss()], 20);
+        results = with_curves(results, 6);
+        let figure = |cell: usize, other: usize| PublishedFigure {
+            cells: vec![cell],
+            claim: Claim::Exceeds(Comparison {
+                others: vec![other],
+                ..claim(None, None, None)
+            }),
+            quote: String::new(),
+        };
+        let table = |metric: &str| Published {
+            metric: metric.to_owned(),
+            title: "T".to_owned(),
+            source: "S".to_owned(),
+            unit: String::new(),
+            scale: 1.0,
+            rows: None,
+            figures: vec![figure(4, 0), figure(0, 4), figure(4, 3)],
+            note: String::new(),
+            why: String::new(),
+        };
+        results.manifest.published = ["time_ratio", "completed", "reward"].map(table).to_vec();
+        let summary = summarise(&results);
+        let metrics = &summary.cells[4].metrics;
+        let named = |name: &str| metrics.iter().find(|one| one.name == name).unwrap();
+        let MetricSummary::Number(ratio) = &named("time_ratio").summary else {
+            panic!("no number")
+        };
+        let MetricSummary::Rate(completed) = &named("completed").summary else {
+            panic!("no rate")
+        };
+        let own = [&ratio.difference, &completed.difference];
+        for (own, all) in own.into_iter().zip(summary.comparisons.chunks(3)) {
+            let own = own.as_ref().unwrap();
+            let [there, back, _] = all else {
+                panic!("not three")
+            };
+            assert_eq!((there.difference, there.ci_low), (own.mean, own.ci_low));
+            assert!((there.difference + back.difference).abs() < 1e-12);
+        }
+        let verdicts: Vec<Verdict> = summary.comparisons.iter().map(|one| one.verdict).collect();
+        use Verdict::{DoesNotHold, Holds, Undecided};
+        assert_eq!(verdicts[..2], [Holds, DoesNotHold]);
+        // Before the half nothing differs; past it the claim that the worse one is more is wrong.
+        assert_eq!(verdicts[6..8], [DoesNotHold, Undecided]);
     }
 }

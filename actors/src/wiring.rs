@@ -1,5 +1,7 @@
 //! Which links a system wants, and what it may know of them once they are declared.
 
+mod build;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -7,7 +9,9 @@ use farside::{Carrier, HostId, SimDuration, Simulation};
 use farside_worlds::HeightField;
 use nalgebra::Point3;
 
-use super::{LinkConfigError, LinkParams};
+pub use build::LinkBuilder;
+
+use crate::link::{LinkConfigError, LinkParams};
 
 /// The links that a system wants, one way each, and where its hosts stand at first. A system lists
 /// them all and hands them over in one call, so that whatever it asks of links afterwards is asked
@@ -15,7 +19,8 @@ use super::{LinkConfigError, LinkParams};
 ///
 /// ```
 /// use farside::{SimDuration, Simulation};
-/// use farside_actors::link::{LinkBuilder, LinksConfig, Wiring};
+/// use farside_actors::link::LinksConfig;
+/// use farside_actors::wiring::{LinkBuilder, Wiring};
 /// let mut sim = Simulation::new(1);
 /// let (base, rover) = (sim.host("base"), sim.host("rover"));
 /// let mut wiring = Wiring::default();
@@ -27,12 +32,12 @@ use super::{LinkConfigError, LinkParams};
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Wiring {
-    pub(super) pairs: Vec<(usize, usize)>,
-    pub(super) hosts: Vec<(HostId, String)>,
+    pub(crate) pairs: Vec<(usize, usize)>,
+    pub(crate) hosts: Vec<(HostId, String)>,
     /// By host: its place in `hosts`.
     known: BTreeMap<HostId, usize>,
-    pub(super) places_m: BTreeMap<String, Point3<f64>>,
-    pub(super) terrain: Option<Arc<HeightField>>,
+    pub(crate) places_m: BTreeMap<String, Point3<f64>>,
+    pub(crate) terrain: Option<Arc<HeightField>>,
 }
 
 impl Wiring {
@@ -94,7 +99,7 @@ impl Links {
     ///
     /// ```
     /// use farside::{FixedDelay, SimDuration, Simulation};
-    /// use farside_actors::link::{Links, Wiring};
+    /// use farside_actors::wiring::{Links, Wiring};
     /// let mut sim = Simulation::new(1);
     /// let (a, b) = (sim.host("a"), sim.host("b"));
     /// let mut wiring = Wiring::default();
@@ -123,13 +128,13 @@ impl Links {
         self.slowest_rate_bit_per_s = rates.into_iter().flatten().min();
     }
 
-    pub(super) fn add(&mut self, from: &str, to: &str, nominal: Arc<LinkParams>) {
+    pub(crate) fn add(&mut self, from: &str, to: &str, nominal: Arc<LinkParams>) {
         self.reckon(nominal.min_delay(), nominal.fastest_bit_per_s());
         self.nominal
             .insert((from.to_owned(), to.to_owned()), nominal);
     }
 
-    pub(super) fn with_remarks(mut self, remarks: BTreeSet<&'static str>) -> Self {
+    pub(crate) fn with_remarks(mut self, remarks: BTreeSet<&'static str>) -> Self {
         self.remarks = remarks.into_iter().collect();
         self
     }

@@ -9,9 +9,10 @@ use farside_worlds::contacts::CapacityTrace;
 use globset::{Glob, GlobMatcher};
 use nalgebra::Point3;
 
-use super::{
-    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, Links,
-    LinksConfig, Timeline, Trace, Wiring,
+use super::{Links, Wiring};
+use crate::link::{
+    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig,
+    Timeline, Trace,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
 use farside::suggest::{closest, did_you_mean};
@@ -53,7 +54,8 @@ impl Pattern {
 ///
 /// ```
 /// use farside::Simulation;
-/// use farside_actors::link::{LinkBuilder, LinksConfig, Wiring};
+/// use farside_actors::link::LinksConfig;
+/// use farside_actors::wiring::{LinkBuilder, Wiring};
 /// let config: LinksConfig = toml::from_str("'base-rover_*' = { loss = 0.5 }").unwrap();
 /// let mut sim = Simulation::new(1);
 /// let (base, rover) = (sim.host("base"), sim.host("rover_1"));
