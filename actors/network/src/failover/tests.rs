@@ -291,7 +291,7 @@ fn two_nodes_far_apart_are_taken_over_by_two() {
     }
 }
 
-/// When the backup fails too, the next in line goes on for both of its regions.
+/// When the backup fails too, the next in the list goes on for both of its regions.
 #[test]
 fn the_next_in_line_follows_a_backup_that_fails_too() {
     for policy in POLICIES {

@@ -149,9 +149,9 @@ impl Base {
         at.is_some_and(|n| n.located.is_some() && !n.answers.contains(&region))
     }
 
-    /// Whether somebody in the line of `region` can be reckoned with no more: it is silent; or it
-    /// has given the region up to somebody who does not take it; or, as a backup, it was replaced
-    /// itself.
+    /// Whether somebody in the backup list of `region` can be reckoned with no more: it is silent;
+    /// or it has given the region up to somebody who does not take it; or, as a backup, it was
+    /// replaced itself.
     fn is_out(&self, id: NodeId, region: NodeId) -> bool {
         let Some(failover) = &self.failover else {
             return false;
