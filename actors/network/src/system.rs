@@ -251,21 +251,8 @@ fn violation(metrics: &NetworkMetrics) -> String {
     format!("{count} collisions: {}{rest}", first.join("; "))
 }
 
-/// Metrics that once had other names: the old one, and the new one.
-const OLD_METRICS: [(&str, &str); 3] = [
-    ("takeovers", "failovers"),
-    ("taken_over", "failed_over"),
-    ("standstill", "deadlock_reason"),
-];
-
 fn results(metrics: &NetworkMetrics) -> Results {
     let mut results = Results::of(metrics);
-    // Their old names, for one version.
-    for (old, new) in OLD_METRICS {
-        if let Some(value) = results.metrics.get(new).cloned() {
-            results.metrics.insert(old.to_owned(), value);
-        }
-    }
     let mut line = |label: &str, text: String| {
         results.summary.push((label.to_owned(), text));
     };

@@ -5,7 +5,7 @@ use farside_actors::system::Metric;
 use farside_actors::system::MetricKind::{Number, Rate, Sample, Word};
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 39] = [
+pub(crate) const ALL: [Metric; 38] = [
     Metric::new("arrival_s", "time to the goal", "s", Sample, Lower),
     Metric::new("arrived", "rovers at their goals", "rovers", Number, Higher),
     Metric::new(
@@ -148,7 +148,6 @@ pub(crate) const ALL: [Metric; 39] = [
         Number,
         Neither,
     ),
-    Metric::new("takeovers", "failovers (the old name)", "", Number, Neither),
     Metric::new(
         "time_ratio",
         "time of those that arrived over the shortest path",
