@@ -294,7 +294,8 @@ fn a_rover_at_its_goal_makes_way() {
     }
 }
 
-/// Far from well-formed: almost one cell in three has a rover, and most must make way for some other.
+/// Far from well-formed: almost one cell in three has a rover, and most must make way for some
+/// other.
 #[test]
 fn crowded_maps_are_sorted_out() {
     let map = GridMap::random(16, 16, 0.1, 4).unwrap();

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! cargo bench -p farside-network --bench mapf
-//! cargo bench -p farside-network --bench mapf -- max-plus 28 unlimited 1     # one run of 250 cycles
+//! cargo bench -p farside-network --bench mapf -- max-plus 28 unlimited 1   # 250 cycles
 //! ```
 
 // A benchmark measures real time.

@@ -137,13 +137,10 @@ pub fn assemble(
     let roadmap = parts.world.open_part(&parts.roadmap, sensors);
     let refused = gaps::refused(&roadmap, sensors, &missions);
     let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
-    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    if !stay_at_target {
-        let all = (0..).map(RoverId).zip(&missions);
-        for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
-            queues.entry(*entry).or_default().push(id);
-        }
-    }
+    let queues = match stay_at_target {
+        true => BTreeMap::new(),
+        false => queues(&missions, has_way),
+    };
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
     gaps::check_refused(&refused, &rover_names, stay_at_target)?;
@@ -197,6 +194,19 @@ pub fn assemble(
         rovers,
         score,
     })
+}
+
+/// Who waits at each entry, in order: all rovers that have a way to their goals.
+fn queues(
+    missions: &[(VertexId, VertexId)],
+    has_way: impl Fn(&RoverId) -> bool,
+) -> BTreeMap<VertexId, Vec<RoverId>> {
+    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
+    let all = (0..).map(RoverId).zip(missions);
+    for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
+        queues.entry(*entry).or_default().push(id);
+    }
+    queues
 }
 
 /// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the

@@ -49,8 +49,8 @@ pub enum Motion {
     Cycles,
     /// An edge takes as long as its length needs, with [`NetworkConfig::speed`] and
     /// [`NetworkConfig::acceleration_limit`]. With the policy `complete` a rover that holds the
-    /// grant for the vertex after next does not stop between; with `paper` a cycle has to be long
-    /// enough for the longest edge.
+    /// grant for the vertex after next does not stop between; with `max-plus` a cycle has to be
+    /// long enough for the longest edge.
     Continuous,
 }
 

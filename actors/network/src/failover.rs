@@ -45,7 +45,7 @@ use crate::ids::RoverId;
 use crate::safety::Occupant;
 use crate::safety::messages::Whereabouts;
 
-/// Each node's backup list, itself first. The next in line is, of the radio neighbours of all
+/// Each node's backup list, itself first. The next in it is, of the radio neighbours of all
 /// before it, the one that is itself, or has as radio neighbours, most of the owners of vertices
 /// next to the node's; of several the lowest.
 pub(crate) fn backup_lists(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Vec<NodeId>> {
@@ -75,7 +75,7 @@ pub(crate) fn backup_lists(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Ve
 }
 
 /// A rover's durable memory of who may still grant it which vertices: a rank for each region that
-/// was ever asked about. Without an entry it is 0, the region itself.
+/// was ever asked about. Without an entry it is 0, the region's own node.
 #[derive(Debug, Default)]
 pub(crate) struct FencingTokens {
     ranks: Vec<(NodeId, u32)>,
@@ -96,7 +96,7 @@ impl FencingTokens {
     }
 }
 
-/// The inquiry of a backup about one region.
+/// A failover that a backup has begun: it asks rovers about one region.
 #[derive(Debug)]
 pub(crate) struct PendingFailover {
     pub(crate) region: NodeId,
@@ -160,7 +160,7 @@ impl FailoverRecord {
         self.regions.len() < before
     }
 
-    /// Keeps an answer to an pending. True if it was the last that was missing.
+    /// Keeps an answer to a pending failover. True if it was the last that was missing.
     pub(crate) fn answered(&mut self, account: Account) -> bool {
         let asked = |i: &&mut PendingFailover| i.region == account.region && i.rank == account.rank;
         let Some(pending) = self.pending.iter_mut().find(asked) else {
@@ -175,7 +175,7 @@ impl FailoverRecord {
         pending.missing().next().is_none()
     }
 
-    /// Ends an pending that all have answered, and takes the region on. Each rover's latest
+    /// Ends a pending failover that all have answered, and takes the region on. Each rover's latest
     /// account, with later facts in their place.
     pub(crate) fn take_on(&mut self, region: NodeId, rank: u32) -> Vec<Account> {
         let asked = |i: &PendingFailover| i.region == region && i.rank == rank;

@@ -50,7 +50,8 @@ impl WorldConfig {
     /// use std::sync::Arc;
     /// use farside_network::{Gaps, WorldConfig};
     /// use farside_worlds::Roadmap;
-    /// let world = WorldConfig { gaps: Gaps::Close, coverage_m: Some(60.0), ..WorldConfig::default() };
+    /// let coverage_m = Some(60.0);
+    /// let world = WorldConfig { gaps: Gaps::Close, coverage_m, ..WorldConfig::default() };
     /// let map = Arc::new(Roadmap::builtin(world.roadmap.name())?);
     /// let sensors = world.place(&map, 1)?;
     /// let open = world.open_part(&map, &sensors);

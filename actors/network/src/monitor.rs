@@ -14,7 +14,7 @@ use farside_worlds::{NodeId, VertexId};
 use super::config::Motion;
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use super::waits::{Standing, WaitRule, Waits};
-use crate::failover::messages::TakenOver;
+use crate::failover::messages::FailedOver;
 use crate::ids::RoverId;
 use crate::max_plus::loads::Loads;
 use crate::max_plus::messages::NodeState;
@@ -63,7 +63,7 @@ pub(crate) struct Score {
     deadlock: Deadlock,
     deadlock_reason: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
-    taken_over: Vec<TakenOver>,
+    failed_over: Vec<FailedOver>,
     confirmed_deadlocks: u32,
     last_confirmed: Vec<RoverId>,
     ended: bool,
@@ -154,9 +154,9 @@ impl Observer for Monitor {
                 score.count(&state);
             } else if kind.name() == "RoadmapKnown" {
                 score.informed.push(record.time());
-            } else if kind.name() == "TakenOver" {
+            } else if kind.name() == "FailedOver" {
                 let taken = kind.schema().decode(record.body).map_err(failed)?;
-                score.taken_over.push(taken);
+                score.failed_over.push(taken);
             }
         }
         Ok(Flow::Continue)
@@ -250,10 +250,10 @@ impl Score {
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
         let reason = if still(self.last_move, config.deadlock_window + site.patience) {
             self.deadlock = Deadlock::Passive;
-            "passive deadlock"
+            "deadlock"
         } else if still(self.nearest.1, config.livelock_window + site.patience) {
             self.deadlock = Deadlock::Livelock;
-            "active deadlock"
+            "livelock"
         } else if self.cycle >= config.cycle_limit {
             "cycle limit"
         } else {
@@ -356,15 +356,15 @@ impl Score {
             metrics.roadmap_known_s = Some(last.as_secs_f64());
         }
         let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
-        let sentence = |t: &TakenOver| {
+        let sentence = |t: &FailedOver| {
             let (region, backup) = (name(t.region), name(t.backup));
             format!("{region} by {backup} in cycle {}", t.cycle)
         };
         metrics.refused = site.refused.len() as u32;
         let refused = site.refused.iter();
         metrics.refused_missions = refused.map(|r| r.sentence(&site.rover_names)).collect();
-        metrics.failovers = self.taken_over.len() as u32;
-        metrics.failed_over = self.taken_over.iter().map(sentence).collect();
+        metrics.failovers = self.failed_over.len() as u32;
+        metrics.failed_over = self.failed_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
@@ -387,6 +387,12 @@ impl Score {
         metrics.costs = site
             .stay_at_target
             .then(|| Costs::new(&rovers.map(cost).collect::<Vec<_>>()));
+        self.measure_paths(site, &mut metrics);
+        metrics
+    }
+
+    /// The paths of the rovers that arrived, in the mean.
+    fn measure_paths(&self, site: &Shared, metrics: &mut NetworkMetrics) {
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
             let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
                 continue;
@@ -417,6 +423,5 @@ impl Score {
         ] {
             *mean /= count;
         }
-        metrics
     }
 }

@@ -7,8 +7,8 @@
 //! 3. A rover takes step n + 1 only after n, only by a grant for it, and only once: of two grants
 //!    for one step it obeys the first. What it accepts is durable before it moves.
 //! 4. A vertex held for (rover, step) is freed by proof only: the rover is on its way from there
-//!    (LEAVING), it is at a later step, or it took (or is irrevocably taking) that step to somewhere
-//!    else.
+//!    (LEAVING), it is at a later step, or it took (or is irrevocably taking) that step to
+//!    somewhere else.
 //!
 //! By 1, 2 and 4 at most one rover may be at, or on its way to, a vertex. Swapping along an edge
 //! would need each of two rovers to hold the vertex on which the other one still stands. All proofs

@@ -247,7 +247,9 @@ mod tests {
         ) {
             let on: BTreeMap<u32, Vec<u32>> = (0..)
                 .zip(&lists)
-                .map(|(rover, list)| (rover, list.iter().copied().filter(|r| *r != rover).collect()))
+                .map(|(rover, list)| {
+                    (rover, list.iter().copied().filter(|r| *r != rover).collect())
+                })
                 .filter(|(_, list): &(u32, Vec<u32>)| !list.is_empty())
                 .collect();
             let closed = |set: u32| (0..7).filter(|r| set >> r & 1 == 1).all(|rover| {

@@ -75,7 +75,7 @@ pub enum Content {
 
 /// What a backup records when it begins to answer for another node's vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TakenOver {
+pub struct FailedOver {
     /// The node that is replaced.
     pub region: NodeId,
     /// The node that answers for its vertices.

@@ -291,7 +291,7 @@ fn two_nodes_far_apart_are_taken_over_by_two() {
     }
 }
 
-/// When the backup fails too, the next in line goes on for both of its regions.
+/// When the backup fails too, the next in the list goes on for both of its regions.
 #[test]
 fn the_next_in_line_follows_a_backup_that_fails_too() {
     for policy in POLICIES {
@@ -442,7 +442,11 @@ fn trial() -> impl Strategy<Value = Trial> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     /// Nodes crash, for good or not, are cut off from each other while rovers still hear them, and
     /// suspect each other for nothing: nobody collides.

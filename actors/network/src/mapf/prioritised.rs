@@ -7,7 +7,7 @@ use super::order::Order;
 use super::plan::Outcome;
 use super::problem::Problem;
 use super::single::{self, Entry};
-use super::table::Table;
+use super::table::StayTable;
 use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it. With several orders to try it stops
@@ -62,7 +62,7 @@ pub fn prioritised_in_time(problem: &Problem<'_>, pace: &Pace<'_>, order: &Order
 }
 
 fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetable {
-    let mut table = Table::new(problem.roadmap(), problem.missions().len());
+    let mut table = StayTable::new(problem.roadmap(), problem.missions().len());
     let mut failures = Vec::new();
     for &rover in order {
         // A predecessor has taken the first interval in which it found the entry free, so that the

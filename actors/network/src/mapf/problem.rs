@@ -35,7 +35,8 @@ impl From<(VertexId, VertexId)> for Mission {
 /// How rovers come and go.
 ///
 /// ```
-/// assert_ne!(farside_network::mapf::Rules::DisappearAtTarget, farside_network::mapf::Rules::StayAtTarget);
+/// use farside_network::mapf::Rules;
+/// assert_ne!(Rules::DisappearAtTarget, Rules::StayAtTarget);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rules {

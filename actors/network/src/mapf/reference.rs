@@ -7,7 +7,7 @@ use super::plan::Outcome;
 use super::problem::{Problem, Rules};
 use super::safe_intervals::{FOREVER, TimedVisit};
 use super::single::{self, Entry};
-use super::table::Table;
+use super::table::StayTable;
 use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it, so that it is sure of a way.
@@ -70,7 +70,7 @@ pub fn reference_in_time(problem: &Problem<'_>, pace: &Pace<'_>, order: &Order) 
 
 fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetable {
     let missions = problem.missions();
-    let mut table = Table::new(problem.roadmap(), missions.len());
+    let mut table = StayTable::new(problem.roadmap(), missions.len());
     let stand = |rover: usize| {
         vec![TimedVisit {
             vertex: missions[rover].entry,

@@ -405,7 +405,8 @@ pub(super) mod tests {
                 }
                 for visit in &way {
                     for &(s, e) in &busy[visit.vertex.0 as usize] {
-                        prop_assert!(visit.end < s || visit.start > e, "{:?} meets ({}, {})", visit, s, e);
+                        let is_apart = visit.end < s || visit.start > e;
+                        prop_assert!(is_apart, "{:?} meets ({}, {})", visit, s, e);
                     }
                 }
             }

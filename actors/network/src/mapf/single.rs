@@ -9,7 +9,7 @@ use farside_worlds::{Roadmap, VertexId};
 use super::plan::Failure;
 use super::problem::{Mission, Problem, Rules};
 use super::safe_intervals::{Aim, FOREVER, Label, SearchSpace, TimedVisit, way_to};
-use super::table::Table;
+use super::table::StayTable;
 use super::timetable::Pace;
 
 /// When a rover may come in.
@@ -31,7 +31,7 @@ pub(crate) enum Entry {
 pub(crate) fn search(
     problem: &Problem<'_>,
     pace: &Pace<'_>,
-    table: &Table,
+    table: &StayTable,
     rover: usize,
     entry: Entry,
 ) -> Result<Vec<TimedVisit>, Failure> {
@@ -120,7 +120,7 @@ fn times_to(map: &Roadmap, pace: &Pace<'_>, goal: VertexId) -> Vec<u64> {
 /// anywhere. `labels` are all places and times that it could reach.
 fn failure(
     ground: &SearchSpace<'_>,
-    table: &Table,
+    table: &StayTable,
     entry: VertexId,
     rover: usize,
     labels: &[Label],

@@ -15,14 +15,14 @@ pub(crate) struct Stay {
 
 /// The stays at each vertex, earliest first; none overlap.
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
+pub(crate) struct StayTable {
     stays: Vec<Vec<Stay>>,
     ways: Vec<Vec<TimedVisit>>,
 }
 
-impl Table {
-    pub(crate) fn new(roadmap: &Roadmap, rovers: usize) -> Table {
-        Table {
+impl StayTable {
+    pub(crate) fn new(roadmap: &Roadmap, rovers: usize) -> StayTable {
+        StayTable {
             stays: vec![Vec::new(); roadmap.len()],
             ways: vec![Vec::new(); rovers],
         }
@@ -132,10 +132,10 @@ mod tests {
 
     #[test]
     fn stays_are_found_and_given_up() {
-        let mut table = Table::new(&grid(3, 2, &[]), 2);
+        let mut table = StayTable::new(&grid(3, 2, &[]), 2);
         table.insert(0, trip(0, &[0, 1, 1, 2], Rules::StayAtTarget));
         table.insert(1, trip(0, &[3, 4, 4, 1, 0], Rules::StayAtTarget));
-        let at = |table: &Table, vertex, tick| table.occupant(v(vertex), tick);
+        let at = |table: &StayTable, vertex, tick| table.occupant(v(vertex), tick);
         assert_eq!((at(&table, 1, 0), at(&table, 1, 2)), (None, Some(0)));
         assert_eq!((at(&table, 1, 3), at(&table, 1, 4)), (Some(1), None));
         assert_eq!(at(&table, 2, 1_000_000), Some(0), "it stays");
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn rings_are_seen_whoever_closes_them() {
         // 0 1 2 3 4 5
-        let mut table = Table::new(&grid(3, 2, &[]), 4);
+        let mut table = StayTable::new(&grid(3, 2, &[]), 4);
         table.insert(0, trip(4, &[0, 1], Rules::DisappearAtTarget));
         table.insert(1, trip(4, &[1, 4], Rules::DisappearAtTarget));
         table.insert(2, trip(4, &[4, 3], Rules::DisappearAtTarget));

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::plan::{Trip, visits};
 use super::safe_intervals::TimedVisit;
 use super::single::{self, Entry};
-use super::table::Table;
+use super::table::StayTable;
 use super::testing::{brute_force, case, first_arrival, walks};
 use super::*;
 use crate::testing::{grid, v};
@@ -26,11 +26,11 @@ fn amid<'a>(
     rules: Rules,
     others: &[Trip],
     mission: Mission,
-) -> (Problem<'a>, Table) {
+) -> (Problem<'a>, StayTable) {
     let ends = |trip: &Trip| Mission::new(trip.vertices[0], trip.end());
     let missions = others.iter().map(ends).chain([mission]).collect();
     let problem = Problem::new(map, missions, rules).unwrap();
-    let mut table = Table::new(map, others.len() + 1);
+    let mut table = StayTable::new(map, others.len() + 1);
     for (rover, trip) in others.iter().enumerate() {
         table.insert(rover, visits(trip, rules));
     }
@@ -75,7 +75,11 @@ fn check(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 400,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn safe_intervals_are_as_fast_as_can_be(
@@ -187,7 +191,9 @@ proptest! {
     }
 
     #[test]
-    fn prioritised_planning_names_whom_it_does_not_serve(case in case(6, 5, 12), seed in any::<u64>()) {
+    fn prioritised_planning_names_whom_it_does_not_serve(
+        case in case(6, 5, 12), seed in any::<u64>(),
+    ) {
         let map = case.roadmap();
         let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
         for order in orders(seed) {
@@ -224,7 +230,11 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_plan_is_better_than_the_coupled_one(case in case(3, 2, 3)) {
@@ -252,7 +262,9 @@ proptest! {
     }
 
     #[test]
-    fn the_reference_is_no_better_than_the_coupled_plan(case in case(4, 3, 4), seed in any::<u64>()) {
+    fn the_reference_is_no_better_than_the_coupled_plan(
+        case in case(4, 3, 4), seed in any::<u64>(),
+    ) {
         let map = case.roadmap();
         let problem = Problem::new(&map, case.missions(), Rules::DisappearAtTarget);
         let Ok(problem) = problem else { return Ok(()) };

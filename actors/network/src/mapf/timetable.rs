@@ -64,7 +64,8 @@ pub struct Timetable {
 /// let map = Roadmap::from_toml(text)?;
 /// let problem = Problem::new(&map, vec![Mission::new(V(0), V(1))], Rules::DisappearAtTarget)?;
 /// let visit = |vertex, start, end| TimedVisit { vertex: V(vertex), start, end };
-/// let hasty = Timetable { ways: vec![vec![visit(0, 0, 1), visit(1, 1, 3)]], ..Timetable::default() };
+/// let ways = vec![vec![visit(0, 0, 1), visit(1, 1, 3)]];
+/// let hasty = Timetable { ways, ..Timetable::default() };
 /// assert_eq!(hasty.errors(&problem, &Pace::CYCLES), []);
 /// let slow = Pace { travel: &|_, _| 7, ..Pace::CYCLES };
 /// assert_eq!(hasty.errors(&problem, &slow), [TimetableError::Way { rover: 0, visit: 1 }]);

@@ -48,7 +48,7 @@ pub(crate) struct Rules {
 /// What one node optimises in one cycle: its own rovers, its neighbours' rovers, and the edges
 /// between them that touch an own one.
 #[derive(Debug)]
-pub(crate) struct MaxPlus {
+pub(crate) struct Solver {
     payoffs: Payoffs,
     rules: Rules,
     agents: Vec<Agent>,
@@ -86,7 +86,7 @@ fn place_of(i: usize, j: usize) -> usize {
     j - usize::from(j > i)
 }
 
-impl MaxPlus {
+impl Solver {
     /// The problem of a node with its own `rovers`, whose paths have their unary payoffs.
     pub(crate) fn new(
         payoffs: Payoffs,
@@ -94,7 +94,7 @@ impl MaxPlus {
         rovers: Vec<(RoverId, Vec<CandidatePath>)>,
     ) -> Self {
         let own = rovers.len();
-        let mut problem = MaxPlus {
+        let mut problem = Solver {
             payoffs,
             rules,
             agents: Vec::new(),

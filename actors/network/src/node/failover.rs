@@ -8,7 +8,7 @@ use farside_worlds::NodeId;
 use super::Node;
 use super::base::{Base, Neighbor};
 use crate::config::Sabotage;
-use crate::failover::messages::{Account, Content, Inquiry, Passed, Replaced, TakenOver};
+use crate::failover::messages::{Account, Content, FailedOver, Inquiry, Passed, Replaced};
 use crate::failover::rank::Replacement;
 use crate::failover::{FailoverRecord, PendingFailover, holder, released};
 use crate::ids::RoverId;
@@ -149,9 +149,9 @@ impl Base {
         at.is_some_and(|n| n.located.is_some() && !n.answers.contains(&region))
     }
 
-    /// Whether somebody in the line of `region` can be reckoned with no more: it is silent; or it
-    /// has given the region up to somebody who does not take it; or, as a backup, it was replaced
-    /// itself.
+    /// Whether somebody in the backup list of `region` can be reckoned with no more: it is silent;
+    /// or it has given the region up to somebody who does not take it; or, as a backup, it was
+    /// replaced itself.
     fn is_out(&self, id: NodeId, region: NodeId) -> bool {
         let Some(failover) = &self.failover else {
             return false;
@@ -375,7 +375,7 @@ impl Node {
         if let Some(reservations) = self.policy.reservations() {
             reservations.succeed(&self.base, ctx, region, Some(&accounts));
         }
-        ctx.sample(&TakenOver {
+        ctx.sample(&FailedOver {
             region,
             backup: self.base.id,
             cycle: self.base.cycle,

@@ -268,7 +268,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn corridors_are_the_chains_between_junctions(kept in prop::collection::vec(any::<bool>(), 31)) {
+        fn corridors_are_the_chains_between_junctions(
+            kept in prop::collection::vec(any::<bool>(), 31),
+        ) {
             let Some(map) = maze(&kept) else { return Ok(()); };
             let found = corridors(&map);
             let inner = |v: &VertexId| map.neighbors(*v).len() == 2;
@@ -280,7 +282,8 @@ mod tests {
             prop_assert_eq!(&insides, &chains(&map));
             prop_assert_eq!(insides.len(), found.len());
             for line in &found {
-                prop_assert!(line.windows(2).all(|step| map.are_adjacent(step[0], step[1])), "{line:?}");
+                let is_line = line.windows(2).all(|step| map.are_adjacent(step[0], step[1]));
+                prop_assert!(is_line, "{line:?}");
                 prop_assert_eq!(line.iter().collect::<BTreeSet<_>>().len(), line.len());
                 // All but the ends are inner; ends are not, unless the line is closed.
                 let (first, last) = (&line[0], &line[line.len() - 1]);

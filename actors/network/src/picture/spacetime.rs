@@ -239,7 +239,8 @@ impl Diagram<'_> {
         if let Some(ns) = locked {
             let cycle = libm::floor(ns as f64 / self.cycle_ns);
             says.push_str(&format!(
-                " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it moves."
+                " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it \
+                 moves."
             ));
         }
         let rovers = self.run.tracks.at(self.to_ns);

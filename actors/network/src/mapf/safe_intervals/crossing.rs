@@ -242,7 +242,14 @@ mod tests {
         fn the_earliest_way_through_gaps_is_found(busy in busy(9), gaps in any::<u32>()) {
             let (map, covers) = (map(), covered(gaps));
             let look = |u: VertexId| Some(busy[u.0 as usize].clone());
-            let ground = SearchSpace { roadmap: &map, headway: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+            let travel = |_, _| STEP;
+            let ground = SearchSpace {
+                roadmap: &map,
+                headway: 1,
+                travel: &travel,
+                busy: &look,
+                covers: &covers,
+            };
             let mut labels = ground.enter(v(0), 0, STEP);
             let open: Vec<u32> = (0..labels.len() as u32).collect();
             ground.expand(&mut labels, &open);
@@ -265,7 +272,14 @@ mod tests {
             for round in 0..9 {
                 let is_mine = |u: VertexId| parts >> u.0 & 1 == round % 2;
                 let look = |u: VertexId| is_mine(u).then(|| busy[u.0 as usize].clone());
-                let ground = SearchSpace { roadmap: &map, headway: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+                let travel = |_, _| STEP;
+                let ground = SearchSpace {
+                roadmap: &map,
+                headway: 1,
+                travel: &travel,
+                busy: &look,
+                covers: &covers,
+            };
                 if round < 2 && is_mine(v(0)) {
                     labels.extend(ground.enter(v(0), 0, STEP));
                 }
@@ -273,7 +287,8 @@ mod tests {
                 ground.expand(&mut labels, &open);
                 // Repetitions would double the labels each time.
                 let mut first = Best::new(map.len(), &covers);
-                let wanted: Vec<u32> = (0..).zip(&labels).filter(|(_, label)| first.improves(label)).map(|(at, _)| at).collect();
+                let better = (0..).zip(&labels).filter(|(_, label)| first.improves(label));
+                let wanted: Vec<u32> = better.map(|(at, _)| at).collect();
                 prune(&mut labels, &wanted);
             }
             let found = earliest(&labels);

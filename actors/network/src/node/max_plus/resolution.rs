@@ -332,11 +332,13 @@ mod tests {
             from in 0..20u32,
         ) {
             // Cutting both edges of a corner would take the map apart: rungs only.
-            let rungs: Vec<_> = cuts.iter().map(|(i, _)| (*i, i + 5)).filter(|(i, _)| i % 5 != 0).collect();
+            let rungs = cuts.iter().map(|(i, _)| (*i, i + 5));
+            let rungs: Vec<_> = rungs.filter(|(i, _)| i % 5 != 0).collect();
             let map = grid(5, 4, &rungs);
             let graph = LocalGraph::over(&map, map.vertices().collect());
             let need = |u: VertexId| needed[u.0 as usize];
-            let holder = |u: VertexId| (u.0 == from || standing[u.0 as usize]).then_some(RoverId(u.0));
+            let is_held = |u: VertexId| u.0 == from || standing[u.0 as usize];
+            let holder = |u: VertexId| is_held(u).then_some(RoverId(u.0));
             let Some(ways) = make_way(&graph, v(from), need, holder) else {
                 // Only if no free place off the ways can be reached.
                 let mut reached = vec![v(from)];

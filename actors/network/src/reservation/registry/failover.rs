@@ -7,7 +7,7 @@
 //! durably, unless a fencing token of its own is higher than the rank that one of the path's
 //! vertices was reserved at. A backup opens a region only when all rovers have answered at its
 //! rank, and they answer with the paths that they have taken. So the table that it makes of their
-//! accounts has just those ways through the region that count, or ever will, of all that lower
+//! accounts has just those paths through the region that count, or ever will, of all that lower
 //! ranks entered, in the order of the old table.
 //!
 //! **All else is asked for again.** Whoever has entered a part and passed it on to the region keeps
