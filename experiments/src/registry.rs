@@ -85,24 +85,34 @@ impl Registry {
         })
     }
 
-    /// The names of all built-in scenarios, sorted.
+    /// All built-in scenarios, sorted by name.
+    pub fn scenarios(&self) -> Vec<Builtin> {
+        sorted(self.systems().flat_map(System::scenarios))
+    }
+
+    /// Their names.
     pub fn scenario_names(&self) -> Vec<&'static str> {
-        names(self.systems().flat_map(System::scenarios))
+        self.scenarios().iter().map(|one| one.name).collect()
     }
 
     /// The text of a built-in scenario.
     pub fn scenario(&self, name: &str) -> Option<&'static str> {
-        text(self.systems().map(System::scenarios), name)
+        Builtin::find(&self.scenarios(), name).map(|one| one.text)
     }
 
-    /// The names of all built-in studies, sorted.
+    /// All built-in studies, sorted by name.
+    pub fn studies(&self) -> Vec<Builtin> {
+        sorted(self.systems().flat_map(System::studies))
+    }
+
+    /// Their names.
     pub fn study_names(&self) -> Vec<&'static str> {
-        names(self.systems().flat_map(System::studies))
+        self.studies().iter().map(|one| one.name).collect()
     }
 
     /// The text of a built-in study.
     pub fn study(&self, name: &str) -> Option<&'static str> {
-        text(self.systems().map(System::studies), name)
+        Builtin::find(&self.studies(), name).map(|one| one.text)
     }
 
     /// What a system says of a metric, if the system is known and has it.
@@ -112,13 +122,8 @@ impl Registry {
     }
 }
 
-fn names<'a>(builtin: impl Iterator<Item = &'a Builtin>) -> Vec<&'static str> {
-    let mut names: Vec<&'static str> = builtin.map(|builtin| builtin.name).collect();
-    names.sort_unstable();
-    names
-}
-
-fn text<'a>(builtin: impl Iterator<Item = &'a [Builtin]>, name: &str) -> Option<&'static str> {
-    let mut found = builtin.filter_map(|all| Builtin::find(all, name));
-    found.next().map(|builtin| builtin.text)
+fn sorted<'a>(builtin: impl Iterator<Item = &'a Builtin>) -> Vec<Builtin> {
+    let mut all: Vec<Builtin> = builtin.copied().collect();
+    all.sort_unstable_by_key(|one| one.name);
+    all
 }

@@ -1,5 +1,6 @@
 //! `farside scenarios` and `farside studies`: what is built in.
 
+use farside_actors::system::Builtin;
 use serde_json::json;
 
 use super::Exit;
@@ -17,17 +18,15 @@ pub(crate) struct Args {
 }
 
 /// Files that are built in.
-struct Shelf<'a> {
-    names: Vec<&'a str>,
-    text: Box<dyn Fn(&str) -> Option<&'static str> + 'a>,
+struct Shelf {
+    files: Vec<Builtin>,
     /// The key whose value says what a file is for.
     about: &'static str,
 }
 
 pub(crate) fn scenarios(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
-        names: registry.scenario_names(),
-        text: Box::new(|name| registry.scenario(name)),
+        files: registry.scenarios(),
         about: "description",
     };
     shelf.list(args)
@@ -35,38 +34,34 @@ pub(crate) fn scenarios(args: &Args, registry: &Registry) -> Result<Exit, Comman
 
 pub(crate) fn studies(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
-        names: registry.study_names(),
-        text: Box::new(|name| registry.study(name)),
+        files: registry.studies(),
         about: "question",
     };
     shelf.list(args)
 }
 
-impl Shelf<'_> {
+impl Shelf {
     fn list(&self, args: &Args) -> Result<Exit, CommandError> {
+        let files = self.files.iter();
         if args.text {
-            let texts = self.names.iter().map(|name| {
-                let text = (self.text)(name).unwrap_or_default();
-                format!("# --- {name}\n{text}")
-            });
+            let texts = files.map(|file| format!("# --- {}\n{}", file.name, file.text));
             print(texts.collect::<Vec<_>>().join("\n"))?;
             return Ok(Exit::Done);
         }
         if args.json {
-            let entry = |name: &&str| json!({ "name": name, self.about: self.about(name) });
-            print_json(&self.names.iter().map(entry).collect::<Vec<_>>())?;
+            let entry = |file: &Builtin| json!({ "name": file.name, self.about: self.about(file) });
+            print_json(&files.map(entry).collect::<Vec<_>>())?;
             return Ok(Exit::Done);
         }
-        let width = self.names.iter().map(|name| name.len()).max().unwrap_or(0);
-        let lines = self.names.iter();
-        let lines = lines.map(|name| format!("{name:width$}  {}", self.about(name)));
+        let width = files.clone().map(|file| file.name.len()).max().unwrap_or(0);
+        let lines = files.map(|file| format!("{:width$}  {}", file.name, self.about(file)));
         print(lines.collect::<Vec<_>>().join("\n"))?;
         Ok(Exit::Done)
     }
 
     /// What a file is for, in its own words.
-    fn about(&self, name: &str) -> String {
-        let table = (self.text)(name).and_then(|text| text.parse::<toml::Table>().ok());
+    fn about(&self, file: &Builtin) -> String {
+        let table = file.text.parse::<toml::Table>().ok();
         let about = table.as_ref().and_then(|table| table.get(self.about));
         about.and_then(toml::Value::as_str).unwrap_or("").to_owned()
     }

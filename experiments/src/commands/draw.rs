@@ -210,7 +210,7 @@ impl Recording for Logged<'_> {
             visit(&Recorded {
                 time_ns: record.key.time_ns,
                 class: record.class,
-                kind: &record.kind,
+                kind: record.kind,
                 body: record.body,
             })?;
         }
