@@ -28,6 +28,11 @@ use values::{Kind, kind_of};
 /// The shares at which distributions are given.
 pub const SHARES: [f64; 7] = [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95];
 
+/// From so many blocks of runs on a difference is called one: with five, chance alone has all of
+/// them on one side of 0 in one case of sixteen, and a bootstrap of values on one side is sure of
+/// it.
+pub const SURE_FROM: usize = 6;
+
 /// What a study says. As JSON, what cannot be known (an end of an interval over one run, a median
 /// that is never reached) is `null`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -217,6 +222,8 @@ pub struct McNemarSummary {
 pub struct Difference {
     /// How many seeds both have.
     pub n: usize,
+    /// How many blocks they are, or the same where no seeds share a problem.
+    pub blocks: usize,
     /// The mean difference.
     pub mean: f64,
     /// The lower end of its interval.
@@ -226,13 +233,19 @@ pub struct Difference {
 }
 
 impl Difference {
-    fn new(n: usize, estimate: Estimate) -> Self {
+    fn new(n: usize, blocks: usize, estimate: Estimate) -> Self {
         Difference {
             n,
+            blocks,
             mean: estimate.value,
             ci_low: estimate.low,
             ci_high: estimate.high,
         }
+    }
+
+    /// Whether there are blocks enough for anything to be sure of, see [`SURE_FROM`].
+    pub fn has_blocks_enough(&self) -> bool {
+        self.blocks >= SURE_FROM
     }
 
     /// The figure with its interval.

@@ -8,7 +8,7 @@ use crate::report::numbers::Style;
 use crate::stats::Estimate;
 use crate::study::summary::values::Kind;
 use crate::study::summary::{
-    CellSummary, ListSummary, MetricSummary, NumberSummary, OverallSummary, RateSummary,
+    CellSummary, ListSummary, MetricSummary, NumberSummary, OverallSummary, RateSummary, SURE_FROM,
 };
 use farside_actors::figure::numbers::plain;
 
@@ -88,14 +88,10 @@ fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) 
     }
 }
 
-/// From so many blocks of runs on a difference is marked: with five, chance alone has all of them
-/// on one side of 0 in one case of sixteen, and a bootstrap of values on one side is sure of it.
-const MARKED_FROM: usize = 6;
-
 /// A difference, marked if its interval leaves out 0.
 fn marked(style: Style, difference: &Estimate, blocks: usize) -> Markup {
     let apart = difference.low > 0.0 || difference.high < 0.0;
-    let sure = apart && difference.is_known() && blocks >= MARKED_FROM;
+    let sure = apart && difference.is_known() && blocks >= SURE_FROM;
     let sign = match (sure, difference.value > 0.0) {
         (true, true) => "\u{a0}▲",
         (true, false) => "\u{a0}▼",

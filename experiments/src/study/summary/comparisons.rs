@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::figures::{number_difference, rate_difference, rate_test};
+use super::figures::{number_difference, rate_test};
 use super::series::{self, ALPHA, DifferencePoint};
 use super::values::Kind;
 use super::{Difference, Estimate};
@@ -18,7 +18,8 @@ pub enum Verdict {
     /// The whole interval is where the claim says that it is not. Of a curve, some index's is, and
     /// Student's p against the broken bound is small, too, when all indices are looked at (Holm).
     DoesNotHold,
-    /// The interval reaches to both sides, or there is none.
+    /// The interval reaches to both sides, there is none, or it is of too few blocks to be sure of
+    /// ([`super::SURE_FROM`]).
     Undecided,
 }
 
@@ -99,6 +100,14 @@ impl Bounds {
         }
     }
 
+    fn verdict(&self, difference: &Difference) -> Verdict {
+        if difference.has_blocks_enough() {
+            self.judge(&difference.estimate())
+        } else {
+            Verdict::Undecided
+        }
+    }
+
     fn judge(&self, difference: &Estimate) -> Verdict {
         if !difference.is_known() {
             return Verdict::Undecided;
@@ -172,6 +181,7 @@ fn summary(
         mean,
         ci_low,
         ci_high,
+        ..
     } = judged.difference;
     ComparisonSummary {
         table: index,
@@ -206,13 +216,15 @@ fn judge(
     let name = &table.metric;
     let difference = match kind {
         Kind::Series => return judge_curve(results, name, cells, claim, bounds),
-        Kind::Rate => rate_difference(&rate_test(results, cells, name)),
+        Kind::Rate => rate_test(results, cells, name).1,
         Kind::Number => number_difference(results, cells, name),
         // Refused when the study is planned; a folder of other making has no verdict.
-        Kind::List | Kind::Text | Kind::Absent => Difference::new(0, Estimate::unknown(f64::NAN)),
+        Kind::List | Kind::Text | Kind::Absent => {
+            Difference::new(0, 0, Estimate::unknown(f64::NAN))
+        }
     };
     Judged {
-        verdict: bounds.judge(&difference.estimate()),
+        verdict: bounds.verdict(&difference),
         cells,
         difference,
         at: None,
@@ -237,7 +249,7 @@ fn judge_curve(
         .collect();
     let verdicts: Vec<Verdict> = points
         .iter()
-        .map(|point| bounds.judge(&point.difference.estimate()))
+        .map(|point| bounds.verdict(&point.difference))
         .collect();
     let pairs = series::pairs(results, cells, name).into_iter();
     let pairs = pairs.filter(|pairs| pairs.index >= from);
@@ -266,7 +278,7 @@ fn judge_curve(
     Judged {
         cells,
         difference: worst.map_or_else(
-            || Difference::new(0, Estimate::unknown(f64::NAN)),
+            || Difference::new(0, 0, Estimate::unknown(f64::NAN)),
             |worst| worst.difference.clone(),
         ),
         at: worst.map(|worst| (worst.index, points.len())),

@@ -108,22 +108,21 @@ pub(super) fn number_difference(
     let n = pairs.len();
     let pairs = in_blocks(&results.manifest, pairs);
     let key = difference_key(results, (here, there), name);
-    Difference::new(n, bootstrap::paired_difference(&pairs, key))
+    Difference::new(n, pairs.len(), bootstrap::paired_difference(&pairs, key))
 }
 
-/// McNemar's test of one cell against another.
+/// McNemar's test of one cell against another, and how much more often something is true.
 pub(super) fn rate_test(
     results: &Results,
     (here, there): (usize, usize),
     name: &str,
-) -> rates::McNemar {
+) -> (rates::McNemar, Difference) {
     let [a, b] = [here, there].map(|cell| truths(results.of_cell(cell), name));
-    rates::mcnemar_in_blocks(&in_blocks(&results.manifest, paired(&a, &b)))
-}
-
-/// How much more often something is true.
-pub(super) fn rate_difference(test: &rates::McNemar) -> Difference {
-    Difference::new(test.pairs(), rates::paired_rate_difference(test))
+    let blocks = in_blocks(&results.manifest, paired(&a, &b));
+    let test = rates::mcnemar_in_blocks(&blocks);
+    let estimate = rates::paired_rate_difference(&test);
+    let difference = Difference::new(test.pairs(), blocks.len(), estimate);
+    (test, difference)
 }
 
 pub(super) fn number_summary(results: &Results, cell: usize, name: &str) -> NumberSummary {
@@ -152,14 +151,15 @@ pub(super) fn rate_summary(results: &Results, cell: usize, name: &str) -> RateSu
     let here = truths(results.of_cell(cell), name);
     let (n, happened) = (here.len(), here.values().filter(|yes| **yes).count());
     let rate = rates::wilson_in_blocks(&in_blocks(&results.manifest, here));
-    let test = other(results, cell).map(|there| rate_test(results, (cell, there), name));
+    let tested = other(results, cell).map(|there| rate_test(results, (cell, there), name));
+    let (test, difference) = tested.unzip();
     RateSummary {
         n,
         happened,
         mean: rate.value,
         ci_low: rate.low,
         ci_high: rate.high,
-        difference: test.as_ref().map(rate_difference),
+        difference,
         mcnemar: test.map(|test| McNemarSummary {
             only_here: test.only_first,
             only_baseline: test.only_second,

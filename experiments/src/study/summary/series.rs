@@ -50,8 +50,8 @@ pub struct SeriesDifference {
     /// against this one other cell, have a p.
     pub family: usize,
     /// The index from which on to the last the difference holds: each interval leaves out 0 on the
-    /// same side, and each p, adjusted, is at most [`ALPHA`]. None if it does not hold at the last
-    /// index.
+    /// same side, each p, adjusted, is at most [`ALPHA`], and there are [`super::SURE_FROM`]
+    /// blocks. None if it does not hold at the last index.
     pub holds_from: Option<f64>,
     /// Whether it is more than in the other cell from there on, or less.
     pub is_more: Option<bool>,
@@ -119,7 +119,11 @@ pub(super) fn difference(
         let p = tests::student(&bootstrap::differences(&blocks), 0.0);
         DifferencePoint {
             index,
-            difference: Difference::new(n, bootstrap::paired_difference(&blocks, key)),
+            difference: Difference::new(
+                n,
+                blocks.len(),
+                bootstrap::paired_difference(&blocks, key),
+            ),
             p,
             p_holm: f64::NAN,
         }
@@ -133,7 +137,9 @@ pub(super) fn difference(
         let Difference {
             ci_low, ci_high, ..
         } = point.difference;
-        let apart = point.p_holm <= ALPHA && (ci_low > 0.0 || ci_high < 0.0);
+        let apart = point.difference.has_blocks_enough()
+            && point.p_holm <= ALPHA
+            && (ci_low > 0.0 || ci_high < 0.0);
         apart.then_some(ci_low > 0.0)
     };
     let is_more = points.last().and_then(side);

@@ -195,6 +195,16 @@ fn a_block_of_seeds_shares_a_problem() {
         other => panic!("{other:?}"),
     };
     assert!(width(&results) > 1.3 * width(&as_runs));
+    // Five problems are too few to be sure of anything.
+    let mut few = place.run(&format!("{STUDY}{CLAIMS}"), "few").unwrap();
+    few.runs.retain(|run| run.seed <= 25);
+    let summary = summarise(&few);
+    let undecided = |verdict: Verdict| verdict == Verdict::Undecided;
+    assert!(summary.comparisons.iter().all(|one| undecided(one.verdict)));
+    let MetricSummary::Series(series) = &summary.cells[1].metrics[0].summary else {
+        panic!("no curve")
+    };
+    assert_eq!(series.difference.as_ref().unwrap().holds_from, None);
     // A manifest says of blocks only where there are some.
     let text = |manifest: &Manifest| serde_json::to_string(manifest).unwrap();
     assert!(text(manifest).contains("\"block\":5") && !text(&alone.manifest).contains("block"));

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use crate::report::measure::{Measure, Study};
 use crate::report::numbers::{Style, with_unit};
 use crate::stats::Estimate;
+use crate::study::summary::SURE_FROM;
 use crate::study::summary::comparisons::{ComparisonSummary, Verdict};
 use farside_actors::figure::numbers::{as_written, plain};
 
@@ -16,7 +17,8 @@ pub(super) fn note(study: &Study<'_>) -> Markup {
             p class="note" {
                 "Where a cell is said to be more than another, the difference is paired by seed. \
                  The claim holds if the whole 95 % interval is where it says, and does not hold if \
-                 the whole interval is elsewhere."
+                 the whole interval is elsewhere; with fewer than " (SURE_FROM) " pairs, or blocks \
+                 of them, it is undecided."
                 @if all.iter().any(|one| one.index.is_some()) {
                     " Of curves it is for each index from the first on, and the one is shown that \
                      speaks most against it."
