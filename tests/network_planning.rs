@@ -8,8 +8,8 @@ use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside_network::messages::{CandidatePaths, Locations, MaxPlus, RoverId};
 use farside_network::{
-    ConfigError, Missions, NetworkConfig, NetworkError, NetworkMetrics, Parts, Processor,
-    TeamConfig, WorldConfig, assemble_over, missions,
+    ConfigError, MaxPlusConfig, Missions, NetworkConfig, NetworkError, NetworkMetrics, Parts,
+    Processor, TeamConfig, WorldConfig, assemble_over, missions,
 };
 use farside_worlds::{NodeId, Roadmap, SensorNetwork};
 
@@ -132,7 +132,10 @@ fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration
 #[test]
 fn the_first_vectors_leave_when_they_are_computed() {
     let network = NetworkConfig {
-        processor: Processor::PairsPerS(25_000),
+        max_plus: MaxPlusConfig {
+            processor: Processor::PairsPerS(25_000),
+            ..MaxPlusConfig::default()
+        },
         cycle_limit: 30,
         ..NetworkConfig::default()
     };
@@ -162,7 +165,10 @@ fn the_first_vectors_leave_when_they_are_computed() {
 #[test]
 fn a_processor_too_slow_for_anything_leaves_rovers_to_the_owners() {
     let network = NetworkConfig {
-        processor: Processor::PairsPerS(1),
+        max_plus: MaxPlusConfig {
+            processor: Processor::PairsPerS(1),
+            ..MaxPlusConfig::default()
+        },
         cycle_limit: 60,
         ..NetworkConfig::default()
     };
@@ -171,7 +177,10 @@ fn a_processor_too_slow_for_anything_leaves_rovers_to_the_owners() {
     // A pair of rovers with one path each would be done; there are hardly any.
     assert!(slow.metrics.max_plus_iterations < 0.2);
     let unlimited = NetworkConfig {
-        processor: Processor::Unlimited,
+        max_plus: MaxPlusConfig {
+            processor: Processor::Unlimited,
+            ..MaxPlusConfig::default()
+        },
         ..network
     };
     let fast = run(30, LATENCY, &unlimited).unwrap();
@@ -237,8 +246,11 @@ fn messages_bytes_and_steps_add_up() {
 fn choices_are_announced_for_anytime_only() {
     for (anytime, damping) in [(false, 0.5), (true, 0.0), (true, 0.7)] {
         let network = NetworkConfig {
-            anytime,
-            damping,
+            max_plus: MaxPlusConfig {
+                anytime,
+                damping,
+                ..MaxPlusConfig::default()
+            },
             cycle_limit: 25,
             ..NetworkConfig::default()
         };
@@ -253,12 +265,18 @@ fn choices_are_announced_for_anytime_only() {
 #[test]
 fn work_goes_from_the_busier_node_to_the_other_one_only() {
     let slow = NetworkConfig {
-        processor: Processor::PairsPerS(100_000),
+        max_plus: MaxPlusConfig {
+            processor: Processor::PairsPerS(100_000),
+            ..MaxPlusConfig::default()
+        },
         cycle_limit: 40,
         ..NetworkConfig::default()
     };
     let outsourcing = NetworkConfig {
-        outsourcing: true,
+        max_plus: MaxPlusConfig {
+            outsourcing: true,
+            ..slow.max_plus.clone()
+        },
         ..slow.clone()
     };
     let Run { metrics, book, .. } = run(40, LATENCY, &outsourcing).unwrap();
@@ -276,7 +294,10 @@ fn work_goes_from_the_busier_node_to_the_other_one_only() {
 
     // Nobody says a word about it unless told to, or where processors are fast enough.
     let fast = NetworkConfig {
-        processor: Processor::Unlimited,
+        max_plus: MaxPlusConfig {
+            processor: Processor::Unlimited,
+            ..outsourcing.max_plus.clone()
+        },
         ..outsourcing
     };
     for network in [slow, fast] {

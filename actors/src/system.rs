@@ -64,12 +64,27 @@ pub trait System: Send + Sync {
         &[]
     }
 
+    /// Keys that once had other names. Scenarios, `--set` and studies may use the old ones: they are
+    /// read as the new ones, and whoever uses them is told.
+    fn renamed(&self) -> Vec<Renamed> {
+        Vec::new()
+    }
+
     /// Reads its tables; `T::deserialize(sections)` of a serde type is all it takes.
     ///
     /// # Errors
     /// Those of serde; they become messages with file, line and column.
     fn parse(&self, sections: toml::Deserializer<'_>)
     -> Result<Box<dyn Settings>, toml::de::Error>;
+}
+
+/// A key that once had another name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Renamed {
+    /// The dotted key as it was: `network.damping`.
+    pub old: String,
+    /// The dotted key as it is: `network.max_plus.damping`.
+    pub new: String,
 }
 
 /// The settings of one scenario for one system. Several threads may build from them at once.

@@ -135,7 +135,7 @@ pub struct Assembled {
     pub contacts: Option<LinkContacts>,
     /// What became of the files that other programs wrote, and of the world, a line at a time, for people.
     pub notes: Vec<String>,
-    /// What the scenario says of links that has no effect, for people.
+    /// What the scenario says that has no effect or is called otherwise now, for people.
     pub remarks: Vec<String>,
 }
 
@@ -185,17 +185,21 @@ impl Scenario {
         registry: &Registry,
         files: Files,
     ) -> Result<Scenario, ScenarioError> {
-        let source = Source::new(name, text, sets)?;
-        let (shared, settings) = {
+        let mut source = Source::new(name, text, sets)?;
+        let system = {
             let document = source.document()?;
             let system = registry.find(&system_name(&source, document.get_ref())?);
-            let system = system.map_err(|unknown| ScenarioError::UnknownValue {
+            system.map_err(|unknown| ScenarioError::UnknownValue {
                 place: source.place_of_key(&["system".to_owned()]),
                 key: "system".to_owned(),
                 found: unknown.found,
                 nearest: unknown.nearest,
                 expected: unknown.expected,
-            })?;
+            })?
+        };
+        source.rename(system.renamed())?;
+        let (shared, settings) = {
+            let document = source.document()?;
             let (shared, own) = part(&source, document, &roots(system))?;
             let shared = Shared::deserialize(toml::Deserializer::from(shared));
             let settings = system.parse(toml::Deserializer::from(own));
@@ -319,7 +323,10 @@ impl Scenario {
         notes.append(&mut system.notes);
         self.check_places(&sim)?;
         let remarks = remarks.iter().map(|remark| format!("links: {remark}"));
-        let remarks = remarks.chain(self.too_late()).collect();
+        let remarks = remarks
+            .chain(self.too_late())
+            .chain(self.source.remarks())
+            .collect();
         if let Some(contacts) = &contacts {
             contacts.check_hosts(&sim).map_err(wrong)?;
             notes.extend(contacts.notes(&sim));

@@ -16,8 +16,8 @@ use std::time::Instant;
 
 use farside::prelude::*;
 use farside_network::{
-    Missions, NetworkConfig, Parts, Policy, Processor, TeamConfig, WorldConfig, assemble_over,
-    missions,
+    MaxPlusConfig, Missions, NetworkConfig, Parts, Policy, Processor, TeamConfig, WorldConfig,
+    assemble_over, missions,
 };
 use farside_worlds::Roadmap;
 
@@ -69,7 +69,10 @@ fn config(policy: Policy, processor: Processor, cycle_limit: Option<u32>) -> Net
     let default = NetworkConfig::default();
     NetworkConfig {
         policy,
-        processor,
+        max_plus: MaxPlusConfig {
+            processor,
+            ..MaxPlusConfig::default()
+        },
         cycle_limit: cycle_limit.unwrap_or(default.cycle_limit),
         ..default
     }

@@ -1,39 +1,34 @@
 //! Assembling the network-guided system: hosts, actors, links, missions, the monitor.
 
-mod error;
-mod site;
-
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::carrier::Carrier;
 use farside::prelude::*;
-use farside::random::RandomKey;
 use farside_actors::wiring::{Links, Wire, Wiring};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
 use nalgebra::Point3;
 
-use super::config::{ConfigError, Motion, NetworkConfig, Policy, TeamConfig, WorldConfig};
-use super::corridors::Corridors;
+use super::config::{ConfigError, Motion, NetworkConfig, Policy, WorldConfig};
+use super::error::NetworkError;
+use super::failover;
 use super::gaps::{self, Refused};
-use super::lng::LocalGraph;
-use super::messages::RoverId;
+use super::ids;
 use super::metrics::NetworkMetrics;
 use super::monitor::{Monitor, Score};
 use super::motion::Ways;
 use super::node::Node;
-use super::payoff::Payoffs;
 use super::rover::Rover;
-use super::schedule::Schedule;
-use super::takeover;
+use super::shared::Shared;
 use super::timing::Timing;
-
-pub use error::NetworkError;
-pub(crate) use site::Site;
+use crate::baseline::Schedule;
+use crate::ids::RoverId;
+use crate::max_plus::lng::LocalGraph;
+use crate::max_plus::payoff::Payoffs;
 
 /// An assembled system: its actors by name, and its score.
 pub struct Network {
-    site: Arc<Site>,
+    site: Arc<Shared>,
     nodes: Vec<Address<Node>>,
     rovers: Vec<Address<Rover>>,
     score: Arc<Mutex<Score>>,
@@ -170,16 +165,12 @@ pub fn assemble(
         .collect();
     let schedule = Schedule::of(config, &timing, &roadmap, &planned, stays);
     let lines = match config.takeover_after {
-        Some(_) => takeover::lines(&roadmap, sensors),
+        Some(_) => failover::lines(&roadmap, sensors),
         None => Vec::new(),
     };
-    let site = Arc::new(Site {
+    let site = Arc::new(Shared {
         lines,
         payoffs: Payoffs::new(config, &roadmap),
-        corridors: match config.corridor_tokens {
-            true => Corridors::new(&roadmap, 2),
-            false => Corridors::default(),
-        },
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: config.patience(links.0, &timing),
         timing,
@@ -292,69 +283,14 @@ fn longest_step(
     }
 }
 
-/// `node_01`, ..., with as many digits as the last number has, at least two, so that the order of
-/// names is that of numbers.
 fn names(kind: &str, count: usize) -> Vec<String> {
-    let digits = count.to_string().len().max(2);
-    (1..=count)
-        .map(|i| format!("{kind}_{i:0digits$}"))
+    let count = count as u32;
+    (0..count)
+        .map(|number| ids::name(kind, number, count))
         .collect()
 }
 
-/// An entry and a goal for each rover, at random. Of `world` only the endpoints are read.
-///
-/// ```
-/// use farside_network::{TeamConfig, WorldConfig, missions};
-/// use farside_worlds::Roadmap;
-/// let map = Roadmap::builtin("crater-dense")?;
-/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
-/// assert!(missions.iter().all(|(entry, goal)| entry != goal));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// When the team is empty, or the roadmap's boundary has no two places to drive between.
-pub fn missions(
-    world: &WorldConfig,
-    roadmap: &Roadmap,
-    team: &TeamConfig,
-    seed: u64,
-) -> Result<Vec<(VertexId, VertexId)>, NetworkError> {
-    if team.rovers == 0 {
-        return Err(NetworkError::NoRovers);
-    }
-    let (entries, exits) = world.endpoints.split(roadmap);
-    // With one entry that is the only exit there is nowhere to go.
-    let pairs = entries
-        .iter()
-        .flat_map(|a| exits.iter().map(move |b| (a, b)));
-    let starts: Vec<_> = entries
-        .iter()
-        .filter(|&&entry| exits.iter().any(|&exit| exit != entry))
-        .copied()
-        .collect();
-    if !pairs.into_iter().any(|(a, b)| a != b) {
-        return Err(NetworkError::Endpoints {
-            roadmap: roadmap.name().to_owned(),
-            entries: entries.len(),
-            exits: exits.len(),
-        });
-    }
-    let mission = |rover: u32| {
-        let key = RandomKey::new(seed).text("mission");
-        let mut draws = key.number(u64::from(rover)).stream();
-        let entry = *draws.choose(&starts).expect("there is a pair");
-        loop {
-            let goal = *draws.choose(&exits).expect("there is a pair");
-            if goal != entry {
-                return (entry, goal);
-            }
-        }
-    };
-    Ok((0..team.rovers).map(mission).collect())
-}
-
-fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Node>> {
     let declare = |(id, name): (NodeId, &String)| {
         let host = sim.host(name);
         sim.heavy(host);
@@ -370,7 +306,7 @@ fn declare_nodes(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Node>> {
         .collect()
 }
 
-fn declare_rovers(sim: &mut Simulation, site: &Arc<Site>) -> Vec<Address<Rover>> {
+fn declare_rovers(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Rover>> {
     let declare = |(id, name): (RoverId, &String)| {
         let host = sim.host(name);
         let site = site.clone();

@@ -1,6 +1,6 @@
 //! Gaps in the coverage of the roadmap: vertices at which no node reaches a rover. *Network-guided*,
 //! section 5, asks "what should be the network's behavior if there are gaps in the coverage of the
-//! workspace". Here it closes them or lets rovers cross them, as [`Gaps`] says.
+//! workspace". Here it closes them or lets rovers cross them, as [`Gaps`](crate::Gaps) says.
 //!
 //! **Closed**, a vertex has no edges left, so that no path, route or reservation leads there, whatever
 //! the policy.
@@ -19,31 +19,13 @@
 use std::sync::Arc;
 
 use farside_worlds::{Roadmap, SensorNetwork, VertexId};
-use serde::{Deserialize, Serialize};
 
-use super::assemble::NetworkError;
-use super::config::{Policy, WorldConfig};
-use super::messages::RoverId;
+use super::config::{Gaps, Policy, WorldConfig};
 use super::safety::RoverMemory;
-
-/// What becomes of vertices at which no node reaches a rover.
-#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum Gaps {
-    /// There must be none.
-    #[default]
-    Refuse,
-    /// They are closed: nothing leads there.
-    Close,
-    /// Rovers cross them out of everybody's hearing (the `complete` policy only).
-    Cross,
-}
+use crate::error::NetworkError;
+use crate::ids::RoverId;
 
 impl Gaps {
-    pub(super) fn is_refuse(&self) -> bool {
-        *self == Gaps::Refuse
-    }
-
     /// Whether a world with these gaps can be.
     ///
     /// # Errors

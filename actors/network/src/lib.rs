@@ -48,9 +48,9 @@
 //! # Starved processors
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
-//! asks for (`network.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
+//! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
 //! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
-//! 2006. With one constant for all cells, `network.processor = "paper"` ([`Processor::PAPER`], the
+//! 2006. With one constant for all cells, `network.max_plus.processor = "paper"` ([`Processor::PAPER`], the
 //! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
 //! which compare more and longer candidate paths. With fewer than three iterations in a cycle
 //! nearly all do.
@@ -86,48 +86,52 @@
 //! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
 
 mod assemble;
-mod assignment;
+mod baseline;
 mod builtin;
-mod candidates;
 pub mod cases;
 mod config;
-mod corridors;
+mod error;
+mod failover;
 mod gaps;
-mod lng;
-mod loads;
+mod ids;
 pub mod mapf;
 mod max_plus;
 pub mod messages;
 mod metrics;
+mod missions;
 mod monitor;
 mod motion;
 mod node;
 #[cfg(test)]
 mod open_tests;
-mod payoff;
 mod picture;
-mod processor;
 pub mod reservation;
 mod rover;
 mod safety;
+mod scenario;
 mod scene;
-mod schedule;
+mod shared;
 mod system;
-mod takeover;
 #[cfg(test)]
 mod testing;
 mod timing;
+mod tracks;
+mod waits;
+mod world;
 
-pub use assemble::{Missions, Network, NetworkError, Parts, assemble, assemble_over, missions};
-pub use candidates::{CandidatePath, Destination, FirstStep};
+pub use assemble::{Missions, Network, Parts, assemble, assemble_over};
 pub use config::{
-    ConfigError, Motion, NetworkConfig, Policy, Priority, RoadmapSource, Sabotage, TeamConfig,
+    ConfigError, Gaps, Motion, NetworkConfig, Policy, RoadmapSource, Sabotage, TeamConfig,
     WorldConfig,
 };
-pub use gaps::Gaps;
+pub use error::NetworkError;
+pub use max_plus::candidates::{CandidatePath, Destination, FirstStep};
+pub use max_plus::config::{MaxPlusConfig, Priority};
+pub use max_plus::processor::Processor;
 pub use metrics::{Costs, Deadlock, NetworkMetrics};
+pub use missions::missions;
 pub use node::Node;
-pub use processor::Processor;
+pub use reservation::config::CompleteConfig;
 pub use rover::Rover;
 pub use system::NetworkSystem;
 pub use timing::Timing;

@@ -60,10 +60,10 @@ mod tests;
 mod timetable;
 
 pub use check::Conflict;
-pub use coupled::{Coupled, CoupledConfig, CoupledError, Objective, coupled};
+pub use coupled::{Coupled, CoupledConfig, coupled};
 pub use order::Order;
 pub use plan::{Failure, Outcome, Plan, PlanMetrics, Trip};
 pub use prioritised::{prioritised, prioritised_in_time};
-pub use problem::{Mission, Problem, ProblemError, Rules};
+pub use problem::{CoupledError, Mission, Objective, Problem, ProblemError, Rules};
 pub use reference::{reference, reference_in_time};
 pub use timetable::{Pace, Timetable, TimetableError};

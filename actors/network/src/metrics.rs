@@ -100,9 +100,9 @@ pub struct NetworkMetrics {
     /// still at work when the time was over.
     pub late_optimisations: f64,
     /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
-    /// neighbours; 0 without `network.outsourcing`.
+    /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
-    /// Deadlocks that nodes' probes confirmed; 0 unless `network.deadlock_probes` sends any.
+    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
     pub last_confirmed: Option<String>,
@@ -120,9 +120,9 @@ pub struct NetworkMetrics {
     /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
     /// move in vain.
     pub standstill: Option<String>,
-    /// The circles of rovers that wait for each other when a team of the `paper` policy, or one of
-    /// `complete` that stays on the map, came to a standstill: each for the one on the next vertex
-    /// of its shortest way. The shortest first.
+    /// The circles of rovers that wait for each other when a team of the `paper` policy, or one that
+    /// stays on the map, came to a standstill: no rover on one can come nearer to its goal before the
+    /// next one moves. The shortest first. Pictures of the run name the same.
     pub wait_cycles: Vec<WaitCycle<VertexId>>,
     /// What published solvers are compared by; only where rovers stay at their goals.
     #[serde(flatten)]

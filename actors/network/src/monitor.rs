@@ -3,13 +3,7 @@
 //!
 //! **Collision.** As [`Collisions`] has it; in entry queues and beyond goals nothing is claimed.
 //!
-//! **Who waits for whom**, at a standstill of the `paper` policy: a rover for the one that claims the
-//! next vertex of its shortest way ([`Roadmap::shortest_path`](farside_worlds::Roadmap)) to its goal;
-//! one in a queue for the one at its entry. Nobody waits for two, so that the circles are all there
-//! are. With `complete`, rovers that queue go their reserved ways and not the shortest: there is no
-//! such graph. Where they stay on the map, those that have no way are looked at in the same manner; and
-//! one that is at its goal with all vertices beside it taken cannot make way, and waits for those
-//! who stand there.
+//! **Who waits for whom**, when a team deadlocks: as [`waits`](crate::waits) has it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,12 +11,16 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside::{RunInfo, SimTime};
 use farside_worlds::{NodeId, VertexId};
 
-use super::assemble::Site;
-use super::config::{Motion, Policy};
-use super::loads::Loads;
-use super::messages::{NodeState, RoverId, RoverState, TakenOver};
+use super::config::Motion;
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
-use farside_actors::invariants::{Collisions, Place, WaitCycle, WaitGraph};
+use super::waits::{Standing, WaitRule, Waits};
+use crate::failover::messages::TakenOver;
+use crate::ids::RoverId;
+use crate::max_plus::loads::Loads;
+use crate::max_plus::messages::NodeState;
+use crate::safety::messages::RoverState;
+use crate::shared::Shared;
+use farside_actors::invariants::{Collisions, Place, WaitCycle};
 
 /// What the monitor keeps of a rover, beside where it is.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +70,7 @@ pub(crate) struct Score {
 }
 
 pub(crate) struct Monitor {
-    site: Arc<Site>,
+    site: Arc<Shared>,
     score: Arc<Mutex<Score>>,
     /// Who takes part, to tell rovers' samples by.
     rovers: Vec<Option<RoverId>>,
@@ -80,7 +78,7 @@ pub(crate) struct Monitor {
 
 impl Monitor {
     /// A monitor, and what it will write the score to.
-    pub(crate) fn new(site: Arc<Site>) -> (Monitor, Arc<Mutex<Score>>) {
+    pub(crate) fn new(site: Arc<Shared>) -> (Monitor, Arc<Mutex<Score>>) {
         let start = |(rover, &(entry, goal)): (RoverId, &(VertexId, VertexId))| {
             let remaining = match site.is_refused(rover) {
                 true => 0,
@@ -183,15 +181,11 @@ impl Score {
     }
 
     /// A rover's change.
-    fn follow(&mut self, site: &Site, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
+    fn follow(&mut self, site: &Shared, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
         self.tracks[at].transmit_energy_j = state.transmit_energy_j;
         let old = self.collisions.place(at);
-        let place = match (state.whereabouts.vertex, state.whereabouts.moving_to) {
-            (None, _) => Place::Away,
-            (Some(here), None) => Place::At(here),
-            (Some(here), Some(next)) => Place::Between(here, next),
-        };
+        let place = state.whereabouts.place();
         if place == old {
             return Flow::Continue;
         }
@@ -241,7 +235,7 @@ impl Score {
     }
 
     /// Looks back when a new cycle begins: why the run should end, if it should.
-    fn verdict(&mut self, site: &Site) -> Option<String> {
+    fn verdict(&mut self, site: &Shared) -> Option<String> {
         let sum: u32 = self.tracks.iter().map(|t| t.remaining).sum();
         if sum < self.nearest.0 {
             self.nearest = (sum, self.cycle);
@@ -268,8 +262,7 @@ impl Score {
         self.ended = true;
         // Why the run stopped is part of its digest, and stays as short as it was.
         let reason = format!("{reason}: {}", self.remaining(site));
-        let looks = config.policy == Policy::Paper || site.stays;
-        if self.deadlock != Deadlock::None && looks {
+        if self.deadlock != Deadlock::None {
             self.wait_cycles = self.circles(site);
         }
         self.standstill = Some(format!("{reason}{}", self.why()));
@@ -277,7 +270,7 @@ impl Score {
     }
 
     /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
-    fn is_out(&self, site: &Site, rover: usize) -> bool {
+    fn is_out(&self, site: &Shared, rover: usize) -> bool {
         if site.is_refused(RoverId(rover as u32)) {
             return false;
         }
@@ -289,7 +282,7 @@ impl Score {
     }
 
     /// Who is still out, in a sentence.
-    fn remaining(&self, site: &Site) -> String {
+    fn remaining(&self, site: &Shared) -> String {
         let out = |rover: &usize| self.is_out(site, *rover);
         let out: Vec<usize> = (0..self.tracks.len()).filter(out).collect();
         let left = out.len();
@@ -306,34 +299,16 @@ impl Score {
     }
 
     /// The circles of rovers that wait for each other.
-    fn circles(&self, site: &Site) -> Vec<WaitCycle<VertexId>> {
-        let mut waits = WaitGraph::new(self.tracks.len());
-        for (rover, &(entry, goal)) in site.missions.iter().enumerate() {
-            let next = match self.collisions.place(rover) {
-                Place::At(here) if here != goal => {
-                    vec![site.roadmap.shortest_path(here, goal)[1]]
-                }
-                Place::At(here) if site.config.policy == Policy::Complete => {
-                    let beside = site.roadmap.neighbors(here);
-                    let is_free = |v: &VertexId| self.collisions.holders(*v).is_empty();
-                    match beside.iter().any(is_free) {
-                        true => continue,
-                        false => beside.to_vec(),
-                    }
-                }
-                Place::Away if self.tracks[rover].entered.is_none() && self.is_out(site, rover) => {
-                    vec![entry]
-                }
-                _ => continue,
-            };
-            for &holder in next.iter().flat_map(|&v| self.collisions.holders(v)) {
-                waits.add(rover, holder);
-            }
-        }
-        waits.named_cycles(|rover| {
-            let at = self.collisions.place(rover).vertex();
-            (site.rover_names[rover].clone(), at)
-        })
+    fn circles(&self, site: &Shared) -> Vec<WaitCycle<VertexId>> {
+        let standing = |(rover, &(_, goal)): (u32, &(VertexId, VertexId))| Standing {
+            rover,
+            place: self.collisions.place(rover as usize),
+            goal,
+        };
+        let rovers: Vec<Standing> = (0..).zip(&site.missions).map(standing).collect();
+        let rule = WaitRule::of(site.config.policy, site.stays);
+        let name = |rover: u32| site.rover_names[rover as usize].clone();
+        Waits::of(&site.roadmap, rule, &rovers).named(name, &rovers)
     }
 
     /// What holds the team up, as far as can be seen from outside; the end of a sentence.
@@ -361,7 +336,7 @@ impl Score {
         arrived.count() as u32
     }
 
-    pub(crate) fn metrics(&self, site: &Site) -> NetworkMetrics {
+    pub(crate) fn metrics(&self, site: &Shared) -> NetworkMetrics {
         let mut metrics = NetworkMetrics {
             rovers: self.tracks.len() as u32,
             collisions: self.collisions(),

@@ -1,167 +1,81 @@
-//! The sensor node: plans for the rovers on its vertices and admits rovers to them. This file holds
-//! its state, its clock and the dispatch of messages; what a cycle does is in [`cycle`], max-plus in
-//! [`optimise`], admission in [`admit`]. What helps the paper's policy out of standstills, each behind
-//! a key of its own: [`gates`], [`tokens`], [`probes`], [`resolution`]; what evens out loads:
-//! [`balance`].
+//! The sensor node: plans for the rovers on its vertices and admits rovers to them. What all nodes do
+//! is here and in [`base`], [`ownership`] and [`failover`]; what a policy does, in [`max_plus`],
+//! [`complete`] and [`planned`], of which a node has one ([`policy`]).
 
-mod admit;
-mod balance;
-mod cycle;
-mod gates;
-mod optimise;
-mod pacing;
-mod probes;
-mod resolution;
-mod takeover;
-#[cfg(test)]
-mod tests;
-mod tokens;
+mod base;
+mod complete;
+mod failover;
+mod max_plus;
+pub(crate) mod messages;
+mod ownership;
+mod planned;
+mod policy;
+mod reservations;
 
 use std::sync::Arc;
 
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
-use serde::{Deserialize, Serialize};
 
-use super::assemble::Site;
-use super::assignment::Request;
-use super::config::Policy;
-use super::lng::LocalGraph;
-use super::messages::{
-    Account, Aside, Assignments, Beacon, CandidatePaths, CorridorNews, Departed, DepartedAck,
-    Holding, Load, Locations, MaxPlus, Passed, Replaced, Resolve, WaitProbe,
-};
-use super::reservation::messages::{ItineraryAnswer, Relay};
-use super::reservation::{Atlas, RegistryDue};
-use super::rover::Rover;
-use super::safety::Ledger;
-use optimise::Optimiser;
-use probes::Probes;
-use resolution::Resolution;
-use takeover::Wards;
-use tokens::Watch;
+use self::messages::Locations;
+use crate::config::Policy;
+use crate::failover::messages::{Account, Passed, Replaced};
+use crate::max_plus::aids::messages::{Aside, Resolve, WaitProbe};
+use crate::max_plus::lng::LocalGraph;
+use crate::max_plus::messages::{Assignments, CandidatePaths, MaxPlus};
+use crate::reservation::messages::{ItineraryAnswer, Relay};
+use crate::safety::Ledger;
+use crate::safety::messages::{Beacon, Departed, DepartedAck};
+use crate::shared::Shared;
+use base::Base;
+use complete::CompletePolicy;
+use max_plus::{IterationOverdue, MaxPlusPolicy, ProcessorDone};
+use planned::PlannedPolicy;
+use policy::{NodePolicy, Phase, PhaseBegins};
+use reservations::RegistryDue;
 
-/// A sensor node of the network-guided system: runs the six steps of section 3.2 in each planning
-/// cycle, and owns vertices by the safety protocol.
+/// A sensor node of the network-guided system: owns vertices by the safety protocol, and grants them
+/// as its policy says.
 ///
 /// Its record of who holds its vertices is durable; what it plans is not.
 pub struct Node {
-    pub(super) site: Arc<Site>,
-    pub(super) id: NodeId,
-    graph: Arc<LocalGraph>,
-    pub(super) neighbors: Vec<Neighbor>,
-    pub(super) rovers: Vec<Address<Rover>>,
-    pub(super) cycle: u32,
-    phase: Phase,
-    optimiser: Optimiser,
-    /// Pairs of candidate paths in an iteration of the last cycle, if nothing was handed over.
-    load: u64,
-    /// Requests for this node's vertices in this cycle.
-    requests: Vec<Request>,
-    /// Own rovers that leave their vertex in this cycle without accelerating.
-    leaving: Vec<VertexId>,
-    forced_stops: u32,
-    /// Who answers for which node's vertices, with `network.takeover_after`.
-    wards: Option<Wards>,
-    probes: Probes,
-    resolution: Resolution,
-    /// By corridor, once tokens are used.
-    watches: Vec<Watch>,
-    /// When the timer of the `complete` policy fires \[ns\].
-    pub(super) alarm: Option<(u64, TimerId)>,
+    base: Base,
+    policy: Box<dyn NodePolicy>,
 }
 
-/// What a node knows of a neighbour.
-pub(super) struct Neighbor {
-    id: NodeId,
-    pub(super) address: Address<Node>,
-    /// The latest cycle in which it told its locations, and what it told.
-    located: Option<u32>,
-    holdings: Vec<Holding>,
-    /// What else it told with its locations.
-    load: Option<Load>,
-    crowding: Option<f64>,
-    answers: Vec<NodeId>,
-}
-
-/// The parts of a planning cycle, in order. A timer begins each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(crate) enum Phase {
-    /// Beacons arrive; the entry queues are served.
-    Listen,
-    /// Step 1: locations are exchanged.
-    Locate,
-    /// Steps 2 and 3: candidate paths.
-    Propose,
-    /// Step 4: max-plus.
-    Optimise,
-    /// Step 5: assignments are exchanged.
-    Assign,
-    /// Step 6: vertices are granted.
-    Admit,
-}
-
-/// Timer: a phase of the cycle begins.
-#[derive(Serialize, Deserialize)]
-#[doc(hidden)]
-pub struct PhaseBegins {
-    phase: Phase,
-}
-
-/// Timer: neighbours' vectors are overdue.
-#[derive(Serialize, Deserialize)]
-#[doc(hidden)]
-pub struct IterationOverdue;
-
-/// Timer: the processor is done with payoffs or an iteration of max-plus in this cycle.
-#[derive(Serialize, Deserialize)]
-#[doc(hidden)]
-pub struct ProcessorDone {
-    cycle: u32,
+/// The state machine of the policy that is configured.
+fn policy_of(base: &Base, graph: Arc<LocalGraph>) -> Box<dyn NodePolicy> {
+    match base.site.config.policy {
+        Policy::Paper => Box::new(MaxPlusPolicy::new(base, graph)),
+        Policy::Complete => Box::new(CompletePolicy::default()),
+        Policy::Reference | Policy::Prioritised | Policy::Coupled => {
+            Box::new(PlannedPolicy::default())
+        }
+    }
 }
 
 impl Node {
-    pub(crate) fn new(site: Arc<Site>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
-        Node {
-            site,
-            id,
-            graph,
-            neighbors: Vec::new(),
-            rovers: Vec::new(),
-            cycle: 0,
-            // A node that starts in the middle of a cycle waits for the next.
-            phase: Phase::Admit,
-            optimiser: Optimiser::default(),
-            load: 0,
-            requests: Vec::new(),
-            leaving: Vec::new(),
-            forced_stops: 0,
-            wards: None,
-            probes: Probes::default(),
-            resolution: Resolution::default(),
-            watches: Vec::new(),
-            alarm: None,
+    pub(crate) fn new(site: Arc<Shared>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
+        let base = Base::new(site, id);
+        let policy = policy_of(&base, graph);
+        Node { base, policy }
+    }
+
+    /// A cycle begins: what was lost is said again, and the policy goes on.
+    fn listen(&mut self, ctx: &mut Context<'_, Self>) {
+        let site = self.base.site.clone();
+        self.base.cycle = site.cycle_at(ctx.now());
+        let knows_roadmap = self.base.knows_roadmap(ctx);
+        if knows_roadmap {
+            self.policy.open_cycle(&self.base, ctx);
         }
-    }
-
-    pub(super) fn neighbor(&self, id: NodeId) -> Option<usize> {
-        self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
-    }
-
-    /// Whether there is anything to reserve, or to be given over the network.
-    fn keeps_registry(&self) -> bool {
-        self.site.config.policy != Policy::Paper || self.site.roadmap_from.is_some()
-    }
-
-    /// Whether it may take part: where nodes are given the roadmap over the network, only with all of it.
-    pub(super) fn knows_roadmap(&self, ctx: &mut Context<'_, Self>) -> bool {
-        let source = self.site.roadmap_from;
-        source.is_none() || ctx.durable::<Atlas>().is_known(source)
-    }
-
-    /// Whether it answers for `v`: its own vertex, or one that it took over.
-    fn owns(&self, v: VertexId) -> bool {
-        self.answers_for(self.site.sensors.owner(v))
+        let phase = Phase::Listen;
+        ctx.timer(site.until_next_cycle(ctx.now()), PhaseBegins { phase });
+        if knows_roadmap {
+            self.watch(ctx);
+            self.repeat(ctx);
+            self.policy.begin_cycle(&self.base, ctx);
+        }
     }
 }
 
@@ -181,7 +95,6 @@ impl Actor for Node {
         WaitProbe,
         Resolve,
         Aside,
-        CorridorNews,
         ProcessorDone,
         Account,
         Replaced,
@@ -190,41 +103,27 @@ impl Actor for Node {
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        for &id in self.site.sensors.neighbors(self.id) {
-            self.neighbors.push(Neighbor {
-                id,
-                address: ctx.lookup::<Node>(&self.site.node_names[id.0 as usize])?,
-                located: None,
-                holdings: Vec::new(),
-                load: None,
-                crowding: None,
-                answers: Vec::new(),
-            });
-        }
-        for name in &self.site.rover_names {
-            self.rovers.push(ctx.lookup::<Rover>(name)?);
-        }
-        self.open_wards(ctx);
+        let base = &mut self.base;
+        base.look_up(ctx)?;
+        base.open_wards(ctx);
         // A node that was replaced has no vertices of its own any more.
-        let owned: &[VertexId] = match self.answers_for(self.id) {
-            true => self.site.sensors.owned(self.id),
+        let owned: &[VertexId] = match base.answers_for(base.id) {
+            true => base.site.sensors.owned(base.id),
             false => &[],
         };
         let ledger = ctx.durable::<Ledger>();
         let is_new = ledger.is_new();
-        ledger.open(owned, self.rovers.len());
-        for (rover, vertex) in self.site.standing().filter(|_| is_new) {
-            let goal = self.site.missions[rover.0 as usize].1;
+        ledger.open(owned, base.rovers.len());
+        for (rover, vertex) in base.site.standing().filter(|_| is_new) {
+            let goal = base.site.missions[rover.0 as usize].1;
             ledger.stand(vertex, rover, goal);
         }
-        if self.keeps_registry() {
-            self.open_registry(ctx);
-        }
+        self.policy.started(&self.base, ctx);
         // The first cycle begins at once; after a restart, the next.
         let delay = if ctx.now() == SimTime::ZERO {
             SimDuration::ZERO
         } else {
-            self.site.until_next_cycle(ctx.now())
+            self.base.site.until_next_cycle(ctx.now())
         };
         let phase = Phase::Listen;
         ctx.timer(delay, PhaseBegins { phase });
@@ -234,35 +133,9 @@ impl Actor for Node {
 
 impl Handler<PhaseBegins> for Node {
     fn handle(&mut self, timer: PhaseBegins, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.phase = timer.phase;
         match timer.phase {
             Phase::Listen => self.listen(ctx),
-            Phase::Locate => self.locate(ctx),
-            Phase::Propose => self.propose(ctx),
-            Phase::Optimise => self.optimise(ctx),
-            Phase::Assign => self.assign(ctx),
-            Phase::Admit => self.admit(ctx),
-        }
-        Ok(())
-    }
-}
-
-impl Handler<Locations> for Node {
-    fn handle(&mut self, message: Locations, ctx: &mut Context<'_, Self>) -> Outcome {
-        if self.wards.is_some() {
-            self.correct(ctx, &message);
-        }
-        if let Some(at) = self.neighbor(message.node) {
-            let neighbor = &mut self.neighbors[at];
-            if neighbor.located.is_none_or(|cycle| cycle < message.cycle) {
-                neighbor.located = Some(message.cycle);
-                neighbor.holdings = message.holdings;
-                neighbor.load = message.load;
-                neighbor.crowding = message.crowding;
-                neighbor.answers = message.answers;
-            }
-        } else {
-            self.located_afar(message);
+            phase => self.policy.begin_phase(&self.base, ctx, phase),
         }
         Ok(())
     }

@@ -10,9 +10,10 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point2;
 
-use super::messages::{Beacon, RoverId, RoverState};
 use super::*;
-use crate::schedule::Schedule;
+use crate::baseline::Schedule;
+use crate::ids::RoverId;
+use crate::safety::messages::{Beacon, RoverState};
 use crate::testing::grid;
 
 /// A link of 5 ms that loses some.

@@ -11,8 +11,6 @@ mod map;
 mod relief;
 mod site;
 mod spacetime;
-pub(crate) mod tracks;
-mod waits;
 
 use farside::SimDuration;
 use farside_actors::figure::Figure;
@@ -24,9 +22,11 @@ use thiserror::Error;
 
 pub(crate) use site::{Ground, Site};
 
-use crate::system::NetworkScenario;
+use crate::ids;
+use crate::scenario::NetworkScenario;
+use crate::tracks::{Sighting, Tracks, TracksError};
+use crate::waits::{Standing, Waits};
 pub(crate) use map::coordinated;
-use tracks::Tracks;
 
 /// The style of pictures, beside that of all figures.
 const STYLE: &str = include_str!("picture/picture.css");
@@ -57,7 +57,7 @@ pub(crate) fn draw(
     let site = ground::site(scenario, run.seeds().problem, files)?;
     let drawn = Drawn {
         site,
-        tracks: Tracks::read(run)?,
+        tracks: Tracks::read(run).map_err(PictureError::from)?,
         scenario: run.scenario().to_owned(),
         seed: run.seeds().run,
     };
@@ -79,7 +79,7 @@ pub(crate) fn draw(
 impl From<PictureError> for Failure {
     fn from(error: PictureError) -> Failure {
         match error {
-            PictureError::Recording(error) => error,
+            PictureError::Tracks(TracksError::Recording(error)) => error,
             error => Failure::NotDrawn(error.to_string()),
         }
     }
@@ -146,13 +146,29 @@ impl Drawn {
         spacetime::figure(self, line, from_ns, to_ns)
     }
 
+    /// Who waits for whom, of rovers at an instant.
+    fn waits(&self, rovers: &[Sighting]) -> Waits {
+        let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
+        Waits::of(&self.site.roadmap, self.site.wait_rule, &rovers)
+    }
+
+    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without one.
+    fn shortest_circle(&self, waits: &Waits, rovers: &[Sighting]) -> String {
+        let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
+        let name = |rover: u32| ids::name("rover", rover, self.site.rovers);
+        let named = waits.named(name, &rovers);
+        named
+            .first()
+            .map_or_else(String::new, |circle| format!(" {circle}."))
+    }
+
     fn time_ns(&self, at: Option<SimDuration>) -> Result<u64, PictureError> {
         let highest = self.tracks.highest_vertex();
-        if highest >= self.site.roadmap.len() as u32 {
-            return Err(PictureError::States(format!(
-                "a rover is at vertex {highest}, and the roadmap has {} vertices",
-                self.site.roadmap.len()
-            )));
+        if highest as usize >= self.site.roadmap.len() {
+            return Err(PictureError::OffTheMap {
+                vertex: highest,
+                count: self.site.roadmap.len(),
+            });
         }
         let end_ns = self.tracks.end_ns;
         match at {
@@ -168,18 +184,15 @@ impl Drawn {
 /// Why there is no picture.
 #[derive(Debug, Error)]
 pub(crate) enum PictureError {
-    /// The recording cannot be read.
+    /// Where rovers were cannot be read.
     #[error(transparent)]
-    Recording(#[from] Failure),
-    /// There are no rovers in it.
+    Tracks(#[from] TracksError),
+    /// A rover is where there is no vertex.
     #[error(
-        "it holds no states of rovers: expected samples of RoverState on /state/**{}",
-        excluded_note(.excluded)
+        "its states of rovers cannot be used: a rover is at vertex {vertex}, and the roadmap has \
+         {count} vertices"
     )]
-    NoStates { excluded: String },
-    /// The rovers' states are none.
-    #[error("its states of rovers cannot be used: {0}")]
-    States(String),
+    OffTheMap { vertex: u32, count: usize },
     /// A time beyond the end.
     #[error("the run ended at {end}: expected a time up to that, found {at}")]
     AfterEnd { at: SimDuration, end: SimDuration },
@@ -207,12 +220,4 @@ pub(crate) enum PictureError {
         "{roadmap} has no corridor, and no rovers wait in a circle: name vertices to go through"
     )]
     NoCorridor { roadmap: String },
-}
-
-fn excluded_note(excluded: &str) -> String {
-    if excluded.is_empty() {
-        String::new()
-    } else {
-        format!("; left out of it were {excluded}")
-    }
 }

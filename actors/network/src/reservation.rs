@@ -53,13 +53,16 @@
 
 mod atlas;
 mod book;
+pub(crate) mod config;
 pub mod messages;
+mod registries;
 mod registry;
 mod relay;
 mod routes;
-mod steps;
 mod ways;
 
 pub(crate) use atlas::Atlas;
-pub(crate) use steps::{Registries, RegistryDue};
+pub(crate) use registries::Registries;
+pub(crate) use registry::{Desk, Registry};
+pub(crate) use relay::Receipt;
 pub(crate) use ways::Ways;

@@ -9,14 +9,15 @@ use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
-use super::assemble::Site;
 use super::config::{Motion, Policy, Sabotage};
-use super::messages::{Account, Beacon, Grant, Inquiry, RoverId, RoverState, Whereabouts};
-use super::node::Node;
 use super::reservation::Ways;
 use super::reservation::messages::{Itinerary, ItineraryAnswer};
 use super::safety::{Answer, RoverMemory};
-use super::takeover::Fences;
+use crate::failover::Fences;
+use crate::failover::messages::{Account, Inquiry};
+use crate::ids::RoverId;
+use crate::safety::messages::{Beacon, Grant, RoverState, Whereabouts};
+use crate::shared::Shared;
 use farside_actors::radio::RadioChange;
 
 /// A rover of the network-guided system.
@@ -24,11 +25,12 @@ use farside_actors::radio::RadioChange;
 /// It accepts [`Grant`]s, and answers with [`Beacon`]s: one a cycle to the owner of its vertex, one
 /// at each change, one to whoever grants a step that is done.
 pub struct Rover {
-    site: Arc<Site>,
+    site: Arc<Shared>,
     id: RoverId,
     entry: VertexId,
     goal: VertexId,
-    nodes: Vec<Address<Node>>,
+    /// The nodes, in order.
+    nodes: Vec<NodeContact>,
     /// What must know where it is.
     radios: Vec<LinkId<RadioChange>>,
     /// How fast it is at the end of the edge under way, or at the vertex that it rolls through \[m/s\];
@@ -62,8 +64,15 @@ pub struct EdgeEnds;
 #[doc(hidden)]
 pub struct PaceAllows;
 
+/// A node, known by what it accepts of a rover.
+struct NodeContact {
+    beacons: Recipient<Beacon>,
+    accounts: Recipient<Account>,
+    itinerary_answers: Recipient<ItineraryAnswer>,
+}
+
 impl Rover {
-    pub(crate) fn new(site: Arc<Site>, id: RoverId) -> Self {
+    pub(crate) fn new(site: Arc<Shared>, id: RoverId) -> Self {
         let (entry, goal) = site.missions[id.0 as usize];
         Rover {
             site,
@@ -180,7 +189,7 @@ impl Rover {
             previous: memory.previous,
             goal: self.goal,
         };
-        ctx.send(self.nodes[to.0 as usize], beacon);
+        ctx.send(self.nodes[to.0 as usize].beacons, beacon);
     }
 
     /// Tells the owner of the vertex that it stands on, or is leaving.
@@ -220,7 +229,7 @@ impl Rover {
             goal: self.goal,
             ways: ctx.durable::<Ways>().left(step).to_vec(),
         };
-        ctx.send(self.nodes[to.0 as usize], account);
+        ctx.send(self.nodes[to.0 as usize].accounts, account);
     }
 
     /// Moves on without being told to: what [`Sabotage::MoveUnbidden`] is for.
@@ -250,7 +259,11 @@ impl Actor for Rover {
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         for name in &self.site.node_names {
-            self.nodes.push(ctx.lookup::<Node>(name)?);
+            self.nodes.push(NodeContact {
+                beacons: ctx.recipient(name)?,
+                accounts: ctx.recipient(name)?,
+                itinerary_answers: ctx.recipient(name)?,
+            });
         }
         self.radios = ctx.links();
         let memory = ctx.durable::<RoverMemory>();
@@ -371,7 +384,8 @@ impl Handler<Itinerary> for Rover {
             ways.take(way);
         }
         let taken = holds || known;
-        ctx.send(self.nodes[node.0 as usize], ItineraryAnswer { walk, taken });
+        let to = self.nodes[node.0 as usize].itinerary_answers;
+        ctx.send(to, ItineraryAnswer { walk, taken });
         Ok(())
     }
 }

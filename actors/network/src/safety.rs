@@ -16,10 +16,13 @@
 //!
 //! What happens without rule 4 is in [`farside_actors::invariants`], as a scenario of a few lines.
 
+pub(crate) mod messages;
+
 use farside::SimTime;
 use farside_worlds::VertexId;
 
-use super::messages::{Grant, Holding, RoverId, Whereabouts};
+use crate::ids::RoverId;
+use crate::safety::messages::{Grant, Holding, Whereabouts};
 
 /// The (rover, step) to which a vertex belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

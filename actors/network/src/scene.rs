@@ -10,7 +10,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::Network;
-use crate::messages::RoverState;
+use crate::safety::messages::RoverState;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside::{RunInfo, SimDuration};
@@ -18,7 +18,7 @@ use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
 
 use crate::picture::colouring;
 use crate::picture::coordinated;
-use crate::system::crater;
+use crate::world::crater;
 
 /// The frame that everything is placed in.
 const MAP: &str = "map";
@@ -41,7 +41,7 @@ pub(super) struct NetworkScene {
     /// The shortest edge \[m\]: what is drawn is as large as fits.
     scale_m: f64,
     /// By the number of the actor in the run; none for those that are no rovers.
-    rovers: Vec<Option<Seen>>,
+    rovers: Vec<Option<Drawn>>,
     collisions: u32,
     /// Of each node.
     colours: Vec<[f64; 4]>,
@@ -54,7 +54,7 @@ pub(super) struct NetworkScene {
 
 /// A rover as it was last drawn.
 #[derive(Clone, Copy)]
-struct Seen {
+struct Drawn {
     on_the_map: bool,
     /// The vertex that it stands on, or drives to.
     holds: Option<VertexId>,
@@ -199,7 +199,7 @@ impl NetworkScene {
         if !self.system.coordinates() {
             return;
         }
-        let holds = self.rovers.iter().flatten().filter_map(|seen| seen.holds);
+        let holds = self.rovers.iter().flatten().filter_map(|drawn| drawn.holds);
         let mut held: Vec<VertexId> = holds.collect();
         held.sort_unstable();
         if held == self.told {
@@ -286,12 +286,12 @@ impl NetworkScene {
     }
 
     /// A rover's sample: where it is now, and which way it faces.
-    fn follow(&self, name: &str, seen: &mut Seen, state: &RoverState, out: &mut Vec<Drawing>) {
+    fn follow(&self, name: &str, drawn: &mut Drawn, state: &RoverState, out: &mut Vec<Drawing>) {
         let whereabouts = &state.whereabouts;
-        seen.holds = whereabouts.moving_to.or(whereabouts.vertex);
+        drawn.holds = whereabouts.place().claim();
         let Some(vertex) = whereabouts.vertex else {
-            if seen.on_the_map {
-                seen.on_the_map = false;
+            if drawn.on_the_map {
+                drawn.on_the_map = false;
                 out.push(Drawing::Remove {
                     id: name.to_owned(),
                 });
@@ -303,19 +303,19 @@ impl NetworkScene {
         let position_m = self.place(vertex);
         if let Some(to) = whereabouts.moving_to {
             let [x, y, _] = self.place(to);
-            seen.heading = [x - position_m[0], y - position_m[1]];
+            drawn.heading = [x - position_m[0], y - position_m[1]];
         }
         let pose = Pose {
             position_m,
-            heading: seen.heading,
+            heading: drawn.heading,
         };
         out.push(Drawing::Transform {
             parent: MAP.to_owned(),
             child: base_link(name),
             pose,
         });
-        if !seen.on_the_map {
-            seen.on_the_map = true;
+        if !drawn.on_the_map {
+            drawn.on_the_map = true;
             out.push(self.rover(name));
         }
         out.push(poses(name, vec![pose]));
@@ -335,14 +335,14 @@ impl NetworkScene {
 impl Scene for NetworkScene {
     fn begin(&mut self, run: &RunInfo, out: &mut Vec<Drawing>) {
         let names: BTreeSet<&String> = self.system.rover_names().iter().collect();
-        let seen = |entity: &farside::Entity| {
-            names.contains(&entity.name).then_some(Seen {
+        let drawn = |entity: &farside::Entity| {
+            names.contains(&entity.name).then_some(Drawn {
                 on_the_map: false,
                 holds: None,
                 heading: [1.0, 0.0],
             })
         };
-        self.rovers = run.entities.iter().map(seen).collect();
+        self.rovers = run.entities.iter().map(drawn).collect();
         if let Some(crater) = self.in_crater.then(crater).and_then(Result::ok) {
             out.extend(self.ground(crater.terrain()));
         }
@@ -373,13 +373,13 @@ impl Scene for NetworkScene {
             RecordClass::Sample => {
                 let at = record.sender.index();
                 let name = run.name(record.sender);
-                let seen = self.rovers.get(at).copied().flatten();
-                if let Some(mut seen) = seen
+                let drawn = self.rovers.get(at).copied().flatten();
+                if let Some(mut drawn) = drawn
                     && let Some(kind) = record.kind
                     && let Ok(state) = kind.schema().decode(record.body)
                 {
-                    self.follow(name, &mut seen, &state, out);
-                    self.rovers[at] = Some(seen);
+                    self.follow(name, &mut drawn, &state, out);
+                    self.rovers[at] = Some(drawn);
                     self.tell_collisions(name, out);
                 }
             }

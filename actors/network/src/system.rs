@@ -4,37 +4,25 @@ use std::sync::Arc;
 
 use farside::Report;
 use farside_actors::figure::Figure;
+use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Builtin, Files, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Results, Section, Settings, Setup, SetupError, System,
+    Renamed, Results, Section, Settings, Setup, SetupError, System,
 };
-use farside_worlds::movingai::{self, Builtin as BuiltinMap, GridMap, GridWorld, TaskList};
-use farside_worlds::{Crater, CraterSettings, Roadmap, SensorError, SensorNetwork, WorldError};
-use serde::{Deserialize, Serialize};
+use farside_worlds::SensorNetwork;
+use serde::Deserialize;
 use serde_json::Value;
 
+use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
+use crate::world::{Ground, crater, ground, in_crater, place};
 use crate::{
-    ConfigError, Missions, Network, NetworkConfig, NetworkError, NetworkMetrics, Parts, TeamConfig,
-    WorldConfig, assemble, builtin, metrics, missions, picture,
+    CompleteConfig, ConfigError, MaxPlusConfig, Missions, Network, NetworkConfig, NetworkError,
+    NetworkMetrics, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics, missions, picture,
 };
-
-/// The most bytes of a roadmap file that are read; the reader itself takes no more than 1 MiB.
-const MAX_ROADMAP_BYTES: u64 = 2 << 20;
-
-/// The most rovers: each has a link to and from each node, and memory is finite.
-const MAX_ROVERS: u32 = 10_000;
 
 /// The network-guided system.
 pub struct NetworkSystem;
-
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct NetworkScenario {
-    pub(crate) world: WorldConfig,
-    pub(crate) team: TeamConfig,
-    pub(crate) network: NetworkConfig,
-}
 
 impl System for NetworkSystem {
     fn name(&self) -> &str {
@@ -46,7 +34,30 @@ impl System for NetworkSystem {
     }
 
     fn sections(&self) -> Vec<Section> {
-        ["world", "team", "network"].map(Section::named).to_vec()
+        [
+            WorldConfig::sections("world"),
+            TeamConfig::sections("team"),
+            NetworkConfig::sections("network"),
+        ]
+        .concat()
+    }
+
+    fn renamed(&self) -> Vec<Renamed> {
+        // Keys of one policy stood in `[network]` itself.
+        let tables = [
+            MaxPlusConfig::sections("network.max_plus"),
+            CompleteConfig::sections("network.complete"),
+        ];
+        let sections = tables.iter().flatten();
+        let keys = sections.flat_map(|section| section.keys.iter().map(move |key| (section, key)));
+        let moved = keys.map(|(section, key)| {
+            let (old, new) = (
+                format!("network.{}", key.name),
+                format!("{}.{}", section.name, key.name),
+            );
+            Renamed { old, new }
+        });
+        moved.collect()
     }
 
     fn metrics(&self) -> &[Metric] {
@@ -79,11 +90,8 @@ impl Settings for NetworkScenario {
     }
 
     fn check(&self) -> Result<(), SetupError> {
-        if !(1..=MAX_ROVERS).contains(&self.team.rovers) {
-            let found = self.team.rovers;
-            let message = format!("{found}: expected from 1 to {MAX_ROVERS}");
-            return Err(SetupError::value("team.rovers", message));
-        }
+        Table::check(&self.world, "world")?;
+        Table::check(&self.team, "team")?;
         let checked = self.network.check();
         checked.map_err(|error| blame(NetworkError::Config(error)))
     }
@@ -162,32 +170,11 @@ impl Settings for NetworkScenario {
 fn blame(error: NetworkError) -> SetupError {
     match error {
         NetworkError::Links(error) => error.into(),
+        NetworkError::Config(ConfigError::Value { key, message }) => {
+            SetupError::value(&key, message)
+        }
         error => SetupError::value(key_of(&error), error),
     }
-}
-
-/// The nodes.
-pub(crate) fn place(
-    world: &WorldConfig,
-    roadmap: &Roadmap,
-    seed: u64,
-) -> Result<SensorNetwork, SetupError> {
-    world.place(roadmap, seed).map_err(|error| {
-        let key = match error {
-            SensorError::NodeCount { .. } => "world.nodes",
-            SensorError::Radius { .. } => "world.radius",
-            SensorError::Coverage { .. } => "world.coverage",
-            SensorError::NoPlacement {
-                radius_m,
-                coverage_m,
-                ..
-            } if coverage_m < radius_m => "world.coverage",
-            // Which of the two to change is the user's choice; the message suggests a radius.
-            _ if world.radius_m.is_some() => "world.radius",
-            _ => "world.nodes",
-        };
-        SetupError::value(key, error)
-    })
 }
 
 /// Where nobody hears a rover, and which rovers that leaves without a way.
@@ -208,112 +195,6 @@ fn gaps(sensors: &SensorNetwork, system: &Network) -> Vec<String> {
             .map(|refused| format!("  {refused}")),
     );
     notes
-}
-
-/// Whether the roadmap lies in the default crater, as the built-in ones do; of others the ground is
-/// not known.
-pub(crate) fn in_crater(world: &WorldConfig) -> bool {
-    Roadmap::builtin_names().contains(&world.roadmap.name())
-}
-
-pub(crate) fn crater() -> Result<Crater, SetupError> {
-    let crater = Crater::generate(&CraterSettings::default());
-    crater.map_err(|error| SetupError::value("world.roadmap", error))
-}
-
-/// Whether the roadmap is a map of cells.
-pub(crate) fn is_grid(name: &str) -> bool {
-    name.ends_with(".map") || BuiltinMap::find(name).is_some()
-}
-
-/// Where rovers drive, and what a map of cells adds.
-pub(crate) struct Ground {
-    pub(crate) roadmap: Roadmap,
-    grid: Option<GridWorld>,
-}
-
-/// The built-in roadmap, the one in a file, or the one that the scenario has itself.
-pub(crate) fn ground(
-    world: &WorldConfig,
-    rovers: u32,
-    files: &mut Files,
-) -> Result<Ground, SetupError> {
-    let name = world.roadmap.name();
-    let wrong = |message: String| SetupError::value("world.roadmap", message);
-    if is_grid(name) {
-        let (_, grid) = grid(world, rovers, files)?;
-        let roadmap = grid.roadmap().clone();
-        return Ok(Ground {
-            roadmap,
-            grid: Some(grid),
-        });
-    }
-    if let Some(tasks) = &world.tasks {
-        let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
-        return Err(SetupError::value("world.tasks", message));
-    }
-    let plain = |roadmap| Ground {
-        roadmap,
-        grid: None,
-    };
-    if let Some(inline) = world.roadmap.table() {
-        return inline.map(plain).map_err(|error| wrong(error.to_string()));
-    }
-    if !name.ends_with(".toml") {
-        return Roadmap::builtin(name)
-            .map(plain)
-            .map_err(|error| match error {
-                WorldError::UnknownRoadmap { .. } => wrong(format!(
-                    "{error} (a roadmap of your own is a .toml file, or a MovingAI .map)"
-                )),
-                other => wrong(other.to_string()),
-            });
-    }
-    let bytes = files.read(name, MAX_ROADMAP_BYTES).map_err(wrong)?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        wrong(format!(
-            "{name}: byte {at} is not UTF-8; expected TOML text"
-        ))
-    })?;
-    let roadmap = Roadmap::from_toml(&text).map_err(|error| wrong(format!("{name}: {error}")))?;
-    Ok(plain(roadmap))
-}
-
-/// A MovingAI map, and the world that it makes with its tasks.
-pub(crate) fn grid(
-    world: &WorldConfig,
-    rovers: u32,
-    files: &mut Files,
-) -> Result<(GridMap, GridWorld), SetupError> {
-    let name = world.roadmap.name();
-    let of_map = |message: String| SetupError::value("world.roadmap", message);
-    let of_tasks = |message: String| SetupError::value("world.tasks", message);
-    let limit = movingai::MAX_FILE_BYTES as u64;
-    let builtin = BuiltinMap::find(name);
-    let (map_name, bytes) = match builtin {
-        Some(file) => (file.map_name, file.map.to_vec()),
-        None => (name, files.read(name, limit).map_err(of_map)?),
-    };
-    let in_map = |error| of_map(format!("{name}: {error}"));
-    let map = GridMap::from_movingai(&bytes).map_err(in_map)?;
-    let (tasks_name, bytes) = match (&world.tasks, builtin) {
-        (Some(tasks), _) => (tasks.as_str(), files.read(tasks, limit).map_err(of_tasks)?),
-        (None, Some(file)) => (name, file.tasks.to_vec()),
-        (None, None) => {
-            let message = "missing: expected a .scen file with the starts and goals on the map";
-            return Err(of_tasks(message.to_owned()));
-        }
-    };
-    let in_tasks = |error| of_tasks(format!("{tasks_name}: {error}"));
-    let tasks = TaskList::from_movingai(&bytes).map_err(in_tasks)?;
-    let first = tasks.first(rovers as usize).map_err(in_tasks)?;
-    let made = GridWorld::new(map_name, &map, world.cell_m, first);
-    let made = made.map_err(|error| match error.line() {
-        Some(_) => in_tasks(error),
-        None => in_map(error),
-    })?;
-    Ok((map, made))
 }
 
 /// Says whether rovers that stay at their goals are sure to arrive: only on well-formed instances.
@@ -341,43 +222,13 @@ fn key_of(error: &NetworkError) -> &'static str {
         | NetworkError::CannotCross
         | NetworkError::Refused { .. } => "world.gaps",
         NetworkError::UnknownSource { .. } => "network.roadmap_from",
-        NetworkError::Config(ConfigError::Range { key, .. } | ConfigError::Planned { key }) => KEYS
-            .iter()
-            .find(|known| known.ends_with(&format!(".{key}")))
-            .unwrap_or(&"network"),
+        NetworkError::Config(ConfigError::Planned { key }) => key,
         _ => "network",
     }
 }
 
 /// The most collisions that are named where a run is called wrong.
 const NAMED_IN_A_LINE: usize = 3;
-
-/// The keys of `[network]` that have ranges.
-const KEYS: [&str; 23] = [
-    "network.cycle",
-    "network.exchange",
-    "network.iteration_timeout",
-    "network.traverse",
-    "network.speed",
-    "network.location_sigma",
-    "network.location_clearance",
-    "network.location_fix",
-    "network.acceleration_limit",
-    "network.longest_path_factor",
-    "network.backtrack_penalty",
-    "network.collision_penalty_factor",
-    "network.noise",
-    "network.convergence",
-    "network.congestion_weight",
-    "network.congestion_spread",
-    "network.damping",
-    "network.processor",
-    "network.takeover_after",
-    "network.passive_window",
-    "network.active_window",
-    "network.cycle_limit",
-    "network.sabotage",
-];
 
 /// How many collisions there were, and the first of them by name.
 fn violation(metrics: &NetworkMetrics) -> String {

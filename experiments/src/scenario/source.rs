@@ -2,11 +2,16 @@
 //!
 //! Positions are byte offsets: those of the file first, then, end to end, those of each `--set`
 //! argument. So one span says where a mistake is, whoever made it.
+//!
+//! Keys that a system has given other names are moved to their new places first, in the file and in
+//! each `--set`, so that nothing behind this knows the old ones.
 
 use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
+
+use farside_actors::system::Renamed;
 
 use super::error::ScenarioError;
 use super::place::{MAX_SHOWN, Place, one_line};
@@ -29,6 +34,10 @@ pub(crate) struct Source {
     name: String,
     text: String,
     sets: Vec<Set>,
+    /// The keys of the system that have other names now.
+    renamed: Vec<Renamed>,
+    /// Those of them that are used under their old names.
+    used: Vec<Renamed>,
 }
 
 impl Source {
@@ -49,15 +58,72 @@ impl Source {
             name: name.to_owned(),
             text,
             sets: taken,
+            renamed: Vec::new(),
+            used: Vec::new(),
+        })
+    }
+
+    /// Reads keys under these old names as under their new ones from now on.
+    ///
+    /// # Errors
+    /// When the file has a key under both names.
+    pub(crate) fn rename(&mut self, renamed: Vec<Renamed>) -> Result<(), ScenarioError> {
+        self.renamed = renamed;
+        let document = self.parsed()?;
+        let mut used = Vec::new();
+        for renamed in &self.renamed {
+            let (old, new) = (parts(&renamed.old), parts(&renamed.new));
+            let (old, new) = (
+                find(document.get_ref(), &old),
+                find(document.get_ref(), &new),
+            );
+            if let (Some(old), Some(_)) = (old, new) {
+                return Err(ScenarioError::Invalid {
+                    place: self.place(old.span().start),
+                    key: renamed.old.clone(),
+                    message: format!("this is {} now, which is given too", renamed.new),
+                });
+            }
+            let is_set = self
+                .sets
+                .iter()
+                .any(|set| set.keys.join(".") == renamed.old);
+            if old.is_some() || is_set {
+                used.push(renamed.clone());
+            }
+        }
+        for set in &mut self.sets {
+            let key = set.keys.join(".");
+            if let Some(renamed) = self.renamed.iter().find(|renamed| renamed.old == key) {
+                set.keys = parts(&renamed.new)
+                    .iter()
+                    .map(|part| (*part).to_owned())
+                    .collect();
+            }
+        }
+        self.used = used;
+        Ok(())
+    }
+
+    /// What to tell whoever uses old names.
+    pub(crate) fn remarks(&self) -> impl Iterator<Item = String> {
+        let remark = |Renamed { old, new }: &Renamed| format!("{old} is called {new} now");
+        self.used.iter().map(remark)
+    }
+
+    fn parsed(&self) -> Result<Spanned<DeTable<'_>>, ScenarioError> {
+        DeTable::parse(&self.text).map_err(|error| ScenarioError::Syntax {
+            place: self.place(error.span().unwrap_or_default().start),
+            message: one_line(error.message()),
         })
     }
 
     /// The document: the file's table with every `--set` laid over it.
     pub(crate) fn document(&self) -> Result<Spanned<DeTable<'_>>, ScenarioError> {
-        let mut root = DeTable::parse(&self.text).map_err(|error| ScenarioError::Syntax {
-            place: self.place(error.span().unwrap_or_default().start),
-            message: one_line(error.message()),
-        })?;
+        let mut root = self.parsed()?;
+        for Renamed { old, new } in &self.renamed {
+            move_key(root.get_mut(), &parts(old), &parts(new));
+        }
         for set in &self.sets {
             self.lay_over(root.get_mut(), set)?;
         }
@@ -177,6 +243,56 @@ impl Source {
             descend(root.get_ref(), span, &mut path);
         }
         path.join(".")
+    }
+}
+
+/// A dotted key, part by part.
+fn parts(key: &str) -> Vec<&str> {
+    key.split('.').collect()
+}
+
+/// The value of a key, given from the top.
+fn find<'a, 'i>(table: &'a DeTable<'i>, key: &[&str]) -> Option<&'a Spanned<DeValue<'i>>> {
+    let (first, rest) = key.split_first()?;
+    let value = table.get(*first)?;
+    match (rest, value.get_ref()) {
+        ([], _) => Some(value),
+        (rest, DeValue::Table(below)) => find(below, rest),
+        _ => None,
+    }
+}
+
+/// Moves what stands at `old`, if anything does, to `new`; it keeps its places in the text.
+fn move_key<'i>(root: &mut DeTable<'i>, old: &[&'i str], new: &[&'i str]) {
+    let Some((key, value)) = remove(root, old) else {
+        return;
+    };
+    let Some((last, tables)) = new.split_last() else {
+        return;
+    };
+    let mut at = root;
+    for part in tables {
+        let part = Spanned::new(key.span(), DeString::from(*part));
+        let empty = || Spanned::new(key.span(), DeValue::Table(DeTable::new()));
+        let DeValue::Table(below) = at.entry(part).or_insert_with(empty).get_mut() else {
+            return;
+        };
+        at = below;
+    }
+    at.insert(Spanned::new(key.span(), DeString::from(*last)), value);
+}
+
+fn remove<'i>(
+    table: &mut DeTable<'i>,
+    key: &[&str],
+) -> Option<(Spanned<DeString<'i>>, Spanned<DeValue<'i>>)> {
+    let (first, rest) = key.split_first()?;
+    if rest.is_empty() {
+        return table.remove_entry(*first);
+    }
+    match table.get_mut(*first)?.get_mut() {
+        DeValue::Table(below) => remove(below, rest),
+        _ => None,
     }
 }
 
@@ -374,6 +490,36 @@ mod tests {
         );
         assert_eq!(source.key_at(&(7..15)), "team.röver");
         assert_eq!(source.key_at(&(26..27)), "seed");
+    }
+
+    fn renamed() -> Vec<Renamed> {
+        let [old, new] = ["a.x", "a.b.x"].map(str::to_owned);
+        vec![Renamed { old, new }]
+    }
+
+    #[test]
+    fn a_key_under_its_old_name_is_read_under_its_new_one() {
+        for (text, sets) in [
+            ("[a]\nx = 1", &[][..]),
+            ("a.x = 2\na.b.y = 3", &["a.x=1"]),
+            ("a.b.x = 2", &["a.x=1"]),
+            ("", &["a.x=1"]),
+        ] {
+            let mut source = source(text, sets);
+            source.rename(renamed()).unwrap();
+            assert_eq!(get(&source, &["a", "b", "x"]), "1", "{text} {sets:?}");
+            let remarks: Vec<String> = source.remarks().collect();
+            assert_eq!(remarks, ["a.x is called a.b.x now"]);
+        }
+        let mut new = source("a.b.x = 1", &["a.b.x=2"]);
+        new.rename(renamed()).unwrap();
+        assert_eq!(new.remarks().count(), 0);
+        let mut both = source("[a]\nx = 1\nb = { x = 2 }", &[]);
+        let error = both.rename(renamed()).unwrap_err().to_string();
+        assert!(
+            error.starts_with("x.toml:2:5: a.x: this is a.b.x now, which is given too"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn mistakes_have_a_place_and_the_nearest_name() {
     let priority = "system = 'network'\nnetwork.priority = 'lowest_di'";
     check(
         priority,
-        "x.toml:2:20: network.priority: ",
+        "x.toml:2:20: network.max_plus.priority: ",
         &["did you mean \"lowest_id\"?"],
     );
     let map = "system = 'network'\nworld.roadmap = 'crater-dens'";
@@ -390,4 +390,41 @@ fn what_begins_when_the_run_is_over_is_remarked_on() {
     assert_eq!(remarks, expected);
     let endless = parse(&text.replace("until = '60s'", ""), &[]).unwrap();
     assert!(endless.assemble().unwrap().remarks.is_empty());
+}
+
+#[test]
+fn keys_that_moved_to_tables_of_their_policies_are_read_where_they_were() {
+    let open = |text: &str, sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        let files = Files::on_disk(PathBuf::new());
+        Scenario::parse(
+            "x.toml",
+            text.to_owned(),
+            &sets,
+            &Registry::builtin(),
+            files,
+        )
+    };
+    let resolved = |text: &str, sets: &[&str]| open(text, sets).unwrap().resolved().unwrap();
+    let new = "system = 'network'\nnetwork.max_plus.damping = 0.5\nnetwork.complete.routes = 3";
+    let old = "system = 'network'\nnetwork.damping = 0.5\nnetwork.routes = 3";
+    assert_eq!(resolved(old, &[]), resolved(new, &[]));
+    let bare = "system = 'network'\n";
+    assert_eq!(
+        resolved(bare, &["network.damping=0.5", "network.routes=3"]),
+        resolved(new, &[])
+    );
+    let assembled = open(old, &[]).unwrap().assemble().unwrap();
+    let remark = "network.damping is called network.max_plus.damping now";
+    assert!(assembled.remarks.iter().any(|found| found == remark));
+    let both = open(&format!("{new}\nnetwork.routes = 4"), &[]);
+    let both = both.err().expect("it is refused").to_string();
+    assert!(
+        both.contains("x.toml:4:18: network.routes: this is"),
+        "{both}"
+    );
+    let zero = open(&format!("{bare}network.routes = 0"), &[]);
+    let zero = zero.err().expect("it is refused").to_string();
+    let expected = "x.toml:2:18: network.complete.routes: 0: expected at least 1";
+    assert!(zero.contains(expected), "{zero}");
 }

@@ -7,14 +7,14 @@ use farside::encoding::Schema;
 use farside_logs::Log;
 use farside_network::messages::RoverState;
 
-use crate::common::{farside, text};
+use crate::common::{farside, json, text};
 
 const CROWD: [&str; 9] = [
     "run",
     "--set",
     "team.rovers=60",
     "--set",
-    "network.max_iterations=1",
+    "network.max_plus.max_iterations=1",
     "--until",
     "25s",
     "--out",
@@ -99,6 +99,44 @@ fn the_map_has_the_rovers_of_its_instant() {
     );
     refused(&["--corridor", "a,b"], "expected auto, or vertices");
     refused(&["--corridor", "1,2,1"], "through vertex");
+}
+
+/// The circle that a run reports and the one that its pictures name are the same.
+#[test]
+fn a_run_and_its_pictures_name_the_same_circle() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = [
+        "run",
+        "--set",
+        "team.rovers=60",
+        "--set",
+        "network.max_plus.max_iterations=1",
+        "--set",
+        "network.active_window=60",
+        "--until",
+        "300s",
+        "--out",
+        "run.mcap",
+        "--json",
+    ];
+    let metrics = &json(&farside(folder.path(), &run))["metrics"];
+    assert!(metrics["deadlock"] != "none", "{metrics}");
+    let circle = metrics["wait_cycles"][0].as_array().expect("a circle");
+    let waiter = |waiter: &serde_json::Value| {
+        let agent = waiter["agent"].as_str().unwrap();
+        format!("{agent} at {}", waiter["at"])
+    };
+    let waiters: Vec<String> = circle.iter().map(waiter).collect();
+    let (first, rest) = waiters.split_first().unwrap();
+    let first_name = first.split(' ').next().unwrap();
+    let named = format!(
+        "{first} waits for {}, which waits for {first_name}.",
+        rest.join(", which waits for ")
+    );
+    for more in [&[][..], &["corridor", "--along", "auto"]] {
+        let picture = drawn(folder.path(), more);
+        assert!(picture.contains(&named), "{named} is not in the picture");
+    }
 }
 
 #[test]

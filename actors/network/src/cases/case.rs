@@ -242,6 +242,12 @@ fn table<T: Serialize>(value: &T) -> Result<toml::Table, fmt::Error> {
 fn without<T: Serialize>(value: &T, usual: &T) -> Result<toml::Table, fmt::Error> {
     let (mut all, usual) = (table(value)?, table(usual)?);
     all.retain(|key, value| usual.get(key) != Some(value));
+    for (key, value) in &mut all {
+        let usual = usual.get(key).and_then(toml::Value::as_table);
+        if let (Some(below), Some(usual)) = (value.as_table_mut(), usual) {
+            below.retain(|key, value| usual.get(key) != Some(value));
+        }
+    }
     Ok(all)
 }
 
@@ -251,7 +257,14 @@ fn write_table(f: &mut fmt::Formatter<'_>, header: &str, table: &toml::Table) ->
         writeln!(f, "\n{header}")?;
     }
     for (key, value) in table {
-        writeln!(f, "{key} = {value}")?;
+        match value {
+            toml::Value::Table(below) => {
+                for (name, value) in below {
+                    writeln!(f, "{key}.{name} = {value}")?;
+                }
+            }
+            value => writeln!(f, "{key} = {value}")?,
+        }
     }
     Ok(())
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use farside_actors::system::settings::one_of;
+use farside_actors::{settings, units};
 use farside_worlds::{
     Endpoints, Ownership, Roadmap, RoadmapError, RoadmapTable, SensorError, SensorNetwork,
 };
@@ -9,73 +11,66 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::gaps::Gaps;
-use farside_actors::units;
-
-/// Where rovers drive: the roadmap and the sensor nodes over it.
-///
-/// ```
-/// use farside_network::WorldConfig;
-/// let world = WorldConfig::default();
-/// assert_eq!((world.roadmap.name(), world.nodes), ("crater-dense", 28));
-/// ```
-#[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
-#[serde(deny_unknown_fields, default, rename_all = "snake_case")]
-pub struct WorldConfig {
-    /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), the path of a TOML
-    /// file or of a MovingAI `.map`, or the roadmap itself.
-    pub roadmap: RoadmapSource,
-    /// How long the side of a cell of a MovingAI map is, in metres.
-    #[serde(rename = "cell", with = "units::length_m")]
-    pub cell_m: f64,
-    /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from the
-    /// start and stay at their goals. A built-in map of cells has its own.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tasks: Option<String>,
-    /// How many sensor nodes; at least 1.
-    pub nodes: u32,
-    /// The radio radius of each, in metres; by default one that nearly every placement can do with.
-    #[serde(
-        rename = "radius",
-        with = "units::length_m::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub radius_m: Option<f64>,
-    /// How far each node reaches rovers, in metres; by default as far as nodes.
-    #[serde(
-        rename = "coverage",
-        with = "units::length_m::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub coverage_m: Option<f64>,
-    /// What becomes of vertices out of the coverage of their owners. By default there must be none, and
-    /// nodes are placed so; else they are placed as if coverage were the radius.
-    #[serde(skip_serializing_if = "Gaps::is_refuse")]
-    pub gaps: Gaps,
-    /// Which boundary vertices are entries, and which exits.
-    pub endpoints: Endpoints,
-    /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally many for
-    /// each as radio range allows; or `traffic`, as much traffic for each.
-    pub ownership: Ownership,
-    /// The seed of the nodes' places; by default the run's seed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub placement_seed: Option<u64>,
+settings! {
+    /// The `[world]` table: where rovers drive, the roadmap and the sensor nodes over it.
+    ///
+    /// ```
+    /// use farside_network::WorldConfig;
+    /// let world = WorldConfig::default();
+    /// assert_eq!((world.roadmap.name(), world.nodes), ("crater-dense", 28));
+    /// ```
+    pub struct WorldConfig {
+        /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), the path of a TOML
+        /// file or of a MovingAI `.map`, or the roadmap itself.
+        pub roadmap: RoadmapSource = "crater-dense".into();
+        /// How long the side of a cell of a MovingAI map is, in metres.
+        pub cell_m as "cell": f64
+            [with = "units::length_m"] = 10.0;
+        /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from the
+        /// start and stay at their goals. A built-in map of cells has its own.
+        pub tasks: Option<String>
+            [skip_serializing_if = "Option::is_none"];
+        /// How many sensor nodes; at least 1.
+        pub nodes: u32 = 28,
+            1..;
+        /// The radio radius of each, in metres; by default one that nearly every placement can do with.
+        pub radius_m as "radius": Option<f64>
+            [with = "units::length_m::option", skip_serializing_if = "Option::is_none"];
+        /// How far each node reaches rovers, in metres; by default as far as nodes.
+        pub coverage_m as "coverage": Option<f64>
+            [with = "units::length_m::option", skip_serializing_if = "Option::is_none"];
+        /// What becomes of vertices out of the coverage of their owners. By default there must be none, and
+        /// nodes are placed so; else they are placed as if coverage were the radius.
+        pub gaps: Gaps
+            [skip_serializing_if = "Gaps::is_refuse"],
+            one_of(&["refuse", "close", "cross"]);
+        /// Which boundary vertices are entries, and which exits.
+        pub endpoints: Endpoints;
+        /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally many for
+        /// each as radio range allows; or `traffic`, as much traffic for each.
+        pub ownership: Ownership;
+        /// The seed of the nodes' places; by default the run's seed.
+        pub placement_seed: Option<u64>
+            [skip_serializing_if = "Option::is_none"];
+    }
 }
 
-impl Default for WorldConfig {
-    fn default() -> Self {
-        WorldConfig {
-            roadmap: "crater-dense".into(),
-            cell_m: 10.0,
-            tasks: None,
-            nodes: 28,
-            radius_m: None,
-            coverage_m: None,
-            gaps: Gaps::default(),
-            endpoints: Endpoints::default(),
-            ownership: Ownership::default(),
-            placement_seed: None,
-        }
+/// What becomes of vertices at which no node reaches a rover.
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Gaps {
+    /// There must be none.
+    #[default]
+    Refuse,
+    /// They are closed: nothing leads there.
+    Close,
+    /// Rovers cross them out of everybody's hearing (the `complete` policy only).
+    Cross,
+}
+
+impl Gaps {
+    fn is_refuse(&self) -> bool {
+        *self == Gaps::Refuse
     }
 }
 
@@ -184,21 +179,19 @@ impl WorldConfig {
     }
 }
 
-/// Who drives.
-///
-/// ```
-/// assert_eq!(farside_network::TeamConfig::default().rovers, 50);
-/// ```
-#[derive(Deserialize, Serialize, Clone, Debug, PartialEq)]
-#[serde(deny_unknown_fields, default, rename_all = "snake_case")]
-pub struct TeamConfig {
-    /// How many rovers, all waiting at their entries at the start; at least 1. Where the world has
-    /// tasks, they do the first ones.
-    pub rovers: u32,
-}
+/// The most rovers: each has a link to and from each node, and memory is finite.
+const MAX_ROVERS: u32 = 10_000;
 
-impl Default for TeamConfig {
-    fn default() -> Self {
-        TeamConfig { rovers: 50 }
+settings! {
+    /// The `[team]` table: who drives.
+    ///
+    /// ```
+    /// assert_eq!(farside_network::TeamConfig::default().rovers, 50);
+    /// ```
+    pub struct TeamConfig {
+        /// How many rovers, all waiting at their entries at the start; at least 1. Where the world has
+        /// tasks, they do the first ones.
+        pub rovers: u32 = 50,
+            1..=MAX_ROVERS;
     }
 }

@@ -3,22 +3,7 @@
 
 use super::joint;
 use super::plan::Plan;
-use super::problem::Problem;
-
-/// What the best plan is.
-///
-/// ```
-/// use farside_network::mapf::Objective;
-/// assert_eq!(Objective::default(), Objective::SumOfCosts);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Objective {
-    /// The least sum of the cycles in which rovers arrive for good, time in queues included.
-    #[default]
-    SumOfCosts,
-    /// The least cycle in which all have arrived.
-    Makespan,
-}
+use super::problem::{CoupledError, Objective, Problem};
 
 /// How to search.
 ///
@@ -45,29 +30,6 @@ impl Default for CoupledConfig {
             independence: true,
         }
     }
-}
-
-/// Why there is no best plan to show.
-///
-/// ```
-/// use farside_network::mapf::CoupledError;
-/// let error = CoupledError::Exhausted { expansions: 500 };
-/// assert_eq!(error.to_string(), "no plan found within 500 expansions");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CoupledError {
-    /// The limit was reached: there may be a plan.
-    #[error("no plan found within {expansions} expansions")]
-    Exhausted {
-        /// Nodes expanded.
-        expansions: u64,
-    },
-    /// There is no plan. Never with [`Rules::Queues`](super::Rules::Queues).
-    #[error("there is no plan: all of {expansions} expansions lead nowhere")]
-    Unsolvable {
-        /// Nodes expanded.
-        expansions: u64,
-    },
 }
 
 /// The best plan for a team, and what it took to find it.

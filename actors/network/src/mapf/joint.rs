@@ -13,9 +13,8 @@ use std::rc::Rc;
 
 use farside_worlds::VertexId;
 
-use super::coupled::{CoupledError, Objective};
 use super::plan::Trip;
-use super::problem::{Problem, Rules};
+use super::problem::{CoupledError, Objective, Problem, Rules};
 
 /// Not yet on the roadmap. Vertices are below [`farside_worlds::roadmap::MAX_VERTICES`].
 const QUEUED: u32 = u32::MAX;

@@ -259,3 +259,41 @@ impl<'a> Problem<'a> {
         false
     }
 }
+
+/// What the best plan is.
+///
+/// ```
+/// use farside_network::mapf::Objective;
+/// assert_eq!(Objective::default(), Objective::SumOfCosts);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Objective {
+    /// The least sum of the cycles in which rovers arrive for good, time in queues included.
+    #[default]
+    SumOfCosts,
+    /// The least cycle in which all have arrived.
+    Makespan,
+}
+
+/// Why there is no best plan to show.
+///
+/// ```
+/// use farside_network::mapf::CoupledError;
+/// let error = CoupledError::Exhausted { expansions: 500 };
+/// assert_eq!(error.to_string(), "no plan found within 500 expansions");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CoupledError {
+    /// The limit was reached: there may be a plan.
+    #[error("no plan found within {expansions} expansions")]
+    Exhausted {
+        /// Nodes expanded.
+        expansions: u64,
+    },
+    /// There is no plan. Never with [`Rules::Queues`](super::Rules::Queues).
+    #[error("there is no plan: all of {expansions} expansions lead nowhere")]
+    Unsolvable {
+        /// Nodes expanded.
+        expansions: u64,
+    },
+}

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use farside_actors::invariants::Place;
 use farside_worlds::{Roadmap, VertexId};
 
 use super::PictureError;
-use super::tracks::{Place, Seen, Tracks};
-use super::waits::Waits;
+use crate::tracks::{Sighting, Tracks};
+use crate::waits::Waits;
 
 /// Every corridor of a roadmap: a maximal chain of vertices with two neighbours each, and the
 /// vertices at its ends, which are junctions or dead ends. A chain that begins and ends at one
@@ -95,14 +96,16 @@ pub(crate) fn through(
 pub(crate) fn busiest(
     roadmap: &Roadmap,
     tracks: &Tracks,
-    rovers: &[Seen],
+    rovers: &[Sighting],
     waits: &Waits,
     cycle_ns: u64,
     until_ns: u64,
 ) -> Result<Vec<VertexId>, PictureError> {
     let stood_ns = standing_ns(roadmap, tracks, cycle_ns, until_ns);
     let circled = |v: VertexId| {
-        let here = |seen: &&Seen| seen.holds() == Some(v) && waits.in_circle(seen.rover);
+        let here = |sighting: &&Sighting| {
+            sighting.place.claim() == Some(v) && waits.in_circle(sighting.rover)
+        };
         rovers.iter().find(here).is_some()
     };
     let score = |line: &[VertexId]| {
@@ -126,8 +129,14 @@ pub(crate) fn busiest(
 
 /// The vertices that the rovers of a circle hold, in order; of two that face each other, with those
 /// that stand in line behind them, and a vertex more on both sides.
-fn round(roadmap: &Roadmap, rovers: &[Seen], waits: &Waits, circle: &[u32]) -> Vec<VertexId> {
-    let place = |rover: u32| rovers.iter().find(|seen| seen.rover == rover)?.holds();
+fn round(roadmap: &Roadmap, rovers: &[Sighting], waits: &Waits, circle: &[u32]) -> Vec<VertexId> {
+    let place = |rover: u32| {
+        rovers
+            .iter()
+            .find(|sighting| sighting.rover == rover)?
+            .place
+            .claim()
+    };
     let order = waits.round(circle);
     let mut line: Vec<VertexId> = order.iter().filter_map(|rover| place(*rover)).collect();
     if let [a, b] = order[..] {
@@ -157,7 +166,7 @@ fn standing_ns(roadmap: &Roadmap, tracks: &Tracks, cycle_ns: u64, until_ns: u64)
         for (at, mark) in marks.iter().enumerate() {
             let end_ns = marks.get(at + 1).map_or(until_ns, |next| next.time_ns);
             let ns = end_ns.min(until_ns).saturating_sub(mark.time_ns);
-            if let (Some(v), None) = (mark.vertex, mark.moving_to)
+            if let Place::At(v) = mark.place
                 && v != mark.goal
             {
                 stood_ns[v.0 as usize] += ns.saturating_sub(cycle_ns);
@@ -168,15 +177,22 @@ fn standing_ns(roadmap: &Roadmap, tracks: &Tracks, cycle_ns: u64, until_ns: u64)
 }
 
 /// Since when the rovers of a circle stand as they do.
-pub(crate) fn closed_ns(tracks: &Tracks, rovers: &[Seen], circle: &[u32], until_ns: u64) -> u64 {
-    let since = |seen: &Seen| {
-        let (_, marks) = tracks.rovers().find(|(rover, _)| *rover == seen.rover)?;
+pub(crate) fn closed_ns(
+    tracks: &Tracks,
+    rovers: &[Sighting],
+    circle: &[u32],
+    until_ns: u64,
+) -> u64 {
+    let since = |sighting: &Sighting| {
+        let (_, marks) = tracks
+            .rovers()
+            .find(|(rover, _)| *rover == sighting.rover)?;
         let last = marks.iter().rfind(|mark| mark.time_ns <= until_ns)?;
         Some(last.time_ns)
     };
-    let members = rovers
-        .iter()
-        .filter(|seen| circle.contains(&seen.rover) && matches!(seen.place, Place::At(_)));
+    let members = rovers.iter().filter(|sighting| {
+        circle.contains(&sighting.rover) && matches!(sighting.place, Place::At(_))
+    });
     members.filter_map(since).max().unwrap_or(until_ns)
 }
 

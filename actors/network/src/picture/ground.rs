@@ -9,7 +9,9 @@ use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
 use super::{Ground, Site};
 use crate::Policy;
-use crate::system::{NetworkScenario, crater, grid, ground, in_crater, is_grid, place};
+use crate::scenario::NetworkScenario;
+use crate::waits::WaitRule;
+use crate::world::{crater, grid, ground, in_crater, is_grid, place};
 
 /// The roadmap, the nodes and the ground, as they are for a run of the problem with this seed.
 pub(super) fn site(
@@ -18,7 +20,8 @@ pub(super) fn site(
     files: &mut Files,
 ) -> Result<Site, SetupError> {
     let (world, rovers) = (&scenario.world, scenario.team.rovers);
-    let (roadmap, drawn) = if is_grid(world.roadmap.name()) {
+    let stays = is_grid(world.roadmap.name());
+    let (roadmap, drawn) = if stays {
         let (map, made) = grid(world, rovers, files)?;
         let middles_m = walls(&map, &made, world.cell_m);
         let cell_m = world.cell_m;
@@ -41,6 +44,8 @@ pub(super) fn site(
         // then the diagram counts seconds.
         cycle: scenario.network.cycle.unwrap_or(SimDuration::from_secs(1)),
         coordinates: scenario.network.policy == Policy::Paper,
+        rovers,
+        wait_rule: WaitRule::of(scenario.network.policy, stays),
     })
 }
 

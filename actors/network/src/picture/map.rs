@@ -5,15 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use farside::SimDuration;
+use farside_actors::invariants::Place;
 use farside_worlds::{NodeId, VertexId};
 use maud::{Markup, PreEscaped, html};
 
 use super::Site;
 use super::colouring;
 use super::relief::contours;
-use super::tracks::{Place, Seen};
-use super::waits::{Waits, nearer};
 use super::{Drawn, Ground};
+use crate::tracks::Sighting;
+use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
 use farside_actors::figure::scale::text_width;
 use farside_actors::figure::svg::{Px, path};
@@ -43,12 +44,12 @@ struct Sheet<'a> {
 
 pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
     let rovers = run.tracks.at(at_ns);
-    let waits = Waits::of(&run.site.roadmap, &rovers);
+    let waits = run.waits(&rovers);
     let sheet = Sheet::new(run);
     let at = SimDuration::from_nanos(at_ns);
-    let count = |counted: fn(&Place) -> bool| rovers.iter().filter(|r| counted(&r.place)).count();
-    let on_map = count(|place| matches!(place, Place::At(_) | Place::Between(..)));
-    let (queued, gone) = (count(|p| *p == Place::Queue), count(|p| *p == Place::Gone));
+    let count = |counted: fn(&&Sighting) -> bool| rovers.iter().filter(counted).count();
+    let on_map = count(|rover| rover.place != Place::Away);
+    let (queued, gone) = (count(|r| r.is_queued()), count(|r| r.is_gone()));
     let circled: usize = waits.circles.iter().map(Vec::len).sum();
     let title = format!("{}, seed {}, at {at}", run.scenario, run.seed);
     let cycle = at_ns / run.site.cycle.as_nanos();
@@ -60,6 +61,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
             " {circled} wait for each other in {}, {behind} wait behind them.",
             counted(waits.circles.len(), "circle")
         ));
+        says.push_str(&run.shortest_circle(&waits, &rovers));
     }
     let pairs = sheet.coordination(&rovers);
     let body = html! {
@@ -73,7 +75,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         path class="coordination" d=(pairs) {}
         (sheet.posts())
         (sheet.arrows(&rovers, &waits))
-        @for seen in &rovers { (sheet.rover(seen, &waits)) }
+        @for sighting in &rovers { (sheet.rover(sighting, &waits)) }
         (legend(SIDE + sheet.width + 24.0, TOP + 10.0, &run.site))
     };
     Figure {
@@ -247,12 +249,12 @@ impl<'a> Sheet<'a> {
     }
 
     /// Entries and exits, and how many wait at each entry.
-    fn ends(&self, rovers: &[Seen]) -> Markup {
-        let entries: BTreeSet<VertexId> = rovers.iter().map(|seen| seen.entry).collect();
-        let exits: BTreeSet<VertexId> = rovers.iter().map(|seen| seen.goal).collect();
+    fn ends(&self, rovers: &[Sighting]) -> Markup {
+        let entries: BTreeSet<VertexId> = rovers.iter().map(|sighting| sighting.entry).collect();
+        let exits: BTreeSet<VertexId> = rovers.iter().map(|sighting| sighting.goal).collect();
         let mut queues = BTreeMap::<VertexId, usize>::new();
-        for seen in rovers.iter().filter(|seen| seen.place == Place::Queue) {
-            *queues.entry(seen.entry).or_default() += 1;
+        for sighting in rovers.iter().filter(|sighting| sighting.is_queued()) {
+            *queues.entry(sighting.entry).or_default() += 1;
         }
         let (from, to) = ends_of(&self.run.site.ground);
         html! {
@@ -292,7 +294,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Lines between the rovers of the coordination graph (section 3.2).
-    fn coordination(&self, rovers: &[Seen]) -> String {
+    fn coordination(&self, rovers: &[Sighting]) -> String {
         let places: Vec<_> = rovers
             .iter()
             .filter_map(|r| Some((r, self.place(r)?)))
@@ -303,7 +305,7 @@ impl<'a> Sheet<'a> {
         }
         for (at, (a, from)) in places.iter().enumerate() {
             for (b, to) in &places[at + 1..] {
-                if let (Some(u), Some(v)) = (a.holds(), b.holds())
+                if let (Some(u), Some(v)) = (a.place.claim(), b.place.claim())
                     && coordinated(&self.run.site.sensors, u, v)
                 {
                     data.push_str(&path([*from, *to]));
@@ -314,41 +316,43 @@ impl<'a> Sheet<'a> {
     }
 
     /// Where a rover is, if it is on the map.
-    fn place(&self, seen: &Seen) -> Option<(f64, f64)> {
-        match seen.place {
-            Place::Queue | Place::Gone => None,
+    fn place(&self, sighting: &Sighting) -> Option<(f64, f64)> {
+        match sighting.place {
+            Place::Away => None,
             Place::At(v) => Some(self.at(v)),
-            Place::Between(u, v, share) => {
-                let (a, b) = (self.at(u), self.at(v));
+            Place::Between(u, v) => {
+                let (a, b, share) = (self.at(u), self.at(v), sighting.share);
                 Some((a.0 + (b.0 - a.0) * share, a.1 + (b.1 - a.1) * share))
             }
         }
     }
 
-    fn rover(&self, seen: &Seen, waits: &Waits) -> Markup {
-        let Some((x, y)) = self.place(seen) else {
+    fn rover(&self, sighting: &Sighting, waits: &Waits) -> Markup {
+        let Some((x, y)) = self.place(sighting) else {
             return html! {};
         };
         let roadmap = &self.run.site.roadmap;
-        let next = match seen.place {
-            Place::Between(_, to, _) => Some(to),
-            Place::At(here) => nearer(roadmap, here, seen.goal).next(),
-            Place::Queue | Place::Gone => None,
+        let next = match sighting.place {
+            Place::Between(_, to) => Some(to),
+            Place::At(here) => nearer(roadmap, here, sighting.goal).next(),
+            Place::Away => None,
         };
-        let (state, says) = match waits.on.get(&seen.rover) {
-            Some(on) if waits.in_circle(seen.rover) => (" circle", waits_for(on, "in a circle")),
-            Some(on) if waits.behind.contains(&seen.rover) => {
+        let (state, says) = match waits.on.get(&sighting.rover) {
+            Some(on) if waits.in_circle(sighting.rover) => {
+                (" circle", waits_for(on, "in a circle"))
+            }
+            Some(on) if waits.behind.contains(&sighting.rover) => {
                 (" behind", waits_for(on, "behind a circle"))
             }
             Some(on) => (" waits", waits_for(on, "for now")),
             None => ("", String::new()),
         };
-        let number = (seen.rover + 1).to_string();
+        let number = (sighting.rover + 1).to_string();
         let r = self.rover;
         let to = ends_of(&self.run.site.ground).1;
         html! {
             g {
-                title { "rover " (number) " to " (to) " " (seen.goal.0) (says) }
+                title { "rover " (number) " to " (to) " " (sighting.goal.0) (says) }
                 @if let Some(next) = next {
                     path class={ "rover" (state) } d=(nose((x, y), self.at(next), r)) {}
                 }
@@ -363,10 +367,10 @@ impl<'a> Sheet<'a> {
     }
 
     /// From those that wait in a circle, or behind one, to those they wait for.
-    fn arrows(&self, rovers: &[Seen], waits: &Waits) -> Markup {
+    fn arrows(&self, rovers: &[Sighting], waits: &Waits) -> Markup {
         let place = |rover: &u32| {
-            let seen = rovers.iter().find(|seen| seen.rover == *rover)?;
-            self.place(seen)
+            let sighting = rovers.iter().find(|sighting| sighting.rover == *rover)?;
+            self.place(sighting)
         };
         let mut arrows = Vec::new();
         for (rover, on) in &waits.on {

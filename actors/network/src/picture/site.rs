@@ -5,16 +5,9 @@ use std::sync::Arc;
 use farside::SimDuration;
 use farside_worlds::{HeightField, Roadmap, SensorNetwork};
 
-/// Where a run took place. A system that has a roadmap tells it by
-/// [`Settings::site`](crate::system::Settings::site), and `farside draw` draws its runs.
-///
-/// ```
-/// use farside_experiments::{scenario::Scenario, system::Registry};
-/// let scenario = Scenario::open("network/crater-sparse", &[], &Registry::builtin())?;
-/// let site = scenario.site(1)?.unwrap();
-/// assert_eq!((site.roadmap.len(), site.cycle.as_secs_f64()), (178, 1.0));
-/// # Ok::<(), farside_experiments::scenario::ScenarioError>(())
-/// ```
+use crate::waits::WaitRule;
+
+/// Where a run took place, as its pictures need it.
 #[derive(Clone, Debug)]
 pub(crate) struct Site {
     /// Where rovers drive.
@@ -27,6 +20,10 @@ pub(crate) struct Site {
     pub(crate) cycle: SimDuration,
     /// Rovers are coordinated by max-plus, and have a coordination graph.
     pub(crate) coordinates: bool,
+    /// How many rovers the team has.
+    pub(crate) rovers: u32,
+    /// For what they wait.
+    pub(crate) wait_rule: WaitRule,
 }
 
 /// What lies around a roadmap.

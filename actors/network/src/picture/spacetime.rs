@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use farside::SimDuration;
+use farside_actors::invariants::Place;
 use farside_worlds::VertexId;
 use maud::{Markup, PreEscaped, html};
 
-use super::tracks::Mark;
-use super::waits::{Waits, nearer};
 use super::{Drawn, Line, PictureError, colouring, corridor};
+use crate::tracks::Mark;
+use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
 use farside_actors::figure::scale::{Scale, text_width, thinned};
 use farside_actors::figure::svg::{Area, Px, path};
@@ -79,8 +80,9 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
                 break;
             }
             let end_ns = marks.get(at + 1).map_or(until_ns, |next| next.time_ns);
-            let here = mark.vertex.and_then(|v| place.get(&v).copied());
-            let there = mark.moving_to.and_then(|v| place.get(&v).copied());
+            let on_line = |v: VertexId| place.get(&v).copied();
+            let here = mark.place.vertex().and_then(on_line);
+            let there = mark.place.claim().and_then(on_line);
             let piece = |from: usize, to: usize, way| Piece {
                 from_ns: mark.time_ns,
                 to_ns: end_ns.min(until_ns),
@@ -88,13 +90,13 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
                 to,
                 way,
             };
-            match (here, mark.moving_to, there) {
-                (Some(here), None, _) => {
+            match (here, mark.place, there) {
+                (Some(here), Place::At(_), _) => {
                     visit
                         .pieces
                         .push(piece(here, here, wanted(run, mark, &place, here)));
                 }
-                (Some(here), Some(_), Some(to)) if here.abs_diff(to) == 1 => {
+                (Some(here), Place::Between(..), Some(to)) if here.abs_diff(to) == 1 => {
                     visit.pieces.push(piece(here, to, Way::between(here, to)));
                 }
                 // Off the line, or to it: a visit begins when the rover has come.
@@ -114,7 +116,7 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
 
 /// Which way a rover that stands on the line wants to go.
 fn wanted(run: &Drawn, mark: &Mark, place: &BTreeMap<VertexId, usize>, here: usize) -> Way {
-    let Some(vertex) = mark.vertex else {
+    let Some(vertex) = mark.place.vertex() else {
         return Way::Across;
     };
     let nearer = nearer(&run.site.roadmap, vertex, mark.goal);
@@ -143,7 +145,7 @@ pub(super) fn figure(
 ) -> Result<Figure, PictureError> {
     let roadmap = &run.site.roadmap;
     let rovers = run.tracks.at(to_ns);
-    let waits = Waits::of(roadmap, &rovers);
+    let waits = run.waits(&rovers);
     let cycle_ns = run.site.cycle.as_nanos();
     let line = match line {
         Line::Auto => corridor::busiest(roadmap, &run.tracks, &rovers, &waits, cycle_ns, to_ns)?,
@@ -196,8 +198,9 @@ pub(super) fn figure(
 fn locked(run: &Drawn, line: &[VertexId], waits: &Waits, to_ns: u64) -> Option<u64> {
     let rovers = run.tracks.at(to_ns);
     let on_line = |rover: &u32| {
-        let seen = rovers.iter().find(|seen| seen.rover == *rover);
-        seen.and_then(|seen| seen.holds())
+        let sighting = rovers.iter().find(|sighting| sighting.rover == *rover);
+        sighting
+            .and_then(|sighting| sighting.place.claim())
             .is_some_and(|v| line.contains(&v))
     };
     let circles = waits
@@ -230,6 +233,8 @@ impl Diagram<'_> {
                 " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it moves."
             ));
         }
+        let rovers = self.run.tracks.at(self.to_ns);
+        says.push_str(&self.run.shortest_circle(self.waits, &rovers));
         says
     }
 

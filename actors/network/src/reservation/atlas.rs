@@ -93,7 +93,7 @@ impl Atlas {
     }
 
     /// The node that knows the roadmap from the start tells its neighbours.
-    pub(super) fn publish(&mut self, registry: &mut Registry, desk: &Desk<'_>) {
+    pub(crate) fn publish(&mut self, registry: &mut Registry, desk: &Desk<'_>) {
         if desk.site.roadmap_from != Some(desk.home) || !self.parts.is_empty() {
             return;
         }
@@ -105,7 +105,7 @@ impl Atlas {
     }
 
     /// Tells the neighbours of a home that was taken over, which may have missed parts.
-    pub(super) fn share(&self, registry: &mut Registry, desk: &Desk<'_>) {
+    pub(crate) fn share(&self, registry: &mut Registry, desk: &Desk<'_>) {
         for part in self.parts.values() {
             for &to in desk.site.sensors.neighbors(desk.home) {
                 registry.post(to, Item::Roadmap(part.clone()));
@@ -115,7 +115,7 @@ impl Atlas {
 
     /// Takes an item that came from a neighbour of `desk`'s home. Returns it if it is the step of a walk
     /// and the roadmap is known; keeps it until then.
-    pub(super) fn receive(
+    pub(crate) fn receive(
         &mut self,
         registry: &mut Registry,
         desk: &Desk<'_>,
@@ -136,7 +136,7 @@ impl Atlas {
     }
 
     /// What was held, once the roadmap is known.
-    pub(super) fn release(&mut self) -> Vec<(NodeId, Item)> {
+    pub(crate) fn release(&mut self) -> Vec<(NodeId, Item)> {
         match self.complete {
             true => std::mem::take(&mut self.held),
             false => Vec::new(),

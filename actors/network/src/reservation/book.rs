@@ -4,28 +4,28 @@
 use farside_worlds::VertexId;
 
 use super::messages::Walk;
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
-use crate::messages::RoverId;
 
 /// A planned visit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Visit {
-    pub(super) walk: Walk,
+pub(crate) struct Visit {
+    pub(crate) walk: Walk,
     /// The step with which the rover comes.
-    pub(super) step: u32,
+    pub(crate) step: u32,
     /// Where it comes from; none from an entry queue.
-    pub(super) from: Option<VertexId>,
-    pub(super) start: u64,
-    pub(super) end: u64,
+    pub(crate) from: Option<VertexId>,
+    pub(crate) start: u64,
+    pub(crate) end: u64,
     /// The whole way is reserved.
-    pub(super) confirmed: bool,
+    pub(crate) confirmed: bool,
     /// The vertex was given to the rover: nothing may come before.
-    pub(super) granted: bool,
+    pub(crate) granted: bool,
 }
 
 /// Why visits cannot be entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Clash {
+pub(crate) enum Clash {
     /// Something in the way will stay.
     Firm,
     /// All that is in the way may yet be struck out, and is younger: it is worth waiting.
@@ -33,7 +33,7 @@ pub(super) enum Clash {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Book {
+pub(crate) struct Book {
     /// The vertices, ascending, each with its visits in order.
     pages: Vec<(VertexId, Vec<Visit>)>,
     /// From the first vertex to the last: the page of each, [`NO_PAGE`] for those of others.
@@ -44,7 +44,7 @@ const NO_PAGE: u32 = u32::MAX;
 
 impl Book {
     /// An empty page for each vertex; a book that has pages stays as it is.
-    pub(super) fn open(&mut self, owned: &[VertexId]) {
+    pub(crate) fn open(&mut self, owned: &[VertexId]) {
         if self.pages.is_empty() {
             self.pages = owned.iter().map(|&v| (v, Vec::new())).collect();
             let first = owned.first().map_or(0, |v| v.0);
@@ -62,7 +62,7 @@ impl Book {
     }
 
     /// The visits at `v` as (start, end); none if it is not in the book.
-    pub(super) fn busy(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
+    pub(crate) fn busy(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
         let visits = &self.pages[self.page(v)?].1;
         Some(
             visits
@@ -73,7 +73,7 @@ impl Book {
     }
 
     /// Enters a rover that stands at `v`, for ever as far as is known.
-    pub(super) fn stand(&mut self, v: VertexId, rover: RoverId, step: u32) {
+    pub(crate) fn stand(&mut self, v: VertexId, rover: RoverId, step: u32) {
         let walk = Walk {
             rover,
             attempt: 0,
@@ -92,13 +92,13 @@ impl Book {
     }
 
     /// Who stands, or will stand, at `v` for ever, as far as is known.
-    pub(super) fn standing(&self, v: VertexId) -> Option<&Visit> {
+    pub(crate) fn standing(&self, v: VertexId) -> Option<&Visit> {
         let last = self.pages[self.page(v)?].1.last()?;
         (last.end == FOREVER && last.confirmed).then_some(last)
     }
 
     /// The rover that stands at `v` for ever will leave it after all.
-    pub(super) fn leave_by(&mut self, v: VertexId, end: u64) {
+    pub(crate) fn leave_by(&mut self, v: VertexId, end: u64) {
         let Some(page) = self.page(v) else { return };
         if let Some(last) = self.pages[page].1.last_mut() {
             last.end = end;
@@ -107,7 +107,7 @@ impl Book {
 
     /// Whether `visits` (with their vertices) may all be entered: apart in time from all others, and
     /// after those that were granted.
-    pub(super) fn check(&self, walk: &Walk, visits: &[TimedVisit]) -> Result<(), Clash> {
+    pub(crate) fn check(&self, walk: &Walk, visits: &[TimedVisit]) -> Result<(), Clash> {
         let mut result = Ok(());
         for new in visits {
             let Some(page) = self.page(new.vertex) else {
@@ -128,7 +128,7 @@ impl Book {
     }
 
     /// Whether `walk` has entered these visits.
-    pub(super) fn has(&self, walk: &Walk, visits: &[TimedVisit]) -> bool {
+    pub(crate) fn has(&self, walk: &Walk, visits: &[TimedVisit]) -> bool {
         let entered = |new: &TimedVisit| {
             let page = self.page(new.vertex).map(|page| &self.pages[page].1);
             let same = |old: &Visit| old.walk == *walk && old.start == new.start;
@@ -138,7 +138,7 @@ impl Book {
     }
 
     /// Enters a visit that was checked.
-    pub(super) fn enter(&mut self, v: VertexId, visit: Visit) {
+    pub(crate) fn enter(&mut self, v: VertexId, visit: Visit) {
         let Some(page) = self.page(v) else { return };
         let visits = &mut self.pages[page].1;
         let at = visits.partition_point(|old| old.start < visit.start);
@@ -146,7 +146,7 @@ impl Book {
     }
 
     /// The whole way is reserved.
-    pub(super) fn confirm(&mut self, walk: &Walk) {
+    pub(crate) fn confirm(&mut self, walk: &Walk) {
         for visit in self.of(walk) {
             visit.confirmed = true;
         }
@@ -159,12 +159,12 @@ impl Book {
     }
 
     /// Strikes out what `walk` has entered.
-    pub(super) fn strike(&mut self, walk: &Walk) {
+    pub(crate) fn strike(&mut self, walk: &Walk) {
         self.retain(|visit| visit.walk != *walk);
     }
 
     /// Strikes out what earlier attempts have entered: they have failed, if there is a later one.
-    pub(super) fn strike_earlier(&mut self, walk: &Walk) {
+    pub(crate) fn strike_earlier(&mut self, walk: &Walk) {
         self.retain(|visit| visit.confirmed || !visit.walk.is_before(walk));
     }
 
@@ -175,7 +175,7 @@ impl Book {
     }
 
     /// The rover to which `v` was granted has gone on.
-    pub(super) fn departed(&mut self, v: VertexId) {
+    pub(crate) fn departed(&mut self, v: VertexId) {
         let Some(page) = self.page(v) else { return };
         let visits = &mut self.pages[page].1;
         if visits.first().is_some_and(|visit| visit.granted) {
@@ -184,7 +184,7 @@ impl Book {
     }
 
     /// The first visit of each vertex, where it may be granted.
-    pub(super) fn heads(&mut self) -> impl Iterator<Item = (VertexId, &mut Visit)> {
+    pub(crate) fn heads(&mut self) -> impl Iterator<Item = (VertexId, &mut Visit)> {
         let firsts = self.pages.iter_mut().filter_map(|(v, visits)| {
             let first = visits.first_mut()?;
             Some((*v, first))

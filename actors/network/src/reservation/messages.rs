@@ -4,8 +4,9 @@
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
+use crate::failover::rank::Replacement;
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{Label, TimedVisit};
-use crate::messages::{Replacement, RoverId};
 
 /// Node to neighbour: items, each to be taken once, and a receipt for those that came the other way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -155,7 +156,7 @@ pub struct Walk {
 
 impl Walk {
     /// Whether this is an earlier attempt of the same walk.
-    pub(super) fn is_before(&self, other: &Walk) -> bool {
+    pub(crate) fn is_before(&self, other: &Walk) -> bool {
         (self.rover, self.since) == (other.rover, other.since) && self.attempt < other.attempt
     }
 
@@ -221,7 +222,7 @@ pub struct Reserve {
 
 impl Reserve {
     /// The way, for its rover.
-    pub(super) fn into_way(self) -> Way {
+    pub(crate) fn into_way(self) -> Way {
         Way {
             walk: self.walk,
             first_step: self.first_step,

@@ -15,9 +15,10 @@ use super::book::{Book, Visit};
 use super::messages::{Item, Probe, Reserve, Walk};
 use super::relay::Line;
 use super::routes::routes;
-use crate::assemble::Site;
+use crate::failover::rank::Replacement;
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
-use crate::messages::{Replacement, RoverId};
+use crate::shared::Shared;
 use making_way::{Aside, Claims};
 use succession::Succession;
 
@@ -90,8 +91,8 @@ struct Offers {
 #[derive(Debug, Default)]
 pub(crate) struct Registry {
     is_open: bool,
-    pub(super) book: Book,
-    pub(super) lines: BTreeMap<NodeId, Line>,
+    pub(crate) book: Book,
+    pub(crate) lines: BTreeMap<NodeId, Line>,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
     /// What is kept free for those who asked others to make way.
@@ -104,13 +105,13 @@ pub(crate) struct Registry {
 }
 
 /// For whose vertices something is done, and when.
-pub(super) struct Desk<'a> {
-    pub(super) site: &'a Site,
+pub(crate) struct Desk<'a> {
+    pub(crate) site: &'a Shared,
     /// The node whose vertices are meant; another one may answer for them.
-    pub(super) home: NodeId,
-    pub(super) now: u64,
+    pub(crate) home: NodeId,
+    pub(crate) now: u64,
     /// The rank that answers for each home, with `network.takeover_after`; else none.
-    pub(super) ranks: &'a [u32],
+    pub(crate) ranks: &'a [u32],
 }
 
 impl Desk<'_> {
@@ -128,7 +129,7 @@ impl Desk<'_> {
 impl Registry {
     /// Makes a new registry ready; in one that has survived a crash, all that was on its way is
     /// repeated.
-    pub(super) fn open(&mut self, desk: &Desk<'_>) {
+    pub(crate) fn open(&mut self, desk: &Desk<'_>) {
         if self.is_open {
             for line in self.lines.values_mut() {
                 line.restart();
@@ -218,7 +219,7 @@ impl Registry {
     }
 
     /// Begins a walk for each applicant that has none under way.
-    pub(super) fn apply(&mut self, desk: &Desk<'_>) {
+    pub(crate) fn apply(&mut self, desk: &Desk<'_>) {
         for at in 0..self.applicants.len() {
             let applicant = &self.applicants[at];
             if applicant.walk.is_some() {
@@ -289,7 +290,7 @@ impl Registry {
             &site.roadmap,
             &site.sensors,
             (entry, goal),
-            site.config.routes,
+            site.config.complete.routes,
         );
         let elder = match &self.applicants[at].aim {
             Aim::Aside(aside) => aside.elder,
@@ -333,7 +334,7 @@ impl Registry {
         with(&ground)
     }
 
-    pub(super) fn take(&mut self, desk: &Desk<'_>, item: Item) {
+    pub(crate) fn take(&mut self, desk: &Desk<'_>, item: Item) {
         match item {
             Item::Probe(probe) => {
                 let elder = probe.walk.age();
@@ -348,7 +349,7 @@ impl Registry {
         }
     }
 
-    pub(super) fn post(&mut self, to: NodeId, item: Item) {
+    pub(crate) fn post(&mut self, to: NodeId, item: Item) {
         if let Some(line) = self.lines.get_mut(&to) {
             line.post(item);
         }
@@ -383,7 +384,7 @@ impl Registry {
     }
 
     /// When something is to be done without being told; of lines, only those that may be used.
-    pub(super) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
+    pub(crate) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
         let lines = self.lines.iter().filter(|(to, _)| may_use(**to));
         let lines = lines.filter_map(|(_, line)| line.next_due());
         let proposals = self.succession.next_due();

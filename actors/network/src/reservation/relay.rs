@@ -21,7 +21,7 @@ struct Pending {
 
 /// One direction to, and one from, a neighbour.
 #[derive(Debug, Default)]
-pub(super) struct Line {
+pub(crate) struct Line {
     next: u64,
     pending: BTreeMap<u64, Pending>,
     /// All below were taken.
@@ -36,15 +36,15 @@ pub(super) struct Line {
 
 /// What acknowledges: all below `taken`, and these.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Receipt {
-    pub(super) taken: u64,
-    pub(super) beyond: Vec<u64>,
+pub(crate) struct Receipt {
+    pub(crate) taken: u64,
+    pub(crate) beyond: Vec<u64>,
     /// When the message was sent that this answers, by the clock of its sender [ns].
-    pub(super) echo: Option<u64>,
+    pub(crate) echo: Option<u64>,
 }
 
 impl Line {
-    pub(super) fn post(&mut self, item: Item) {
+    pub(crate) fn post(&mut self, item: Item) {
         let pending = Pending {
             item,
             due: 0,
@@ -55,16 +55,16 @@ impl Line {
     }
 
     /// The measured round trip; a guess before the first answer \[ns\].
-    pub(super) fn round_trip(&self) -> u64 {
+    pub(crate) fn round_trip(&self) -> u64 {
         self.round_trip.unwrap_or(FIRST_ROUND_TRIP)
     }
 
-    pub(super) fn is_measured(&self) -> bool {
+    pub(crate) fn is_measured(&self) -> bool {
         self.round_trip.is_some()
     }
 
     /// What is to be sent now: items that are new or overdue, and a receipt. None if nothing is due.
-    pub(super) fn due(&mut self, now: u64) -> Option<(Receipt, Vec<Numbered>)> {
+    pub(crate) fn due(&mut self, now: u64) -> Option<(Receipt, Vec<Numbered>)> {
         let patience = (2 * self.round_trip()).max(LEAST_PATIENCE);
         let mut items = Vec::new();
         let mut has_part = false;
@@ -95,12 +95,12 @@ impl Line {
     }
 
     /// When an item is to be repeated, if any is on its way.
-    pub(super) fn next_due(&self) -> Option<u64> {
+    pub(crate) fn next_due(&self) -> Option<u64> {
         self.pending.values().map(|p| p.due).min()
     }
 
     /// After a crash nobody knows what was on its way: all is repeated.
-    pub(super) fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         for pending in self.pending.values_mut() {
             pending.due = 0;
         }
@@ -108,7 +108,7 @@ impl Line {
 
     /// One of the ends is replaced: numbers begin anew, and what was not acknowledged is said again, to whom
     /// that may have been news before.
-    pub(super) fn renew(&mut self) {
+    pub(crate) fn renew(&mut self) {
         let pending = std::mem::take(&mut self.pending);
         *self = Line::default();
         for item in pending.into_values().map(|pending| pending.item) {
@@ -117,14 +117,14 @@ impl Line {
     }
 
     /// Takes what is to be said off the line: who is at its other end is here.
-    pub(super) fn hand_over(&mut self) -> Vec<Item> {
+    pub(crate) fn hand_over(&mut self) -> Vec<Item> {
         let pending = std::mem::take(&mut self.pending);
         pending.into_values().map(|pending| pending.item).collect()
     }
 
     /// A receipt has come. What it echoes says how long a round trip takes, however often things were
     /// repeated.
-    pub(super) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {
+    pub(crate) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {
         if let Some(sent) = receipt.echo {
             let sample = now.saturating_sub(sent);
             let smoothed = self.round_trip.map_or(sample, |old| (7 * old + sample) / 8);
@@ -135,7 +135,7 @@ impl Line {
     }
 
     /// Takes an item of a message sent at `sent`, unless it was taken before.
-    pub(super) fn take(&mut self, sent: u64, numbered: Numbered) -> Option<Item> {
+    pub(crate) fn take(&mut self, sent: u64, numbered: Numbered) -> Option<Item> {
         self.owes = Some(sent);
         let Numbered { number, item } = numbered;
         if number < self.taken || !self.beyond.insert(number) {
@@ -151,7 +151,7 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::RoverId;
+    use crate::ids::RoverId;
     use crate::reservation::messages::{Settle, Verdict, Walk};
     use proptest::prelude::*;
 

@@ -9,7 +9,7 @@ use farside_worlds::{DistancesTo, NodeId, Roadmap, SensorNetwork, VertexId};
 /// Up to `count` different sequences of owners, each of which has a way from `from` to `to` through
 /// its vertices in that order; the shortest way first. Each further one is a shortest way where edges
 /// already used cost more.
-pub(super) fn routes(
+pub(crate) fn routes(
     roadmap: &Roadmap,
     sensors: &SensorNetwork,
     (from, to): (VertexId, VertexId),

@@ -34,8 +34,8 @@ impl Ways {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::RoverId;
     use crate::mapf::safe_intervals::TimedVisit;
-    use crate::messages::RoverId;
     use crate::testing::v;
 
     fn way(since: u64, first_step: u32, vertices: &[u32]) -> Way {

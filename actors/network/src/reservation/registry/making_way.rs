@@ -16,28 +16,28 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use farside_worlds::{Roadmap, VertexId};
 
 use super::{Aim, Applicant, Desk, Origin, Registry};
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, way_to};
-use crate::messages::RoverId;
 use crate::reservation::messages::{Item, Reserve, Settle, Verdict, Walk, Yield};
 
 /// Out of whose way.
 #[derive(Clone, Debug)]
-pub(super) struct Aside {
+pub(crate) struct Aside {
     /// What is to be left free.
     path: BTreeSet<VertexId>,
     /// The age of the walk for which way is made.
-    pub(super) elder: (u64, RoverId),
+    pub(crate) elder: (u64, RoverId),
     /// Then it is no longer asked for [ns].
     until: u64,
 }
 
 /// The vertices that were asked for: by whom, since when, and until when.
 #[derive(Debug, Default)]
-pub(super) struct Claims(BTreeMap<VertexId, ((u64, RoverId), u64)>);
+pub(crate) struct Claims(BTreeMap<VertexId, ((u64, RoverId), u64)>);
 
 impl Claims {
     /// Whether somebody who goes before `who` wants the vertex.
-    pub(super) fn is_claimed(&self, v: VertexId, who: (u64, RoverId), now: u64) -> bool {
+    pub(crate) fn is_claimed(&self, v: VertexId, who: (u64, RoverId), now: u64) -> bool {
         let claim = self.0.get(&v).filter(|(_, until)| *until > now);
         claim.is_some_and(|(by, _)| *by < who)
     }
@@ -50,7 +50,7 @@ impl Claims {
     }
 
     /// The rover has its way.
-    pub(super) fn give_up(&mut self, rover: RoverId) {
+    pub(crate) fn give_up(&mut self, rover: RoverId) {
         self.0.retain(|_, ((_, by), _)| *by != rover);
     }
 }
@@ -58,7 +58,7 @@ impl Claims {
 impl Registry {
     /// When and for whom the vertex is taken, as far as who asks would have to put up with it: those
     /// who stand there for ever make way, unless they go before.
-    pub(super) fn busy_for_elders(
+    pub(crate) fn busy_for_elders(
         &self,
         v: VertexId,
         asked: (u64, RoverId),
@@ -77,7 +77,7 @@ impl Registry {
     }
 
     /// Asks those of this node's rovers that stand on a path to step aside, and passes that on.
-    pub(super) fn make_way(&mut self, desk: &Desk<'_>, request: Yield) {
+    pub(crate) fn make_way(&mut self, desk: &Desk<'_>, request: Yield) {
         let asked = request.elder;
         let until = desk.now + CLAIMED_FOR * desk.site.timing.cycle.as_nanos();
         let aside = Aside {
@@ -136,7 +136,7 @@ impl Registry {
     /// Begins an attempt of a rover that may have been asked to step aside, from where it stands. None
     /// if it goes to its goal; where else it is to try to go; nothing more if it has found a place or
     /// need not go.
-    pub(super) fn step_aside(
+    pub(crate) fn step_aside(
         &mut self,
         desk: &Desk<'_>,
         at: usize,
@@ -194,7 +194,7 @@ impl Registry {
 
     /// A rover that has stepped aside goes on to its goal, once the other one has had the time to
     /// pass.
-    pub(super) fn return_later(&mut self, desk: &Desk<'_>, walk: &Walk) {
+    pub(crate) fn return_later(&mut self, desk: &Desk<'_>, walk: &Walk) {
         if !desk.site.stays {
             return;
         }

@@ -1,5 +1,5 @@
 //! What becomes of walks and of books when a node is replaced (`network.takeover_after`). That deputies
-//! admit to vertices safely is the affair of [`takeover`](crate::takeover); here it is that no
+//! admit to vertices safely is the affair of [`takeover`](crate::failover); here it is that no
 //! reserved way is lost, and none is left that nobody settles.
 //!
 //! **A way counts once its rover has taken it.** Where nodes may be replaced, the first node of a way does
@@ -17,7 +17,7 @@
 use farside_worlds::NodeId;
 
 use super::{Desk, Origin, Registry, owners};
-use crate::messages::Account;
+use crate::failover::messages::Account;
 use crate::reservation::book::Visit;
 use crate::reservation::messages::{
     Item, Itinerary, ItineraryAnswer, Reserve, Settle, Verdict, Walk,
@@ -25,7 +25,7 @@ use crate::reservation::messages::{
 
 /// What a registry keeps in case nodes are replaced.
 #[derive(Debug, Default)]
-pub(super) struct Succession {
+pub(crate) struct Succession {
     /// Ways that rovers are asked to take, and when they are asked again [ns].
     proposals: Vec<(Reserve, u64)>,
     /// Parts entered here and passed on, of walks that are not settled.
@@ -37,12 +37,12 @@ pub(super) struct Succession {
 }
 
 impl Succession {
-    pub(super) fn next_due(&self) -> Option<u64> {
+    pub(crate) fn next_due(&self) -> Option<u64> {
         self.proposals.iter().map(|(_, due)| *due).min()
     }
 
     /// A part of a way is passed on.
-    pub(super) fn pass(&mut self, reserve: &Reserve) {
+    pub(crate) fn pass(&mut self, reserve: &Reserve) {
         let known = |r: &Reserve| r.walk == reserve.walk && r.at == reserve.at;
         if !self.open.iter().any(known) {
             self.open.push(reserve.clone());
@@ -50,21 +50,21 @@ impl Succession {
     }
 
     /// What is open of these walks is so no more.
-    pub(super) fn close(&mut self, walks: impl Fn(&Walk) -> bool) {
+    pub(crate) fn close(&mut self, walks: impl Fn(&Walk) -> bool) {
         self.open.retain(|reserve| !walks(&reserve.walk));
     }
 
-    pub(super) fn is_proposed(&self, walk: &Walk) -> bool {
+    pub(crate) fn is_proposed(&self, walk: &Walk) -> bool {
         self.proposals.iter().any(|(r, _)| r.walk == *walk)
     }
 
     /// Whether who answered for the home before may have chosen a way for an attempt that began then. A
     /// second one must not be: it would pass for the first. The attempt is begun anew, if it has to be.
-    pub(super) fn is_stale(&self, attempt_began: u64) -> bool {
+    pub(crate) fn is_stale(&self, attempt_began: u64) -> bool {
         attempt_began < self.since
     }
 
-    pub(super) fn take(&mut self, walk: Walk) {
+    pub(crate) fn take(&mut self, walk: Walk) {
         if !self.taken.contains(&walk) {
             self.taken.push(walk);
         }
@@ -74,7 +74,7 @@ impl Succession {
 impl Registry {
     /// Whether a way that is to be reserved was taken already: then that is said again, to whom it was
     /// lost on.
-    pub(super) fn is_taken(&mut self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
+    pub(crate) fn is_taken(&mut self, desk: &Desk<'_>, reserve: &Reserve) -> bool {
         if !self.succession.taken.contains(&reserve.walk) {
             return false;
         }
@@ -90,16 +90,12 @@ impl Registry {
     }
 
     /// All of a way is entered, tentatively: its rover is asked to take it.
-    pub(super) fn propose(&mut self, reserve: Reserve) {
+    pub(crate) fn propose(&mut self, reserve: Reserve) {
         self.succession.proposals.push((reserve, 0));
     }
 
     /// What rovers are to be asked now, by `node`, which answers for this home.
-    pub(in crate::reservation) fn proposals_due(
-        &mut self,
-        desk: &Desk<'_>,
-        node: NodeId,
-    ) -> Vec<Itinerary> {
+    pub(crate) fn proposals_due(&mut self, desk: &Desk<'_>, node: NodeId) -> Vec<Itinerary> {
         let again = desk.now + desk.site.timing.cycle.as_nanos();
         let all = self.succession.proposals.iter_mut();
         let due = all.filter(|(_, due)| *due <= desk.now);
@@ -115,7 +111,7 @@ impl Registry {
     }
 
     /// A rover has taken its way, or will not.
-    pub(in crate::reservation) fn answered(&mut self, desk: &Desk<'_>, answer: ItineraryAnswer) {
+    pub(crate) fn answered(&mut self, desk: &Desk<'_>, answer: ItineraryAnswer) {
         let proposals = &mut self.succession.proposals;
         let Some(at) = proposals.iter().position(|(r, _)| r.walk == answer.walk) else {
             return;
@@ -137,7 +133,7 @@ impl Registry {
     }
 
     /// Another one answers for `home` than before.
-    pub(in crate::reservation) fn renew(&mut self, desk: &Desk<'_>, home: NodeId) {
+    pub(crate) fn renew(&mut self, desk: &Desk<'_>, home: NodeId) {
         if let Some(line) = self.lines.get_mut(&home) {
             line.renew();
         }
@@ -164,7 +160,7 @@ impl Registry {
     }
 
     /// The registry of a home that is taken over, from what rovers say.
-    pub(in crate::reservation) fn succeed(desk: &Desk<'_>, accounts: &[Account]) -> Registry {
+    pub(crate) fn succeed(desk: &Desk<'_>, accounts: &[Account]) -> Registry {
         let mut registry = Registry::default();
         registry.open_empty(desk);
         registry.succession.since = desk.now;

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use farside_worlds::VertexId;
 
 use super::{Desk, Offers, Registry, owners};
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
-use crate::messages::RoverId;
 use crate::reservation::book::{Clash, Visit};
 use crate::reservation::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Wish, Yield};
 
@@ -18,7 +18,7 @@ impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     ///
     /// A wish is in the name of a walk that began with `elder`.
-    pub(super) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: (u64, RoverId)) {
+    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: (u64, RoverId)) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
             let busy = |v| self.busy_for_elders(v, elder);
@@ -49,7 +49,7 @@ impl Registry {
     }
 
     /// A probe has come to the owner of its goal.
-    pub(super) fn offer(
+    pub(crate) fn offer(
         &mut self,
         desk: &Desk<'_>,
         probe: &Probe,
@@ -112,7 +112,7 @@ impl Registry {
     }
 
     /// Decides what has waited for long enough.
-    pub(in crate::reservation) fn decide_overdue(&mut self, desk: &Desk<'_>) {
+    pub(crate) fn decide_overdue(&mut self, desk: &Desk<'_>) {
         let overdue = |o: &Offers| !o.decided && o.deadline <= desk.now && o.best.is_some();
         let rovers = self
             .offers
@@ -124,7 +124,7 @@ impl Registry {
         }
     }
 
-    pub(super) fn decide(&mut self, desk: &Desk<'_>, rover: RoverId) {
+    pub(crate) fn decide(&mut self, desk: &Desk<'_>, rover: RoverId) {
         let Some(offers) = self.offers.get_mut(&rover).filter(|o| !o.decided) else {
             return;
         };
@@ -167,7 +167,7 @@ impl Registry {
     }
 
     /// Enters this home's part of a way, from the back.
-    pub(super) fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
+    pub(crate) fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
         if desk.may_be_replaced() && self.is_taken(desk, &reserve) {
             return;
         }
@@ -243,7 +243,7 @@ impl Registry {
     }
 
     /// The whole way is entered: from here on it holds.
-    pub(super) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
+    pub(crate) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
         self.settled(desk, &reserve.walk, Verdict::Confirmed);
         if desk.site.stays {
             let TimedVisit { vertex, end, .. } = reserve.way[0];
@@ -276,7 +276,7 @@ impl Registry {
     }
 
     /// Strikes out all of a way that was entered, from visit `lo` on.
-    pub(super) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+    pub(crate) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         let released = Settle {
             walk: reserve.walk,
             verdict: Verdict::Released,
@@ -290,7 +290,7 @@ impl Registry {
     }
 
     /// The first part of the way, from visit `lo` on, cannot be entered.
-    pub(super) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
+    pub(crate) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         self.release(desk, reserve, lo);
         let failed = Settle {
             walk: reserve.walk,
@@ -301,7 +301,7 @@ impl Registry {
         self.fail(desk, failed);
     }
 
-    pub(super) fn forward(&mut self, settle: Settle) {
+    pub(crate) fn forward(&mut self, settle: Settle) {
         let at = settle.at + 1;
         if let Some(&to) = settle.route.get(at as usize) {
             self.post(to, Item::Settle(Settle { at, ..settle }));
@@ -309,7 +309,7 @@ impl Registry {
     }
 
     /// Tells the node that began; if that is this one, it begins again.
-    pub(super) fn fail(&mut self, desk: &Desk<'_>, settle: Settle) {
+    pub(crate) fn fail(&mut self, desk: &Desk<'_>, settle: Settle) {
         if let Some(at) = settle.at.checked_sub(1) {
             let to = settle.route[at as usize];
             self.post(to, Item::Settle(Settle { at, ..settle }));
@@ -335,7 +335,7 @@ impl Registry {
         applicant.again = Some((next, desk.now + pause));
     }
 
-    pub(super) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
+    pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
         match settle.verdict {
             Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
             Verdict::Confirmed => {
@@ -349,7 +349,7 @@ impl Registry {
     }
 
     /// Something was settled: who waited for it may go on.
-    pub(super) fn unpark(&mut self, desk: &Desk<'_>) {
+    pub(crate) fn unpark(&mut self, desk: &Desk<'_>) {
         for reserve in std::mem::take(&mut self.parked) {
             self.reserve(desk, reserve);
         }

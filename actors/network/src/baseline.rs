@@ -1,0 +1,112 @@
+//! Plans made for the whole team before the start, by someone who knows everything: the baselines
+//! among the policies. They are driven by the same grants as any other plan.
+
+use farside_worlds::{Roadmap, VertexId};
+
+use crate::config::{Motion, NetworkConfig, Policy};
+use crate::ids::RoverId;
+use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
+use crate::mapf::{
+    CoupledConfig, Mission, Order, Pace, Problem, Rules, coupled, prioritised_in_time,
+    reference_in_time,
+};
+use crate::motion::Ways;
+use crate::timing::Timing;
+
+/// Each rover's visits \[ns\], none for one that has no way; and what it took to find them.
+#[derive(Debug, Default)]
+pub(crate) struct Schedule {
+    pub(crate) visits: Vec<(RoverId, Vec<TimedVisit>)>,
+    pub(crate) expansions: u64,
+}
+
+impl Schedule {
+    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that have
+    /// a way.
+    ///
+    /// # Errors
+    /// When there is no plan, or it would take too long to find, or the policy cannot plan for this
+    /// motion.
+    pub(crate) fn of(
+        config: &NetworkConfig,
+        timing: &Timing,
+        roadmap: &Roadmap,
+        missions: &[(RoverId, (VertexId, VertexId))],
+        stays: bool,
+    ) -> Result<Option<Schedule>, String> {
+        if matches!(config.policy, Policy::Paper | Policy::Complete) {
+            return Ok(None);
+        }
+        let rules = if stays { Rules::OnMap } else { Rules::Queues };
+        let (rovers, missions): (Vec<RoverId>, Vec<_>) = missions.iter().copied().unzip();
+        let of_rover = |visits: Vec<Vec<TimedVisit>>| rovers.into_iter().zip(visits).collect();
+        let missions = missions.into_iter().map(Mission::from).collect();
+        let problem = Problem::new(roadmap, missions, rules).map_err(|error| error.to_string())?;
+        if config.policy == Policy::Coupled {
+            let (visits, expansions) = Schedule::coupled(config, timing, &problem)?;
+            let visits = of_rover(visits);
+            return Ok(Some(Schedule { visits, expansions }));
+        }
+        let ways = Ways { roadmap, config };
+        let cycle_ns = timing.cycle.as_nanos();
+        let travel = |u, v| ways.planned(u, v).as_nanos();
+        let (pace, tick_ns) = match config.motion {
+            Motion::Cycles => (Pace::CYCLES, cycle_ns),
+            Motion::Continuous => {
+                let pace = Pace {
+                    travel: &travel,
+                    // What a rover stands for at its entry.
+                    enter: if stays { 0 } else { cycle_ns },
+                    // What leaves a vertex says so, and what comes next is told.
+                    gap: timing.iteration_timeout.as_nanos().max(1),
+                };
+                (pace, 1)
+            }
+        };
+        let plan = match config.policy {
+            Policy::Prioritised => prioritised_in_time,
+            _ => reference_in_time,
+        };
+        let table = plan(&problem, &pace, &Order::QueuePosition);
+        Ok(Some(Schedule {
+            visits: of_rover(in_ns(table.ways, tick_ns)),
+            expansions: 0,
+        }))
+    }
+
+    /// The visits of the joint search's plan, and what it took to find it.
+    fn coupled(
+        config: &NetworkConfig,
+        timing: &Timing,
+        problem: &Problem<'_>,
+    ) -> Result<(Vec<Vec<TimedVisit>>, u64), String> {
+        if config.motion == Motion::Continuous {
+            let why = "network.policy \"coupled\" searches in whole cycles, and so cannot plan for \
+                       network.motion \"continuous\"; \"reference\" can";
+            return Err(why.to_owned());
+        }
+        let limits = CoupledConfig {
+            max_expansions: config.max_expansions,
+            // The growth is what this baseline is there to show.
+            independence: false,
+            ..CoupledConfig::default()
+        };
+        let best = coupled(problem, &limits).map_err(|error| error.to_string())?;
+        let visits = in_ns(best.plan.visits(problem), timing.cycle.as_nanos());
+        Ok((visits, best.expansions))
+    }
+}
+
+/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards it
+/// at that instant.
+fn in_ns(mut ways: Vec<Vec<TimedVisit>>, tick_ns: u64) -> Vec<Vec<TimedVisit>> {
+    let scale = |tick: u64| match tick {
+        FOREVER => FOREVER,
+        tick => tick * tick_ns,
+    };
+    for visit in ways.iter_mut().flatten() {
+        visit.start = scale(visit.start);
+        visit.end = scale(visit.end);
+    }
+    ways
+}

@@ -1,0 +1,3 @@
+//! What helps the policy `max-plus` out of deadlocks, each behind a key of its own.
+
+pub(crate) mod messages;

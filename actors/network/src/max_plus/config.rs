@@ -1,0 +1,115 @@
+//! The keys of a scenario's `[network.max_plus]` table. Every reading of the paper that its text leaves open
+//! is a key.
+
+use std::ops::RangeInclusive;
+
+use farside_actors::settings;
+use farside_actors::system::settings::{one_of, such_that};
+use serde::{Deserialize, Serialize};
+
+use super::processor::Processor;
+
+/// Payoffs travel in single precision: what would overflow there is refused.
+const WEIGHTS: RangeInclusive<f64> = 0.0..=1e9;
+
+/// Who wins a vertex that several rovers' paths enter in the same cycle. The paper: "a priority has
+/// to be used" (section 3.5).
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Priority {
+    /// The one that has stood still for longest, of equals the lowest number.
+    #[default]
+    LongestWait,
+    /// The lowest number.
+    LowestId,
+}
+
+settings! {
+    /// The `[network.max_plus]` table: what only the policy `max-plus` reads.
+    ///
+    /// ```
+    /// use farside_network::NetworkConfig;
+    /// let network: NetworkConfig = toml::from_str("max_plus.damping = 0.7")?;
+    /// assert_eq!((network.max_plus.damping, network.max_plus.max_iterations), (0.7, 100));
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    pub struct MaxPlusConfig {
+        /// The most iterations of max-plus in a cycle (the paper: 100).
+        pub max_iterations: u32 = 100;
+        /// How fast each node computes: pairs of candidate paths a second, `"paper"` or `"unlimited"`.
+        /// The optimisation uses what is ready in its time.
+        pub processor: Processor = Processor::PAPER,
+            such_that(
+                "more than 0/s",
+                Processor::to_string,
+                |processor: &Processor| *processor != Processor::PairsPerS(0),
+            );
+        /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as computed.
+        /// 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum on DCOPs
+        /// through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus oscillates.
+        pub damping: f64,
+            0.0..1.0;
+        /// Anytime max-plus: a node whose optimisation has not converged when its time is over takes the
+        /// best of all iterations' assignments instead of the last. It judges by what it knows: its own
+        /// rovers' payoffs, alone, with each other, and with the paths that its neighbours announce
+        /// beside their vectors. After Vlassis, Elhorst and Kok (2004), who judge along a spanning
+        /// tree of the whole network.
+        pub anytime: bool;
+        /// Outsourcing: a node with more to compute than its processor can do in the time has radio
+        /// neighbours with less of it compute for it: they make max-plus vectors to their own rovers from what
+        /// it sends instead of them. Does nothing where processors take no time.
+        pub outsourcing: bool;
+        /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that leads into
+        /// a node's part of the roadmap with one rover more on each vertex; in [0, 1e9], 0 is the paper's.
+        pub congestion_weight: f64,
+            WEIGHTS;
+        /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in what it says of
+        /// its crowding. With 0 what its own rovers are is all, which neighbours know anyway.
+        pub congestion_spread: f64,
+            0.0..1.0;
+        /// C, the estimate of the longest path, in diameters of the roadmap.
+        pub longest_path_factor: f64 = 20.0,
+            WEIGHTS;
+        /// What a path loses that leads back to the vertex just left.
+        pub backtrack_penalty: f64 = 40.0,
+            WEIGHTS;
+        /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait there.
+        /// Below `backtrack_penalty`, rovers that face each other wait for ever; near C, none
+        /// ever waits in a pocket for another to pass, and two of them go round in circles. A very
+        /// high one leaves only the zero path to wait by.
+        pub leaf_wait_penalty: f64 = 45.0,
+            WEIGHTS;
+        /// The payoff of a collision in the cycle to come is minus this many C.
+        pub collision_penalty_factor: f64 = 10.0,
+            WEIGHTS;
+        /// Payoffs get noise from [0, this), new in each cycle.
+        pub noise: f64 = 0.1,
+            WEIGHTS;
+        /// Max-plus has converged when no value changes by more than this.
+        pub convergence: f64 = 1e-3,
+            WEIGHTS;
+        /// Who wins a vertex.
+        pub priority: Priority,
+            one_of(&["longest_wait", "lowest_id"]);
+        /// Whether a rover may follow one that leaves, in the same cycle (section 3.5).
+        pub acceleration: bool = true;
+        /// Whether it may follow one that itself follows. The paper's implementation ignores this.
+        pub acceleration_chains: bool;
+        /// Entry gates: an entry's owner lets a rover in only while its neighbourhood is not too full.
+        pub entry_gates: bool;
+        /// The share of the vertices of the owner's local neighbourhood graph up to which gates are
+        /// open, from 0 to 1.
+        pub entry_gate_occupancy: f64 = 0.15,
+            0.0..=1.0;
+        /// Wait-for probes, which confirm deadlocks and name the rovers in them.
+        pub deadlock_probes: bool;
+        /// A rover that has come no nearer to its goal for so many cycles waits, as probes see it; at
+        /// least 1. So often a probe is sent for it.
+        pub probe_after: u32 = 6,
+            1..;
+        /// Local resolution of confirmed deadlocks: one of the rovers goes aside. Sends probes too.
+        pub junction_resolution: bool;
+        /// For how many cycles it stays aside, not counting the way there.
+        pub aside_hold: u32 = 8;
+    }
+}

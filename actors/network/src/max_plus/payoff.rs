@@ -1,0 +1,223 @@
+//! Payoffs (*network-guided*, section 3.4): what a path is worth to a rover, and what two paths are
+//! worth to a pair.
+
+use std::sync::LazyLock;
+
+use farside_worlds::{Roadmap, VertexId};
+
+use crate::config::{NetworkConfig, Policy};
+use crate::max_plus::candidates::{CandidatePath, Destination};
+
+/// The constants of the payoff functions for one roadmap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Payoffs {
+    /// C, "an estimate of the maximum path length in the roadmap" [cycles].
+    pub(crate) longest: f64,
+    /// What a path loses whose first vertex is the one just left.
+    pub(crate) backtrack: f64,
+    /// What the path of length 0 of a rover that stands on a leaf loses.
+    pub(crate) leaf_wait: f64,
+    /// The payoff of a pair that collides in the cycle to come: "a highly negative constant".
+    pub(crate) imminent: f64,
+}
+
+/// From this cycle on, what a collision divides a payoff by no longer falls.
+const FAR: usize = 9;
+
+/// [`divisor`] of each cycle, the last of all later ones.
+static DIVISORS: LazyLock<[f32; FAR + 1]> =
+    LazyLock::new(|| std::array::from_fn(|t| divisor(t as u32) as f32));
+
+impl Payoffs {
+    pub(crate) fn new(config: &NetworkConfig, roadmap: &Roadmap) -> Self {
+        // On a large roadmap the diameter takes a while, and other policies have no payoffs.
+        let diameter = match config.policy {
+            Policy::Paper => roadmap.diameter(),
+            _ => 0,
+        };
+        let longest = config.max_plus.longest_path_factor * f64::from(diameter.max(1));
+        Payoffs {
+            longest,
+            backtrack: config.max_plus.backtrack_penalty,
+            leaf_wait: config.max_plus.leaf_wait_penalty,
+            imminent: -config.max_plus.collision_penalty_factor * longest,
+        }
+    }
+
+    /// The unary payoff: C - length to the goal; C - (length + the rest of the way) to a leaf;
+    /// 0 for the zero path. `noise` is added to all, and a path back to `previous` pays for it.
+    pub(crate) fn unary(
+        &self,
+        roadmap: &Roadmap,
+        path: &CandidatePath,
+        goal: VertexId,
+        previous: Option<VertexId>,
+        noise: f64,
+    ) -> f32 {
+        let end = *path.vertices.last().expect("a path has a start");
+        let worth = match path.destination {
+            Destination::Stay => 0.0,
+            Destination::Goal => self.longest - f64::from(path.length()),
+            Destination::Leaf => {
+                let waits = path.length() == 0;
+                let penalty = if waits { self.leaf_wait } else { 0.0 };
+                self.longest - f64::from(path.length() + roadmap.distance(end, goal)) - penalty
+            }
+        };
+        let backtracks = previous.is_some() && path.next_vertex() == previous;
+        let penalty = if backtracks { self.backtrack } else { 0.0 };
+        (worth - penalty + noise) as f32
+    }
+
+    /// The pairwise payoff of two paths with these unary payoffs that collide in cycle `collision`.
+    pub(crate) fn pairwise(&self, sum: f32, collision: Option<u32>) -> f32 {
+        match collision {
+            None => sum,
+            Some(0 | 1) => self.imminent as f32,
+            // Dividing a negative sum would make the collision the better choice.
+            Some(t) => sum.min(sum / DIVISORS[FAR.min(t as usize)]),
+        }
+    }
+}
+
+/// What a collision `t` cycles ahead divides a pair's payoff by: max(e, e^(10 - t)).
+pub(crate) fn divisor(t: u32) -> f64 {
+    libm::exp((10.0 - f64::from(t)).max(1.0))
+}
+
+/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where it
+/// is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero path, and
+/// the wait on a leaf) holds its vertex for ever; any other claims nothing after its end.
+pub(crate) fn collision_from(a: &CandidatePath, b: &CandidatePath, first: u32) -> Option<u32> {
+    let stays = |path: &CandidatePath| path.length() == 0;
+    let cycles = match (stays(a), stays(b)) {
+        (true, true) => 1,
+        (true, false) => b.length(),
+        (false, true) => a.length(),
+        (false, false) => a.length().min(b.length()),
+    };
+    let place = |path: &CandidatePath, t: u32| {
+        // Only a path that stays ends before.
+        let at = (t as usize).min(path.vertices.len() - 1);
+        path.vertices[at]
+    };
+    if first > cycles {
+        return None;
+    }
+    let (mut from_a, mut from_b) = (place(a, first - 1), place(b, first - 1));
+    for t in first..=cycles {
+        let (to_a, to_b) = (place(a, t), place(b, t));
+        if to_a == to_b || (to_a == from_b && to_b == from_a) {
+            return Some(t);
+        }
+        (from_a, from_b) = (to_a, to_b);
+    }
+    None
+}
+
+/// The first cycle of all in which two paths collide.
+#[cfg(test)]
+pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
+    collision_from(a, b, 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{grid, v};
+    use std::f64::consts::E;
+
+    fn path(destination: Destination, vertices: &[u32]) -> CandidatePath {
+        CandidatePath {
+            destination,
+            vertices: vertices.iter().map(|&u| v(u)).collect(),
+            payoff: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_divisor_has_the_papers_values() {
+        assert_eq!(divisor(2).round(), 2981.0);
+        for t in [9, 10, 50] {
+            assert!((divisor(t) - E).abs() < 1e-12);
+        }
+        for t in 0..40 {
+            assert_eq!(DIVISORS[FAR.min(t as usize)], divisor(t) as f32);
+        }
+        assert!((divisor(8) - E * E).abs() < 1e-12);
+        assert!((2..9).all(|t| divisor(t) > divisor(t + 1)));
+    }
+
+    #[test]
+    fn collisions_by_hand() {
+        use Destination::{Goal, Leaf, Stay};
+        let east = path(Leaf, &[0, 1, 2, 3]);
+        assert_eq!(
+            collision(&east, &path(Leaf, &[3, 2, 1, 0])),
+            Some(2),
+            "a swap"
+        );
+        assert_eq!(
+            collision(&east, &path(Leaf, &[4, 3, 2, 1])),
+            Some(2),
+            "a meeting"
+        );
+        assert_eq!(collision(&east, &path(Stay, &[3])), Some(3));
+        assert_eq!(collision(&path(Stay, &[3]), &east), Some(3));
+        assert_eq!(
+            collision(&east, &path(Leaf, &[1, 2, 3, 4])),
+            None,
+            "following"
+        );
+        assert_eq!(
+            collision(&east, &path(Goal, &[2, 2, 1])),
+            Some(2),
+            "a swap after a wait"
+        );
+        // A goal path vanishes after its end, a leaf path claims nothing there.
+        assert_eq!(collision(&east, &path(Goal, &[4, 3])), None);
+        assert_eq!(collision(&east, &path(Leaf, &[4, 3])), None);
+        assert_eq!(
+            collision(&path(Leaf, &[0, 1]), &path(Leaf, &[2, 1])),
+            Some(1)
+        );
+        assert_eq!(collision(&path(Stay, &[0]), &path(Stay, &[1])), None);
+    }
+
+    #[test]
+    fn unary_payoffs_follow_the_paper() {
+        let map = grid(6, 1, &[]);
+        let payoffs = Payoffs::new(&NetworkConfig::default(), &map);
+        assert_eq!(payoffs.longest, 100.0);
+        let unary = |p: &CandidatePath, previous| payoffs.unary(&map, p, v(5), previous, 0.0);
+        assert_eq!(unary(&path(Destination::Goal, &[3, 4, 5]), None), 98.0);
+        assert_eq!(
+            unary(&path(Destination::Leaf, &[3, 2, 1]), None),
+            100.0 - 2.0 - 4.0
+        );
+        assert_eq!(
+            unary(&path(Destination::Leaf, &[3, 2, 1]), Some(v(2))),
+            54.0
+        );
+        assert_eq!(
+            unary(&path(Destination::Leaf, &[3, 3, 2]), Some(v(2))),
+            100.0 - 2.0 - 3.0 - 40.0
+        );
+        assert_eq!(
+            unary(&path(Destination::Leaf, &[0]), Some(v(1))),
+            100.0 - 5.0 - payoffs.leaf_wait as f32
+        );
+        assert_eq!(unary(&path(Destination::Stay, &[3]), Some(v(3))), 0.0);
+    }
+
+    #[test]
+    fn a_nearer_collision_is_worse_and_the_next_cycle_worst() {
+        let map = grid(6, 1, &[]);
+        let payoffs = Payoffs::new(&NetworkConfig::default(), &map);
+        let worth = |t| payoffs.pairwise(150.0, t);
+        assert!(worth(Some(1)) < worth(Some(2)) && worth(Some(2)) < worth(Some(5)));
+        assert!(worth(Some(30)) < worth(None));
+        assert_eq!(worth(Some(1)), -1000.0);
+        assert!(payoffs.pairwise(-20.0, Some(2)) <= -20.0);
+    }
+}

@@ -1,0 +1,12 @@
+//! The keys of a scenario's `[network.complete]` table.
+
+use farside_actors::settings;
+
+settings! {
+    /// The `[network.complete]` table: what only the policy `complete` reads.
+    pub struct CompleteConfig {
+        /// Along how many routes a walk looks for a way; at least 1.
+        pub routes: u32 = 8,
+            1..;
+    }
+}
