@@ -149,7 +149,7 @@ pub struct Setup<'a> {
     /// Reads the files that the scenario names.
     pub files: &'a mut Files,
     links: Option<LinkBuilder>,
-    remarks: Vec<&'static str>,
+    remarks: Vec<String>,
 }
 
 impl<'a> Setup<'a> {
@@ -202,11 +202,11 @@ impl<'a> Setup<'a> {
         self.links.as_ref().is_some_and(LinkBuilder::has_radios)
     }
 
-    /// What the scenario says of links that has no effect, once the system is assembled.
+    /// What the scenario says of links and processors that has no effect, once the system is assembled.
     ///
     /// # Errors
     /// When the system has declared no links, and the scenario has patterns for some.
-    pub fn close(mut self) -> Result<Vec<&'static str>, LinkConfigError> {
+    pub fn close(mut self) -> Result<Vec<String>, LinkConfigError> {
         if self.links.is_some() {
             self.link(&Wiring::default())?;
         }

@@ -322,8 +322,8 @@ impl Scenario {
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);
         self.check_places(&sim)?;
-        let remarks = remarks.iter().map(|remark| format!("links: {remark}"));
         let remarks = remarks
+            .into_iter()
             .chain(self.too_late())
             .chain(self.source.remarks())
             .collect();
