@@ -12,8 +12,11 @@ mod section;
 mod series;
 pub mod settings;
 
+use std::sync::Arc;
+
 use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
+use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
@@ -148,6 +151,10 @@ pub struct Setup<'a> {
     pub sim: &'a mut Simulation,
     /// Reads the files that the scenario names.
     pub files: &'a mut Files,
+    /// The scenario's contact plan, over hosts' names and in the run's time, for who plans by it.
+    /// Links follow it where `[links]` and `[[degrade]]` say nothing else: what one link has by all
+    /// that is planned, [`Links::nominal`] says.
+    pub contacts: Option<Arc<ContactPlan>>,
     links: Option<LinkBuilder>,
     remarks: Vec<String>,
 }
@@ -167,6 +174,7 @@ impl<'a> Setup<'a> {
             until,
             sim,
             files,
+            contacts: links.plan().cloned(),
             links: Some(links),
             remarks: Vec::new(),
         }

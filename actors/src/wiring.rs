@@ -217,8 +217,11 @@ impl Links {
         actor
     }
 
-    /// What the link from one host to another has without degradations, its contacts included; none
-    /// if there is no such link.
+    /// What the link from one host to another has without degradations; none if there is no such
+    /// link. Its contacts are included: those of `[links]`, or else of the scenario's contact plan.
+    ///
+    /// Planners plan by this, and links act by the truth: a degradation is for the planner to find
+    /// out. What is nominal does not change during a run.
     pub fn nominal(&self, from: &str, to: &str) -> Option<&LinkParams> {
         let found = self.nominal.get(&(from.to_owned(), to.to_owned()));
         found.map(Arc::as_ref)

@@ -308,7 +308,7 @@ impl Scenario {
         let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
         let contacts = contacts.transpose().map_err(wrong)?;
         if let Some(contacts) = &contacts {
-            contacts::hand_over(contacts, &mut links);
+            links.set_plan(contacts.plan().clone());
         }
         let mut notes = Vec::new();
         let traces = links.read_traces(|name| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use farside::{HostId, SimDuration, SimTime, Simulation};
 use farside_worlds::HeightField;
-use farside_worlds::contacts::CapacityTrace;
+use farside_worlds::contacts::{CapacityTrace, ContactPlan};
 use nalgebra::Point3;
 
 use super::pattern::{Pattern, shape};
@@ -56,8 +56,8 @@ pub struct LinkBuilder {
     until: Option<SimDuration>,
     /// The first mistake that a link met.
     mistake: Option<LinkConfigError>,
-    /// The contacts from one host to another, where a plan has any say.
-    plan: Option<Box<Plan>>,
+    /// When which host hears which, where a plan has any say.
+    plan: Option<Arc<ContactPlan>>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<Known>,
 }
@@ -68,9 +68,6 @@ struct Worse {
     when: Degrade,
     over: LinkOverrides,
 }
-
-/// The contacts from one host to another, by their names.
-type Plan = dyn Fn(&str, &str) -> Option<Contacts>;
 
 /// The timeline of all links with one base and one set of degradations.
 struct Known {
@@ -144,10 +141,16 @@ impl LinkBuilder {
         Ok(builder)
     }
 
-    /// Gives links the contacts of a plan, beneath what `[links]` says of them: `contacts` there
-    /// replaces the plan's. `None` leaves a link alone; no contacts at all close it.
-    pub fn set_plan(&mut self, plan: impl Fn(&str, &str) -> Option<Contacts> + 'static) {
-        self.plan = Some(Box::new(plan));
+    /// Gives links the contacts of a plan over hosts' names, beneath what `[links]` says of them:
+    /// `contacts` there replaces the plan's. A link between hosts that the plan does not both name is
+    /// left alone; one between hosts that it names, without a contact, is closed.
+    pub fn set_plan(&mut self, plan: Arc<ContactPlan>) {
+        self.plan = Some(plan);
+    }
+
+    /// The contact plan, if there is one.
+    pub fn plan(&self) -> Option<&Arc<ContactPlan>> {
+        self.plan.as_ref()
     }
 
     /// Reads the traces that parameters name, each once.
@@ -333,7 +336,11 @@ impl LinkBuilder {
         let name = format!("{from}-{to}");
         let mut base = self.default.clone();
         if base.contacts.is_none() {
-            base.contacts = self.plan.as_ref().and_then(|plan| plan(from, to));
+            let windows = self
+                .plan
+                .as_ref()
+                .and_then(|plan| plan.windows_between(from, to));
+            base.contacts = windows.map(Contacts::of_plan);
         }
         for (pattern, over) in &mut self.overrides {
             if pattern.matches(&name) {
