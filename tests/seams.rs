@@ -3,6 +3,8 @@
 
 mod hosts;
 mod names;
+mod planning;
+mod processors;
 mod recipients;
 mod told;
 

@@ -429,6 +429,20 @@ mod tests {
     }
 
     #[test]
+    fn a_heading_is_written_as_it_was_before_there_were_orientations() {
+        // By protobuf's encoding: two messages of three and of two doubles, zeros left out.
+        let double = |field: u8, value: f64| [&[field << 3 | 1][..], &value.to_le_bytes()].concat();
+        let inner =
+            |field: u8, bytes: Vec<u8>| [&[field << 3 | 2, bytes.len() as u8][..], &bytes].concat();
+        let half = 0.5f64.sqrt();
+        let place = [double(1, 3.0), double(2, 4.0), double(3, 0.5)].concat();
+        let turn = [double(3, -half), double(4, half)].concat();
+        let south = scene::Pose::heading([3.0, 4.0, 0.5], [0.0, -1.0]);
+        let found = Pose::from(&south).encode_to_vec();
+        assert_eq!(found, [inner(1, place), inner(2, turn)].concat());
+    }
+
+    #[test]
     fn orientations_are_written_at_length_one() {
         let half = 0.5f64.sqrt();
         let none = [0.0, 0.0, 0.0, 1.0];
