@@ -6,6 +6,7 @@ mod names;
 mod planning;
 mod processors;
 mod recipients;
+mod studies;
 mod told;
 
 use farside::{Executor, Report, Simulation};
