@@ -92,7 +92,7 @@ struct Cut {
 /// The policies and motions that each scenario of the network system is run with. The search over
 /// all rovers at once is feasible for few of them.
 const NETWORK_VARIANTS: [(&str, &[&str]); 6] = [
-    ("paper", &["network.policy=paper"]),
+    ("max-plus", &["network.policy=max-plus"]),
     ("complete", &["network.policy=complete"]),
     ("reference", &["network.policy=reference"]),
     ("prioritised", &["network.policy=prioritised"]),

@@ -112,8 +112,8 @@ fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run
 
 const LATENCY: SimDuration = SimDuration::from_millis(5);
 
-/// When a node's first vectors leave, by the rules of the processor's documentation and the times of
-/// the phases alone: 40 us for each pair of paths.
+/// When a node's first vectors leave, by the rules of the processor's documentation and the times
+/// of the phases alone: 40 us for each pair of paths.
 fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration {
     let pairs = |a: &[u64], b: &[u64]| a.iter().sum::<u64>() * b.iter().sum::<u64>();
     let own = &heard.paths[&node];

@@ -33,7 +33,7 @@ fn config(cases: u32) -> ProptestConfig {
 /// A case as it comes, but with this policy, and with an end.
 fn with_policy(mut case: Case, policy: Policy) -> Case {
     case.network.policy = policy;
-    (case.network.passive_window, case.network.cycle_limit) = match policy {
+    (case.network.deadlock_window, case.network.cycle_limit) = match policy {
         // A walk over links that are seconds late takes its time before the first rover enters.
         Policy::Complete => (60, 200),
         _ => (20, 120),
@@ -42,7 +42,7 @@ fn with_policy(mut case: Case, policy: Policy) -> Case {
 }
 
 fn any_policy() -> impl Strategy<Value = Case> {
-    let policy = prop_oneof![Just(Policy::Paper), Just(Policy::Complete)];
+    let policy = prop_oneof![Just(Policy::MaxPlus), Just(Policy::Complete)];
     let all = (cases(Bounds::default()), policy, any::<[bool; 4]>());
     all.prop_map(|(mut case, policy, switches)| {
         let [chains, is_rigid, gates, resolution] = switches;
@@ -61,8 +61,8 @@ fn any_policy() -> impl Strategy<Value = Case> {
 fn patient() -> NetworkConfig {
     NetworkConfig {
         policy: Policy::Complete,
-        passive_window: 2000,
-        active_window: 4000,
+        deadlock_window: 2000,
+        livelock_window: 4000,
         cycle_limit: 20_000,
         ..NetworkConfig::default()
     }
@@ -114,8 +114,8 @@ proptest! {
 proptest! {
     #![proptest_config(config(64))]
 
-    /// Liveness: half of the messages lost, latencies of more than a cycle, outages, nodes and rovers
-    /// that crash and come back.
+    /// Liveness: half of the messages lost, latencies of more than a cycle, outages, nodes and
+    /// rovers that crash and come back.
     #[test]
     fn with_the_complete_policy_all_arrive(case in cases(Bounds {
         loss_percent: 50,
@@ -136,7 +136,7 @@ fn any_gaps() -> impl Strategy<Value = Case> {
         cases.prop_map(move |case| with_policy(case, policy))
     };
     prop_oneof![
-        with(Gaps::Close, Policy::Paper),
+        with(Gaps::Close, Policy::MaxPlus),
         with(Gaps::Close, Policy::Complete),
         with(Gaps::Cross, Policy::Complete),
     ]
@@ -154,7 +154,8 @@ proptest! {
 proptest! {
     #![proptest_config(config(96))]
 
-    /// Liveness with gaps, which only some of the links' faults reach: nobody waits before one for ever.
+    /// Liveness with gaps, which only some of the links' faults reach: nobody waits before one for
+    /// ever.
     #[test]
     fn all_that_have_a_way_cross_gaps_and_arrive(case in cases_with_gaps(Bounds {
         loss_percent: 50,
@@ -180,11 +181,12 @@ proptest! {
         ownership in prop_oneof![Just(Ownership::Balanced), Just(Ownership::Traffic)],
         weight in prop_oneof![Just(0.0), Just(30.0)],
     ) {
-        let mut case = with_policy(case, Policy::Paper);
+        let mut case = with_policy(case, Policy::MaxPlus);
         case.world.ownership = ownership;
         case.network.max_plus.outsourcing = true;
         case.network.max_plus.processor = Speed::PerS(500);
-        (case.network.max_plus.congestion_weight, case.network.max_plus.congestion_spread) = (weight, 0.5);
+        case.network.max_plus.congestion_weight = weight;
+        case.network.max_plus.congestion_spread = 0.5;
         no_collision(&case)?;
     }
 }
@@ -222,11 +224,12 @@ proptest! {
     }
 }
 
-/// The property above with a rule broken: "a vertex counts as occupied until its occupant is heard to
-/// have left". The cases are the first of a fixed sequence, so that this does not depend on luck.
+/// The property above with a rule broken: "a vertex counts as occupied until its occupant is heard
+/// to have left". The cases are the first of a fixed sequence, so that this does not depend on
+/// luck.
 #[test]
 fn freeing_a_vertex_before_it_is_heard_free_is_found_and_shrinks() {
-    for policy in [Policy::Paper, Policy::Complete] {
+    for policy in [Policy::MaxPlus, Policy::Complete] {
         let broken = any_policy().prop_map(move |case| {
             let mut case = with_policy(case, policy);
             case.network.sabotage = Sabotage::FreeOnGrant;
@@ -308,10 +311,7 @@ fn with_everything_lost_nobody_moves_and_the_run_ends() {
     assert_eq!(metrics.deadlock, Deadlock::Passive);
     assert!(metrics.wait_cycles.is_empty(), "all are in their queues");
     let detail = report.end.detail();
-    assert!(
-        detail.contains("passive deadlock: 6 rovers left"),
-        "{detail}"
-    );
+    assert!(detail.contains("deadlock: 6 rovers left"), "{detail}");
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn a_latency_of_several_cycles_slows_down_and_does_not_stop() {
     case.team.rovers = 2;
     case.link.latency = SimDuration::from_millis(2700);
     case.link.jitter = SimDuration::from_millis(450);
-    case.network.passive_window = 40;
+    case.network.deadlock_window = 40;
     let (slow, report) = run(&case);
     let found = (slow.arrived, slow.collisions);
     assert_eq!(found, (2, 0), "{}", report.end.detail());
@@ -405,17 +405,17 @@ fn rovers_that_wait_in_a_circle_are_named() {
     for seed in 1..=40 {
         let mut case = plain(seed);
         case.team.rovers = 14;
-        case.network.active_window = 60;
+        case.network.livelock_window = 60;
         let mut sim = Simulation::new(seed);
         let system = case.assemble(&mut sim).expect("the case makes sense");
         let report = sim.run(Executor::Inline).expect("it starts");
         let metrics = system.metrics();
-        let standstill = metrics.standstill.unwrap_or_default();
+        let deadlock = metrics.deadlock_reason.unwrap_or_default();
         if metrics.deadlock == Deadlock::None {
             assert!(metrics.wait_cycles.is_empty());
             continue;
         }
-        assert!(standstill.starts_with(report.end.detail().trim_start_matches("@control: ")));
+        assert!(deadlock.starts_with(report.end.detail().trim_start_matches("@control: ")));
         let map = case.roadmap().expect("a roadmap");
         for cycle in &metrics.wait_cycles {
             let waiters = &cycle.0;
@@ -424,16 +424,16 @@ fn rovers_that_wait_in_a_circle_are_named() {
                 let number: usize = waiter.agent["rover_".len()..].parse().expect("a number");
                 let goal = system.missions()[number - 1].1;
                 let (here, there) = (waiter.at.expect("on the map"), next.at.expect("there too"));
-                assert!(map.are_adjacent(here, there), "{standstill}");
+                assert!(map.are_adjacent(here, there), "{deadlock}");
                 let is_nearer = map.distance(there, goal) < map.distance(here, goal);
-                assert!(is_nearer, "{standstill}");
+                assert!(is_nearer, "{deadlock}");
             }
             circles += 1;
         }
         match metrics.wait_cycles.first() {
-            Some(shortest) => assert!(standstill.ends_with(&format!("; {shortest}"))),
-            None if metrics.deadlock == Deadlock::Active => {
-                assert!(standstill.ends_with("rovers moved without coming nearer to their goals"));
+            Some(shortest) => assert!(deadlock.ends_with(&format!("; {shortest}"))),
+            None if metrics.deadlock == Deadlock::Livelock => {
+                assert!(deadlock.ends_with("rovers moved without coming nearer to their goals"));
             }
             None => {}
         }

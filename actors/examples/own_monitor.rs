@@ -148,7 +148,7 @@ fn run(careful: bool) {
     let (monitor, collisions) = CollisionMonitor::new(move |_, cart: &CartState| place(cart));
     sim.observe(monitor);
     let window = SimDuration::from_secs(30);
-    let (monitor, standstills) = DeadlockMonitor::new(window, move |_, cart: &CartState| Seen {
+    let (monitor, deadlocks) = DeadlockMonitor::new(window, move |_, cart: &CartState| Seen {
         place: place(cart),
         waits: cart.blocked_by.map_or(Waits::ForNobody, Waits::ForVertex),
         done: cart.arrived,
@@ -160,11 +160,11 @@ fn run(careful: bool) {
     for collision in collisions.get().named() {
         println!("  collision: {collision}");
     }
-    for standstill in standstills.get() {
-        println!("  {standstill}");
+    for deadlock in deadlocks.get() {
+        println!("  {deadlock}");
     }
     assert_eq!(collisions.get().count() > 0, !careful);
-    assert_eq!(standstills.get().len(), usize::from(careful));
+    assert_eq!(deadlocks.get().len(), usize::from(careful));
 }
 
 fn main() {

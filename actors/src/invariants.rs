@@ -1,4 +1,4 @@
-//! What must never happen, as parts that watch any scenario: collisions, and standstills with the
+//! What must never happen, as parts that watch any scenario: collisions, and deadlocks with the
 //! circle of those who wait for each other. They know no rover, no node and no protocol: only what
 //! actors record of themselves, so that they can find fault with all of these.
 //!
@@ -54,7 +54,7 @@
 //! let (monitor, collisions) = CollisionMonitor::new(|_, cart: &CartState| Place::At(cart.at));
 //! sim.observe(monitor);
 //! let window = SimDuration::from_secs(20);
-//! let (monitor, standstills) = DeadlockMonitor::new(window, |_, cart: &CartState| Seen {
+//! let (monitor, deadlocks) = DeadlockMonitor::new(window, |_, cart: &CartState| Seen {
 //!     place: Place::At(cart.at),
 //!     waits: Waits::ForVertex(cart.wants),
 //!     done: false,
@@ -64,8 +64,8 @@
 //!
 //! assert_eq!(collisions.get().count(), 0);
 //! let circle = "cart_a at 3 waits for cart_b at 4, which waits for cart_a";
-//! assert_eq!(standstills.get()[0].cycles[0].to_string(), circle);
-//! assert_eq!(report.end.detail(), format!("@control: standstill since 0s: {circle}"));
+//! assert_eq!(deadlocks.get()[0].cycles[0].to_string(), circle);
+//! assert_eq!(report.end.detail(), format!("@control: deadlock since 0s: {circle}"));
 //! ```
 //!
 //! `actors/examples/own_monitor.rs` is a longer one, with a collision in it.
@@ -75,5 +75,5 @@ mod observe;
 mod waits;
 
 pub use collisions::{Collision, Collisions, Contested, NAMED_COLLISIONS, Place};
-pub use observe::{CollisionMonitor, DeadlockMonitor, Handle, Seen, Standstill, Waits};
+pub use observe::{CollisionMonitor, DeadlockMonitor, DeadlockReport, Handle, Seen, Waits};
 pub use waits::{WaitCycle, WaitGraph, Waiter};

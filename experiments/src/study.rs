@@ -62,8 +62,8 @@
 //! # Curves
 //!
 //! A metric may be a curve over an index, as a reward over the steps of an optimiser: a
-//! [`Series`](crate::system::Series). What the index is, is declared once, by the system
-//! ([`System::series`](crate::system::System::series)); a study may say it differently.
+//! [`Series`](farside_actors::system::Series). What the index is, is declared once, by the system
+//! ([`MetricKind::Series`](farside_actors::system::MetricKind)); a study may say it differently.
 //!
 //! ```toml
 //! metrics = [

@@ -1,11 +1,12 @@
-//! What planning costs: wall time of one core for a cycle of all nodes together, and for whole runs, with
-//! 100 rovers on the dense roadmap over perfect links, everything else that happens in a run included,
-//! without digest and log. Beside times it says what was done, which no other load on the machine
-//! changes: cycles and messages; for instructions run it under `valgrind --tool=callgrind`.
+//! What planning costs: wall time of one core for a cycle of all nodes together, and for whole
+//! runs, with 100 rovers on the dense roadmap over perfect links, everything else that happens in a
+//! run included, without digest and log. Beside times it says what was done, which no other load on
+//! the machine changes: cycles and messages; for instructions run it under `valgrind
+//! --tool=callgrind`.
 //!
 //! ```text
-//! cargo bench -p farside-actors --bench planning
-//! cargo bench -p farside-actors --bench planning -- paper 28 unlimited 1     # one run of 250 cycles
+//! cargo bench -p farside-network --bench mapf
+//! cargo bench -p farside-network --bench mapf -- max-plus 28 unlimited 1   # 250 cycles
 //! ```
 
 // A benchmark measures real time.
@@ -24,7 +25,7 @@ use farside_worlds::Roadmap;
 
 const ROVERS: u32 = 100;
 
-/// From here on teams that come to a standstill do the same cycle again and again.
+/// From here on teams that come to a deadlock do the same cycle again and again.
 const CYCLES: u32 = 250;
 
 const SEEDS: u64 = 4;
@@ -101,13 +102,13 @@ fn row(nodes: u32, policy: Policy, processor: Speed, cycle_limit: Option<u32>) {
     );
 }
 
-/// `paper 28 unlimited 1`: one run, for a profiler.
+/// `max-plus 28 unlimited 1`: one run, for a profiler.
 fn one(arguments: &[String]) -> Option<Cost> {
     let [policy, nodes, processor, seed] = arguments else {
         return None;
     };
     let policy = match policy.as_str() {
-        "paper" => Policy::Paper,
+        "max-plus" => Policy::MaxPlus,
         "complete" => Policy::Complete,
         _ => return None,
     };
@@ -135,12 +136,12 @@ fn main() {
     println!("at most {CYCLES} cycles:");
     for nodes in [14, 21, 28] {
         for processor in [Speed::Unlimited, PAPER_SPEED] {
-            row(nodes, Policy::Paper, processor, Some(CYCLES));
+            row(nodes, Policy::MaxPlus, processor, Some(CYCLES));
         }
     }
     println!("whole runs:");
     for processor in [Speed::Unlimited, PAPER_SPEED] {
-        row(28, Policy::Paper, processor, None);
+        row(28, Policy::MaxPlus, processor, None);
     }
     row(28, Policy::Complete, Speed::Unlimited, None);
 }

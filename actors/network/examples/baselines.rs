@@ -91,7 +91,7 @@ fn problem(
     };
     let missions = missions(&world, map, &TeamConfig { rovers }, seed)?;
     let missions = missions.into_iter().map(Mission::from).collect();
-    Ok(Problem::new(map, missions, Rules::Queues)?)
+    Ok(Problem::new(map, missions, Rules::DisappearAtTarget)?)
 }
 
 /// A plan that the checker has nothing to say against.

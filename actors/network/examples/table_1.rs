@@ -1,16 +1,18 @@
-//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside it:
-//! 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that lose
-//! nothing unless told to.
+//! Measures the paper's Table 1 (*network-guided*, section 4) and the figures in the text beside
+//! it: 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that
+//! lose nothing unless told to.
 //!
 //!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
-//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`, `jitter_ms`,
-//! `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations), `processor` (`unlimited`,
-//! `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight), `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating, any-to-any,
-//! west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains` (true, false), `cycle_limit`, `active_window`, `motion` (cycles, continuous),
-//! `speed`, `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`, `backtrack`,
-//! `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate` (occupancy),
-//! `probe_after`, `hold` (cycles).
+//! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`,
+//! `jitter_ms`, `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations),
+//! `processor` (`unlimited`, `2M/s`), `damping`, `anytime`, `outsourcing`, `congestion` (weight),
+//! `spread`, `iterations`, `priority` (longest_wait, lowest_id), `endpoints` (alternating,
+//! any-to-any, west-to-east), `ownership` (nearest, balanced, traffic), `acceleration`, `chains`
+//! (true, false), `cycle_limit`, `livelock_window`, `motion` (cycles, continuous), `speed`,
+//! `acceleration_limit`, `sigma` (of locations), `roadmap_from`, and the payoffs' `factor`,
+//! `backtrack`, `leaf_wait`, `noise`. Aids: `gates`, `probes`, `resolution` (true, false), `gate`
+//! (occupancy), `probe_after`, `hold` (cycles).
 
 use std::sync::Arc;
 
@@ -96,7 +98,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
                     "complete" => Policy::Complete,
                     "reference" => Policy::Reference,
                     "prioritised" => Policy::Prioritised,
-                    _ => Policy::Paper,
+                    _ => Policy::MaxPlus,
                 }
             }
             "routes" => network.complete.routes = value.parse()?,
@@ -111,7 +113,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "acceleration_limit" => network.acceleration_limit = value.parse()?,
             "roadmap_from" => network.roadmap_from = Some(value.to_owned()),
             "sigma" => network.location_sigma_m = value.parse()?,
-            "passive" => network.passive_window = value.parse()?,
+            "passive" => network.deadlock_window = value.parse()?,
             "first_seed" => options.first_seed = value.parse()?,
             "maps" => options.maps = value.split(',').map(str::to_owned).collect(),
             "nodes" => options.nodes = numbers(value)?,
@@ -131,7 +133,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
             "iteration_timeout" => network.iteration_timeout = Some(parse_duration(value)?),
             "iterations" => network.max_plus.max_iterations = value.parse()?,
             "cycle_limit" => network.cycle_limit = value.parse()?,
-            "active_window" => network.active_window = value.parse()?,
+            "livelock_window" => network.livelock_window = value.parse()?,
             "chains" => network.max_plus.acceleration_chains = value.parse()?,
             "gates" => network.max_plus.entry_gates = value.parse()?,
             "gate" => network.max_plus.entry_gate_occupancy = value.parse()?,
@@ -238,7 +240,7 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
         "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}  {:5.1}  {:6.2}  {:4.1}",
         percent(&|m| m.deadlock != Deadlock::None),
         percent(&|m| m.deadlock == Deadlock::Passive),
-        percent(&|m| m.deadlock == Deadlock::Active),
+        percent(&|m| m.deadlock == Deadlock::Livelock),
         percent(&|m| m.deadlock == Deadlock::None && m.arrived < m.rovers),
         all(&|(m, _)| f64::from(m.arrived)),
         mean(&|m| m.path_ratio),

@@ -17,7 +17,7 @@ use super::gaps::{self, Refused};
 use super::ids;
 use super::metrics::NetworkMetrics;
 use super::monitor::{Monitor, Score};
-use super::motion::Ways;
+use super::motion::EdgeTimes;
 use super::node::Node;
 use super::rover::Rover;
 use super::shared::Shared;
@@ -79,8 +79,8 @@ impl<'a> Parts<'a> {
 pub enum Missions {
     /// Rovers queue at their entries, and leave the map at their goals: each one's entry and goal.
     Queued(Vec<(VertexId, VertexId)>),
-    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal, no
-    /// two starts and no two goals alike.
+    /// Rovers stand on the map from the start, and stay at their goals: each one's start and goal,
+    /// no two starts and no two goals alike.
     Standing(Vec<(VertexId, VertexId)>),
 }
 
@@ -116,13 +116,14 @@ impl Missions {
 }
 
 /// Declares the network-guided system in `sim`: a host and an actor `node_01`, ... for each sensor
-/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions between
-/// neighbouring nodes and between each node and each rover; and the monitor, which ends the run.
+/// node and `rover_01`, ... for each rover; the links that `wire` makes, for both directions
+/// between neighbouring nodes and between each node and each rover; and the monitor, which ends the
+/// run.
 ///
 /// # Errors
 /// When a setting makes no sense, the phases of a cycle do not fit into it, the team is empty, two
-/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be; and
-/// those of `wire`.
+/// rovers would share a vertex at the start or the end, or coverage gaps are not as they may be;
+/// and those of `wire`.
 pub fn assemble(
     sim: &mut Simulation,
     parts: &Parts<'_>,
@@ -133,21 +134,18 @@ pub fn assemble(
     config.check()?;
     missions.check(&parts.roadmap)?;
     parts.world.gaps.check(sensors, config.policy)?;
-    let stays = matches!(missions, Missions::Standing(_));
+    let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all().to_vec();
     let roadmap = parts.world.open_part(&parts.roadmap, sensors);
     let refused = gaps::refused(&roadmap, sensors, &missions);
     let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
-    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
-    if !stays {
-        let all = (0..).map(RoverId).zip(&missions);
-        for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
-            queues.entry(*entry).or_default().push(id);
-        }
-    }
+    let queues = match stay_at_target {
+        true => BTreeMap::new(),
+        false => queues(&missions, has_way),
+    };
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
-    gaps::check_refused(&refused, &rover_names, stays)?;
+    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
     let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
     let places = places_m(&roadmap, sensors, &missions);
     for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
@@ -157,7 +155,7 @@ pub fn assemble(
         wiring.terrain(terrain.clone());
     }
     let speed = match config.policy {
-        Policy::Paper => config.max_plus.processor,
+        Policy::MaxPlus => config.max_plus.processor,
         // What other policies compute takes no time.
         _ => Speed::Unlimited,
     };
@@ -173,13 +171,13 @@ pub fn assemble(
         .zip(missions.iter().copied())
         .filter(|(id, _)| has_way(id))
         .collect();
-    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stays);
-    let lines = match config.takeover_after {
-        Some(_) => failover::lines(&roadmap, sensors),
+    let schedule = Schedule::of(config, &timing, &roadmap, &planned, stay_at_target);
+    let backup_lists = match config.failover_after {
+        Some(_) => failover::backup_lists(&roadmap, sensors),
         None => Vec::new(),
     };
     let site = Arc::new(Shared {
-        lines,
+        backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
         schedule: schedule.map_err(NetworkError::NoPlan)?,
         patience: config.patience(links.0, &timing),
@@ -194,7 +192,7 @@ pub fn assemble(
         roadmap,
         sensors: sensors.clone(),
         missions,
-        stays,
+        stay_at_target,
     });
     let nodes = declare_nodes(sim, &site, &wired);
     let rovers = declare_rovers(sim, &site);
@@ -208,8 +206,21 @@ pub fn assemble(
     })
 }
 
-/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the one
-/// from one host to another, by their names.
+/// Who waits at each entry, in order: all rovers that have a way to their goals.
+fn queues(
+    missions: &[(VertexId, VertexId)],
+    has_way: impl Fn(&RoverId) -> bool,
+) -> BTreeMap<VertexId, Vec<RoverId>> {
+    let mut queues = BTreeMap::<VertexId, Vec<RoverId>>::new();
+    let all = (0..).map(RoverId).zip(missions);
+    for (id, (entry, _)) in all.filter(|(id, _)| has_way(id)) {
+        queues.entry(*entry).or_default().push(id);
+    }
+    queues
+}
+
+/// The same over links of one's own kind, for simulations without a scenario: `carrier` makes the
+/// one from one host to another, by their names.
 ///
 /// # Errors
 /// Those of [`assemble`].
@@ -238,16 +249,16 @@ fn source(config: &NetworkConfig, names: &[String]) -> Result<Option<NodeId>, Ne
     Ok(Some(NodeId(at as u32)))
 }
 
-/// The parts of a cycle. The paper's policy moves rovers within its cycles: where nothing is said, they
-/// are long enough for the longest edge.
+/// The parts of a cycle. The policy `max-plus` moves rovers within its cycles: where nothing is
+/// said, they are long enough for the longest edge.
 fn timing(
     roadmap: &Roadmap,
     config: &NetworkConfig,
     (latency, rate_bit_per_s): (SimDuration, Option<u64>),
 ) -> Result<Timing, ConfigError> {
     let mut config = config.clone();
-    if config.policy == Policy::Paper && config.motion == Motion::Continuous {
-        let longest = Ways {
+    if config.policy == Policy::MaxPlus && config.motion == Motion::Continuous {
+        let longest = EdgeTimes {
             roadmap,
             config: &config,
         }
@@ -260,23 +271,23 @@ fn timing(
 /// The longest that a step is planned to take.
 ///
 /// # Errors
-/// When an edge takes so long that a cycle of the paper's policy has no time for it, or that driving
-/// along it would look like a deadlock.
+/// When an edge takes so long that a cycle of the policy `max-plus` has no time for it, or that
+/// driving along it would look like a deadlock.
 fn longest_step(
     roadmap: &Roadmap,
     config: &NetworkConfig,
     timing: &Timing,
 ) -> Result<SimDuration, NetworkError> {
-    let ways = Ways { roadmap, config };
+    let ways = EdgeTimes { roadmap, config };
     let longest = ways
         .longest()
         .filter(|_| config.motion == Motion::Continuous);
     let Some((edge, time)) = longest else {
         return Ok(timing.cycle);
     };
-    let window = timing.cycle * u64::from(config.passive_window);
-    let mut limits = vec![("network.passive_window", window)];
-    if config.policy == Policy::Paper {
+    let window = timing.cycle * u64::from(config.deadlock_window);
+    let mut limits = vec![("network.deadlock_window", window)];
+    if config.policy == Policy::MaxPlus {
         // What a rover is granted at the end of a cycle's phases it has done before the next cycle.
         let left = timing.cycle.saturating_sub(timing.decided_after());
         limits.insert(0, ("what network.cycle leaves after its phases", left));
@@ -389,9 +400,9 @@ impl Network {
         self.site.timing
     }
 
-    /// Whether rovers are coordinated by max-plus, as those of the policy `paper` are.
+    /// Whether rovers are coordinated by max-plus, as those of the policy `max-plus` are.
     pub fn coordinates(&self) -> bool {
-        self.site.config.policy == Policy::Paper
+        self.site.config.policy == Policy::MaxPlus
     }
 
     /// The length of a planning cycle, stretched if links are slow.

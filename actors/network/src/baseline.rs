@@ -10,7 +10,7 @@ use crate::mapf::{
     CoupledConfig, Mission, Order, Pace, Problem, Rules, coupled, prioritised_in_time,
     reference_in_time,
 };
-use crate::motion::Ways;
+use crate::motion::EdgeTimes;
 use crate::timing::Timing;
 
 /// Each rover's visits \[ns\], none for one that has no way; and what it took to find them.
@@ -21,8 +21,8 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that have
-    /// a way.
+    /// The plan of a policy that plans ahead; of another none. `missions` are those of rovers that
+    /// have a way.
     ///
     /// # Errors
     /// When there is no plan, or it would take too long to find, or the policy cannot plan for this
@@ -32,12 +32,16 @@ impl Schedule {
         timing: &Timing,
         roadmap: &Roadmap,
         missions: &[(RoverId, (VertexId, VertexId))],
-        stays: bool,
+        stay_at_target: bool,
     ) -> Result<Option<Schedule>, String> {
-        if matches!(config.policy, Policy::Paper | Policy::Complete) {
+        if matches!(config.policy, Policy::MaxPlus | Policy::Complete) {
             return Ok(None);
         }
-        let rules = if stays { Rules::OnMap } else { Rules::Queues };
+        let rules = if stay_at_target {
+            Rules::StayAtTarget
+        } else {
+            Rules::DisappearAtTarget
+        };
         let (rovers, missions): (Vec<RoverId>, Vec<_>) = missions.iter().copied().unzip();
         let of_rover = |visits: Vec<Vec<TimedVisit>>| rovers.into_iter().zip(visits).collect();
         let missions = missions.into_iter().map(Mission::from).collect();
@@ -47,7 +51,7 @@ impl Schedule {
             let visits = of_rover(visits);
             return Ok(Some(Schedule { visits, expansions }));
         }
-        let ways = Ways { roadmap, config };
+        let ways = EdgeTimes { roadmap, config };
         let cycle_ns = timing.cycle.as_nanos();
         let travel = |u, v| ways.planned(u, v).as_nanos();
         let (pace, tick_ns) = match config.motion {
@@ -56,9 +60,9 @@ impl Schedule {
                 let pace = Pace {
                     travel: &travel,
                     // What a rover stands for at its entry.
-                    enter: if stays { 0 } else { cycle_ns },
+                    enter: if stay_at_target { 0 } else { cycle_ns },
                     // What leaves a vertex says so, and what comes next is told.
-                    gap: timing.iteration_timeout.as_nanos().max(1),
+                    headway: timing.iteration_timeout.as_nanos().max(1),
                 };
                 (pace, 1)
             }
@@ -97,8 +101,8 @@ impl Schedule {
     }
 }
 
-/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards it
-/// at that instant.
+/// Visits in ticks as visits in time: a rover that is at a vertex from tick t on sets out towards
+/// it at that instant.
 fn in_ns(mut ways: Vec<Vec<TimedVisit>>, tick_ns: u64) -> Vec<Vec<TimedVisit>> {
     let scale = |tick: u64| match tick {
         FOREVER => FOREVER,

@@ -6,11 +6,11 @@
 //!
 //! # A rule broken, and what is left of the case that shows it
 //!
-//! In the network-guided system a vertex counts as occupied until its occupant is heard to have left
-//! it. [`Sabotage::FreeOnGrant`](crate::Sabotage) breaks that: the vertex is free as soon as
+//! In the network-guided system a vertex counts as occupied until its occupant is heard to have
+//! left it. [`Sabotage::FreeOnGrant`](crate::Sabotage) breaks that: the vertex is free as soon as
 //! the grant of the next one is sent. `tests/network_safety.rs` tries its property, that nobody
-//! collides, on random cases with this fault, and finds a collision within a few. `proptest` shrinks
-//! it to two rovers, one node, three vertices and a jitter of a millisecond, and prints:
+//! collides, on random cases with this fault, and finds a collision within a few. `proptest`
+//! shrinks it to two rovers, one node, three vertices and a jitter of a millisecond, and prints:
 //!
 //! ```toml
 #![doc = include_str!("cases/freed-on-grant.toml")]

@@ -1,6 +1,6 @@
-//! The settings of the network-guided system: the keys of a scenario's `[network]` table, with their
-//! defaults. Every reading of the paper that its text leaves open is a key here. `[world]`
-//! is in `world`, `[team]` is shared by systems.
+//! The settings of the network-guided system: the keys of a scenario's `[network]` table, with
+//! their defaults. Every reading of the paper that its text leaves open is a key here. `[world]`
+//! is in `world`; `[team]` is shared by systems.
 
 mod auto;
 mod world;
@@ -22,14 +22,15 @@ pub use world::{Gaps, RoadmapSource, WorldConfig};
 #[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
-    /// The paper's: candidate paths, payoffs, max-plus.
+    /// The paper's: candidate paths, payoffs, max-plus. Its old name is `paper`.
     #[default]
-    Paper,
-    /// The reservation walk: no rover enters before its whole way is reserved. See
+    #[serde(rename = "max-plus", alias = "paper")]
+    MaxPlus,
+    /// The reservation request: no rover enters before its whole way is reserved. See
     /// [`reservation`](super::reservation).
     Complete,
-    /// A baseline that knows everything and never fails: revised prioritised planning, in the order of
-    /// the queues ([`crate::mapf::reference`]).
+    /// A baseline that knows everything and never fails: revised prioritised planning, in the order
+    /// of the queues ([`crate::mapf::reference`]).
     Reference,
     /// A baseline that knows everything and fails often: prioritised planning in space and time
     /// ([`crate::mapf::prioritised`]). A rover without a way never enters.
@@ -43,25 +44,25 @@ pub enum Policy {
 #[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// As in the paper: each edge takes [`NetworkConfig::traverse`], whatever its length, and at most one is
-    /// driven in a cycle.
+    /// As in the paper: each edge takes [`NetworkConfig::traverse`], whatever its length, and at
+    /// most one is driven in a cycle.
     #[default]
     Cycles,
     /// An edge takes as long as its length needs, with [`NetworkConfig::speed`] and
-    /// [`NetworkConfig::acceleration_limit`]. With the policy `complete` a rover that holds the grant for
-    /// the vertex after next does not stop between; with `paper` a cycle has to be long enough for
-    /// the longest edge.
+    /// [`NetworkConfig::acceleration_limit`]. With the policy `complete` a rover that holds the
+    /// grant for the vertex after next does not stop between; with `max-plus` a cycle has to be
+    /// long enough for the longest edge.
     Continuous,
 }
 
 settings! {
     /// The `[network]` table: the algorithm and its protocol.
     ///
-    /// A cycle's schedule: after one `exchange` nodes tell their neighbours who is where (step 1), after
-    /// two they send candidate paths (steps 2 and 3), after three max-plus begins (step 4); when
-    /// `optimisation` is over paths are assigned and sent (step 5), and one `exchange` later vertices
-    /// are granted (step 6). Messages that come later than that are still used: vectors as long as
-    /// the optimisation lasts, requests whenever they come.
+    /// A cycle's schedule: after one `exchange` nodes tell their neighbours who is where (step 1),
+    /// after two they send candidate paths (steps 2 and 3), after three max-plus begins (step 4);
+    /// when `optimisation` is over paths are assigned and sent (step 5), and one `exchange` later
+    /// vertices are granted (step 6). Messages that come later than that are still used: vectors as
+    /// long as the optimisation lasts, requests whenever they come.
     ///
     /// ```
     /// use farside_network::NetworkConfig;
@@ -71,15 +72,15 @@ settings! {
     /// ```
     pub struct NetworkConfig {
         /// Who decides which rover asks for which vertex.
-        pub policy: Policy = Policy::Paper,
-            one_of(&["paper", "complete", "reference", "prioritised", "coupled"]);
+        pub policy: Policy = Policy::MaxPlus,
+            one_of(&["max-plus", "complete", "reference", "prioritised", "coupled"]);
         /// What only the policy `max-plus` reads.
         pub max_plus: MaxPlusConfig, Within;
         /// What only the policy `complete` reads.
         pub complete: CompleteConfig, Within;
-        /// The length of a planning cycle: at most one move of each rover. `None`, which is `"auto"` in
-        /// a scenario, is as long as its parts take over the slowest link, at least 1 s: see
-        /// [`Timing`](crate::Timing). The next three the same.
+        /// The length of a planning cycle: at most one move of each rover. `None`, which is
+        /// `"auto"` in a scenario, is as long as its parts take over the slowest link, at least 1
+        /// s: see [`Timing`](crate::Timing). The next three the same.
         pub cycle: Option<SimDuration> [with = "auto"],
             if_set(over(SimDuration::ZERO));
         /// How long each exchange of step 1, 3 and 5 may take, and the rovers' beacons before them.
@@ -87,7 +88,8 @@ settings! {
             if_set(over(SimDuration::ZERO));
         /// The cycle's time for max-plus (the paper: 500 ms).
         pub optimisation: Option<SimDuration> [with = "auto"];
-        /// How long a node waits for its neighbours' vectors before it goes on with the last it has.
+        /// How long a node waits for its neighbours' vectors before it goes on with the last it
+        /// has.
         pub iteration_timeout: Option<SimDuration> [with = "auto"],
             if_set(over(SimDuration::ZERO));
         /// How long a rover takes along an edge, with `motion = "cycles"`.
@@ -96,48 +98,51 @@ settings! {
         /// Whether an edge takes time by its length.
         pub motion: Motion,
             one_of(&["cycles", "continuous"]);
-        /// The highest speed of continuous motion \[m/s\], in (0, 1000]. By default 4 m/s, what the rovers are
-        /// asked for that are to carry people on the Moon: an edge of 16 m, the median of the built-in
-        /// dense roadmap, then takes 8 s from rest to rest.
+        /// The highest speed of continuous motion \[m/s\], in (0, 1000]. By default 4 m/s, what the
+        /// rovers are asked for that are to carry people on the Moon: an edge of 16 m, the median
+        /// of the built-in dense roadmap, then takes 8 s from rest to rest.
         pub speed: f64 [with = "units::speed_m_per_s"] = 4.0,
             up_to_a_thousand("more than 0 m/s, at most 1000 m/s");
         /// The highest acceleration of continuous motion, and the highest deceleration \[m/s2\], in
-        /// (0, 1000]. By default 1 m/s2: about what wheels on loose ground can pass on in the Moon's
-        /// gravity of 1.6 m/s2.
+        /// (0, 1000]. By default 1 m/s2: about what wheels on loose ground can pass on in the
+        /// Moon's gravity of 1.6 m/s2.
         pub acceleration_limit: f64 [with = "units::acceleration_m_per_s2"] = 1.0,
             up_to_a_thousand("more than 0 m/s2, at most 1000 m/s2");
-        /// How wrong a rover's estimate of its own position is, as the standard deviation along its way
-        /// \[m\], in [0, 100]; 0 is the paper's. A rover says that it has left a vertex only when it is off it
-        /// by `location_clearance`, though its estimate were three times this wrong; and that it has come
-        /// to one only when a fix of its position was good enough, for which it stops.
+        /// How wrong a rover's estimate of its own position is, as the standard deviation along its
+        /// way \[m\], in [0, 100]; 0 is the paper's. A rover says that it has left a vertex only
+        /// when it is off it by `location_clearance`, though its estimate were three times this
+        /// wrong; and that it has come to one only when a fix of its position was good enough, for
+        /// which it stops.
         pub location_sigma_m as "location_sigma": f64 [with = "units::length_m"],
             in_unit("m", 0.0..=100.0);
-        /// How far from a vertex a rover is off it \[m\], in [0.1, 100]; and how wrong a fix may be for it to
-        /// know that it is there. By default 2 m, the length of a rover: with half of that on either
-        /// side two of them do not touch.
+        /// How far from a vertex a rover is off it \[m\], in [0.1, 100]; and how wrong a fix may be
+        /// for it to know that it is there. By default 2 m, the length of a rover: with half of
+        /// that on either side two of them do not touch.
         pub location_clearance_m as "location_clearance": f64 [with = "units::length_m"] = 2.0,
             in_unit("m", 0.1..=100.0);
-        /// How long a fix takes, where locations are uncertain. One that is not good enough is repeated.
+        /// How long a fix takes, where locations are uncertain. One that is not good enough is
+        /// repeated.
         pub location_fix: SimDuration [with = "units::duration"] = SimDuration::from_millis(100),
             over(SimDuration::ZERO);
-        /// The node, such as `node_01`, that alone knows the roadmap at the start and gives it to the others over
-        /// the network, in parts. Nodes plan and admit only once they know all of it. Absent, all do.
+        /// The node, such as `node_01`, that alone knows the roadmap at the start and gives it to
+        /// the others over the network, in parts. Nodes plan and admit only once they know all of
+        /// it. Absent, all do.
         pub roadmap_from: Option<String> [skip_serializing_if = "Option::is_none"];
-        /// `complete`: how many cycles before its planned time a vertex may be granted. In continuous
-        /// motion, how many times what the longest edge takes, if that is more.
+        /// `complete`: how many cycles before its planned time a vertex may be granted. In
+        /// continuous motion, how many times what the longest edge takes, if that is more.
         pub grants_ahead: u32 = 2;
         /// `coupled`: the most nodes that the search may expand.
         pub max_expansions: u64 = 1_000_000;
-        /// `paper`, `complete`: a node that was not heard for so many cycles, at least 1, is replaced by a
-        /// neighbour, for the rest of the run. Without it (the default) its vertices stay closed until it
-        /// is back.
-        pub takeover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
+        /// `max-plus`, `complete`: a node that was not heard for so many cycles, at least 1, is
+        /// replaced by a neighbour, for the rest of the run. Without it (the default) its vertices
+        /// stay closed until it is back.
+        pub failover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
             if_set(1..);
-        /// Passive deadlock: no move and no entry for so many cycles.
-        pub passive_window: u32 = 20,
+        /// Deadlock: no move and no entry for so many cycles.
+        pub deadlock_window: u32 = 20,
             1..;
-        /// Active deadlock: no new minimum of the sum of remaining distances for so many cycles.
-        pub active_window: u32 = 300,
+        /// Livelock: no new minimum of the sum of remaining distances for so many cycles.
+        pub livelock_window: u32 = 300,
             1..;
         /// The run ends after so many cycles, arrived or not.
         pub cycle_limit: u32 = 5000,
@@ -168,7 +173,7 @@ pub enum Sabotage {
     /// None: the protocol as it is.
     #[default]
     None,
-    /// Owners grant an occupied vertex with this probability (the `paper` policy only).
+    /// Owners grant an occupied vertex with this probability (the policy `max-plus` only).
     GrantOccupied(f64),
     /// Rovers move on without a grant, at each cycle with this probability.
     MoveUnbidden(f64),
@@ -176,8 +181,9 @@ pub enum Sabotage {
     /// should count as occupied until its occupant is heard to leave.
     FreeOnGrant,
     /// Rovers obey nodes that are replaced.
-    IgnoreFences,
-    /// Deputies take the vertices that they take over as free.
+    #[serde(alias = "ignore_fences")]
+    IgnoreFencing,
+    /// Backups take the vertices that they take over as free.
     ForgetAccounts,
 }
 
@@ -206,7 +212,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A key for policies whose nodes decide as they go.
-    #[error("{key} is for the policies paper and complete; leave it out")]
+    #[error("{key} is for the policies max-plus and complete; leave it out")]
     Planned {
         /// The key.
         key: &'static str,
@@ -237,9 +243,10 @@ impl NetworkConfig {
             let key = key.join(".");
             ConfigError::Value { key, message }
         })?;
-        if self.takeover_after.is_some() && !matches!(self.policy, Policy::Paper | Policy::Complete)
+        if self.failover_after.is_some()
+            && !matches!(self.policy, Policy::MaxPlus | Policy::Complete)
         {
-            let key = "network.takeover_after";
+            let key = "network.failover_after";
             return Err(ConfigError::Planned { key });
         }
         Ok(())

@@ -47,7 +47,7 @@ pub enum NetworkError {
         /// The vertices.
         vertices: Vec<VertexId>,
     },
-    /// Only walks reserve crossings.
+    /// Only reservation requests reserve crossings.
     #[error("gaps can be crossed with network.policy = \"complete\" only; close them, or use that")]
     CannotCross,
     /// Gaps leave rovers without a way: all of them, or some that stand on the map.

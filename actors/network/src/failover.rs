@@ -1,39 +1,39 @@
-//! Takeover: who answers for the vertices of a node that has fallen silent, and what makes that safe
-//! (*network-guided*, section 5, asks "how should the network adapt when a node fails").
+//! Failover: who answers for the vertices of a node that has fallen silent, and what makes that
+//! safe (*network-guided*, section 5, asks "how should the network adapt when a node fails").
 //!
-//! **Lines.** Each node, as the *home* of its vertices, has a line of succession that follows from the
-//! map alone ([`lines`]): itself at rank 0, then deputies that are radio neighbours of it and of each
-//! other. Whoever has rank k may take the home over when all of lower rank that could still answer for
-//! it are silent.
+//! **Backup lists.** The vertices of each node are a *region*, which is called by that node. Each
+//! region has a backup list that follows from the map alone ([`backup_lists`]): its own node at
+//! rank 0, then backups that are radio neighbours of it and of each other. The node at rank k may
+//! take the region over when all of lower rank that could still answer for it are silent.
 //!
-//! **Fences.** A deputy of rank k asks every rover, again and again until each has answered. A rover
-//! that is asked durably raises its fence for this home to k, and answers where it is; from then on
-//! it obeys grants of this home's vertices from the deputy of rank k only ([`Fences`]). Fences only
-//! rise.
+//! **Fencing.** A backup of rank k asks every rover, again and again until each has answered. A
+//! rover that is asked durably raises its fencing token for this region to k, and answers where it
+//! is. From then on it obeys grants of this region's vertices from the backup of rank k only
+//! ([`FencingTokens`]). The tokens, often called epochs, only rise.
 //!
-//! **Why no two rovers meet.** Let v be a vertex of the home, and let the deputy of rank k open it when
-//! all rovers have answered at rank k. A grant of v by a lower rank was obeyed before the rover
-//! answered, or never will be. If it was obeyed before, then at its answer the rover was at v, or on
-//! its way there, or had left v for good: its account says which, because what a rover obeys is
-//! durable before it moves. So the rovers that are, or may ever again come, to v by grants of lower
-//! ranks are those that the accounts name, and v is opened as theirs; there is at most one, because
-//! up to then one ledger at a time admitted to v. A grant that was sent and not obeyed is void. A
-//! deputy of higher rank opens only when all fences are above k, and the same holds for it. Suspicion
-//! plays no part in this: a node that lives and is only unheard is fenced like one that is dead, and
-//! two deputies that ask at the same time cannot both be answered by all at their rank and still be
-//! obeyed.
+//! **Why no two rovers meet.** Let v be a vertex of the region, and let the backup of rank k open
+//! it when all rovers have answered at rank k. A grant of v by a lower rank was obeyed before the
+//! rover answered, or never will be. If it was obeyed before, then at its answer the rover was at
+//! v, or on its way there, or had left v for good: its account says which, because what a rover
+//! obeys is durable before it moves. So the rovers that are, or may ever again come, to v by grants
+//! of lower ranks are those that the accounts name, and v is opened as theirs; there is at most
+//! one, because up to then one occupancy table at a time admitted to v. A grant that was sent and
+//! not obeyed is void. A backup of higher rank opens only when all tokens are above k, and the same
+//! holds for it. Suspicion plays no part in this: a node that lives and is only unheard is fenced
+//! like one that is dead, and two backups that ask at the same time cannot both be answered by all
+//! at their rank and still be obeyed.
 //!
-//! A second failure is the same case: when the deputy falls silent, the next in line goes on for the
-//! same home, with rovers' accounts anew; and the deputy's own vertices have a line of their own. Nodes
-//! say whom they answer for, so that a home is not left that was given up to a deputy that then
-//! failed. When
-//! a line is at its end, or a rover never answers, nothing happens and the vertices stay closed. A node
-//! that was replaced stays out for the rest of the run.
+//! A second failure is the same case. When the backup falls silent, the next in the list goes on
+//! for the same region, with rovers' accounts anew; and the backup's own vertices have a list of
+//! their own. Nodes say for whom they answer, so that a region is not left that was given up to a
+//! backup that then failed. When a list is at its end, or a rover never answers, nothing happens
+//! and the vertices stay closed. A node that was replaced stays out for the rest of the run.
 //!
-//! **Reserved ways**, of the policy `complete`, are told with the accounts; what else becomes of them is
-//! in `reservation::registry::succession`. A deputy and the neighbours of its homes need not hear each
-//! other: what they say is passed on by others, one hop after the other, each of which may lose it. Over
-//! links that lose much that takes its time: with a fifth lost and four hops between them, minutes.
+//! **Reserved paths**, of the policy `complete`, are told with the accounts; what else becomes of
+//! them is in `reservation::registry::failover`. A backup and the neighbours of its regions need
+//! not hear each other: what they say is passed on by others, one hop after the other, each of
+//! which may lose it. Over links that lose much that takes its time: with a fifth lost and four
+//! hops between them, minutes.
 
 pub(crate) mod messages;
 pub(crate) mod rank;
@@ -45,17 +45,17 @@ use crate::ids::RoverId;
 use crate::safety::Occupant;
 use crate::safety::messages::Whereabouts;
 
-/// Each node's line of succession, itself first. The next in line is, of the radio neighbours of all
+/// Each node's backup list, itself first. The next in it is, of the radio neighbours of all
 /// before it, the one that is itself, or has as radio neighbours, most of the owners of vertices
 /// next to the node's; of several the lowest.
-pub(crate) fn lines(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Vec<NodeId>> {
-    let line = |home: NodeId| {
+pub(crate) fn backup_lists(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Vec<NodeId>> {
+    let line = |region: NodeId| {
         let mut beside: Vec<NodeId> = sensors
-            .owned(home)
+            .owned(region)
             .iter()
             .flat_map(|&v| roadmap.neighbors(v))
             .map(|&v| sensors.owner(v))
-            .filter(|&owner| owner != home)
+            .filter(|&owner| owner != region)
             .collect();
         beside.sort_unstable();
         beside.dedup();
@@ -63,8 +63,8 @@ pub(crate) fn lines(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Vec<NodeI
             let hears = |&&o: &&NodeId| o == m || sensors.are_neighbors(o, m);
             beside.iter().filter(hears).count()
         };
-        let mut line = vec![home];
-        let mut left = sensors.neighbors(home).to_vec();
+        let mut line = vec![region];
+        let mut left = sensors.neighbors(region).to_vec();
         while let Some(&next) = left.iter().max_by_key(|&&m| (reach(m), u32::MAX - m.0)) {
             line.push(next);
             left.retain(|&m| sensors.are_neighbors(m, next));
@@ -74,38 +74,38 @@ pub(crate) fn lines(roadmap: &Roadmap, sensors: &SensorNetwork) -> Vec<Vec<NodeI
     sensors.nodes().map(line).collect()
 }
 
-/// A rover's durable memory of who may still grant it which vertices: a rank for each home that was
-/// ever asked about. Without an entry it is 0, the home itself.
+/// A rover's durable memory of who may still grant it which vertices: a rank for each region that
+/// was ever asked about. Without an entry it is 0, the region's own node.
 #[derive(Debug, Default)]
-pub(crate) struct Fences {
+pub(crate) struct FencingTokens {
     ranks: Vec<(NodeId, u32)>,
 }
 
-impl Fences {
-    pub(crate) fn rank(&self, home: NodeId) -> u32 {
-        let known = self.ranks.iter().find(|(node, _)| *node == home);
+impl FencingTokens {
+    pub(crate) fn rank(&self, region: NodeId) -> u32 {
+        let known = self.ranks.iter().find(|(node, _)| *node == region);
         known.map_or(0, |&(_, rank)| rank)
     }
 
-    /// Raises the fence to `rank`, if it is lower.
-    pub(crate) fn raise(&mut self, home: NodeId, rank: u32) {
-        match self.ranks.iter_mut().find(|(node, _)| *node == home) {
+    /// Raises the token to `rank`, if it is lower.
+    pub(crate) fn raise(&mut self, region: NodeId, rank: u32) {
+        match self.ranks.iter_mut().find(|(node, _)| *node == region) {
             Some((_, known)) => *known = (*known).max(rank),
-            None => self.ranks.push((home, rank)),
+            None => self.ranks.push((region, rank)),
         }
     }
 }
 
-/// The inquiry of a deputy about one home.
+/// A failover that a backup has begun: it asks rovers about one region.
 #[derive(Debug)]
-pub(crate) struct Inquest {
-    pub(crate) home: NodeId,
+pub(crate) struct PendingFailover {
+    pub(crate) region: NodeId,
     pub(crate) rank: u32,
     /// What each rover has answered.
     pub(crate) accounts: Vec<Option<Account>>,
 }
 
-impl Inquest {
+impl PendingFailover {
     /// Rovers that have not answered.
     pub(crate) fn missing(&self) -> impl Iterator<Item = RoverId> + '_ {
         let all = (0..).map(RoverId).zip(&self.accounts);
@@ -114,23 +114,23 @@ impl Inquest {
     }
 }
 
-/// A node's durable memory of takeovers.
+/// A node's durable memory of failovers.
 #[derive(Debug, Default)]
-pub(crate) struct Charter {
-    /// The homes that this node answers for, ascending; at first its own.
-    pub(crate) homes: Vec<NodeId>,
-    /// The rank that answers for each home, as far as is known here.
+pub(crate) struct FailoverRecord {
+    /// The regions that this node answers for, ascending; at first its own.
+    pub(crate) regions: Vec<NodeId>,
+    /// The rank that answers for each region, as far as is known here.
     pub(crate) ranks: Vec<u32>,
-    pub(crate) inquests: Vec<Inquest>,
+    pub(crate) pending: Vec<PendingFailover>,
     /// The latest fact heard of each rover.
     facts: Vec<Option<Whereabouts>>,
 }
 
-impl Charter {
-    /// Makes a new charter ready; leaves one that has survived a crash as it is.
+impl FailoverRecord {
+    /// Makes a new record ready; leaves one that has survived a crash as it is.
     pub(crate) fn open(&mut self, id: NodeId, nodes: usize, rovers: usize) {
         if self.ranks.is_empty() {
-            self.homes = vec![id];
+            self.regions = vec![id];
             self.ranks = vec![0; nodes];
             self.facts = vec![None; rovers];
         }
@@ -150,43 +150,43 @@ impl Charter {
         *self.facts.get(rover.0 as usize)?
     }
 
-    /// Gives a home up, and whatever was asked about it at `rank` or below. False if this node did
-    /// not answer for it.
-    pub(crate) fn resign(&mut self, home: NodeId, rank: u32) -> bool {
-        self.inquests
-            .retain(|inquest| inquest.home != home || inquest.rank > rank);
-        let before = self.homes.len();
-        self.homes.retain(|&h| h != home);
-        self.homes.len() < before
+    /// Gives a region up, and whatever was asked about it at `rank` or below. False if this node
+    /// did not answer for it.
+    pub(crate) fn resign(&mut self, region: NodeId, rank: u32) -> bool {
+        self.pending
+            .retain(|pending| pending.region != region || pending.rank > rank);
+        let before = self.regions.len();
+        self.regions.retain(|&h| h != region);
+        self.regions.len() < before
     }
 
-    /// Keeps an answer to an inquest. True if it was the last that was missing.
+    /// Keeps an answer to a pending failover. True if it was the last that was missing.
     pub(crate) fn answered(&mut self, account: Account) -> bool {
-        let asked = |i: &&mut Inquest| i.home == account.home && i.rank == account.rank;
-        let Some(inquest) = self.inquests.iter_mut().find(asked) else {
+        let asked = |i: &&mut PendingFailover| i.region == account.region && i.rank == account.rank;
+        let Some(pending) = self.pending.iter_mut().find(asked) else {
             return false;
         };
-        if let Some(slot) = inquest
+        if let Some(slot) = pending
             .accounts
             .get_mut(account.whereabouts.rover.0 as usize)
         {
             *slot = Some(account);
         }
-        inquest.missing().next().is_none()
+        pending.missing().next().is_none()
     }
 
-    /// Ends an inquest that all have answered, and takes the home on. Each rover's latest account,
-    /// with later facts in their place.
-    pub(crate) fn take_on(&mut self, home: NodeId, rank: u32) -> Vec<Account> {
-        let asked = |i: &Inquest| i.home == home && i.rank == rank;
-        let Some(at) = self.inquests.iter().position(asked) else {
+    /// Ends a pending failover that all have answered, and takes the region on. Each rover's latest
+    /// account, with later facts in their place.
+    pub(crate) fn take_on(&mut self, region: NodeId, rank: u32) -> Vec<Account> {
+        let asked = |i: &PendingFailover| i.region == region && i.rank == rank;
+        let Some(at) = self.pending.iter().position(asked) else {
             return Vec::new();
         };
-        let inquest = self.inquests.remove(at);
-        self.ranks[home.0 as usize] = rank;
-        self.homes.push(home);
-        self.homes.sort_unstable();
-        self.homes.dedup();
+        let pending = self.pending.remove(at);
+        self.ranks[region.0 as usize] = rank;
+        self.regions.push(region);
+        self.regions.sort_unstable();
+        self.regions.dedup();
         let latest = |account: Account| {
             let known = self.fact(account.whereabouts.rover);
             match known.filter(|fact| age(fact) > age(&account.whereabouts)) {
@@ -198,7 +198,7 @@ impl Charter {
                 None => account,
             }
         };
-        inquest.accounts.into_iter().flatten().map(latest).collect()
+        pending.accounts.into_iter().flatten().map(latest).collect()
     }
 }
 
@@ -207,7 +207,8 @@ fn age(fact: &Whereabouts) -> (u32, bool) {
     (fact.step, fact.moving_to.is_some())
 }
 
-/// Who holds `vertex` by rovers' accounts: the one that is there and not leaving, or on its way there.
+/// Who holds `vertex` by rovers' accounts: the one that is there and not leaving, or on its way
+/// there.
 pub(crate) fn holder(accounts: &[Account], vertex: VertexId, cycle: u32) -> Option<Occupant> {
     let claims = |account: &&Account| {
         let fact = &account.whereabouts;
@@ -226,8 +227,8 @@ pub(crate) fn holder(accounts: &[Account], vertex: VertexId, cycle: u32) -> Opti
     })
 }
 
-/// How many of a queue have entered, by their accounts. A vertex is granted to the next in the queue
-/// only when the one before has gone on, so they are the first.
+/// How many of a queue have entered, by their accounts. A vertex is granted to the next in the
+/// queue only when the one before has gone on, so they are the first.
 pub(crate) fn released(accounts: &[Account], queue: &[RoverId]) -> u32 {
     let entered = |rover: &&RoverId| {
         accounts

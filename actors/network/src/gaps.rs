@@ -1,20 +1,21 @@
-//! Gaps in the coverage of the roadmap: vertices at which no node reaches a rover. *Network-guided*,
-//! section 5, asks "what should be the network's behavior if there are gaps in the coverage of the
-//! workspace". Here it closes them or lets rovers cross them, as [`Gaps`](crate::Gaps) says.
+//! Gaps in the coverage of the roadmap: vertices at which no node reaches a rover.
+//! *Network-guided*, section 5, asks "what should be the network's behavior if there are gaps in
+//! the coverage of the workspace". Here it closes them or lets rovers cross them, as
+//! [`Gaps`](crate::Gaps) says.
 //!
-//! **Closed**, a vertex has no edges left, so that no path, route or reservation leads there, whatever
-//! the policy.
+//! **Closed**, a vertex has no edges left, so that no path, route or reservation leads there,
+//! whatever the policy.
 //!
 //! **Crossed**, a gap is driven through in one go: a *crossing* leads from a covered vertex through
 //! uncovered ones to the next covered one. From when it has said that it sets out until it has come
-//! out a rover neither speaks nor listens: what is sent to it meanwhile is as good as lost, also where
-//! links know of no distance. So it sets out only when it holds the grants for all vertices of the
-//! crossing, the covered one beyond included, and then needs to hear nothing. The crossing's owners
-//! learn of it when it has come out, each from the next one's owner. Why no rover waits for ever
-//! before a gap: [`reservation`](super::reservation).
+//! out a rover neither speaks nor listens: what is sent to it meanwhile is as good as lost, also
+//! where links know of no distance. So it sets out only when it holds the grants for all vertices
+//! of the crossing, the covered one beyond included, and then needs to hear nothing. The crossing's
+//! owners learn of it when it has come out, each from the next one's owner. Why no rover waits for
+//! ever before a gap: [`reservation`](super::reservation).
 //!
-//! A rover whose entry or goal lies in a gap, or that has no way to its goal where gaps are closed, is
-//! refused: it never enters.
+//! A rover whose entry or goal lies in a gap, or that has no way to its goal where gaps are closed,
+//! is refused: it never enters.
 
 use std::sync::Arc;
 
@@ -49,7 +50,8 @@ impl WorldConfig {
     /// use std::sync::Arc;
     /// use farside_network::{Gaps, WorldConfig};
     /// use farside_worlds::Roadmap;
-    /// let world = WorldConfig { gaps: Gaps::Close, coverage_m: Some(60.0), ..WorldConfig::default() };
+    /// let coverage_m = Some(60.0);
+    /// let world = WorldConfig { gaps: Gaps::Close, coverage_m, ..WorldConfig::default() };
     /// let map = Arc::new(Roadmap::builtin(world.roadmap.name())?);
     /// let sensors = world.place(&map, 1)?;
     /// let open = world.open_part(&map, &sensors);
@@ -124,9 +126,9 @@ pub(super) fn refused(
 pub(super) fn check_refused(
     refused: &[Refused],
     rover_names: &[String],
-    stays: bool,
+    stay_at_target: bool,
 ) -> Result<(), NetworkError> {
-    let too_many = if stays { 1 } else { rover_names.len() };
+    let too_many = if stay_at_target { 1 } else { rover_names.len() };
     if refused.len() < too_many {
         return Ok(());
     }

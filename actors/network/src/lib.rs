@@ -36,33 +36,33 @@
 //! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
 //! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
 //! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
-//! team of 50 comes to a standstill. And a rover that stands on a leaf of its node's local
+//! team of 50 comes to a deadlock. And a rover that stands on a leaf of its node's local
 //! neighbourhood graph has a path of length 0 to that leaf
-//! ([`leaf_wait_penalty`](NetworkConfig::leaf_wait_penalty)): without it two rovers that meet at a
+//! ([`leaf_wait_penalty`](MaxPlusConfig::leaf_wait_penalty)): without it two rovers that meet at a
 //! pocket push each other in and out of it for ever, because the zero path is worth nothing.
 //!
 //! The paper's step 5 and its request to the owner of the next vertex are one message here
-//! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that comes
-//! too late to be weighed against others is granted if the vertex is free.
+//! ([`messages::Assignments`]), and the owner's grant goes to the rover itself. A request that
+//! comes too late to be weighed against others is granted if the vertex is free.
 //!
 //! # Starved processors
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
-//! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team comes to a
-//! standstill on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms of a core of
-//! 2006. With one constant for all cells, `network.max_plus.processor = "paper"` ([`PAPER_SPEED`], the
-//! default), its pattern appears: teams come to a standstill sooner with fewer nodes,
-//! which compare more and longer candidate paths. With fewer than three iterations in a cycle
-//! nearly all do.
+//! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team
+//! comes to a deadlock on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms
+//! of a core of 2006. With one constant for all cells, `network.max_plus.processor = "paper"`
+//! ([`PAPER_SPEED`], the default), its pattern appears: teams come to a deadlock sooner with
+//! fewer nodes, which compare more and longer candidate paths. With fewer than three iterations in
+//! a cycle nearly all do.
 //!
 //! # Spreading the load
 //!
-//! Section 5 (iii) of the paper asks what could be done where rovers gather and few nodes have all the
-//! computing. Three answers can be switched on. A node with more than it can compute has neighbours
-//! compute for it ([`outsourcing`](NetworkConfig::outsourcing)); rovers are led round crowds
-//! ([`congestion_weight`](NetworkConfig::congestion_weight)); vertices are divided among nodes more evenly
-//! ([`ownership`](WorldConfig::ownership)). Standstills in 16 teams each, in per cent; dense roadmap,
-//! links of 5 ms, `active_window = 150`:
+//! Section 5 (iii) of the paper asks what could be done where rovers gather and few nodes have all
+//! the computing. Three answers can be switched on. A node with more than it can compute has
+//! neighbours compute for it ([`outsourcing`](MaxPlusConfig::outsourcing)); rovers are led round
+//! crowds ([`congestion_weight`](MaxPlusConfig::congestion_weight)); vertices are divided among
+//! nodes more evenly ([`ownership`](WorldConfig::ownership)). Deadlocks in 16 teams each, in per
+//! cent; dense roadmap, links of 5 ms, `livelock_window = 150`:
 //!
 //! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
 //! |---|---|---|---|---|---|---|---|---|
@@ -71,19 +71,26 @@
 //! | 100, 21 | 94 | 81 | | 75 | 50 | 88 | 0 | 0 |
 //! | 75, 14 | 100 | 94 | | 100 | 75 | 94 | 25 | 0 |
 //!
-//! Each helps where some nodes have too much to do and others have not. Where all have, nobody is there to
-//! hand work to, and what helps is to let fewer rovers in: [`entry_gates`](NetworkConfig::entry_gates).
-//! With them loads are uneven again, and outsourcing does the rest. A weight of 100 is too much: detours
-//! of a third. To divide vertices by expected traffic (`traffic`) does less than to count them. Study
-//! `network/load-balancing`.
+//! Each helps where some nodes have too much to do and others have not. Where all have, nobody is
+//! there to hand work to, and what helps is to let fewer rovers in:
+//! [`entry_gates`](MaxPlusConfig::entry_gates). With them loads are uneven again, and outsourcing
+//! does the rest. A weight of 100 is too much: detours of a third. To divide vertices by expected
+//! traffic (`traffic`) does less than to count them. Study `network/load-balancing`.
 //!
 //! # Where what is
 //!
-//! The algorithm, without messages: `lng` (the local neighbourhood graph), `candidates`, `payoff`,
-//! `max_plus`, `assignment`; how long it takes: `processor`, `timing`, and how evenly: `loads`; how long
-//! an edge takes: `motion`. The protocol: [`messages`], `safety` (what owners and rovers keep, and why
-//! no two rovers meet), `takeover` (who answers for a node that has fallen silent), `gaps` (where
-//! nobody hears a rover), `node` and `rover` (the actors). Outside both: `monitor`.
+//! `node` and `rover` are the actors. A node consists of what all nodes share and of a state
+//! machine for its policy: `node::max_plus`, `node::complete`, `node::planned`; a new policy is a
+//! new file there. What state machines work with knows nothing of actors: `max_plus` (local
+//! neighbourhood graph, candidate paths, payoffs, the solver), [`reservation`] (tables, requests),
+//! [`mapf`] (plans for whole teams, which `baseline` hands to the planned policies), `motion` (how
+//! long an edge takes). Below all policies stand `safety` (what owners and rovers keep, and why no
+//! two rovers meet), `failover` (who answers for a node that has fallen silent) and `gaps` (where
+//! nobody hears a rover). [`messages`] lists what is said, each declared with its part.
+//!
+//! Outside of the protocol: `monitor` and `metrics` (what a run amounts to), `waits` and `tracks`
+//! (who waits for whom, who was where), `picture` and `scene`; `system`, `scenario`, `config` and
+//! `world` (what scenarios say).
 
 mod assemble;
 mod baseline;

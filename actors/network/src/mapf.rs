@@ -1,6 +1,7 @@
 //! Planning on roadmaps in space and time, without messages: the baselines that the network-guided
-//! system is held against, centralised, in whole cycles or by what each edge takes ([`Pace`]). They plan
-//! one rover after the other with the search that nodes share among them, too: [`safe_intervals`].
+//! system is held against, centralised, in whole cycles or by what each edge takes ([`Pace`]). They
+//! plan one rover after the other with the search that nodes share among them, too:
+//! [`safe_intervals`].
 //!
 //! | planner | what it is |
 //! |---|---|
@@ -14,7 +15,7 @@
 //! let map = Roadmap::builtin("crater-dense")?;
 //! let rim = map.boundary();
 //! let missions = (0..10).map(|i| Mission::new(rim[i % 3], rim[rim.len() - 1 - i])).collect();
-//! let problem = Problem::new(&map, missions, Rules::Queues)?;
+//! let problem = Problem::new(&map, missions, Rules::DisappearAtTarget)?;
 //! let outcome = reference(&problem, &Order::QueuePosition);
 //! assert!(outcome.failures.is_empty());
 //! assert_eq!(outcome.plan.conflicts(&problem), []);
@@ -24,10 +25,11 @@
 //!
 //! # The model
 //!
-//! In time a plan is a list of [visits](safe_intervals). Else time is counted in cycles, from 0; *in cycle t* a rover is at one vertex, and from one cycle to
-//! the next it moves along one edge or waits. That is the distributed system's model with the
-//! instants at which its cycles begin: what a rover does during a cycle of the simulator lies
-//! between two cycles here, so that a lone rover needs as many cycles as its path has edges in both.
+//! In time a plan is a list of [visits](safe_intervals). Else time is counted in cycles, from 0;
+//! *in cycle t* a rover is at one vertex, and from one cycle to the next it moves along one edge or
+//! waits. That is the distributed system's model with the instants at which its cycles begin: what
+//! a rover does during a cycle of the simulator lies between two cycles here, so that a lone rover
+//! needs as many cycles as its path has edges in both.
 //!
 //! - Two rovers may not be at one vertex in one cycle, nor swap along an edge.
 //! - **Following closely is allowed**: a rover may enter a vertex in the very cycle in which its
@@ -36,11 +38,11 @@
 //!   once, each into the vertex that the next one leaves. The real system cannot do it: an owner
 //!   grants a vertex when its occupant is committed to leaving, so in a rotation each grant
 //!   would wait for the one before it, all the way round.
-//! - With [`Rules::Queues`] rovers wait in first-in-first-out queues outside their entries, all
-//!   present in cycle 0 and occupying nothing. A rover that reaches its goal in cycle t occupies it
-//!   in t and is gone in t + 1.
-//! - With [`Rules::OnMap`], for grid maps, rovers stand at their entries in cycle 0 and stay at
-//!   their goals for ever.
+//! - With [`Rules::DisappearAtTarget`] rovers wait in first-in-first-out queues outside their
+//!   entries, all present in cycle 0 and occupying nothing. A rover that reaches its goal in cycle t
+//!   occupies it in t and is gone in t + 1.
+//! - With [`Rules::StayAtTarget`], for grid maps, rovers stand at their entries in cycle 0 and stay
+//!   at their goals for ever.
 
 mod check;
 mod coupled;

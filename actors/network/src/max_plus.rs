@@ -1,6 +1,6 @@
-//! The algorithm of the policy `max-plus`, without messages between actors: the local neighbourhood graph,
-//! candidate paths, payoffs, max-plus itself, and how long a processor takes for it. What nodes do with
-//! it is in `node::max_plus`.
+//! The algorithm of the policy `max-plus`, without messages between actors: the local neighbourhood
+//! graph, candidate paths, payoffs, max-plus itself, and how long a processor takes for it. What
+//! nodes do with it is in `node::max_plus`.
 
 pub(crate) mod aids;
 pub(crate) mod assignment;

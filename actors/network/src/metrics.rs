@@ -10,17 +10,17 @@ use farside_actors::invariants::{Collision, WaitCycle};
 
 pub(crate) use catalogue::ALL;
 
-/// How a team came to a standstill.
+/// How a team came to a stop before its goals.
 #[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Deadlock {
     /// It did not.
     #[default]
     None,
-    /// No rover moved or entered for `network.passive_window` cycles.
+    /// A deadlock: no rover moved or entered for `network.deadlock_window` cycles.
     Passive,
-    /// Rovers moved, and came no nearer to their goals for `network.active_window` cycles.
-    Active,
+    /// Rovers moved, and came no nearer to their goals for `network.livelock_window` cycles.
+    Livelock,
 }
 
 /// The result of a run. Means are over the rovers that arrived, and 0 if none did.
@@ -43,7 +43,7 @@ pub struct NetworkMetrics {
     pub refused_missions: Vec<String>,
     /// Every rover reached its goal.
     pub completed: bool,
-    /// The team came to a standstill, see `deadlock`.
+    /// The team came to a deadlock or a livelock, see `deadlock`.
     pub deadlocked: bool,
     /// When each rover reached its goal, in seconds of virtual time, rover by rover; none for those
     /// that had not when the run ended.
@@ -55,7 +55,7 @@ pub struct NetworkMetrics {
     pub collisions: u32,
     /// The first of them: when, who, where.
     pub collided: Vec<Collision<VertexId>>,
-    /// How the team came to a standstill, if it did.
+    /// How the team came to a deadlock, if it did.
     pub deadlock: Deadlock,
     /// Cycles in which at least one rover was kept from a vertex that its path entered.
     pub interventions: u32,
@@ -79,50 +79,51 @@ pub struct NetworkMetrics {
     pub mean_backtracks: f64,
     /// Cycles until the last rover arrived, or the run ended.
     pub cycles: u32,
-    /// Messages that links were given, lost ones included and copies not, for each rover of the team
-    /// in each cycle.
+    /// Messages that links were given, lost ones included and copies not, for each rover of the
+    /// team in each cycle.
     pub messages_per_rover_cycle: f64,
     /// The encoded size of the same, headers not included \[B\].
     pub bytes_per_rover_cycle: f64,
     /// Max-plus iterations of a node that plans for rovers, in a cycle.
     pub max_plus_iterations: f64,
-    /// Pairs of candidate paths that a node's processor was given to look at in a cycle, in the mean of
-    /// all nodes, also of those that had no rovers.
+    /// Pairs of candidate paths that a node's processor was given to look at in a cycle, in the
+    /// mean of all nodes, also of those that had no rovers.
     pub pairs_per_cycle: f64,
     /// The same of the node that was given most in each cycle, in the mean of the cycles.
     pub peak_load: f64,
-    /// How uneven loads were: `peak_load` over `pairs_per_cycle`, 1 if all nodes were given the same; 0
-    /// if nothing was computed.
+    /// How uneven loads were: `peak_load` over `pairs_per_cycle`, 1 if all nodes were given the
+    /// same; 0 if nothing was computed.
     pub load_imbalance: f64,
     /// The share of all pairs that the busiest node of the run was given.
     pub busiest_share: f64,
-    /// Of the optimisations in which a node had rovers to plan for, the share in which its processor was
-    /// still at work when the time was over.
+    /// Of the optimisations in which a node had rovers to plan for, the share in which its
+    /// processor was still at work when the time was over.
     pub late_optimisations: f64,
     /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
     /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
-    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends any.
+    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends
+    /// any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
     pub last_confirmed: Option<String>,
     /// Nodes that the `coupled` policy's search expanded before the start.
     pub plan_expansions: u64,
-    /// When the last node knew the roadmap, where nodes are given it over the network \[s\]; none if
-    /// some never did.
+    /// When the last node knew the roadmap, where nodes are given it over the network \[s\]; none
+    /// if some never did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadmap_known_s: Option<f64>,
     /// Times a neighbour took over the vertices of a node that had fallen silent.
-    pub takeovers: u32,
+    pub failovers: u32,
     /// Which node was replaced by which, and in which cycle, in order.
-    pub taken_over: Vec<String>,
-    /// Why rovers are still out, for a team that came to a standstill: how many, and where the
-    /// first of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers
-    /// move in vain.
-    pub standstill: Option<String>,
-    /// The circles of rovers that wait for each other when a team of the `paper` policy, or one that
-    /// stays on the map, came to a standstill: no rover on one can come nearer to its goal before the
-    /// next one moves. The shortest first. Pictures of the run name the same.
+    pub failed_over: Vec<String>,
+    /// Why rovers are still out, for a team that came to a deadlock: how many, and where the first
+    /// of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers move
+    /// in vain.
+    pub deadlock_reason: Option<String>,
+    /// The circles of rovers that wait for each other when a team of the policy `max-plus`, or one
+    /// that stays on the map, came to a deadlock: no rover on one can come nearer to its goal
+    /// before the next one moves. The shortest first. Pictures of the run name the same.
     pub wait_cycles: Vec<WaitCycle<VertexId>>,
     /// What published solvers are compared by; only where rovers stay at their goals.
     #[serde(flatten)]
@@ -132,10 +133,10 @@ pub struct NetworkMetrics {
 /// The costs of a solution as the literature on multi-agent path-finding has them (Stern et al.,
 /// *Multi-agent pathfinding*, SoCS 2019), in time steps, each a planning cycle.
 ///
-/// A rover's cost is the step at which it comes to its goal for the last time, to the nearest, so that
-/// the milliseconds a message takes are no step; 0 if it never leaves it. Each move is a step at least,
-/// also one that was granted ahead of its time. Rovers that wait need not wait for whole steps: only
-/// with `network.grants_ahead = 0` is none ever ahead of the steps of its plan.
+/// A rover's cost is the step at which it comes to its goal for the last time, to the nearest, so
+/// that the milliseconds a message takes are no step; 0 if it never leaves it. Each move is a step
+/// at least, also one that was granted ahead of its time. Rovers that wait need not wait for whole
+/// steps: only with `network.grants_ahead = 0` is none ever ahead of the steps of its plan.
 ///
 /// ```
 /// use farside_network::Costs;
@@ -162,7 +163,8 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// Of rovers' costs, none for those that do not stand at their goals, and shortest paths' edges.
+    /// Of rovers' costs, none for those that do not stand at their goals, and shortest paths'
+    /// edges.
     pub fn new(rovers: &[(Option<u32>, u32)]) -> Costs {
         let shortest = rovers.iter().map(|&(_, edges)| edges);
         let sum_of_costs_bound: u64 = shortest.clone().map(u64::from).sum();

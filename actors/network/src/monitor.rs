@@ -14,7 +14,7 @@ use farside_worlds::{NodeId, VertexId};
 use super::config::Motion;
 use super::metrics::{Costs, Deadlock, NetworkMetrics};
 use super::waits::{Standing, WaitRule, Waits};
-use crate::failover::messages::TakenOver;
+use crate::failover::messages::FailedOver;
 use crate::ids::RoverId;
 use crate::max_plus::loads::Loads;
 use crate::max_plus::messages::NodeState;
@@ -61,9 +61,9 @@ pub(crate) struct Score {
     /// The least sum of remaining distances so far, and when it was reached.
     nearest: (u32, u32),
     deadlock: Deadlock,
-    standstill: Option<String>,
+    deadlock_reason: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
-    taken_over: Vec<TakenOver>,
+    failed_over: Vec<FailedOver>,
     confirmed_deadlocks: u32,
     last_confirmed: Vec<RoverId>,
     ended: bool,
@@ -154,9 +154,9 @@ impl Observer for Monitor {
                 score.count(&state);
             } else if kind.name() == "RoadmapKnown" {
                 score.informed.push(record.time());
-            } else if kind.name() == "TakenOver" {
+            } else if kind.name() == "FailedOver" {
                 let taken = kind.schema().decode(record.body).map_err(failed)?;
-                score.taken_over.push(taken);
+                score.failed_over.push(taken);
             }
         }
         Ok(Flow::Continue)
@@ -205,7 +205,7 @@ impl Score {
         if vertex == Some(state.goal) && track.arrived.is_none() {
             track.arrived = Some(cycle);
             track.arrived_at = Some(now);
-        } else if site.stays && track.cost.is_some() {
+        } else if site.stay_at_target && track.cost.is_some() {
             // It makes way for another, and has to come back.
             (track.arrived, track.arrived_at) = (None, None);
         }
@@ -248,12 +248,12 @@ impl Score {
         }
         let config = &site.config;
         let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
-        let reason = if still(self.last_move, config.passive_window + site.patience) {
+        let reason = if still(self.last_move, config.deadlock_window + site.patience) {
             self.deadlock = Deadlock::Passive;
-            "passive deadlock"
-        } else if still(self.nearest.1, config.active_window + site.patience) {
-            self.deadlock = Deadlock::Active;
-            "active deadlock"
+            "deadlock"
+        } else if still(self.nearest.1, config.livelock_window + site.patience) {
+            self.deadlock = Deadlock::Livelock;
+            "livelock"
         } else if self.cycle >= config.cycle_limit {
             "cycle limit"
         } else {
@@ -265,7 +265,7 @@ impl Score {
         if self.deadlock != Deadlock::None {
             self.wait_cycles = self.circles(site);
         }
-        self.standstill = Some(format!("{reason}{}", self.why()));
+        self.deadlock_reason = Some(format!("{reason}{}", self.why()));
         Some(reason)
     }
 
@@ -275,7 +275,7 @@ impl Score {
             return false;
         }
         let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
-        match site.stays {
+        match site.stay_at_target {
             true => track.remaining > 0 || !matches!(place, Place::At(_)),
             false => track.arrived.is_none() || place != Place::Away,
         }
@@ -306,7 +306,7 @@ impl Score {
             goal,
         };
         let rovers: Vec<Standing> = (0..).zip(&site.missions).map(standing).collect();
-        let rule = WaitRule::of(site.config.policy, site.stays);
+        let rule = WaitRule::of(site.config.policy, site.stay_at_target);
         let name = |rover: u32| site.rover_names[rover as usize].clone();
         Waits::of(&site.roadmap, rule, &rovers).named(name, &rovers)
     }
@@ -316,7 +316,7 @@ impl Score {
         if let Some(shortest) = self.wait_cycles.first() {
             return format!("; {shortest}");
         }
-        if self.deadlock != Deadlock::Active {
+        if self.deadlock != Deadlock::Livelock {
             return String::new();
         }
         let since = self.nearest.1;
@@ -346,7 +346,7 @@ impl Score {
             interventions: self.interventions,
             cycles: self.cycle + 1,
             confirmed_deadlocks: self.confirmed_deadlocks,
-            standstill: self.standstill.clone(),
+            deadlock_reason: self.deadlock_reason.clone(),
             plan_expansions: site.schedule.as_ref().map_or(0, |s| s.expansions),
             ..NetworkMetrics::default()
         };
@@ -356,15 +356,15 @@ impl Score {
             metrics.roadmap_known_s = Some(last.as_secs_f64());
         }
         let name = |id: NodeId| site.node_names[id.0 as usize].as_str();
-        let sentence = |t: &TakenOver| {
-            let (home, deputy) = (name(t.home), name(t.deputy));
-            format!("{home} by {deputy} in cycle {}", t.cycle)
+        let sentence = |t: &FailedOver| {
+            let (region, backup) = (name(t.region), name(t.backup));
+            format!("{region} by {backup} in cycle {}", t.cycle)
         };
         metrics.refused = site.refused.len() as u32;
         let refused = site.refused.iter();
         metrics.refused_missions = refused.map(|r| r.sentence(&site.rover_names)).collect();
-        metrics.takeovers = self.taken_over.len() as u32;
-        metrics.taken_over = self.taken_over.iter().map(sentence).collect();
+        metrics.failovers = self.failed_over.len() as u32;
+        metrics.failed_over = self.failed_over.iter().map(sentence).collect();
         let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
         metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
         let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
@@ -385,8 +385,14 @@ impl Score {
             (track.cost, site.roadmap.distance(start, goal))
         };
         metrics.costs = site
-            .stays
+            .stay_at_target
             .then(|| Costs::new(&rovers.map(cost).collect::<Vec<_>>()));
+        self.measure_paths(site, &mut metrics);
+        metrics
+    }
+
+    /// The paths of the rovers that arrived, in the mean.
+    fn measure_paths(&self, site: &Shared, metrics: &mut NetworkMetrics) {
         for (track, &(entry, goal)) in self.tracks.iter().zip(&site.missions) {
             let (Some(entered), Some(arrived)) = (track.entered, track.arrived) else {
                 continue;
@@ -398,7 +404,7 @@ impl Score {
             metrics.path_ratio += f64::from(steps) / shortest;
             metrics.time_ratio += match (site.config.motion, track.arrived_at) {
                 (Motion::Continuous, Some(at)) if entry != goal => {
-                    at.as_secs_f64() / site.ways().alone(entry, goal).as_secs_f64()
+                    at.as_secs_f64() / site.edge_times().alone(entry, goal).as_secs_f64()
                 }
                 _ => f64::from(arrived + 1) / shortest,
             };
@@ -417,6 +423,5 @@ impl Score {
         ] {
             *mean /= count;
         }
-        metrics
     }
 }

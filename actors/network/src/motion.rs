@@ -1,13 +1,15 @@
-//! How long an edge takes. In cycles: always `network.traverse`. In continuous motion: as long as its
-//! length needs, with a highest speed and a highest acceleration, which is also the deceleration.
+//! How long an edge takes. In cycles: always `network.traverse`. In continuous motion: as long as
+//! its length needs, with a highest speed and a highest acceleration, which is also the
+//! deceleration.
 //!
-//! A rover stops at each vertex, unless it holds the grant for the vertex after as it sets out: then
-//! it **rolls** through, as fast as it may. Three things bound its speed there: what it can reach on
-//! the edge before; what it can brake from on the edge after, at whose end it may have to stand; and
-//! the turn: of its velocity only the part along the next edge stays, and of a right angle nothing.
+//! A rover stops at each vertex, unless it holds the grant for the vertex after as it sets out:
+//! then it **rolls** through, as fast as it may. Three things bound its speed there: what it can
+//! reach on the edge before; what it can brake from on the edge after, at whose end it may have to
+//! stand; and the turn: of its velocity only the part along the next edge stays, and of a right
+//! angle nothing.
 //!
-//! Plans reckon with a stop at each vertex. Order drives execution, so a rover that is ahead of its plan
-//! does no harm.
+//! Plans reckon with a stop at each vertex. Order drives execution, so a rover that is ahead of its
+//! plan does no harm.
 
 mod alone;
 
@@ -38,8 +40,8 @@ pub(super) struct Profile {
 }
 
 impl Limits {
-    /// The fastest way along an edge, with these speeds at its ends. `start` and `end` have to be such
-    /// that the length is enough to get from one to the other: see [`Limits::reachable`].
+    /// The fastest way along an edge, with these speeds at its ends. `start` and `end` have to be
+    /// such that the length is enough to get from one to the other: see [`Limits::reachable`].
     pub(super) fn profile(&self, length_m: f64, start: f64, end: f64) -> Profile {
         let a = self.acceleration;
         // Speeding up and braking without anything between meet at this speed.
@@ -119,12 +121,12 @@ fn duration(seconds: f64) -> SimDuration {
 }
 
 /// Edges and how they are driven along.
-pub(super) struct Ways<'a> {
+pub(super) struct EdgeTimes<'a> {
     pub(super) roadmap: &'a Roadmap,
     pub(super) config: &'a NetworkConfig,
 }
 
-impl Ways<'_> {
+impl EdgeTimes<'_> {
     fn limits(&self) -> Limits {
         Limits {
             speed: self.config.speed,
@@ -146,8 +148,8 @@ impl Ways<'_> {
         self.way_m(u, v).norm()
     }
 
-    /// Along the edge from `here` to `next`, setting out with `start` \[m/s\]; `beyond` is the vertex
-    /// after, if the rover may roll on to it.
+    /// Along the edge from `here` to `next`, setting out with `start` \[m/s\]; `beyond` is the
+    /// vertex after, if the rover may roll on to it.
     pub(super) fn drive(
         &self,
         (here, next): (VertexId, VertexId),
@@ -182,7 +184,8 @@ impl Ways<'_> {
         }
     }
 
-    /// How long the edge takes from rest to rest, and a fix of the position: what plans reckon with.
+    /// How long the edge takes from rest to rest, and a fix of the position: what plans reckon
+    /// with.
     pub(super) fn planned(&self, u: VertexId, v: VertexId) -> SimDuration {
         let time = self.drive((u, v), None, 0.0).time;
         match self.config.location_sigma_m > 0.0 {
@@ -248,7 +251,7 @@ mod tests {
             let profile = limits.profile(length_m, start, end);
             let expected = integrate(&limits, length_m, start, end, share * length_m);
             let actual = profile.time_at_s(share * length_m);
-            // Close to a standstill at the end a millimetre takes long.
+            // Close to a deadlock at the end a millimetre takes long.
             prop_assert!((actual - expected).abs() < 0.03, "{} and {}", actual, expected);
         }
 
@@ -295,7 +298,7 @@ mod tests {
     #[test]
     fn a_rover_rolls_straight_on_and_stops_for_a_corner() {
         let (roadmap, config) = (grid(4, 2, &[]), config());
-        let ways = Ways {
+        let ways = EdgeTimes {
             roadmap: &roadmap,
             config: &config,
         };
@@ -318,7 +321,7 @@ mod tests {
     fn in_cycles_every_edge_takes_the_same() {
         let roadmap = grid(3, 1, &[]);
         let config = NetworkConfig::default();
-        let ways = Ways {
+        let ways = EdgeTimes {
             roadmap: &roadmap,
             config: &config,
         };

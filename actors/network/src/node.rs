@@ -1,5 +1,5 @@
-//! The sensor node: plans for the rovers on its vertices and admits rovers to them. What all nodes do
-//! is here and in [`base`], [`ownership`] and [`failover`]; what a policy does, in [`max_plus`],
+//! The sensor node: plans for the rovers on its vertices and admits rovers to them. What all nodes
+//! do is here and in [`base`], [`ownership`] and [`failover`]; what a policy does, in [`max_plus`],
 //! [`complete`] and [`planned`], of which a node has one ([`policy`]).
 
 mod base;
@@ -25,7 +25,7 @@ use crate::max_plus::aids::messages::{Aside, Resolve, WaitProbe};
 use crate::max_plus::lng::LocalGraph;
 use crate::max_plus::messages::{Assignments, CandidatePaths, MaxPlus};
 use crate::reservation::messages::{ItineraryAnswer, Relay};
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 use crate::safety::messages::{Beacon, Departed, DepartedAck};
 use crate::shared::Shared;
 use base::Base;
@@ -35,8 +35,8 @@ use planned::PlannedPolicy;
 use policy::{NodePolicy, Phase, PhaseBegins};
 use reservations::RegistryDue;
 
-/// A sensor node of the network-guided system: owns vertices by the safety protocol, and grants them
-/// as its policy says.
+/// A sensor node of the network-guided system: owns vertices by the safety protocol, and grants
+/// them as its policy says.
 ///
 /// Its record of who holds its vertices is durable; what it plans is not.
 pub struct Node {
@@ -47,7 +47,7 @@ pub struct Node {
 /// The state machine of the policy that is configured.
 fn policy_of(base: &Base, graph: Arc<LocalGraph>, processor: Processor) -> Box<dyn NodePolicy> {
     match base.site.config.policy {
-        Policy::Paper => Box::new(MaxPlusPolicy::new(base, graph, processor)),
+        Policy::MaxPlus => Box::new(MaxPlusPolicy::new(base, graph, processor)),
         Policy::Complete => Box::new(CompletePolicy::default()),
         Policy::Reference | Policy::Prioritised | Policy::Coupled => {
             Box::new(PlannedPolicy::default())
@@ -112,18 +112,18 @@ impl Actor for Node {
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         let base = &mut self.base;
         base.look_up(ctx)?;
-        base.open_wards(ctx);
+        base.open_failover(ctx);
         // A node that was replaced has no vertices of its own any more.
         let owned: &[VertexId] = match base.answers_for(base.id) {
             true => base.site.sensors.owned(base.id),
             false => &[],
         };
-        let ledger = ctx.durable::<Ledger>();
-        let is_new = ledger.is_new();
-        ledger.open(owned, base.rovers.len());
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let is_new = occupancy.is_new();
+        occupancy.open(owned, base.rovers.len());
         for (rover, vertex) in base.site.standing().filter(|_| is_new) {
             let goal = base.site.missions[rover.0 as usize].1;
-            ledger.stand(vertex, rover, goal);
+            occupancy.stand(vertex, rover, goal);
         }
         self.policy.started(&self.base, ctx);
         // The first cycle begins at once; after a restart, the next.

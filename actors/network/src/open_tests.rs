@@ -39,7 +39,7 @@ impl Carrier for Lossy {
 
 /// What was seen of a run: rovers' changes, and what they said.
 #[derive(Default)]
-struct Seen {
+struct Witnessed {
     changes: Vec<(SimTime, RoverState)>,
     /// When each beacon was sent.
     beacons: Vec<(SimTime, Beacon)>,
@@ -47,7 +47,7 @@ struct Seen {
     relays: u32,
 }
 
-struct Witness(Arc<Mutex<Seen>>);
+struct Witness(Arc<Mutex<Witnessed>>);
 
 impl Observer for Witness {
     fn wants(&self) -> Wants {
@@ -115,10 +115,10 @@ impl Case {
         (world, sensors)
     }
 
-    fn run(&self) -> Result<(NetworkMetrics, Report, Seen), NetworkError> {
+    fn run(&self) -> Result<(NetworkMetrics, Report, Witnessed), NetworkError> {
         let (world, sensors) = self.world();
         let mut sim = Simulation::new(self.seed);
-        let seen = Arc::new(Mutex::new(Seen::default()));
+        let seen = Arc::new(Mutex::new(Witnessed::default()));
         sim.observe(Witness(seen.clone()));
         let loss = |from: &str, to: &str| {
             let are_nodes = from.starts_with("node") && to.starts_with("node");
@@ -147,7 +147,7 @@ impl Case {
     }
 
     /// Runs until all have arrived, none has met another.
-    fn arrives(&self) -> (NetworkMetrics, Seen) {
+    fn arrives(&self) -> (NetworkMetrics, Witnessed) {
         let (metrics, report, seen) = self.run().unwrap();
         let result = (metrics.arrived, metrics.collisions);
         assert_eq!(result, (self.rovers, 0), "{}", report.end.detail());
@@ -156,7 +156,7 @@ impl Case {
 }
 
 /// Each move: from where to where, when it began and ended.
-fn moves(seen: &Seen) -> Vec<(VertexId, VertexId, SimTime, SimTime)> {
+fn moves(seen: &Witnessed) -> Vec<(VertexId, VertexId, SimTime, SimTime)> {
     let mut begun = BTreeMap::new();
     let mut moves = Vec::new();
     for (time, state) in &seen.changes {
@@ -194,7 +194,7 @@ mod motion {
         // Rest to rest over 10 m at 2 m/s and 1 m/s2.
         let stops = SimDuration::from_secs(7).as_nanos();
         for (policy, loss) in [
-            (Policy::Paper, 0.0),
+            (Policy::MaxPlus, 0.0),
             (Policy::Complete, 0.0),
             (Policy::Complete, 0.3),
         ] {
@@ -236,7 +236,7 @@ mod motion {
 
     #[test]
     fn an_edge_that_takes_too_long_is_named() {
-        let mut network = continuous(Policy::Paper);
+        let mut network = continuous(Policy::MaxPlus);
         network.cycle = Some(SimDuration::from_secs(7));
         let error = Case::new(network).run().err().unwrap();
         assert!(matches!(error, NetworkError::SlowEdge { .. }));
@@ -246,13 +246,13 @@ mod motion {
         // Where nothing is said, the cycle is long enough.
         let network = NetworkConfig {
             cycle: None,
-            ..continuous(Policy::Paper)
+            ..continuous(Policy::MaxPlus)
         };
         Case::new(network).run().unwrap();
         let mut network = continuous(Policy::Complete);
-        (network.cycle, network.passive_window) = (Some(SimDuration::from_secs(1)), 7);
+        (network.cycle, network.deadlock_window) = (Some(SimDuration::from_secs(1)), 7);
         let text = Case::new(network).run().err().unwrap().to_string();
-        assert!(text.contains("network.passive_window is 7s"), "{text}");
+        assert!(text.contains("network.deadlock_window is 7s"), "{text}");
     }
 
     /// Vertices at these places [m], and nothing but the first and the last to drive between.
@@ -304,7 +304,8 @@ mod motion {
         }
     }
 
-    /// Rovers that roll are ahead of their plan; what keeps one behind it is the way of messages only.
+    /// Rovers that roll are ahead of their plan; what keeps one behind it is the way of messages
+    /// only.
     #[test]
     fn the_references_plan_in_time_is_driven() {
         for seed in 1..=3 {
@@ -351,12 +352,12 @@ mod location {
         }
     }
 
-    /// Nobody says LEAVING before it is off the vertex by the clearance, nor that it has come before it
-    /// has; and all arrive all the same.
+    /// Nobody says LEAVING before it is off the vertex by the clearance, nor that it has come
+    /// before it has; and all arrive all the same.
     #[test]
     fn what_is_said_is_certain() {
         for (policy, sigma_m, loss) in [
-            (Policy::Paper, 0.5, 0.0),
+            (Policy::MaxPlus, 0.5, 0.0),
             (Policy::Complete, 0.5, 0.0),
             (Policy::Complete, 1.5, 0.3),
         ] {
@@ -409,8 +410,8 @@ mod roadmap {
     #[test]
     fn who_is_given_the_roadmap_waits_for_it_and_all_arrive() {
         for (policy, loss) in [
-            (Policy::Paper, 0.0),
-            (Policy::Paper, 0.3),
+            (Policy::MaxPlus, 0.0),
+            (Policy::MaxPlus, 0.3),
             (Policy::Complete, 0.0),
             (Policy::Complete, 0.3),
         ] {
@@ -426,7 +427,7 @@ mod roadmap {
             case.network.roadmap_from = None;
             let (before, none) = case.arrives();
             assert_eq!(before.roadmap_known_s, None);
-            if policy == Policy::Paper {
+            if policy == Policy::MaxPlus {
                 assert_eq!(none.relays, 0);
             }
             // Three nodes were given two parts each, by messages like others.
@@ -437,7 +438,7 @@ mod roadmap {
     /// Nobody comes to a node that does not know the roadmap, if nodes do not hear each other.
     #[test]
     fn who_does_not_know_the_roadmap_admits_nobody() {
-        for policy in [Policy::Paper, Policy::Complete] {
+        for policy in [Policy::MaxPlus, Policy::Complete] {
             let mut case = Case::new(NetworkConfig {
                 policy,
                 roadmap_from: Some("node_02".to_owned()),
@@ -486,7 +487,7 @@ mod gaps {
     }
 
     /// With the least coverage that leaves half of the rovers a way: all of these arrive.
-    fn run(case: &mut Case) -> (SensorNetwork, Seen) {
+    fn run(case: &mut Case) -> (SensorNetwork, Witnessed) {
         let run = |metres: u32| {
             case.coverage_m = Some(f64::from(metres));
             let found = case.run().ok()?;
@@ -501,8 +502,8 @@ mod gaps {
         (sensors, seen)
     }
 
-    /// From setting out into a gap to coming out nobody hears a rover but for LEAVING, and it goes on
-    /// as fast as it can.
+    /// From setting out into a gap to coming out nobody hears a rover but for LEAVING, and it goes
+    /// on as fast as it can.
     #[test]
     fn who_crosses_is_silent_and_does_not_wait() {
         let mut crossings = 0;
@@ -556,7 +557,7 @@ mod gaps {
     #[test]
     fn closed_gaps_are_never_entered() {
         for policy in [
-            Policy::Paper,
+            Policy::MaxPlus,
             Policy::Complete,
             Policy::Reference,
             Policy::Prioritised,
@@ -573,7 +574,7 @@ mod gaps {
     #[test]
     fn what_cannot_be_is_refused_and_named() {
         let error = |case: Case| case.run().err().unwrap().to_string();
-        let text = error(with_gaps(Policy::Paper, Gaps::Cross, 1));
+        let text = error(with_gaps(Policy::MaxPlus, Gaps::Cross, 1));
         assert!(text.contains("network.policy = \"complete\""), "{text}");
         let mut nowhere = with_gaps(Policy::Complete, Gaps::Close, 1);
         nowhere.coverage_m = Some(0.1);

@@ -20,7 +20,7 @@ use farside_actors::system::{
 use farside_worlds::VertexId;
 use thiserror::Error;
 
-pub(crate) use site::{Ground, Site};
+pub(crate) use site::{Site, Surroundings};
 
 use crate::ids;
 use crate::scenario::NetworkScenario;
@@ -64,7 +64,10 @@ pub(crate) fn draw(
     let figure = match picture {
         "map" => drawn.map(request.at),
         "corridor" => {
-            let line = request.along.as_deref().map_or(Ok(Line::Auto), Line::read);
+            let line = request
+                .along
+                .as_deref()
+                .map_or(Ok(VertexLine::Auto), VertexLine::read);
             let line = line.map_err(Failure::NotDrawn)?;
             drawn.time_space(&line, request.from, request.at)
         }
@@ -98,25 +101,25 @@ pub(crate) struct Drawn {
 
 /// Which line of vertices a time-space diagram is of.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Line {
+pub(crate) enum VertexLine {
     /// Where rovers are most in each other's way.
     Auto,
     /// The corridor of one vertex, or the shortest ways between several.
     Through(Vec<VertexId>),
 }
 
-impl Line {
+impl VertexLine {
     /// A line as people write it: `auto`, `12` or `12,40`.
-    fn read(text: &str) -> Result<Line, String> {
+    fn read(text: &str) -> Result<VertexLine, String> {
         if text == "auto" {
-            return Ok(Line::Auto);
+            return Ok(VertexLine::Auto);
         }
         let vertex = |part: &str| {
             let number = part.trim().parse::<u32>().map(VertexId);
             number.map_err(|_| format!("along {part:?}: expected auto, or vertices as in 12,40"))
         };
         let vertices = text.split(',').map(vertex).collect::<Result<_, _>>();
-        vertices.map(Line::Through)
+        vertices.map(VertexLine::Through)
     }
 }
 
@@ -130,7 +133,7 @@ impl Drawn {
     /// The time-space diagram of a line, from a time to another; of the whole run unless given.
     pub(crate) fn time_space(
         &self,
-        line: &Line,
+        line: &VertexLine,
         from: Option<SimDuration>,
         to: Option<SimDuration>,
     ) -> Result<Figure, PictureError> {
@@ -152,7 +155,8 @@ impl Drawn {
         Waits::of(&self.site.roadmap, self.site.wait_rule, &rovers)
     }
 
-    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without one.
+    /// The rovers of the shortest circle in a sentence, with a space before it; nothing without
+    /// one.
     fn shortest_circle(&self, waits: &Waits, rovers: &[Sighting]) -> String {
         let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
         let name = |rover: u32| ids::name("rover", rover, self.site.rovers);

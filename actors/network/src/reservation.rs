@@ -1,68 +1,74 @@
-//! The `complete` policy: no rover enters before a way through time to its exit is reserved for it.
+//! The `complete` policy: no rover enters before a path through time to its exit is reserved for
+//! it.
 //!
-//! # The walk
+//! # A reservation request
 //!
-//! A **book** of each node holds, for each of its vertices, the planned visits in order. The node at
-//! whose entry a rover waits sends probes along a few routes, each a sequence of neighbouring
-//! nodes (`routes`). Each node on it works out where in its own part of the roadmap the rover could
-//! be and when, from its own book alone ([`crate::mapf::safe_intervals`]), and passes that on. The
-//! owner of the goal picks the earliest arrival of all routes and sends the way back; each node
-//! enters its part in its book, tentatively. When the first node has entered its part, the way is
-//! reserved, irrevocably, and a confirmation runs forward. The next rover of the queue follows.
+//! Each node has a **reservation table**: for each of its vertices the planned visits, in order.
+//! The node at whose entry a rover waits sends probes along a few routes, each a sequence of
+//! neighbouring nodes (`routes`). Each node on a route works out where in its own part of the
+//! roadmap the rover could be and when, from its own table alone ([`crate::mapf::safe_intervals`]),
+//! and passes that on. The owner of the goal picks the earliest arrival of all routes and sends
+//! that timed path back; each node enters its part in its table, tentatively. When the first node
+//! has entered its part, the path is reserved, irrevocably, and a confirmation runs forward. The
+//! next rover of the queue follows.
 //!
-//! Walks of several rovers are under way at the same time. Where a part cannot be entered because it
-//! would meet a visit that is confirmed, or that of an older walk, the walk fails: what it entered
-//! is struck out, and it is tried again, as old as it was. Where it would meet only visits of younger
-//! walks, it waits until they are confirmed or struck out.
+//! Requests of several rovers are under way at the same time. Conflicts are settled by age, as
+//! *wait-die* settles those of transactions in databases (Rosenkrantz, Stearns and Lewis, 1978).
+//! Where a part cannot be entered because it would meet a visit that is confirmed, or that of an
+//! older request, the request fails: what it entered is struck out, and it is tried again, as old
+//! as it was. Where it would meet only visits of younger requests, it waits until they are
+//! confirmed or struck out.
 //!
 //! # Execution
 //!
-//! Order drives execution, not the clock: a vertex is granted to the rover whose visit is the first in
-//! its book, once the rover before has gone on and the visit is confirmed. Grants, departures and
-//! all else that keeps rovers apart are those of the safety protocol.
+//! Order drives execution, not the clock: a vertex is granted to the rover whose visit is the first
+//! in its table, once the rover before has gone on and the visit is confirmed. Grants, departures
+//! and all else that keeps rovers apart are those of the safety protocol.
 //!
-//! # Why no team of queued rovers can come to a standstill
+//! # Why no team of queued rovers can come to a deadlock
 //!
-//! *A walk ends.* Waiting goes from older to younger walks only, so there is no cycle of walks that
-//! wait for each other. A walk that fails does so because another one was confirmed or is older. The
-//! oldest fails only because others were confirmed since it began, and there are finitely many. And
-//! there is always a way to find: after the last planned visit all vertices are free for ever, rovers
-//! vanish at their goals, and one that waits in a queue is in nobody's way.
+//! *A request ends.* Waiting goes from older to younger requests only, so there is no cycle of
+//! requests that wait for each other. A request that fails does so because another one was
+//! confirmed or is older. The oldest fails only because others were confirmed since it began, and
+//! there are finitely many. And there is always a way to find: after the last planned visit all
+//! vertices are free for ever, rovers vanish at their goals, and one that waits in a queue is in
+//! nobody's way.
 //!
-//! *A reserved way is driven to its end.* Let each planned visit that has not begun wait for two
-//! things: that its rover's visit before it has begun, and that the visit before it in the book has
-//! ended, which is when that rover's next visit has begun. Both began earlier in planned time, the
-//! second because visits in one book lie apart. So of all visits that have not begun the one
+//! *A reserved path is driven to its end.* Let each planned visit that has not begun wait for two
+//! things: that its rover's visit before it has begun, and that the visit before it in the table
+//! has ended, which is when that rover's next visit has begun. Both began earlier in planned time,
+//! the second because visits in one table lie apart. So of all visits that have not begun the one
 //! with the earliest planned time waits for nothing but messages, and those are repeated until they
 //! are heard. This holds however late the team is, because planned times are never changed.
 //!
-//! *Gaps change nothing of that.* Nobody hears a rover that crosses a gap in the coverage
-//! ([`Gaps`](super::Gaps)), so it sets out into one only with all grants for the crossing. That is one
-//! claim, of all its vertices and the covered one beyond, and all these visits begin in planned time
-//! when it sets out. So the whole claim waits for visits that began earlier: its rover's one before it,
-//! and at each of its vertices the one before it in the book, which ends when that rover goes on. From a
-//! vertex in a gap it goes on without waiting for anything, and it is heard when it has come out. And there
-//! is still a way to find: a shortest way through covered vertices and gaps, which a walk looks along
-//! first, has each crossing lead from one covered vertex to another, past no vertex twice.
+//! *Coverage gaps change nothing of that.* Nobody hears a rover that crosses a gap in the coverage
+//! ([`Gaps`](super::Gaps)), so it sets out into one only with all grants for the crossing. That is
+//! one claim, of all its vertices and the covered one beyond, and all these visits begin in planned
+//! time when it sets out. So the whole claim waits for visits that began earlier: its rover's one
+//! before it, and at each of its vertices the one before it in the table, which ends when that
+//! rover goes on. From a vertex in a gap it goes on without waiting for anything, and it is heard
+//! when it has come out. And there is still a way to find: a shortest way through covered vertices
+//! and gaps, which a request looks along first, has each crossing lead from one covered vertex to
+//! another, past no vertex twice.
 //!
-//! *Nor does the loss of a node.* Whoever takes over for it (`network.takeover_after`) has the same ways in
-//! its book, in the same order: see [`takeover`](super::NetworkConfig::takeover_after).
+//! *Nor does the loss of a node.* Whoever takes over for it (`network.failover_after`) has the same
+//! paths in its table, in the same order: see [`failover`](super::NetworkConfig::failover_after).
 //!
 //! Both need links that lose less than all, and nodes and rovers that come back: what they keep is
 //! durable.
 
 mod atlas;
-mod book;
 pub(crate) mod config;
 pub mod messages;
 mod registries;
 mod registry;
 mod relay;
 mod routes;
-mod ways;
+mod table;
+mod timed_paths;
 
 pub(crate) use atlas::Atlas;
 pub(crate) use registries::Registries;
 pub(crate) use registry::{Desk, Registry};
 pub(crate) use relay::Receipt;
-pub(crate) use ways::Ways;
+pub(crate) use timed_paths::TimedPaths;

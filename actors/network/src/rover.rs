@@ -10,10 +10,10 @@ use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
 use super::config::{Motion, Policy, Sabotage};
-use super::reservation::Ways;
+use super::reservation::TimedPaths;
 use super::reservation::messages::{Itinerary, ItineraryAnswer};
 use super::safety::{Answer, RoverMemory};
-use crate::failover::Fences;
+use crate::failover::FencingTokens;
 use crate::failover::messages::{Account, Inquiry};
 use crate::ids::RoverId;
 use crate::safety::messages::{Beacon, Grant, RoverState, Whereabouts};
@@ -33,8 +33,8 @@ pub struct Rover {
     nodes: Vec<NodeContact>,
     /// What must know where it is.
     radios: Vec<LinkId<RadioChange>>,
-    /// How fast it is at the end of the edge under way, or at the vertex that it rolls through \[m/s\];
-    /// a crash stops it.
+    /// How fast it is at the end of the edge under way, or at the vertex that it rolls through
+    /// \[m/s\]; a crash stops it.
     speed: f64,
     /// It may say that it is leaving: it is off the vertex for certain.
     off: bool,
@@ -109,7 +109,10 @@ impl Rover {
         let is_certain = sigma_m == 0.0;
         let beyond = memory.granted_beyond(|v| self.site.sensors.covers(v));
         let beyond = beyond.filter(|_| is_certain);
-        let drive = self.site.ways().drive((here, next), beyond, self.speed);
+        let drive = self
+            .site
+            .edge_times()
+            .drive((here, next), beyond, self.speed);
         self.speed = drive.end;
         ctx.timer(drive.time, EdgeEnds);
         self.fixes = 0;
@@ -132,8 +135,8 @@ impl Rover {
         }
     }
 
-    /// How far from the vertex it is when it says that it has left: as soon as its estimate is that it is
-    /// off it by the clearance and three standard deviations. Errors beyond that it notices.
+    /// How far from the vertex it is when it says that it has left: as soon as its estimate is that
+    /// it is off it by the clearance and three standard deviations. Errors beyond that it notices.
     fn leaves_at_m(&self, ctx: &Context<'_, Self>, step: u32) -> f64 {
         let config = &self.site.config;
         let most_m = 3.0 * config.location_sigma_m;
@@ -202,32 +205,32 @@ impl Rover {
 
     /// The node that answers for a vertex: its owner, or who has replaced it.
     fn acting(&self, ctx: &mut Context<'_, Self>, vertex: VertexId) -> NodeId {
-        let home = self.site.sensors.owner(vertex);
-        match self.site.lines.get(home.0 as usize) {
-            Some(line) => line[ctx.durable::<Fences>().rank(home) as usize],
-            None => home,
+        let region = self.site.sensors.owner(vertex);
+        match self.site.backup_lists.get(region.0 as usize) {
+            Some(line) => line[ctx.durable::<FencingTokens>().rank(region) as usize],
+            None => region,
         }
     }
 
     /// Whether who grants a vertex answers for it, as far as the rover was told.
     fn obeys(&self, ctx: &mut Context<'_, Self>, grant: &Grant) -> bool {
-        let heeds = self.site.config.sabotage != Sabotage::IgnoreFences;
+        let heeds = self.site.config.sabotage != Sabotage::IgnoreFencing;
         let acting = grant.to.map(|to| self.acting(ctx, to));
         !heeds || acting.is_none_or(|acting| acting == grant.node)
     }
 
-    /// Tells `to` where it is, and whom it obeys about the vertices of `home`.
-    fn account(&self, ctx: &mut Context<'_, Self>, to: NodeId, home: NodeId) {
-        let rank = ctx.durable::<Fences>().rank(home);
+    /// Tells `to` where it is, and whom it obeys about the vertices of `region`.
+    fn account(&self, ctx: &mut Context<'_, Self>, to: NodeId, region: NodeId) {
+        let rank = ctx.durable::<FencingTokens>().rank(region);
         let memory = ctx.durable::<RoverMemory>();
         let (step, previous) = (memory.step, memory.previous);
         let account = Account {
-            home,
+            region,
             rank,
             whereabouts: memory.whereabouts(self.id),
             previous,
             goal: self.goal,
-            ways: ctx.durable::<Ways>().left(step).to_vec(),
+            paths: ctx.durable::<TimedPaths>().left(step).to_vec(),
         };
         ctx.send(self.nodes[to.0 as usize].accounts, account);
     }
@@ -267,16 +270,17 @@ impl Actor for Rover {
         }
         self.radios = ctx.links();
         let memory = ctx.durable::<RoverMemory>();
-        if self.site.stays && memory.step == 0 {
+        if self.site.stay_at_target && memory.step == 0 {
             memory.vertex = Some(self.entry);
             memory.step = 1;
         }
-        // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound to.
+        // Stopped in the middle of an edge by a crash, it drives the edge to its end: it is bound
+        // to.
         if ctx.durable::<RoverMemory>().moving_to.is_some() {
             self.drive(ctx);
         }
         self.record(ctx);
-        if self.site.config.policy != Policy::Paper {
+        if self.site.config.policy != Policy::MaxPlus {
             self.proceed(ctx);
         }
         ctx.timer(self.site.until_next_cycle(ctx.now()), CycleStarts);
@@ -318,7 +322,7 @@ impl Handler<Grant> for Rover {
             }
             return Ok(());
         }
-        if self.site.config.policy == Policy::Paper {
+        if self.site.config.policy == Policy::MaxPlus {
             self.obey(&grant, ctx);
             return Ok(());
         }
@@ -332,28 +336,29 @@ impl Handler<Grant> for Rover {
 
 impl Handler<Inquiry> for Rover {
     fn handle(&mut self, inquiry: Inquiry, ctx: &mut Context<'_, Self>) -> Outcome {
-        let Inquiry { node, home, rank } = inquiry;
-        let line = self.site.lines.get(home.0 as usize);
+        let Inquiry { node, region, rank } = inquiry;
+        let line = self.site.backup_lists.get(region.0 as usize);
         let entitled = line.and_then(|line| line.get(rank as usize));
         if entitled != Some(&node) || self.is_in_gap(ctx) {
             return Ok(());
         }
         let site = self.site.clone();
-        let is_higher = rank > ctx.durable::<Fences>().rank(home);
-        let of_home = |v: VertexId| site.sensors.owner(v) == home;
+        let is_higher = rank > ctx.durable::<FencingTokens>().rank(region);
+        let of_home = |v: VertexId| site.sensors.owner(v) == region;
         let beyond = ctx
             .durable::<RoverMemory>()
             .granted_beyond(|v| site.sensors.covers(v));
         if is_higher && beyond.is_some_and(of_home) && self.speed > 0.0 {
-            // It cannot stop before a vertex that it is about to roll on to. It answers when it is there.
+            // It cannot stop before a vertex that it is about to roll on to. It answers when it is
+            // there.
             return Ok(());
         }
-        ctx.durable::<Fences>().raise(home, rank);
+        ctx.durable::<FencingTokens>().raise(region, rank);
         if is_higher {
             let is_void = |grant: &Grant| grant.to.is_some_and(of_home);
             ctx.durable::<RoverMemory>().forget(is_void);
         }
-        self.account(ctx, node, home);
+        self.account(ctx, node, region);
         Ok(())
     }
 }
@@ -365,35 +370,35 @@ impl Handler<Itinerary> for Rover {
         }
         let Itinerary {
             node,
-            way,
+            path,
             replaced,
         } = itinerary;
-        let walk = way.walk;
-        let reserved_at = |home| {
-            let of = replaced.iter().find(|r| r.home == home);
+        let request = path.request;
+        let reserved_at = |region| {
+            let of = replaced.iter().find(|r| r.region == region);
             of.map_or(0, |r| r.rank)
         };
         let site = self.site.clone();
-        let fences = ctx.durable::<Fences>();
-        let mut homes = way.visits.iter().map(|v| site.sensors.owner(v.vertex));
-        let holds = homes.all(|home| fences.rank(home) == reserved_at(home))
-            || site.config.sabotage == Sabotage::IgnoreFences;
-        let ways = ctx.durable::<Ways>();
-        let known = ways.has(&walk);
+        let fencing_tokens = ctx.durable::<FencingTokens>();
+        let mut regions = path.visits.iter().map(|v| site.sensors.owner(v.vertex));
+        let holds = regions.all(|region| fencing_tokens.rank(region) == reserved_at(region))
+            || site.config.sabotage == Sabotage::IgnoreFencing;
+        let paths = ctx.durable::<TimedPaths>();
+        let known = paths.has(&request);
         if holds && !known {
-            ways.take(way);
+            paths.take(path);
         }
         let taken = holds || known;
         let to = self.nodes[node.0 as usize].itinerary_answers;
-        ctx.send(to, ItineraryAnswer { walk, taken });
+        ctx.send(to, ItineraryAnswer { request, taken });
         Ok(())
     }
 }
 
 impl Rover {
     /// Takes the next step if it was granted ahead, and no sooner than a cycle after the last move
-    /// began; in continuous motion at once, but for a cycle at the entry. Into a gap only with the grants
-    /// for the way through.
+    /// began; in continuous motion at once, but for a cycle at the entry. Into a gap only with the
+    /// grants for the way through.
     fn proceed(&mut self, ctx: &mut Context<'_, Self>) {
         let now = ctx.now();
         let memory = ctx.durable::<RoverMemory>();
@@ -462,7 +467,7 @@ impl Handler<EdgeEnds> for Rover {
         if ctx.durable::<RoverMemory>().arrive() {
             self.record(ctx);
             self.beacon_here(ctx);
-            if self.site.config.policy != Policy::Paper {
+            if self.site.config.policy != Policy::MaxPlus {
                 self.proceed(ctx);
             }
         }

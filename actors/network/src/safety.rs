@@ -7,8 +7,8 @@
 //! 3. A rover takes step n + 1 only after n, only by a grant for it, and only once: of two grants
 //!    for one step it obeys the first. What it accepts is durable before it moves.
 //! 4. A vertex held for (rover, step) is freed by proof only: the rover is on its way from there
-//!    (LEAVING), it is at a later step, or it took (or is irrevocably taking) that step to somewhere
-//!    else.
+//!    (LEAVING), it is at a later step, or it took (or is irrevocably taking) that step to
+//!    somewhere else.
 //!
 //! By 1, 2 and 4 at most one rover may be at, or on its way to, a vertex. Swapping along an edge
 //! would need each of two rovers to hold the vertex on which the other one still stands. All proofs
@@ -56,7 +56,7 @@ pub(crate) struct Duty {
     pub(crate) whereabouts: Whereabouts,
 }
 
-/// What a fact changed in a [`Ledger`].
+/// What a fact changed in a [`OccupancyTable`].
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct News {
     /// Vertices that are free now.
@@ -70,7 +70,7 @@ pub(crate) struct News {
 
 /// An owner's durable record of its vertices.
 #[derive(Debug, Default)]
-pub(crate) struct Ledger {
+pub(crate) struct OccupancyTable {
     /// In the order of the vertices.
     slots: Vec<Slot>,
     /// The latest step heard of each rover.
@@ -78,8 +78,8 @@ pub(crate) struct Ledger {
     duties: Vec<Duty>,
 }
 
-impl Ledger {
-    /// Makes a new ledger ready; leaves one that has survived a crash as it is.
+impl OccupancyTable {
+    /// Makes a new occupancy table ready; leaves one that has survived a crash as it is.
     pub(crate) fn open(&mut self, owned: &[VertexId], rovers: usize) {
         if self.slots.is_empty() {
             let slot = |&vertex: &VertexId| Slot {
@@ -122,7 +122,7 @@ impl Ledger {
         }
     }
 
-    /// True for a ledger that has not been opened yet.
+    /// True for an occupancy table that has not been opened yet.
     pub(crate) fn is_new(&self) -> bool {
         self.slots.is_empty()
     }
@@ -131,7 +131,7 @@ impl Ledger {
         self.slots.binary_search_by_key(&vertex, |s| s.vertex).ok()
     }
 
-    /// Who holds `vertex`; none if it is free, or not in this ledger.
+    /// Who holds `vertex`; none if it is free, or not in this occupancy table.
     pub(crate) fn occupant(&self, vertex: VertexId) -> Option<&Occupant> {
         self.slots[self.slot(vertex)?].occupant.as_ref()
     }
@@ -422,10 +422,10 @@ mod tests {
     const R: RoverId = RoverId(0);
     const Q: RoverId = RoverId(1);
 
-    fn ledger() -> Ledger {
-        let mut ledger = Ledger::default();
-        ledger.open(&[v(1), v(2), v(5)], 2);
-        ledger
+    fn occupancy() -> OccupancyTable {
+        let mut occupancy = OccupancyTable::default();
+        occupancy.open(&[v(1), v(2), v(5)], 2);
+        occupancy
     }
 
     fn fact(step: u32, vertex: Option<u32>, moving_to: Option<u32>) -> Whereabouts {
@@ -439,11 +439,11 @@ mod tests {
 
     #[test]
     fn a_vertex_is_granted_once_and_freed_by_proof_only() {
-        let mut ledger = ledger();
-        assert!(ledger.grant(v(2), R, 4, Some(v(1)), 0));
-        assert!(!ledger.grant(v(2), Q, 1, None, 0), "it is taken");
+        let mut occupancy = occupancy();
+        assert!(occupancy.grant(v(2), R, 4, Some(v(1)), 0));
+        assert!(!occupancy.grant(v(2), Q, 1, None, 0), "it is taken");
         assert!(
-            !ledger.grant(v(5), R, 4, Some(v(1)), 0),
+            !occupancy.grant(v(5), R, 4, Some(v(1)), 0),
             "one vertex for a step"
         );
         // Before it came: where it was, or on its way here, proves nothing.
@@ -452,19 +452,19 @@ mod tests {
             fact(3, Some(1), Some(2)),
             fact(0, None, None),
         ] {
-            assert_eq!(ledger.hear(&stale, None, 1), News::default());
+            assert_eq!(occupancy.hear(&stale, None, 1), News::default());
         }
-        let news = ledger.hear(&fact(4, Some(2), None), Some(v(9)), 7);
+        let news = occupancy.hear(&fact(4, Some(2), None), Some(v(9)), 7);
         assert!(news.arrived && news.freed.is_empty());
         assert!(
-            !ledger.hear(&fact(4, Some(2), None), None, 8).arrived,
+            !occupancy.hear(&fact(4, Some(2), None), None, 8).arrived,
             "only once"
         );
-        assert_eq!(ledger.occupant(v(2)).unwrap().since, 7);
-        let news = ledger.hear(&fact(4, Some(2), Some(3)), None, 9);
+        assert_eq!(occupancy.occupant(v(2)).unwrap().since, 7);
+        let news = occupancy.hear(&fact(4, Some(2), Some(3)), None, 9);
         assert_eq!(news.freed, [v(2)], "LEAVING");
-        assert!(!ledger.grant(v(2), R, 4, None, 9), "an outdated request");
-        assert!(ledger.grant(v(2), Q, 1, None, 9));
+        assert!(!occupancy.grant(v(2), R, 4, None, 9), "an outdated request");
+        assert!(occupancy.grant(v(2), Q, 1, None, 9));
     }
 
     #[test]
@@ -475,42 +475,50 @@ mod tests {
             fact(3, Some(1), Some(7)),
             fact(9, None, None),
         ] {
-            let mut ledger = ledger();
-            assert!(ledger.grant(v(2), R, 4, Some(v(1)), 0));
-            assert_eq!(ledger.hear(&proof, None, 1).freed, [v(2)], "{proof:?}");
+            let mut occupancy = occupancy();
+            assert!(occupancy.grant(v(2), R, 4, Some(v(1)), 0));
+            assert_eq!(occupancy.hear(&proof, None, 1).freed, [v(2)], "{proof:?}");
         }
     }
 
     #[test]
     fn each_queued_rover_is_let_in_once() {
-        let mut ledger = ledger();
-        assert_eq!(ledger.release(v(5), &[Q, R], 0), Some(Q));
-        assert_eq!(ledger.release(v(5), &[Q, R], 1), None, "the entry is taken");
+        let mut occupancy = occupancy();
+        assert_eq!(occupancy.release(v(5), &[Q, R], 0), Some(Q));
+        assert_eq!(
+            occupancy.release(v(5), &[Q, R], 1),
+            None,
+            "the entry is taken"
+        );
         let gone = Whereabouts {
             rover: Q,
             ..fact(2, Some(6), None)
         };
-        assert_eq!(ledger.hear(&gone, None, 2).freed, [v(5)]);
-        assert_eq!(ledger.release(v(5), &[Q, R], 2), Some(R));
-        ledger.hear(&fact(1, Some(5), Some(6)), None, 3);
-        assert_eq!(ledger.release(v(5), &[Q, R], 3), None, "the queue is empty");
+        assert_eq!(occupancy.hear(&gone, None, 2).freed, [v(5)]);
+        assert_eq!(occupancy.release(v(5), &[Q, R], 2), Some(R));
+        occupancy.hear(&fact(1, Some(5), Some(6)), None, 3);
+        assert_eq!(
+            occupancy.release(v(5), &[Q, R], 3),
+            None,
+            "the queue is empty"
+        );
     }
 
     #[test]
     fn duties_last_until_acknowledged() {
-        let mut ledger = ledger();
+        let mut occupancy = occupancy();
         let duty = |step| Duty {
             to: NodeId(3),
             whereabouts: fact(step, Some(1), None),
         };
-        ledger.take_on(duty(2));
-        ledger.take_on(duty(6));
-        assert_eq!(ledger.duties(), [duty(6)]);
-        ledger.acknowledged(NodeId(3), R, 2);
-        ledger.acknowledged(NodeId(4), R, 6);
-        assert_eq!(ledger.duties(), [duty(6)]);
-        ledger.acknowledged(NodeId(3), R, 6);
-        assert!(ledger.duties().is_empty());
+        occupancy.take_on(duty(2));
+        occupancy.take_on(duty(6));
+        assert_eq!(occupancy.duties(), [duty(6)]);
+        occupancy.acknowledged(NodeId(3), R, 2);
+        occupancy.acknowledged(NodeId(4), R, 6);
+        assert_eq!(occupancy.duties(), [duty(6)]);
+        occupancy.acknowledged(NodeId(3), R, 6);
+        assert!(occupancy.duties().is_empty());
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! The network-guided system as viewers draw it: the roadmap in the colours of its nodes, the nodes,
-//! rovers that drive, and which of them are coordinated.
+//! The network-guided system as viewers draw it: the roadmap in the colours of its nodes, the
+//! nodes, rovers that drive, and which of them are coordinated.
 //!
 //! All of it is told by committed samples: a rover's frame is placed when it sets out and when it
 //! arrives, and viewers move it in between. The coordination graph is told as it is when a planning
@@ -41,7 +41,7 @@ pub(super) struct NetworkScene {
     /// The shortest edge \[m\]: what is drawn is as large as fits.
     scale_m: f64,
     /// By the number of the actor in the run; none for those that are no rovers.
-    rovers: Vec<Option<Drawn>>,
+    rovers: Vec<Option<DrawnRover>>,
     collisions: u32,
     /// Of each node.
     colours: Vec<[f64; 4]>,
@@ -54,7 +54,7 @@ pub(super) struct NetworkScene {
 
 /// A rover as it was last drawn.
 #[derive(Clone, Copy)]
-struct Drawn {
+struct DrawnRover {
     on_the_map: bool,
     /// The vertex that it stands on, or drives to.
     holds: Option<VertexId>,
@@ -286,7 +286,13 @@ impl NetworkScene {
     }
 
     /// A rover's sample: where it is now, and which way it faces.
-    fn follow(&self, name: &str, drawn: &mut Drawn, state: &RoverState, out: &mut Vec<Drawing>) {
+    fn follow(
+        &self,
+        name: &str,
+        drawn: &mut DrawnRover,
+        state: &RoverState,
+        out: &mut Vec<Drawing>,
+    ) {
         let whereabouts = &state.whereabouts;
         drawn.holds = whereabouts.place().claim();
         let Some(vertex) = whereabouts.vertex else {
@@ -333,7 +339,7 @@ impl Scene for NetworkScene {
     fn begin(&mut self, run: &RunInfo, out: &mut Vec<Drawing>) {
         let names: BTreeSet<&String> = self.system.rover_names().iter().collect();
         let drawn = |entity: &farside::Entity| {
-            names.contains(&entity.name).then_some(Drawn {
+            names.contains(&entity.name).then_some(DrawnRover {
                 on_the_map: false,
                 holds: None,
                 heading: [1.0, 0.0],

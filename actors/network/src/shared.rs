@@ -11,7 +11,7 @@ use crate::config::{Motion, NetworkConfig};
 use crate::gaps::Refused;
 use crate::ids::RoverId;
 use crate::max_plus::payoff::Payoffs;
-use crate::motion::Ways;
+use crate::motion::EdgeTimes;
 use crate::timing::Timing;
 
 /// What all nodes and rovers of a run know from the start, and what does not change.
@@ -34,9 +34,9 @@ pub(crate) struct Shared {
     /// Each rover's entry, or where it stands at first, and its goal.
     pub(crate) missions: Vec<(VertexId, VertexId)>,
     /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
-    pub(crate) stays: bool,
-    /// Each node's line of succession, with `network.takeover_after`; else empty.
-    pub(crate) lines: Vec<Vec<NodeId>>,
+    pub(crate) stay_at_target: bool,
+    /// Each node's backup list, with `network.failover_after`; else empty.
+    pub(crate) backup_lists: Vec<Vec<NodeId>>,
     /// The plan of a policy that plans ahead.
     pub(crate) schedule: Option<Schedule>,
     /// Who waits at each entry, in order.
@@ -54,7 +54,7 @@ impl Shared {
     /// Who stands where at the start.
     pub(crate) fn standing(&self) -> impl Iterator<Item = (RoverId, VertexId)> + '_ {
         let all = (0..).map(RoverId).zip(&self.missions);
-        all.filter(|_| self.stays)
+        all.filter(|_| self.stay_at_target)
             .map(|(id, (start, _))| (id, *start))
     }
 
@@ -78,8 +78,8 @@ impl Shared {
     }
 
     /// How edges are driven along.
-    pub(crate) fn ways(&self) -> Ways<'_> {
-        Ways {
+    pub(crate) fn edge_times(&self) -> EdgeTimes<'_> {
+        EdgeTimes {
             roadmap: &self.roadmap,
             config: &self.config,
         }
@@ -89,7 +89,7 @@ impl Shared {
     pub(crate) fn planned_step(&self, u: VertexId, v: VertexId) -> SimDuration {
         match self.config.motion {
             Motion::Cycles => self.timing.cycle,
-            Motion::Continuous => self.ways().planned(u, v),
+            Motion::Continuous => self.edge_times().planned(u, v),
         }
     }
 

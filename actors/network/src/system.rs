@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
-use crate::world::{Ground, crater, ground, in_crater, place};
+use crate::world::{RoadmapGround, crater, ground, in_crater, place};
 use crate::{
     CompleteConfig, ConfigError, MaxPlusConfig, Missions, Network, NetworkConfig, NetworkError,
     NetworkMetrics, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics, missions, picture,
@@ -43,6 +43,15 @@ impl System for NetworkSystem {
     }
 
     fn renamed(&self) -> Vec<Renamed> {
+        let old_names = [
+            ("failover_after", "takeover_after"),
+            ("deadlock_window", "passive_window"),
+            ("livelock_window", "active_window"),
+        ];
+        let renamed = old_names.map(|(new, old)| Renamed {
+            old: format!("network.{old}"),
+            new: format!("network.{new}"),
+        });
         // Keys of one policy stood in `[network]` itself.
         let tables = [
             MaxPlusConfig::sections("network.max_plus"),
@@ -57,7 +66,7 @@ impl System for NetworkSystem {
             );
             Renamed { old, new }
         });
-        moved.collect()
+        renamed.into_iter().chain(moved).collect()
     }
 
     fn metrics(&self) -> &[Metric] {
@@ -97,7 +106,7 @@ impl Settings for NetworkScenario {
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
-        let Ground { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
+        let RoadmapGround { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
         let roadmap = Arc::new(roadmap);
         let sensors = Arc::new(place(&self.world, &roadmap, setup.problem_seed)?);
         let (world, in_crater) = (&self.world, in_crater(&self.world));
@@ -258,14 +267,18 @@ fn results(metrics: &NetworkMetrics) -> Results {
     if let Some(shortest) = metrics.wait_cycles.first() {
         line("circles of rovers", metrics.wait_cycles.len().to_string());
         line("the shortest", shortest.to_string());
-    } else if let Some((_, why)) = metrics.standstill.as_ref().and_then(|s| s.split_once("; ")) {
-        line("standstill", why.to_owned());
+    } else if let Some((_, why)) = metrics
+        .deadlock_reason
+        .as_ref()
+        .and_then(|s| s.split_once("; "))
+    {
+        line("why", why.to_owned());
     }
     if metrics.refused > 0 {
         line("rovers without a way", metrics.refused.to_string());
     }
-    for replaced in &metrics.taken_over {
-        line("taken over", replaced.clone());
+    for replaced in &metrics.failed_over {
+        line("failover", replaced.clone());
     }
     line("planning cycles", metrics.cycles.to_string());
     if metrics.arrived > 0 {

@@ -1,11 +1,11 @@
 //! Who waits for whom at an instant, and who waits in a circle: the one rule of it, for what a run
 //! reports and for what its pictures show.
 //!
-//! A rover waits if it stands, is not at its goal, and each vertex that would bring it nearer to its
-//! goal is claimed by another rover. Where rovers stay on the map and make room for others (policy
-//! `complete`), one that is at its goal waits too if all vertices beside it are claimed: it cannot
-//! let anybody pass. Rovers in entry queues hold nothing, so that nobody waits for them. With policies
-//! whose rovers take planned paths other than the shortest, there is no such graph.
+//! A rover waits if it stands, is not at its goal, and each vertex that would bring it nearer to
+//! its goal is claimed by another rover. Where rovers stay on the map and make room for others
+//! (policy `complete`), one that is at its goal waits too if all vertices beside it are claimed: it
+//! cannot let anybody pass. Rovers in entry queues hold nothing, so that nobody waits for them.
+//! With policies whose rovers take planned paths other than the shortest, there is no such graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,10 +36,10 @@ pub(crate) enum WaitRule {
 
 impl WaitRule {
     /// That of a policy whose rovers stay on the map, or queue at entries and leave it.
-    pub(crate) fn of(policy: Policy, stays: bool) -> WaitRule {
-        match (policy, stays) {
+    pub(crate) fn of(policy: Policy, stay_at_target: bool) -> WaitRule {
+        match (policy, stay_at_target) {
             (Policy::Complete, true) => WaitRule::AndRoom,
-            (Policy::Paper, _) | (_, true) => WaitRule::ShortestPaths,
+            (Policy::MaxPlus, _) | (_, true) => WaitRule::ShortestPaths,
             _ => WaitRule::Unknown,
         }
     }
@@ -50,8 +50,8 @@ impl WaitRule {
 pub(crate) struct Waits {
     /// Those that wait, and for whom, each list sorted.
     pub(crate) on: BTreeMap<u32, Vec<u32>>,
-    /// Rovers that wait for each other: each list is a strongly connected part of the graph, made of
-    /// rovers that none can leave on a shortest path before another of them does.
+    /// Rovers that wait for each other: each list is a strongly connected part of the graph, made
+    /// of rovers that none can leave on a shortest path before another of them does.
     pub(crate) circles: Vec<Vec<u32>>,
     /// Those that wait, if not in a circle, then for one.
     pub(crate) behind: BTreeSet<u32>,
@@ -247,7 +247,9 @@ mod tests {
         ) {
             let on: BTreeMap<u32, Vec<u32>> = (0..)
                 .zip(&lists)
-                .map(|(rover, list)| (rover, list.iter().copied().filter(|r| *r != rover).collect()))
+                .map(|(rover, list)| {
+                    (rover, list.iter().copied().filter(|r| *r != rover).collect())
+                })
                 .filter(|(_, list): &(u32, Vec<u32>)| !list.is_empty())
                 .collect();
             let closed = |set: u32| (0..7).filter(|r| set >> r & 1 == 1).all(|rover| {

@@ -1,5 +1,5 @@
-//! Where rovers drive, as scenarios name it: a built-in roadmap, one in a file, a map of cells; and the
-//! nodes over it.
+//! Where rovers drive, as scenarios name it: a built-in roadmap, one in a file, a map of cells; and
+//! the nodes over it.
 
 use farside_actors::system::{Files, SetupError};
 use farside_worlds::movingai::{self, Builtin as BuiltinMap, GridMap, GridWorld, TaskList};
@@ -51,7 +51,7 @@ pub(crate) fn is_grid(name: &str) -> bool {
 }
 
 /// Where rovers drive, and what a map of cells adds.
-pub(crate) struct Ground {
+pub(crate) struct RoadmapGround {
     pub(crate) roadmap: Roadmap,
     pub(crate) grid: Option<GridWorld>,
 }
@@ -61,13 +61,13 @@ pub(crate) fn ground(
     world: &WorldConfig,
     rovers: u32,
     files: &mut Files,
-) -> Result<Ground, SetupError> {
+) -> Result<RoadmapGround, SetupError> {
     let name = world.roadmap.name();
     let wrong = |message: String| SetupError::value("world.roadmap", message);
     if is_grid(name) {
         let (_, grid) = grid(world, rovers, files)?;
         let roadmap = grid.roadmap().clone();
-        return Ok(Ground {
+        return Ok(RoadmapGround {
             roadmap,
             grid: Some(grid),
         });
@@ -76,7 +76,7 @@ pub(crate) fn ground(
         let message = format!("{tasks:?}: expected none, as the roadmap is not a MovingAI map");
         return Err(SetupError::value("world.tasks", message));
     }
-    let plain = |roadmap| Ground {
+    let plain = |roadmap| RoadmapGround {
         roadmap,
         grid: None,
     };

@@ -172,9 +172,9 @@ pub struct Seen<V> {
     pub done: bool,
 }
 
-/// Agents that came to a standstill.
+/// Agents that came to a deadlock.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Standstill<V> {
+pub struct DeadlockReport<V> {
     /// Since when nothing changed.
     pub since: SimTime,
     /// When that was noticed.
@@ -186,9 +186,9 @@ pub struct Standstill<V> {
     pub left: usize,
 }
 
-impl<V: fmt::Display> fmt::Display for Standstill<V> {
+impl<V: fmt::Display> fmt::Display for DeadlockReport<V> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "standstill since {}: ", self.since)?;
+        write!(f, "deadlock since {}: ", self.since)?;
         match self.cycles.first() {
             Some(cycle) => cycle.fmt(f),
             None => write!(
@@ -215,7 +215,7 @@ pub struct DeadlockMonitor<S, V, R> {
     window: SimDuration,
     stops: bool,
     watch: Watch<V>,
-    found: Handle<Vec<Standstill<V>>>,
+    found: Handle<Vec<DeadlockReport<V>>>,
 }
 
 impl<S, V, R> DeadlockMonitor<S, V, R>
@@ -226,7 +226,7 @@ where
 {
     /// A monitor that asks `read` what an actor's latest sample says, by the actor's name; and what to
     /// read the result from. It reports, and leaves the run alone.
-    pub fn new(window: SimDuration, read: R) -> (Self, Handle<Vec<Standstill<V>>>) {
+    pub fn new(window: SimDuration, read: R) -> (Self, Handle<Vec<DeadlockReport<V>>>) {
         let found = Handle::new(Vec::new());
         let monitor = DeadlockMonitor {
             samples: Samples::new(),
@@ -239,7 +239,7 @@ where
         (monitor, found)
     }
 
-    /// The same monitor, but the first standstill ends the run.
+    /// The same monitor, but the first deadlock ends the run.
     #[must_use]
     pub fn that_stops(mut self) -> Self {
         self.stops = true;
@@ -247,7 +247,7 @@ where
     }
 
     fn notice(&mut self, now: SimTime, window: SimDuration) -> Flow {
-        let Some(found) = self.watch.standstill(now, window) else {
+        let Some(found) = self.watch.deadlock(now, window) else {
             return Flow::Continue;
         };
         let reason = found.to_string();
@@ -378,7 +378,7 @@ impl<V: Copy + Ord> Watch<V> {
         graph
     }
 
-    fn standstill(&mut self, now: SimTime, window: SimDuration) -> Option<Standstill<V>> {
+    fn deadlock(&mut self, now: SimTime, window: SimDuration) -> Option<DeadlockReport<V>> {
         let graph = std::mem::take(&mut self.stale).then(|| self.graph());
         if let Some(graph) = graph {
             let since = |circle: &Vec<usize>| circle.iter().map(|&a| self.agents[a].changed).max();
@@ -420,7 +420,7 @@ impl<V: Copy + Ord> Watch<V> {
             };
             WaitCycle(circle.iter().map(waiter).collect())
         };
-        Some(Standstill {
+        Some(DeadlockReport {
             since: since.unwrap_or(self.last_move),
             noticed: now,
             cycles: due.iter().map(|(circle, _)| named(circle)).collect(),
@@ -463,21 +463,21 @@ mod tests {
                 c,
                 seen(Place::At(second as u32 + 10), Waits::ForNobody),
             );
-            let found = watch.standstill(at(second), WINDOW);
+            let found = watch.deadlock(at(second), WINDOW);
             assert_eq!(found.is_some(), second == 7, "at {second} s");
             if let Some(found) = found {
-                let text = "standstill since 2s: a at 1 waits for b at 2, which waits for a";
+                let text = "deadlock since 2s: a at 1 waits for b at 2, which waits for a";
                 assert_eq!(found.to_string(), text);
                 assert_eq!((found.noticed, found.left), (at(7), 3));
             }
         }
         // It breaks up and forms anew: that is another one.
         watch.update(at(12), b, seen(Place::At(2), Waits::ForNobody));
-        assert_eq!(watch.standstill(at(12), WINDOW), None);
+        assert_eq!(watch.deadlock(at(12), WINDOW), None);
         watch.update(at(13), b, seen(Place::At(2), Waits::ForVertex(1)));
         watch.update(at(17), c, seen(Place::At(9), Waits::ForNobody));
-        assert_eq!(watch.standstill(at(17), WINDOW), None);
-        assert_eq!(watch.standstill(at(18), WINDOW).unwrap().since, at(13));
+        assert_eq!(watch.deadlock(at(17), WINDOW), None);
+        assert_eq!(watch.deadlock(at(18), WINDOW).unwrap().since, at(13));
     }
 
     #[test]
@@ -490,9 +490,9 @@ mod tests {
             ..seen(Place::At(2), Waits::ForVertex(1))
         };
         watch.update(at(3), b, done);
-        assert_eq!(watch.standstill(at(7), WINDOW), None);
-        let found = watch.standstill(at(8), WINDOW).unwrap();
+        assert_eq!(watch.deadlock(at(7), WINDOW), None);
+        let found = watch.deadlock(at(8), WINDOW).unwrap();
         assert_eq!((found.since, found.left, found.cycles.len()), (at(3), 1, 0));
-        assert_eq!(watch.standstill(at(20), WINDOW), None, "told once");
+        assert_eq!(watch.deadlock(at(20), WINDOW), None, "told once");
     }
 }

@@ -91,7 +91,7 @@ settings! {
         /// The encoded size of each message \[byte\].
         pub size_bytes as "size": u64 [with = "units::data_size_bytes"] = 200,
             such_that(
-                "9B to 1MiB",
+                "40B to 1MiB",
                 |bytes: &u64| units::print_data_size(*bytes),
                 |bytes: &u64| (Datagram::MIN_SIZE_BYTES..=Datagram::MAX_SIZE_BYTES).contains(bytes),
             );

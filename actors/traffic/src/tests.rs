@@ -384,12 +384,16 @@ fn each_mistake_names_its_key() {
             "via.0: \"b*\" is no host",
         ),
         (
+            "from = 'a', period = '1s'",
+            "to: missing: expected a host, or a glob over hosts",
+        ),
+        (
             "from = 'a', to = 'base', period = '0s'",
-            "period: 0s: expected a time over zero",
+            "period: missing, or 0s: expected a time over zero",
         ),
         (
             "from = 'a', to = 'base', period = '1s', size = '39B'",
-            "size: 39B: expected from 40B",
+            "size: 39B: expected 40B to 1MiB",
         ),
         (
             "from = 'a', to = 'base', period = '1s', start = '2s', stop = '2s'",

@@ -97,7 +97,7 @@ fn wrong_units_types_and_ranges_are_refused_where_they_stand() {
     check(
         "system = 'network'\nteam.rovers = 0",
         "x.toml:2:15: ",
-        &["from 1 to"],
+        &["expected 1 to"],
     );
     check(
         "system = 'network'\nteam = 3",
@@ -270,7 +270,7 @@ fn a_set_is_blamed_by_name() {
         ("links.default.los=0.5", "did you mean \"loss\"?"),
         ("links.default.burst.loss=0.5", "the mean length of a burst"),
         ("links.default.preset=moon", "expected one of perfect"),
-        ("team.rovers=0", "from 1 to"),
+        ("team.rovers=0", "expected 1 to"),
         ("world.nodes=229", "1 to 228"),
         ("tame.rovers=5", "did you mean \"team\"?"),
     ] {

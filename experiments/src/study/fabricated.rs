@@ -205,7 +205,7 @@ pub(crate) fn true_ratio(harm: f64) -> f64 {
     1.15 + 0.4 * harm + 1.6 * harm * harm
 }
 
-/// The probability that a team of a cell that harms so much comes to a standstill.
+/// The probability that a team of a cell that harms so much ends in a deadlock.
 pub(crate) fn true_deadlocks(harm: f64) -> f64 {
     (0.9 * (harm - 0.45)).clamp(0.0, 0.9)
 }

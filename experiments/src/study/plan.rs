@@ -324,12 +324,12 @@ impl Study {
             Scenario::open(&path.to_string_lossy(), &all, registry)
         };
         opened.map_err(|error| {
-            if let ScenarioError::NotFound { known, nearest, .. } = error {
+            if let ScenarioError::NotFound { known, .. } = error {
                 return StudyError::Text(ScenarioError::UnknownValue {
                     place: self.source.place_of_key(&["scenario".to_owned()]),
                     key: "scenario".to_owned(),
                     found: name.clone(),
-                    nearest,
+                    nearest: nearest(name, registry.scenario_names().into_iter()),
                     expected: format!("a file, or one of {known}"),
                 });
             }

@@ -79,10 +79,13 @@ fn the_map_has_the_rovers_of_its_instant() {
             "{at}"
         );
     }
-    let corridor = drawn(folder.path(), &["--corridor", "auto"]);
+    let corridor = drawn(folder.path(), &["corridor", "--along", "auto"]);
     assert_well_formed(&corridor);
     assert!(corridor.contains("class=\"stand"));
-    assert_eq!(drawn(folder.path(), &["--corridor", "auto"]), corridor);
+    assert_eq!(
+        drawn(folder.path(), &["corridor", "--along", "auto"]),
+        corridor
+    );
     let refused = |more: &[&str], says: &str| {
         let output = farside(folder.path(), &[&["draw", "run.mcap"], more].concat());
         assert_eq!(output.status.code(), Some(2));
@@ -94,11 +97,14 @@ fn the_map_has_the_rovers_of_its_instant() {
     };
     refused(&["--at", "1h"], "the run ended at 25");
     refused(
-        &["--corridor", "99999"],
+        &["corridor", "--along", "99999"],
         "has no vertex 99999: expected 0 to",
     );
-    refused(&["--corridor", "a,b"], "expected auto, or vertices");
-    refused(&["--corridor", "1,2,1"], "through vertex");
+    refused(
+        &["corridor", "--along", "a,b"],
+        "expected auto, or vertices",
+    );
+    refused(&["corridor", "--along", "1,2,1"], "through vertex");
 }
 
 /// The circle that a run reports and the one that its pictures name are the same.
@@ -112,7 +118,7 @@ fn a_run_and_its_pictures_name_the_same_circle() {
         "--set",
         "network.max_plus.max_iterations=1",
         "--set",
-        "network.active_window=60",
+        "network.livelock_window=60",
         "--until",
         "300s",
         "--out",
@@ -156,7 +162,7 @@ fn what_cannot_be_drawn_is_refused() {
     farside(folder.path(), &run);
     let output = farside(folder.path(), &["draw", "t.mcap"]);
     assert_eq!(output.status.code(), Some(2));
-    let says = "its system is \"traffic\", which has no roadmap";
+    let says = "its system \"traffic\" has no pictures";
     assert!(
         text(&output.stderr).contains(says),
         "{}",

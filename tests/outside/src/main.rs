@@ -9,17 +9,17 @@
 
 use std::sync::{Arc, Mutex};
 
+use farside::RunInfo;
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::scene::{Drawing, Level, Scene};
-use farside::RunInfo;
 use farside_actors::figure::{Figure, svg};
-use farside_actors::wiring::Wiring;
 use farside_actors::system::settings::{Table, over};
 use farside_actors::system::{
     Assembly, Better, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
     Results, Section, Series, SeriesIndex, Settings, Setup, SetupError, System,
 };
+use farside_actors::wiring::Wiring;
 use farside_actors::{settings, units};
 use farside_experiments::{cli, registry::Registry};
 use serde::{Deserialize, Serialize};
@@ -103,7 +103,11 @@ impl Scene for Calls {
         if record.class == RecordClass::Delivered {
             let (level, message) = (Level::Info, "calls".to_owned());
             let name = run.name(record.sender).to_owned();
-            out.push(Drawing::Text { level, name, message });
+            out.push(Drawing::Text {
+                level,
+                name,
+                message,
+            });
         }
     }
 }
@@ -127,23 +131,39 @@ impl System for BeaconSystem {
         const CALL: SeriesIndex = SeriesIndex::new("call", "");
         const ALL: [Metric; 2] = [
             Metric::number("heard", "calls heard", "calls", Better::Higher),
-            Metric::series("heard_over_calls", "calls heard so far", "calls", CALL, Better::Higher),
+            Metric::series(
+                "heard_over_calls",
+                "calls heard so far",
+                "calls",
+                CALL,
+                Better::Higher,
+            ),
         ];
         &ALL
     }
 
     fn scenarios(&self) -> &[Builtin] {
         const TEXT: &str = include_str!("../files/quiet.toml");
-        &[Builtin { name: "beacons/quiet", text: TEXT }]
+        &[Builtin {
+            name: "beacons/quiet",
+            text: TEXT,
+        }]
     }
 
     fn studies(&self) -> &[Builtin] {
         const TEXT: &str = include_str!("../files/loss.toml");
-        &[Builtin { name: "beacons/loss", text: TEXT }]
+        &[Builtin {
+            name: "beacons/loss",
+            text: TEXT,
+        }]
     }
 
     fn pictures(&self) -> &[PictureInfo] {
-        &[PictureInfo { name: "calls", about: "when calls were heard", takes: &[] }]
+        &[PictureInfo {
+            name: "calls",
+            about: "when calls were heard",
+            takes: &[],
+        }]
     }
 
     fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
@@ -165,7 +185,9 @@ impl Settings for BeaconScenario {
         setup.sim.actor(lander, "lander", |_| Lander);
         for name in (1..=self.beacons.count).map(|number| format!("beacon_{number}")) {
             let (host, settings) = (setup.sim.host(&name), self.beacons.clone());
-            setup.sim.actor(host, &name, move |_| Beacon(settings.clone()));
+            setup
+                .sim
+                .actor(host, &name, move |_| Beacon(settings.clone()));
             wiring.link((host, &name), (lander, "lander"));
         }
         setup.link(&wiring)?;
@@ -175,13 +197,17 @@ impl Settings for BeaconScenario {
         let conclude = move |_: &Report| {
             let times = heard.0.lock().expect("the run is over").clone();
             let mut results = Results::default();
-            results.metrics.insert("heard".to_owned(), times.len().into());
+            results
+                .metrics
+                .insert("heard".to_owned(), times.len().into());
             let until = |call: u32| settings.interval.as_secs_f64() * f64::from(call + 2);
             let by = |call| times.iter().filter(|time| **time < until(call)).count() as f64;
             let index = (0..settings.calls).map(f64::from).collect();
             let values = (0..settings.calls).map(|call| Some(by(call))).collect();
             let curve = Series::new(index, values).expect("as many of both, and they rise");
-            results.metrics.insert("heard_over_calls".to_owned(), curve.into());
+            results
+                .metrics
+                .insert("heard_over_calls".to_owned(), curve.into());
             results.line("calls heard", times.len().to_string());
             if times.is_empty() {
                 results.violations.push("no call was heard".to_owned());

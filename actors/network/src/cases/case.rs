@@ -19,12 +19,12 @@ use farside_actors::wiring::LinkBuilder;
 /// A scenario of the network-guided system: what [`crate::assemble`] takes, with its links,
 /// degradations and crashes.
 ///
-/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with nothing
-/// in it that is as by default: read there it gives the same run, to the last event.
+/// It is shown, by `Display` and by `Debug`, as a scenario file that `farside run` reads, with
+/// nothing in it that is as by default: read there it gives the same run, to the last event.
 ///
 /// ```
 /// use farside::SimDuration;
-/// use farside_actors::invariants::{Case, Downtime};
+/// use farside_network::cases::{Case, Downtime};
 /// let mut case = Case::default();
 /// case.team.rovers = 2;
 /// case.link.loss = 0.3;
@@ -173,9 +173,9 @@ impl Case {
 
     /// The same case with this seed, the next one, and so on.
     ///
-    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of the
-    /// larger one, because seeds decide missions, placement and losses, but it fails with some. So it
-    /// shrinks on.
+    /// A property of cases is best tried with several: a smaller case rarely fails with the seed of
+    /// the larger one, because seeds decide missions, placement and losses, but it fails with some.
+    /// So it shrinks on.
     pub fn seeds(&self, count: u64) -> impl Iterator<Item = Case> + '_ {
         (0..count).map(|more| Case {
             seed: self.seed.wrapping_add(more),

@@ -1,8 +1,8 @@
-//! `proptest` strategies for all that a run of the network-guided system is made of: roadmaps, sensor
-//! networks over them, teams, links and their degradations, crashes, and whole [`Case`]s.
+//! `proptest` strategies for all that a run of the network-guided system is made of: roadmaps,
+//! sensor networks over them, teams, links and their degradations, crashes, and whole [`Case`]s.
 //!
-//! Everything is made of small whole numbers and short lists, so that a failing case shrinks: to few
-//! vertices, few rovers and nodes, links without faults, nobody who crashes.
+//! Everything is made of small whole numbers and short lists, so that a failing case shrinks: to
+//! few vertices, few rovers and nodes, links without faults, nobody who crashes.
 //!
 //! ```
 //! # #[cfg(feature = "proptest")] {
@@ -65,8 +65,9 @@ impl Default for Bounds {
 /// The distance between neighbouring vertices \[m\].
 const SPACING_M: f64 = 10.0;
 
-/// Roadmaps of 2 to `vertices` vertices: nearly trees, with a loop here and there, or grids of which
-/// edges are cut out. The outermost vertices are the boundary. They shrink to two vertices and an edge.
+/// Roadmaps of 2 to `vertices` vertices: nearly trees, with a loop here and there, or grids of
+/// which edges are cut out. The outermost vertices are the boundary. They shrink to two vertices
+/// and an edge.
 pub fn roadmaps(vertices: usize) -> impl Strategy<Value = Roadmap> {
     prop_oneof![grown(vertices), cut_grids(vertices)]
 }
@@ -134,7 +135,8 @@ pub fn cut_grid(columns: u32, rows: u32, cuts: u64) -> Roadmap {
     on_lattice("grid", &cells, &edges).expect("the whole grid hangs together")
 }
 
-/// The roadmap of these cells; none if it falls apart. A cell next to a free one is on the boundary.
+/// The roadmap of these cells; none if it falls apart. A cell next to a free one is on the
+/// boundary.
 fn on_lattice(name: &str, cells: &[(i32, i32)], edges: &[(u32, u32)]) -> Option<Roadmap> {
     let place =
         |&(x, y): &(i32, i32)| Point2::new(f64::from(x) * SPACING_M, f64::from(y) * SPACING_M);
@@ -149,8 +151,8 @@ fn on_lattice(name: &str, cells: &[(i32, i32)], edges: &[(u32, u32)]) -> Option<
     Roadmap::new(name, places, edges.collect(), boundary).ok()
 }
 
-/// Worlds over a roadmap of this strategy: up to so many nodes, with a radius that is as short as can
-/// be or reaches everywhere, and any division of the boundary. They shrink to one node.
+/// Worlds over a roadmap of this strategy: up to so many nodes, with a radius that is as short as
+/// can be or reaches everywhere, and any division of the boundary. They shrink to one node.
 pub fn worlds(
     roadmaps: impl Strategy<Value = Roadmap>,
     nodes: u32,
@@ -195,7 +197,8 @@ pub fn teams(rovers: u32) -> impl Strategy<Value = TeamConfig> {
     (1..=rovers).prop_map(|rovers| TeamConfig { rovers })
 }
 
-/// Links that are late, jitter, lose and repeat, within the bounds. They shrink to 5 ms and no fault.
+/// Links that are late, jitter, lose and repeat, within the bounds. They shrink to 5 ms and no
+/// fault.
 pub fn links(bounds: &Bounds) -> impl Strategy<Value = LinkParams> + use<> {
     let latest = bounds.latency.as_nanos() / 1_000_000;
     let latency = prop_oneof![Just(5u64), 1..100u64, 100..=latest.max(100)];
@@ -218,8 +221,8 @@ fn percent(percent: u32) -> f64 {
     f64::from(percent) / 100.0
 }
 
-/// Degradations within the bounds, up to 10 s long: outages, losses, late links; of all links, or of
-/// those from or to rovers.
+/// Degradations within the bounds, up to 10 s long: outages, losses, late links; of all links, or
+/// of those from or to rovers.
 pub fn degradations(bounds: &Bounds) -> impl Strategy<Value = Vec<Degrade>> + use<> {
     let over = prop_oneof![
         Just(LinkOverrides {
@@ -294,8 +297,8 @@ pub fn cases(bounds: Bounds) -> impl Strategy<Value = Case> {
     })
 }
 
-/// The same with nodes that reach rovers less far, so that up to two thirds of the vertices are gaps,
-/// closed or crossed; at least half of the rovers keep a way. They shrink to no gaps.
+/// The same with nodes that reach rovers less far, so that up to two thirds of the vertices are
+/// gaps, closed or crossed; at least half of the rovers keep a way. They shrink to no gaps.
 ///
 /// # Panics
 /// The strategy, when `gaps` is [`Gaps::Refuse`].

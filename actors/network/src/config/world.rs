@@ -20,34 +20,35 @@ settings! {
     /// assert_eq!((world.roadmap.name(), world.nodes), ("crater-dense", 28));
     /// ```
     pub struct WorldConfig {
-        /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), the path of a TOML
-        /// file or of a MovingAI `.map`, or the roadmap itself.
+        /// A built-in roadmap's name (`crater-dense`, `crater-sparse`, `rubble-32-32-10`), the path
+        /// of a TOML file or of a MovingAI `.map`, or the roadmap itself.
         pub roadmap: RoadmapSource = "crater-dense".into();
         /// How long the side of a cell of a MovingAI map is, in metres.
         pub cell_m as "cell": f64
             [with = "units::length_m"] = 10.0;
-        /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from the
-        /// start and stay at their goals. A built-in map of cells has its own.
+        /// A MovingAI `.scen` file with the starts and goals of rovers that stand on the map from
+        /// the start and stay at their goals. A built-in map of cells has its own.
         pub tasks: Option<String>
             [skip_serializing_if = "Option::is_none"];
         /// How many sensor nodes; at least 1.
         pub nodes: u32 = 28,
             1..;
-        /// The radio radius of each, in metres; by default one that nearly every placement can do with.
+        /// The radio radius of each, in metres; by default one that nearly every placement can do
+        /// with.
         pub radius_m as "radius": Option<f64>
             [with = "units::length_m::option", skip_serializing_if = "Option::is_none"];
         /// How far each node reaches rovers, in metres; by default as far as nodes.
         pub coverage_m as "coverage": Option<f64>
             [with = "units::length_m::option", skip_serializing_if = "Option::is_none"];
-        /// What becomes of vertices out of the coverage of their owners. By default there must be none, and
-        /// nodes are placed so; else they are placed as if coverage were the radius.
+        /// What becomes of vertices out of the coverage of their owners. By default there must be
+        /// none, and nodes are placed so; else they are placed as if coverage were the radius.
         pub gaps: Gaps
             [skip_serializing_if = "Gaps::is_refuse"],
             one_of(&["refuse", "close", "cross"]);
         /// Which boundary vertices are entries, and which exits.
         pub endpoints: Endpoints;
-        /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally many for
-        /// each as radio range allows; or `traffic`, as much traffic for each.
+        /// Who owns which vertices: the `nearest` node, as in the paper; `balanced`, as equally
+        /// many for each as radio range allows; or `traffic`, as much traffic for each.
         pub ownership: Ownership;
         /// The seed of the nodes' places; by default the run's seed.
         pub placement_seed: Option<u64>
@@ -157,8 +158,8 @@ impl WorldConfig {
     /// Places the nodes over `roadmap`, which is the one that [`WorldConfig::roadmap`] names.
     ///
     /// # Errors
-    /// When no network with these settings is consistent with the roadmap, or it would have gaps and may
-    /// not.
+    /// When no network with these settings is consistent with the roadmap, or it would have gaps
+    /// and may not.
     pub fn place(&self, roadmap: &Roadmap, run_seed: u64) -> Result<SensorNetwork, SensorError> {
         let nodes = self.nodes as usize;
         let default = || SensorNetwork::default_radius_m(roadmap, nodes.max(1));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Replacement {
     /// The node.
-    pub home: NodeId,
-    /// The deputy's place in its line of succession, from 1.
+    pub region: NodeId,
+    /// The backup's place in its backup list, from 1.
     pub rank: u32,
 }

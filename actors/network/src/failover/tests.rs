@@ -9,7 +9,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use proptest::prelude::*;
 
-use super::lines;
+use super::backup_lists;
 use crate::safety::messages::RoverState;
 use crate::testing::grid;
 use crate::{
@@ -71,7 +71,8 @@ struct Trial {
     /// Columns and rows of a grid; without, the dense crater.
     grid: Option<(u32, u32)>,
     link: Bad,
-    /// Nodes that hear no other node, and are not heard by any, between two seconds; rovers they hear.
+    /// Nodes that hear no other node, and are not heard by any, between two seconds; rovers they
+    /// hear.
     unheard: Vec<(u32, (u64, u64))>,
     /// Who crashes, when, and for how long: nodes by number, then rovers \[ms\].
     crashes: Vec<(u32, u64, Option<u64>)>,
@@ -80,7 +81,7 @@ struct Trial {
     sabotage: Sabotage,
 }
 
-const POLICIES: [Policy; 2] = [Policy::Paper, Policy::Complete];
+const POLICIES: [Policy; 2] = [Policy::MaxPlus, Policy::Complete];
 
 fn crater(policy: Policy, seed: u64) -> Trial {
     Trial {
@@ -163,11 +164,12 @@ fn run_on(
     };
     let settings = NetworkConfig {
         policy: trial.policy,
-        takeover_after: trial.after,
+        failover_after: trial.after,
         cycle_limit: trial.cycle_limit,
-        // These links do not say how late they may be: what is passed round a failure takes many of them.
-        passive_window: trial.cycle_limit / 5,
-        active_window: trial.cycle_limit,
+        // These links do not say how late they may be: what is passed round a failure takes many of
+        // them.
+        deadlock_window: trial.cycle_limit / 5,
+        livelock_window: trial.cycle_limit,
         sabotage: trial.sabotage,
         ..NetworkConfig::default()
     };
@@ -224,21 +226,21 @@ fn busiest(trial: &Trial) -> Vec<NodeId> {
     nodes
 }
 
-fn all_arrive(trial: &Trial, takeovers: u32) {
+fn all_arrive(trial: &Trial, failovers: u32) {
     let (metrics, report) = run(trial);
     let detail = report.end.detail();
     assert_eq!(
         (metrics.arrived, metrics.collisions),
         (trial.rovers, 0),
         "{detail} {:?}",
-        metrics.taken_over
+        metrics.failed_over
     );
-    assert_eq!(metrics.takeovers, takeovers, "{:?}", metrics.taken_over);
-    assert_eq!(metrics.taken_over.len(), takeovers as usize);
+    assert_eq!(metrics.failovers, failovers, "{:?}", metrics.failed_over);
+    assert_eq!(metrics.failed_over.len(), failovers as usize);
 }
 
-/// A node with rovers on its vertices is gone for good: with takeover all rovers arrive, and without
-/// some never do.
+/// A node with rovers on its vertices is gone for good: with failover all rovers arrive, and
+/// without some never do.
 #[test]
 fn a_neighbour_takes_over_for_a_node_that_is_gone_for_good() {
     for (policy, seed) in POLICIES
@@ -251,7 +253,7 @@ fn a_neighbour_takes_over_for_a_node_that_is_gone_for_good() {
         all_arrive(&trial, 1);
         trial.after = None;
         let (metrics, _) = run(&trial);
-        assert!(!metrics.completed && metrics.takeovers == 0, "seed {seed}");
+        assert!(!metrics.completed && metrics.failovers == 0, "seed {seed}");
     }
 }
 
@@ -276,7 +278,7 @@ fn two_nodes_far_apart_are_taken_over_by_two() {
         let mut trial = crater(policy, 3);
         let busy = busiest(&trial);
         let (_, map, sensors) = world(&trial);
-        let lines = lines(&map, &sensors);
+        let lines = backup_lists(&map, &sensors);
         let first = busy[0];
         let apart = |n: &&NodeId| {
             lines[n.0 as usize]
@@ -289,14 +291,14 @@ fn two_nodes_far_apart_are_taken_over_by_two() {
     }
 }
 
-/// When the deputy fails too, the next in line goes on for both of its homes.
+/// When the backup fails too, the next in the list goes on for both of its regions.
 #[test]
-fn the_next_in_line_follows_a_deputy_that_fails_too() {
+fn the_next_in_line_follows_a_backup_that_fails_too() {
     for policy in POLICIES {
         let mut trial = crater(policy, 1);
         let victim = busiest(&trial)[0];
         let (_, map, sensors) = world(&trial);
-        let line = lines(&map, &sensors)[victim.0 as usize].clone();
+        let line = backup_lists(&map, &sensors)[victim.0 as usize].clone();
         assert!(line.len() > 2);
         trial.crashes = vec![
             (victim.0, CRASH_MS, None),
@@ -345,7 +347,7 @@ fn threads_change_nothing() {
         let threads = Executor::Kameo { threads: 2 };
         let threads = run_on(&trial, threads, None, Places::default());
         let inline = run(&trial);
-        assert_eq!(inline.0.takeovers, 1);
+        assert_eq!(inline.0.failovers, 1);
         assert_eq!(threads, inline);
     }
 }
@@ -353,7 +355,7 @@ fn threads_change_nothing() {
 #[test]
 fn only_nodes_that_decide_as_they_go_are_replaced() {
     let mut network = NetworkConfig {
-        takeover_after: Some(3),
+        failover_after: Some(3),
         ..NetworkConfig::default()
     };
     assert!(network.check().is_ok());
@@ -363,21 +365,21 @@ fn only_nodes_that_decide_as_they_go_are_replaced() {
     let text = network.check().unwrap_err().to_string();
     assert_eq!(
         text,
-        "network.takeover_after is for the policies paper and complete; leave it out"
+        "network.failover_after is for the policies max-plus and complete; leave it out"
     );
-    network.takeover_after = Some(0);
+    network.failover_after = Some(0);
     let text = network.check().unwrap_err().to_string();
-    assert_eq!(text, "network.takeover_after: 0: expected at least 1");
+    assert_eq!(text, "network.failover_after: 0: expected at least 1");
 }
 
-/// By brute force: each in line hears all before it, none of those left out does, and the first reaches
-/// as many of the owners around as any could.
+/// By brute force: each in line hears all before it, none of those left out does, and the first
+/// reaches as many of the owners around as any could.
 #[test]
 fn a_line_is_a_clique_and_its_first_reaches_the_most() {
     for seed in 1..=5 {
-        let (_, map, sensors) = world(&crater(Policy::Paper, seed));
-        for (home, line) in sensors.nodes().zip(lines(&map, &sensors)) {
-            assert_eq!(line[0], home);
+        let (_, map, sensors) = world(&crater(Policy::MaxPlus, seed));
+        for (region, line) in sensors.nodes().zip(backup_lists(&map, &sensors)) {
+            assert_eq!(line[0], region);
             for m in sensors.nodes() {
                 let hears = |n: &&NodeId| sensors.are_neighbors(m, **n);
                 let heard = line.iter().filter(hears).count();
@@ -389,7 +391,7 @@ fn a_line_is_a_clique_and_its_first_reaches_the_most() {
                 let beside = |&o: &NodeId| {
                     let edge = |e: &&(VertexId, VertexId)| {
                         let ends = (sensors.owner(e.0), sensors.owner(e.1));
-                        o != home && (ends == (home, o) || ends == (o, home))
+                        o != region && (ends == (region, o) || ends == (o, region))
                     };
                     map.edges().iter().find(edge).is_some()
                 };
@@ -397,7 +399,7 @@ fn a_line_is_a_clique_and_its_first_reaches_the_most() {
                 sensors.nodes().filter(beside).filter(near).count()
             };
             if let Some(&first) = line.get(1) {
-                let best = sensors.neighbors(home).iter().map(|&m| reach(m)).max();
+                let best = sensors.neighbors(region).iter().map(|&m| reach(m)).max();
                 assert_eq!(Some(reach(first)), best);
             }
         }
@@ -440,21 +442,26 @@ fn trial() -> impl Strategy<Value = Trial> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     /// Nodes crash, for good or not, are cut off from each other while rovers still hear them, and
     /// suspect each other for nothing: nobody collides.
     #[test]
     fn nobody_collides_whoever_takes_over(trial in trial()) {
         let (metrics, report) = run(&trial);
-        prop_assert_eq!(metrics.collisions, 0, "{} {:?}", report.end.detail(), metrics.taken_over);
+        prop_assert_eq!(metrics.collisions, 0, "{} {:?}", report.end.detail(), metrics.failed_over);
     }
 }
 
-/// A team of the crater of which nodes fail for good, or are unheard for a while, in the middle of walks:
-/// over links that lose and delay.
+/// A team of the crater of which nodes fail for good, or are unheard for a while, in the middle of
+/// requests: over links that lose and delay.
 fn failures() -> impl Strategy<Value = Trial> {
-    // Round a failure messages take many hops: with more loss than this they do get through, in hours.
+    // Round a failure messages take many hops: with more loss than this they do get through, in
+    // hours.
     let link = (0.0..0.15, 0..600u64, 0.0..0.2);
     let crashes = prop::collection::vec((0..28u32, 300..20_000u64), 1..4);
     let unheard = prop::collection::vec((0..28u32, (1..25u64, 5..30u64)), 0..3);
@@ -479,11 +486,11 @@ fn failures() -> impl Strategy<Value = Trial> {
     )
 }
 
-/// Whether every home has somebody left to answer for it, and all who are left hear each other by way of
-/// others: who failed or was replaced is out.
+/// Whether every region has somebody left to answer for it, and all who are left hear each other by
+/// way of others: who failed or was replaced is out.
 fn can_go_on(trial: &Trial, metrics: &NetworkMetrics) -> bool {
     let (_, map, sensors) = world(trial);
-    let replaced = metrics.taken_over.iter().map(|text| {
+    let replaced = metrics.failed_over.iter().map(|text| {
         let digits = text.trim_start_matches("node_").chars();
         let number: String = digits.take_while(char::is_ascii_digit).collect();
         NodeId(number.parse::<u32>().unwrap() - 1)
@@ -499,13 +506,14 @@ fn can_go_on(trial: &Trial, metrics: &NetworkMetrics) -> bool {
         heard.extend(more);
         at += 1;
     }
-    let lines = lines(&map, &sensors);
+    let lines = backup_lists(&map, &sensors);
     lines.iter().all(|line| line.iter().any(is_left))
         && heard.len() == sensors.nodes().filter(is_left).count()
 }
 
 proptest! {
-    // The same cases each time: what holds after ever rarer coincidences is for longer searches than this.
+    // The same cases each time: what holds after ever rarer coincidences is for longer searches
+    // than this.
     #![proptest_config(ProptestConfig {
         cases: 32,
         failure_persistence: None,
@@ -513,21 +521,21 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all arrive,
-    /// as long as somebody is left to answer for each vertex.
+    /// With the policy `complete` no reserved way is lost, and none stays that nobody settles: all
+    /// arrive, as long as somebody is left to answer for each vertex.
     #[test]
     fn all_arrive_whoever_fails(trial in failures()) {
         let (metrics, report) = run(&trial);
         prop_assert_eq!(metrics.collisions, 0);
         prop_assert!(
             metrics.arrived == trial.rovers || !can_go_on(&trial, &metrics),
-            "{} {:?}", report.end.detail(), metrics.taken_over
+            "{} {:?}", report.end.detail(), metrics.failed_over
         );
     }
 }
 
-/// Whether one of many small runs with this fault shows a collision: a node that others do not hear,
-/// and rovers do.
+/// Whether one of many small runs with this fault shows a collision: a node that others do not
+/// hear, and rovers do.
 fn collides_with(policy: Policy, sabotage: Sabotage) -> bool {
     (1..=200).any(|seed| {
         let trial = Trial {
@@ -562,11 +570,11 @@ fn ignoring_fences_is_noticed() {
     assert!(
         POLICIES
             .iter()
-            .all(|&policy| collides_with(policy, Sabotage::IgnoreFences))
+            .all(|&policy| collides_with(policy, Sabotage::IgnoreFencing))
     );
 }
 
-/// And if a deputy opens vertices without asking who is there.
+/// And if a backup opens vertices without asking who is there.
 #[test]
 fn forgetting_accounts_is_noticed() {
     assert!(
@@ -576,8 +584,8 @@ fn forgetting_accounts_is_noticed() {
     );
 }
 
-/// A node is unheard for so long that a deputy begins to ask for its vertices, and gives them up; but the
-/// deputy crashes before all have answered. Somebody else takes them.
+/// A node is unheard for so long that a backup begins to ask for its vertices, and gives them up;
+/// but the backup crashes before all have answered. Somebody else takes them.
 #[test]
 fn a_home_is_not_left_that_was_given_up_to_nobody() {
     let trial = Trial {
@@ -590,10 +598,10 @@ fn a_home_is_not_left_that_was_given_up_to_nobody() {
     };
     let (metrics, report) = run(&trial);
     let detail = report.end.detail();
-    assert_eq!(metrics.arrived, 10, "{detail} {:?}", metrics.taken_over);
+    assert_eq!(metrics.arrived, 10, "{detail} {:?}", metrics.failed_over);
 }
 
-/// What a node that is replaced has chosen a way for, its deputy chooses none for again.
+/// What a node that is replaced has chosen a way for, its backup chooses none for again.
 #[test]
 fn no_attempt_gets_two_ways() {
     let trial = Trial {
@@ -611,12 +619,13 @@ fn no_attempt_gets_two_ways() {
     };
     let (metrics, report) = run(&trial);
     let detail = report.end.detail();
-    assert_eq!(metrics.arrived, 35, "{detail} {:?}", metrics.taken_over);
+    assert_eq!(metrics.arrived, 35, "{detail} {:?}", metrics.failed_over);
 }
 
-/// A deputy that hears nobody for a while and is replaced does not keep the next in line from its turn.
+/// A backup that hears nobody for a while and is replaced does not keep the next in line from its
+/// turn.
 #[test]
-fn a_deputy_that_was_replaced_is_passed_over() {
+fn a_backup_that_was_replaced_is_passed_over() {
     let trial = Trial {
         rovers: 15,
         link: Bad {
@@ -632,5 +641,5 @@ fn a_deputy_that_was_replaced_is_passed_over() {
     };
     let (metrics, report) = run(&trial);
     let detail = report.end.detail();
-    assert_eq!(metrics.arrived, 15, "{detail} {:?}", metrics.taken_over);
+    assert_eq!(metrics.arrived, 15, "{detail} {:?}", metrics.failed_over);
 }

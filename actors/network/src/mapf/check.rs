@@ -16,7 +16,7 @@ use super::problem::{Problem, Rules};
 /// let text = "name = 'pair'\nboundary = [0, 1]\npositions_m = [[0, 0], [5, 0]]\nedges = [[0, 1]]";
 /// let map = Roadmap::from_toml(text)?;
 /// let missions = vec![Mission::new(V(0), V(1)), Mission::new(V(1), V(0))];
-/// let problem = Problem::new(&map, missions, Rules::Queues)?;
+/// let problem = Problem::new(&map, missions, Rules::DisappearAtTarget)?;
 /// let trip = |way: [V; 2]| Some(Trip { entered: 0, vertices: way.to_vec() });
 /// let plan = Plan { trips: vec![trip([V(0), V(1)]), trip([V(1), V(0)])] };
 /// let swap = Conflict::Swap { cycle: 1, rovers: (0, 1), edge: (V(0), V(1)) };
@@ -146,7 +146,7 @@ impl Plan {
             return found;
         }
         check_queues(self, problem, &mut found);
-        let stays = problem.rules() == Rules::OnMap;
+        let stays = problem.rules() == Rules::StayAtTarget;
         let present = self.trips.iter().flatten();
         let end = present.map(Trip::last_cycle).max().unwrap_or(0);
         let mut before = BTreeMap::new();
@@ -174,7 +174,7 @@ impl Plan {
 fn check_trip(problem: &Problem<'_>, rover: usize, trip: &Trip, found: &mut Vec<Conflict>) {
     let (mission, map) = (problem.missions()[rover], problem.roadmap());
     let (vertex, cycle) = (trip.vertices[0], trip.entered);
-    let stays = problem.rules() == Rules::OnMap;
+    let stays = problem.rules() == Rules::StayAtTarget;
     if vertex != mission.entry || stays && cycle != 0 {
         found.push(Conflict::Start {
             rover,
@@ -313,7 +313,10 @@ mod tests {
             rovers: (0, 1),
         };
         assert_eq!(
-            conflicts(Rules::Queues, &[(0, &[0, 1, 2]), (0, &[2, 1, 4])]),
+            conflicts(
+                Rules::DisappearAtTarget,
+                &[(0, &[0, 1, 2]), (0, &[2, 1, 4])]
+            ),
             [expected]
         );
         // Where one stays for ever, and one only passes later.
@@ -323,27 +326,31 @@ mod tests {
             rovers: (0, 1),
         };
         let ways: [(u32, &[u32]); 2] = [(0, &[0, 1]), (0, &[5, 5, 4, 1, 2])];
-        assert_eq!(conflicts(Rules::OnMap, &ways), [expected]);
-        assert_eq!(conflicts(Rules::Queues, &ways), [], "it is gone by then");
+        assert_eq!(conflicts(Rules::StayAtTarget, &ways), [expected]);
+        assert_eq!(
+            conflicts(Rules::DisappearAtTarget, &ways),
+            [],
+            "it is gone by then"
+        );
         // One enters where another passes.
         let ways: [(u32, &[u32]); 2] = [(0, &[0, 1, 2]), (1, &[1, 4])];
-        assert_eq!(conflicts(Rules::Queues, &ways).len(), 1);
+        assert_eq!(conflicts(Rules::DisappearAtTarget, &ways).len(), 1);
     }
 
     #[test]
     fn following_closely_is_allowed_and_swapping_is_not() {
         let ways: [(u32, &[u32]); 3] = [(0, &[1, 2, 5]), (0, &[0, 1, 2]), (0, &[3, 0, 1])];
-        assert_eq!(conflicts(Rules::Queues, &ways), []);
+        assert_eq!(conflicts(Rules::DisappearAtTarget, &ways), []);
         // Into the queue's place, behind one that arrives and is gone.
         let ways: [(u32, &[u32]); 3] = [(0, &[0, 1]), (1, &[0, 1]), (2, &[0, 3])];
-        assert_eq!(conflicts(Rules::Queues, &ways), []);
+        assert_eq!(conflicts(Rules::DisappearAtTarget, &ways), []);
         let swap = Conflict::Swap {
             cycle: 1,
             rovers: (0, 1),
             edge: (v(1), v(2)),
         };
         assert_eq!(
-            conflicts(Rules::Queues, &[(0, &[1, 2]), (0, &[2, 1])]),
+            conflicts(Rules::DisappearAtTarget, &[(0, &[1, 2]), (0, &[2, 1])]),
             [swap]
         );
     }
@@ -355,15 +362,19 @@ mod tests {
             cycle: 1,
             rovers: vec![0, 1, 3, 2],
         };
-        assert_eq!(conflicts(Rules::OnMap, &ring), [expected]);
-        assert_eq!(conflicts(Rules::OnMap, &ring[..3]), [], "one place is free");
+        assert_eq!(conflicts(Rules::StayAtTarget, &ring), [expected]);
+        assert_eq!(
+            conflicts(Rules::StayAtTarget, &ring[..3]),
+            [],
+            "one place is free"
+        );
     }
 
     #[test]
     fn trips_must_make_sense() {
         let map = grid(3, 2, &[]);
         let missions = vec![Mission::new(v(0), v(2)), Mission::new(v(0), v(5))];
-        let problem = Problem::new(&map, missions, Rules::Queues).unwrap();
+        let problem = Problem::new(&map, missions, Rules::DisappearAtTarget).unwrap();
         let check = |ways: &[(u32, &[u32])]| plan(ways).conflicts(&problem);
         let good: (u32, &[u32]) = (1, &[0, 1, 4, 5]);
         assert_eq!(check(&[(0, &[0, 1, 2]), good]), []);

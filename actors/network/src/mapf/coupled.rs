@@ -14,8 +14,8 @@ use super::problem::{CoupledError, Objective, Problem};
 pub struct CoupledConfig {
     /// What is to be least.
     pub objective: Objective,
-    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and an
-    /// expansion adds up to as many nodes as a vertex has neighbours, and two.
+    /// The most nodes that are expanded, over all groups. A node takes some 100 to 200 bytes, and
+    /// an expansion adds up to as many nodes as a vertex has neighbours, and two.
     pub max_expansions: u64,
     /// Plans rovers apart for as long as their plans do not meet (independence detection, Standley
     /// 2010). Off: all are planned as one from the start.
@@ -66,7 +66,7 @@ pub struct Coupled {
 /// let map = Roadmap::from_toml(text)?;
 /// // Two change places by way of the siding: 4 cycles for one, 3 for the other.
 /// let missions = [(0, 2), (2, 0)].map(|(a, b)| Mission::new(V(a), V(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::OnMap)?;
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::StayAtTarget)?;
 /// let best = coupled(&problem, &CoupledConfig::default())?;
 /// assert_eq!(best.cost, 7);
 /// assert_eq!(best.plan.conflicts(&problem), []);
@@ -74,8 +74,8 @@ pub struct Coupled {
 /// ```
 ///
 /// # Errors
-/// When the limit of expansions is reached, or, with [`Rules::OnMap`](super::Rules::OnMap), when
-/// there is no plan.
+/// When the limit of expansions is reached, or, with
+/// [`Rules::StayAtTarget`](super::Rules::StayAtTarget), when there is no plan.
 pub fn coupled(problem: &Problem<'_>, config: &CoupledConfig) -> Result<Coupled, CoupledError> {
     let rovers = problem.missions().len();
     let mut plan = Plan {

@@ -2,10 +2,10 @@
 //! (operator decomposition, Standley 2010). Exact.
 //!
 //! A state says of each rover whether it is still queued, where it is, or that it is done. Being
-//! done is a decision for ever: with [`Rules::OnMap`] a rover that comes to its goal may be done
-//! or may move on again later, which makes the costs of waiting there a matter of the state
-//! alone. The search begins one cycle early, with all in their queues (on a map, each in one of
-//! its own that it must leave at once), so that whoever needs n steps arrives in cycle n - 1.
+//! done is a decision for ever: with [`Rules::StayAtTarget`] a rover that comes to its goal may be
+//! done or may move on again later, which makes the costs of waiting there a matter of the state
+//! alone. The search begins one cycle early, with all in their queues (on a map, each in one of its
+//! own that it must leave at once), so that whoever needs n steps arrives in cycle n - 1.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -41,8 +41,8 @@ struct Search<'a> {
     open: BinaryHeap<(Reverse<u32>, u32, usize, Reverse<usize>)>,
 }
 
-/// The best trips of `members` (sorted; the trips in their order), with nobody else there. `expansions` counts on, up to
-/// `limit`.
+/// The best trips of `members` (sorted; the trips in their order), with nobody else there.
+/// `expansions` counts on, up to `limit`.
 pub(crate) fn search(
     problem: &Problem<'_>,
     members: &[usize],
@@ -191,7 +191,7 @@ impl Search<'_> {
     /// Where the member may be in the next cycle, for all that it knows alone.
     fn moves(&self, symbols: &[u32], place: usize) -> Vec<u32> {
         let mission = self.problem.missions()[self.members[place]];
-        let stays = self.problem.rules() == Rules::OnMap;
+        let stays = self.problem.rules() == Rules::StayAtTarget;
         let mut moves = Vec::new();
         let mut arrive = |vertex: VertexId| {
             if vertex == mission.goal {
@@ -225,7 +225,7 @@ impl Search<'_> {
     fn is_free(&self, symbols: &[u32], place: usize, next: u32) -> bool {
         let count = self.members.len();
         let goal = |place: usize| self.problem.missions()[self.members[place]].goal;
-        let stays = self.problem.rules() == Rules::OnMap;
+        let stays = self.problem.rules() == Rules::StayAtTarget;
         let before = |place: usize| match symbols_of(symbols[place]) {
             Symbol::Queued => None,
             Symbol::At(vertex) => Some(vertex),

@@ -15,7 +15,7 @@ use super::timetable::{Pace, Timetable};
 ///             edges = [[0, 1], [1, 2]]";
 /// let map = Roadmap::from_toml(text)?;
 /// let missions = [(0, 2), (0, 2), (2, 1)].map(|(a, b)| Mission::new(V(a), V(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget)?;
 /// assert_eq!(Order::QueuePosition.orders(&problem).collect::<Vec<_>>(), [[0, 2, 1]]);
 /// assert_eq!(Order::ShortestFirst.orders(&problem).collect::<Vec<_>>(), [[2, 0, 1]]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -23,7 +23,7 @@ use super::timetable::{Pace, Timetable};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// The heads of all queues, then those behind them, and so on; equals by number. With
-    /// [`Rules::OnMap`] simply by number.
+    /// [`Rules::StayAtTarget`] simply by number.
     QueuePosition,
     /// Of those at the heads of what is left of the queues, the one with the shortest way to
     /// drive, equals by number.
@@ -83,7 +83,7 @@ impl Order {
 }
 
 fn queue_position(problem: &Problem<'_>) -> Vec<usize> {
-    if problem.rules() == Rules::OnMap {
+    if problem.rules() == Rules::StayAtTarget {
         return (0..problem.missions().len()).collect();
     }
     let mut order: Vec<(usize, usize)> = Vec::new();

@@ -51,7 +51,7 @@ impl Trip {
 /// let map = Roadmap::builtin("crater-sparse")?;
 /// let way = map.shortest_path(map.boundary()[0], map.boundary()[1]);
 /// let mission = Mission::new(way[0], *way.last().expect("it has an end"));
-/// let problem = Problem::new(&map, vec![mission], Rules::Queues)?;
+/// let problem = Problem::new(&map, vec![mission], Rules::DisappearAtTarget)?;
 /// let plan = Plan { trips: vec![Some(Trip { entered: 0, vertices: way })] };
 /// assert_eq!(plan.conflicts(&problem), []);
 /// assert_eq!(plan.metrics(&problem).time_ratio, 1.0);
@@ -98,8 +98,8 @@ pub struct Failure {
     pub rover: usize,
     /// Who stands or drives in its way when nothing is left to it, sorted.
     pub blockers: Vec<usize>,
-    /// When that is, in ticks of the plan (cycles, if it is in cycles): the last instant at which it
-    /// could still be anywhere; or at which somebody moves, if that is before.
+    /// When that is, in ticks of the plan (cycles, if it is in cycles): the last instant at which
+    /// it could still be anywhere; or at which somebody moves, if that is before.
     pub at: u64,
 }
 
@@ -143,9 +143,9 @@ impl Plan {
             .is_some_and(|trip| trip.end() == goal)
     }
 
-    /// The plan as a timetable in cycles: each rover's stays, one after the other; empty for a rover
-    /// without a trip. The last stay has no end with [`Rules::OnMap`], and one cycle with
-    /// [`Rules::Queues`].
+    /// The plan as a timetable in cycles: each rover's stays, one after the other; empty for a
+    /// rover without a trip. The last stay has no end with [`Rules::StayAtTarget`], and one cycle
+    /// with [`Rules::DisappearAtTarget`].
     pub fn visits(&self, problem: &Problem<'_>) -> Vec<Vec<TimedVisit>> {
         let visits = |trip: &Option<Trip>| {
             let trip = trip.as_ref();
@@ -189,7 +189,7 @@ pub(crate) fn visits(trip: &Trip, rules: Rules) -> Vec<TimedVisit> {
             }),
         }
     }
-    if rules == Rules::OnMap
+    if rules == Rules::StayAtTarget
         && let Some(last) = visits.last_mut()
     {
         last.end = FOREVER;
@@ -224,16 +224,16 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let mut expected = vec![(0, 2, 4), (1, 4, 5), (2, 5, 8), (1, 8, 9)];
-        assert_eq!(stays(Rules::Queues), expected);
+        assert_eq!(stays(Rules::DisappearAtTarget), expected);
         expected[3].2 = FOREVER;
-        assert_eq!(stays(Rules::OnMap), expected);
+        assert_eq!(stays(Rules::StayAtTarget), expected);
     }
 
     #[test]
     fn time_counts_from_the_start_and_the_path_from_the_entry() {
         let map = grid(3, 1, &[]);
         let missions = vec![Mission::new(v(0), v(2)), Mission::new(v(2), v(0))];
-        let problem = Problem::new(&map, missions, Rules::Queues).unwrap();
+        let problem = Problem::new(&map, missions, Rules::DisappearAtTarget).unwrap();
         let trip = |entered, way: &[u32]| {
             let vertices = way.iter().copied().map(v).collect();
             Some(Trip { entered, vertices })

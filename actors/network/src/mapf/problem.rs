@@ -35,15 +35,16 @@ impl From<(VertexId, VertexId)> for Mission {
 /// How rovers come and go.
 ///
 /// ```
-/// assert_ne!(farside_network::mapf::Rules::Queues, farside_network::mapf::Rules::OnMap);
+/// use farside_network::mapf::Rules;
+/// assert_ne!(Rules::DisappearAtTarget, Rules::StayAtTarget);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rules {
     /// Rovers wait in queues outside their entries, in the order of their numbers, and leave the
     /// roadmap at their goals.
-    Queues,
+    DisappearAtTarget,
     /// Rovers stand at their entries from cycle 0 on, and stay at their goals.
-    OnMap,
+    StayAtTarget,
 }
 
 /// Why something is no problem to plan for.
@@ -53,7 +54,7 @@ pub enum Rules {
 /// use farside_worlds::{Roadmap, VertexId};
 /// let map = Roadmap::builtin("crater-sparse")?;
 /// let mission = Mission::new(VertexId(0), VertexId(1));
-/// let error = Problem::new(&map, vec![mission, mission], Rules::OnMap).unwrap_err();
+/// let error = Problem::new(&map, vec![mission, mission], Rules::StayAtTarget).unwrap_err();
 /// assert!(matches!(error, ProblemError::SameEntry { first: 0, second: 1, .. }));
 /// # Ok::<(), farside_worlds::WorldError>(())
 /// ```
@@ -98,7 +99,7 @@ pub enum ProblemError {
 /// use farside_worlds::{Roadmap, VertexId};
 /// let map = Roadmap::builtin("crater-sparse")?;
 /// let missions = [(5, 9), (7, 9), (5, 8)].map(|(a, b)| Mission::new(VertexId(a), VertexId(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget)?;
 /// assert_eq!(problem.queues(), [vec![0, 2], vec![1]]);
 /// assert_eq!(problem.predecessor(2), Some(0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -116,8 +117,8 @@ impl<'a> Problem<'a> {
     /// The problem of `missions` on `roadmap`. Entries and goals need not be on its boundary.
     ///
     /// # Errors
-    /// When a mission leaves the roadmap; with [`Rules::OnMap`] also when two rovers have the same
-    /// entry or the same goal.
+    /// When a mission leaves the roadmap; with [`Rules::StayAtTarget`] also when two rovers have
+    /// the same entry or the same goal.
     pub fn new(
         roadmap: &'a Roadmap,
         missions: Vec<Mission>,
@@ -135,7 +136,7 @@ impl<'a> Problem<'a> {
                     });
                 }
             }
-            if rules == Rules::Queues {
+            if rules == Rules::DisappearAtTarget {
                 continue;
             }
             if let Some(first) = entries.insert(mission.entry, rover) {
@@ -184,8 +185,8 @@ impl<'a> Problem<'a> {
         self.rules
     }
 
-    /// Who waits at each entry, first to last, by the entries' numbers. With [`Rules::OnMap`]
-    /// each rover is a queue of its own.
+    /// Who waits at each entry, first to last, by the entries' numbers. With
+    /// [`Rules::StayAtTarget`] each rover is a queue of its own.
     pub fn queues(&self) -> &[Vec<usize>] {
         &self.queues
     }
@@ -203,8 +204,8 @@ impl<'a> Problem<'a> {
 
     /// The rovers that have no way to their goals round the entries and goals of all others. None:
     /// the problem is *well-formed* (Cap, Vokrinek and Kleiner 2015, section 3), and
-    /// [`reference`](fn@super::reference) is certain to solve it. With [`Rules::Queues`] every problem
-    /// is: a rover that has not entered, or has left, is in nobody's way.
+    /// [`reference`](fn@super::reference) is certain to solve it. With [`Rules::DisappearAtTarget`]
+    /// every problem is: a rover that has not entered, or has left, is in nobody's way.
     ///
     /// ```
     /// use farside_network::mapf::{Mission, Problem, Rules};
@@ -213,14 +214,14 @@ impl<'a> Problem<'a> {
     ///             edges = [[0, 1], [1, 2]]";
     /// let map = Roadmap::from_toml(line)?;
     /// let missions = [(0, 1), (1, 2)].map(|(a, b)| Mission::new(VertexId(a), VertexId(b)));
-    /// let stays = Problem::new(&map, missions.to_vec(), Rules::OnMap)?;
+    /// let stays = Problem::new(&map, missions.to_vec(), Rules::StayAtTarget)?;
     /// assert_eq!(stays.ill_formed(), [0, 1]);
-    /// let leaves = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+    /// let leaves = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget)?;
     /// assert!(leaves.ill_formed().is_empty());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn ill_formed(&self) -> Vec<usize> {
-        if self.rules == Rules::Queues {
+        if self.rules == Rules::DisappearAtTarget {
             return Vec::new();
         }
         let mut claims = vec![0u32; self.roadmap.len()];
@@ -290,7 +291,7 @@ pub enum CoupledError {
         /// Nodes expanded.
         expansions: u64,
     },
-    /// There is no plan. Never with [`Rules::Queues`](super::Rules::Queues).
+    /// There is no plan. Never with [`Rules::DisappearAtTarget`](super::Rules::DisappearAtTarget).
     #[error("there is no plan: all of {expansions} expansions lead nowhere")]
     Unsolvable {
         /// Nodes expanded.

@@ -7,17 +7,17 @@ use super::plan::Outcome;
 use super::problem::{Problem, Rules};
 use super::safe_intervals::{FOREVER, TimedVisit};
 use super::single::{self, Entry};
-use super::table::Table;
+use super::table::StayTable;
 use super::timetable::{Pace, Timetable};
 
 /// Plans one rover after the other, each round those before it, so that it is sure of a way.
 ///
-/// With [`Rules::Queues`] a rover waits in its queue for as long as need be. Nobody can be without
-/// a way: when all planned before it have left the roadmap it is empty, and the queue's
+/// With [`Rules::DisappearAtTarget`] a rover waits in its queue for as long as need be. Nobody can
+/// be without a way: when all planned before it have left the roadmap it is empty, and the queue's
 /// predecessor has entered by then. So there are no failures.
 ///
-/// With [`Rules::OnMap`] each rover keeps clear of the places where those planned after it still
-/// stand, and those keep clear of where it stays. On well-formed problems
+/// With [`Rules::StayAtTarget`] each rover keeps clear of the places where those planned after it
+/// still stand, and those keep clear of where it stays. On well-formed problems
 /// ([`Problem::ill_formed`] is empty) that leaves a way to everybody: to wait until all before have
 /// arrived, and to drive round all entries and goals. On others failures are named; a rover that
 /// fails stands at its entry for ever, and has a trip that ends there.
@@ -29,7 +29,7 @@ use super::timetable::{Pace, Timetable};
 ///             edges = [[0, 1], [1, 2]]";
 /// let map = Roadmap::from_toml(text)?;
 /// let missions = [(0, 2), (2, 0)].map(|(a, b)| Mission::new(V(a), V(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget)?;
 /// let outcome = reference(&problem, &Order::QueuePosition);
 /// // The second enters behind the first, which is at that end in cycle 2 and then gone.
 /// assert_eq!(outcome.plan.trips[1].as_ref().map(|trip| trip.entered), Some(3));
@@ -49,8 +49,8 @@ pub fn reference(problem: &Problem<'_>, order: &Order) -> Outcome {
 ///             edges = [[0, 1], [1, 2]]";
 /// let map = Roadmap::from_toml(text)?;
 /// let missions = [(0, 2), (2, 0)].map(|(a, b)| Mission::new(V(a), V(b)));
-/// let problem = Problem::new(&map, missions.to_vec(), Rules::Queues)?;
-/// let pace = Pace { travel: &|a, b| if a.0 + b.0 == 1 { 5 } else { 4 }, enter: 2, gap: 1 };
+/// let problem = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget)?;
+/// let pace = Pace { travel: &|a, b| if a.0 + b.0 == 1 { 5 } else { 4 }, enter: 2, headway: 1 };
 /// let table = reference_in_time(&problem, &pace, &Order::QueuePosition);
 /// assert_eq!(table.errors(&problem, &pace), []);
 /// // The first is at its goal at 2 + 5 + 4, gone at 12, and known to be gone at 13.
@@ -70,7 +70,7 @@ pub fn reference_in_time(problem: &Problem<'_>, pace: &Pace<'_>, order: &Order) 
 
 fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetable {
     let missions = problem.missions();
-    let mut table = Table::new(problem.roadmap(), missions.len());
+    let mut table = StayTable::new(problem.roadmap(), missions.len());
     let stand = |rover: usize| {
         vec![TimedVisit {
             vertex: missions[rover].entry,
@@ -78,7 +78,7 @@ fn in_order(problem: &Problem<'_>, pace: &Pace<'_>, order: &[usize]) -> Timetabl
             end: FOREVER,
         }]
     };
-    if problem.rules() == Rules::OnMap {
+    if problem.rules() == Rules::StayAtTarget {
         for rover in 0..missions.len() {
             table.insert(rover, stand(rover));
         }

@@ -1,19 +1,21 @@
 //! Safe-interval path planning (Phillips and Likhachev, 2011) in continuous time, over any part of
 //! a roadmap, so that a search can be handed from one part to the next.
 //!
-//! A rover's way is a list of visits. A **visit** of a vertex begins when the rover sets out towards
-//! it, and ends when it sets out towards the next: from then on the vertex is free. Between two
-//! visits of one vertex by different rovers there is a gap, the time that it takes to learn of the
-//! one and to permit the other. A **safe interval** of a vertex is a time in which a visit may lie.
+//! A rover's way is a list of visits. A **visit** of a vertex begins when the rover sets out
+//! towards it, and ends when it sets out towards the next: from then on the vertex is free. Between
+//! two visits of one vertex by different rovers there is a gap, the time that it takes to learn of
+//! the one and to permit the other. A **safe interval** of a vertex is a time in which a visit may
+//! lie.
 //!
-//! Of two ways into the same safe interval the one that is there first is as good as the other in all
-//! that follows, since it may wait. So a search keeps one [`Label`] for each vertex and interval.
-//! Swapping along an edge needs no rule of its own: each of the two rovers would have to begin its
-//! visit after the other one has ended. Only where there is no gap at all, as in whole cycles, can both
-//! happen at one instant.
+//! Of two ways into the same safe interval the one that is there first is as good as the other in
+//! all that follows, since it may wait. So a search keeps one [`Label`] for each vertex and
+//! interval. Swapping along an edge needs no rule of its own: each of the two rovers would have to
+//! begin its visit after the other one has ended. Only where there is no gap at all, as in whole
+//! cycles, can both happen at one instant.
 //!
-//! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up to
-//! that of the covered vertex beyond, begin when it sets out into it. How that is searched: `crossing`.
+//! Through vertices that are not covered a rover drives in one go: all its visits of a crossing, up
+//! to that of the covered vertex beyond, begin when it sets out into it. How that is searched:
+//! `crossing`.
 
 mod crossing;
 
@@ -37,8 +39,8 @@ pub struct Label {
     pub start: u64,
     /// When the rover then stands there \[ns\].
     pub ready: u64,
-    /// When the visit must have ended \[ns\]: the safe interval's end. At a vertex that is not covered the
-    /// latest time to pass it, as the crossing goes so far.
+    /// When the visit must have ended \[ns\]: the safe interval's end. At a vertex that is not
+    /// covered the latest time to pass it, as the crossing goes so far.
     pub until: u64,
     /// The label it comes from, by its place in the same list; none where the way begins.
     pub parent: Option<u32>,
@@ -56,11 +58,11 @@ pub struct TimedVisit {
 }
 
 /// The part of a roadmap that a search may enter, and who is there when.
-pub struct Ground<'a> {
+pub struct SearchSpace<'a> {
     /// The roadmap.
     pub roadmap: &'a Roadmap,
     /// The least time between one rover's leaving and the next one's coming \[ns\].
-    pub gap: u64,
+    pub headway: u64,
     /// How long a rover takes from setting out to being ready to set out again \[ns\]; at least 1.
     pub travel: &'a dyn Fn(VertexId, VertexId) -> u64,
     /// The visits planned at a vertex, as (start, end), disjoint and in order; none for a vertex
@@ -70,16 +72,16 @@ pub struct Ground<'a> {
     pub covers: &'a dyn Fn(VertexId) -> bool,
 }
 
-/// What a search for one place looks for; [`Ground::expand`] looks for nothing and finds all.
+/// What a search for one place looks for; [`SearchSpace::expand`] looks for nothing and finds all.
 pub(super) struct Aim<'a> {
     /// No less than this long is left from a vertex on \[ns\], and no more than an edge's time and
     /// what is left at its end.
     pub(super) left: &'a dyn Fn(VertexId) -> u64,
     /// Whether a label is the end of the search.
     pub(super) is_end: &'a dyn Fn(&Label) -> bool,
-    /// Whether there is no setting out from the first vertex to the second at this instant, the only
-    /// one at which one safe interval is left for the other. Without a gap rovers can change places,
-    /// in twos and in rings, at such an instant and at no other.
+    /// Whether there is no setting out from the first vertex to the second at this instant, the
+    /// only one at which one safe interval is left for the other. Without a gap rovers can change
+    /// places, in twos and in rings, at such an instant and at no other.
     pub(super) is_barred: &'a dyn Fn(VertexId, VertexId, u64) -> bool,
 }
 
@@ -90,22 +92,22 @@ pub(super) struct Aim<'a> {
 /// let safe: Vec<_> = safe_intervals(&[(10, 20), (22, 30)], 2).collect();
 /// assert_eq!(safe, [(0, 8), (32, FOREVER)]);
 /// ```
-pub fn safe_intervals(busy: &[(u64, u64)], gap: u64) -> impl Iterator<Item = (u64, u64)> + '_ {
+pub fn safe_intervals(busy: &[(u64, u64)], headway: u64) -> impl Iterator<Item = (u64, u64)> + '_ {
     (0..=busy.len()).filter_map(move |i| {
         let from = if i == 0 {
             0
         } else {
-            busy[i - 1].1.saturating_add(gap)
+            busy[i - 1].1.saturating_add(headway)
         };
         let to = match busy.get(i) {
-            Some((start, _)) => start.saturating_sub(gap),
+            Some((start, _)) => start.saturating_sub(headway),
             None => FOREVER,
         };
         (from < to).then_some((from, to))
     })
 }
 
-impl Ground<'_> {
+impl SearchSpace<'_> {
     /// Labels for a rover that comes to `vertex` from outside the roadmap, at `earliest` or later,
     /// and needs `dwell` \[ns\] to come in.
     pub fn enter(&self, vertex: VertexId, earliest: u64, dwell: u64) -> Vec<Label> {
@@ -121,12 +123,14 @@ impl Ground<'_> {
                 parent: None,
             })
         };
-        safe_intervals(&busy, self.gap).filter_map(label).collect()
+        safe_intervals(&busy, self.headway)
+            .filter_map(label)
+            .collect()
     }
 
     /// Expands the labels at `open` (places in `labels`) and all that come of them, earliest first;
     /// appends what is found to `labels`. Labels lead on from any vertex, but only to vertices that
-    /// [`Ground::busy`] knows.
+    /// [`SearchSpace::busy`] knows.
     pub fn expand(&self, labels: &mut Vec<Label>, open: &[u32]) {
         let all = Aim {
             left: &|_| 0,
@@ -136,8 +140,8 @@ impl Ground<'_> {
         self.search(labels, open, &all);
     }
 
-    /// As [`Ground::expand`], but the most promising label first (A*), and only until one is the end:
-    /// its place. No other end is ready sooner.
+    /// As [`SearchSpace::expand`], but the most promising label first (A*), and only until one is
+    /// the end: its place. No other end is ready sooner.
     pub(super) fn search(
         &self,
         labels: &mut Vec<Label>,
@@ -175,7 +179,7 @@ impl Ground<'_> {
                 }
                 let travel = (self.travel)(from.vertex, to);
                 let in_time = |safe: &(u64, u64)| course.sets_out(safe.0).is_some();
-                for safe in safe_intervals(&busy, self.gap).take_while(in_time) {
+                for safe in safe_intervals(&busy, self.headway).take_while(in_time) {
                     let parent = Some(at);
                     let label = course.label(to, travel, safe, (self.covers)(to));
                     let Some(label) = label.map(|label| Label { parent, ..label }) else {
@@ -196,8 +200,8 @@ impl Ground<'_> {
 
 /// The way that ends with the label at `last`: each visit begins as early as can be, but the first
 /// one as late as the second allows, so that a rover that comes from outside waits there and not in
-/// the way of others. The last visit ends at `end`. Vertices that `covers` does not say are covered are
-/// driven through.
+/// the way of others. The last visit ends at `end`. Vertices that `covers` does not say are covered
+/// are driven through.
 pub fn way_to(
     labels: &[Label],
     last: u32,
@@ -272,20 +276,20 @@ pub(super) mod tests {
     fn ground<'a>(
         roadmap: &'a Roadmap,
         busy: &'a dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
-    ) -> Ground<'a> {
-        Ground {
+    ) -> SearchSpace<'a> {
+        SearchSpace {
             roadmap,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy,
             covers: &|_| true,
         }
     }
 
-    /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits one
-    /// instant or sets out, and may be nowhere within a gap of another's visit. Through vertices
-    /// that are not covered it drives without a stop, and claims all of them, and the one beyond, as it
-    /// sets out.
+    /// The earliest time to be ready at `goal`, by trying every instant: a rover at a vertex waits
+    /// one instant or sets out, and may be nowhere within a gap of another's visit. Through
+    /// vertices that are not covered it drives without a stop, and claims all of them, and the one
+    /// beyond, as it sets out.
     pub(super) fn brute_force(
         roadmap: &Roadmap,
         busy: &Busy,
@@ -306,7 +310,8 @@ pub(super) mod tests {
                 let zero = &mut open[at as usize][start.0 as usize];
                 *zero = (*zero).max(Some(0));
             }
-            // Those who set out now have not been on their way for any time: no move leads to another.
+            // Those who set out now have not been on their way for any time: no move leads to
+            // another.
             for u in roadmap.vertices() {
                 if open[at as usize][u.0 as usize] == Some(STEP) {
                     if u == goal {
@@ -376,8 +381,8 @@ pub(super) mod tests {
     }
 
     proptest! {
-        /// The search finds the earliest arrival, its way keeps clear of all visits, and a search in
-        /// two parts finds no less than one that is told to pass through them in that order.
+        /// The search finds the earliest arrival, its way keeps clear of all visits, and a search
+        /// in two parts finds no less than one that is told to pass through them in that order.
         #[test]
         fn the_earliest_way_is_found(busy in busy(6), goal in 0u32..6) {
             let map = grid(3, 2, &[(1, 4)]);
@@ -400,7 +405,8 @@ pub(super) mod tests {
                 }
                 for visit in &way {
                     for &(s, e) in &busy[visit.vertex.0 as usize] {
-                        prop_assert!(visit.end < s || visit.start > e, "{:?} meets ({}, {})", visit, s, e);
+                        let is_apart = visit.end < s || visit.start > e;
+                        prop_assert!(is_apart, "{:?} meets ({}, {})", visit, s, e);
                     }
                 }
             }

@@ -8,41 +8,41 @@ use farside_worlds::{Roadmap, VertexId};
 
 use super::plan::Failure;
 use super::problem::{Mission, Problem, Rules};
-use super::safe_intervals::{Aim, FOREVER, Ground, Label, TimedVisit, way_to};
-use super::table::Table;
+use super::safe_intervals::{Aim, FOREVER, Label, SearchSpace, TimedVisit, way_to};
+use super::table::StayTable;
 use super::timetable::Pace;
 
 /// When a rover may come in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
-    /// At this tick or any later one, as late as the rest of its way allows: so that it waits in its
-    /// queue, where it is in nobody's way, and not at its entry. With [`Rules::OnMap`] it stands
-    /// there from the start all the same.
+    /// At this tick or any later one, as late as the rest of its way allows: so that it waits in
+    /// its queue, where it is in nobody's way, and not at its entry. With [`Rules::StayAtTarget`]
+    /// it stands there from the start all the same.
     From(u64),
     /// As soon as its entry is free: it may not wait outside for a clear way.
     AtOnce,
 }
 
-/// The way of `rover` that ends first. With [`Rules::OnMap`] it stays at its goal for ever.
+/// The way of `rover` that ends first. With [`Rules::StayAtTarget`] it stays at its goal for ever.
 ///
 /// # Errors
-/// When there is none: with [`Rules::Queues`] and [`Entry::From`] only if somebody stays on the map
-/// for ever.
+/// When there is none: with [`Rules::DisappearAtTarget`] and [`Entry::From`] only if somebody stays
+/// on the map for ever.
 pub(crate) fn search(
     problem: &Problem<'_>,
     pace: &Pace<'_>,
-    table: &Table,
+    table: &StayTable,
     rover: usize,
     entry: Entry,
 ) -> Result<Vec<TimedVisit>, Failure> {
     let (map, rules) = (problem.roadmap(), problem.rules());
     let mission = problem.missions()[rover];
-    let ground = Ground {
+    let ground = SearchSpace {
         roadmap: map,
-        gap: pace.gap,
+        headway: pace.headway,
         travel: pace.travel,
         busy: &|v| Some(table.busy(v)),
-        // Closed gaps are no part of the map; only the reservation walk crosses open ones.
+        // Closed gaps are no part of the map; only a reservation request crosses open ones.
         covers: &|_| true,
     };
     let mut labels = first_labels(&ground, pace, rules, mission, entry);
@@ -50,7 +50,8 @@ pub(crate) fn search(
     let aim = Aim {
         left: &|v| left[v.0 as usize],
         is_end: &|label| {
-            label.vertex == mission.goal && (rules == Rules::Queues || label.until == FOREVER)
+            label.vertex == mission.goal
+                && (rules == Rules::DisappearAtTarget || label.until == FOREVER)
         },
         is_barred: &|from, to, at| table.closes_ring(from, to, at).is_some(),
     };
@@ -61,11 +62,11 @@ pub(crate) fn search(
     let label = labels[last as usize];
     let end = match rules {
         // It takes a gap to be known as gone.
-        Rules::Queues => label.ready.saturating_add(pace.gap).min(label.until),
-        Rules::OnMap => FOREVER,
+        Rules::DisappearAtTarget => label.ready.saturating_add(pace.headway).min(label.until),
+        Rules::StayAtTarget => FOREVER,
     };
     let mut way = way_to(&labels, last, end, |_| true);
-    if rules == Rules::OnMap || entry == Entry::AtOnce {
+    if rules == Rules::StayAtTarget || entry == Entry::AtOnce {
         let first = std::iter::successors(Some(&label), |label| {
             label.parent.map(|at| &labels[at as usize])
         });
@@ -76,7 +77,7 @@ pub(crate) fn search(
 
 /// Where the search begins.
 fn first_labels(
-    ground: &Ground<'_>,
+    ground: &SearchSpace<'_>,
     pace: &Pace<'_>,
     rules: Rules,
     mission: Mission,
@@ -88,9 +89,9 @@ fn first_labels(
     };
     let mut labels = ground.enter(mission.entry, earliest, pace.enter);
     match (rules, entry) {
-        (Rules::OnMap, _) => labels.retain(|label| label.start == 0),
-        (Rules::Queues, Entry::AtOnce) => labels.truncate(1),
-        (Rules::Queues, Entry::From(_)) => {}
+        (Rules::StayAtTarget, _) => labels.retain(|label| label.start == 0),
+        (Rules::DisappearAtTarget, Entry::AtOnce) => labels.truncate(1),
+        (Rules::DisappearAtTarget, Entry::From(_)) => {}
     }
     labels
 }
@@ -118,8 +119,8 @@ fn times_to(map: &Roadmap, pace: &Pace<'_>, goal: VertexId) -> Vec<u64> {
 /// Who said no when nothing was left: at the latest instant at which the rover could still be
 /// anywhere. `labels` are all places and times that it could reach.
 fn failure(
-    ground: &Ground<'_>,
-    table: &Table,
+    ground: &SearchSpace<'_>,
+    table: &StayTable,
     entry: VertexId,
     rover: usize,
     labels: &[Label],
@@ -146,11 +147,12 @@ fn failure(
         for &to in ground.roadmap.neighbors(here) {
             let there = at.saturating_add((ground.travel)(here, to));
             let meets = |from: u64, until: u64| {
-                until.saturating_add(ground.gap) > at && from < there.saturating_add(ground.gap)
+                until.saturating_add(ground.headway) > at
+                    && from < there.saturating_add(ground.headway)
             };
             let stays = table.stays(to).iter();
             let mut taken = stays.filter(|stay| meets(stay.from, stay.until)).peekable();
-            if taken.peek().is_none() && ground.gap == 0 {
+            if taken.peek().is_none() && ground.headway == 0 {
                 blockers.extend(table.closes_ring(here, to, at));
             }
             blockers.extend(taken.map(|stay| stay.rover));

@@ -15,14 +15,14 @@ pub(crate) struct Stay {
 
 /// The stays at each vertex, earliest first; none overlap.
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
+pub(crate) struct StayTable {
     stays: Vec<Vec<Stay>>,
     ways: Vec<Vec<TimedVisit>>,
 }
 
-impl Table {
-    pub(crate) fn new(roadmap: &Roadmap, rovers: usize) -> Table {
-        Table {
+impl StayTable {
+    pub(crate) fn new(roadmap: &Roadmap, rovers: usize) -> StayTable {
+        StayTable {
             stays: vec![Vec::new(); roadmap.len()],
             ways: vec![Vec::new(); rovers],
         }
@@ -101,9 +101,9 @@ impl Table {
         (tick < visit.end).then_some(visit.vertex)
     }
 
-    /// Who leaves `to` at `tick`, if a chain of rovers that follow one another at that instant leads
-    /// from there back to `from`. A chain of one is a swap. Rovers can only do so without a gap between
-    /// them. Nobody may be at `to` then.
+    /// Who leaves `to` at `tick`, if a chain of rovers that follow one another at that instant
+    /// leads from there back to `from`. A chain of one is a swap. Rovers can only do so without a
+    /// gap between them. Nobody may be at `to` then.
     pub(crate) fn closes_ring(&self, from: VertexId, to: VertexId, tick: u64) -> Option<usize> {
         let last = self.occupant(from, tick)?;
         let ahead = self.occupant(to, tick.checked_sub(1)?)?;
@@ -132,10 +132,10 @@ mod tests {
 
     #[test]
     fn stays_are_found_and_given_up() {
-        let mut table = Table::new(&grid(3, 2, &[]), 2);
-        table.insert(0, trip(0, &[0, 1, 1, 2], Rules::OnMap));
-        table.insert(1, trip(0, &[3, 4, 4, 1, 0], Rules::OnMap));
-        let at = |table: &Table, vertex, tick| table.occupant(v(vertex), tick);
+        let mut table = StayTable::new(&grid(3, 2, &[]), 2);
+        table.insert(0, trip(0, &[0, 1, 1, 2], Rules::StayAtTarget));
+        table.insert(1, trip(0, &[3, 4, 4, 1, 0], Rules::StayAtTarget));
+        let at = |table: &StayTable, vertex, tick| table.occupant(v(vertex), tick);
         assert_eq!((at(&table, 1, 0), at(&table, 1, 2)), (None, Some(0)));
         assert_eq!((at(&table, 1, 3), at(&table, 1, 4)), (Some(1), None));
         assert_eq!(at(&table, 2, 1_000_000), Some(0), "it stays");
@@ -147,17 +147,16 @@ mod tests {
 
     #[test]
     fn rings_are_seen_whoever_closes_them() {
-        // 0 1 2
-        // 3 4 5
-        let mut table = Table::new(&grid(3, 2, &[]), 4);
-        table.insert(0, trip(4, &[0, 1], Rules::Queues));
-        table.insert(1, trip(4, &[1, 4], Rules::Queues));
-        table.insert(2, trip(4, &[4, 3], Rules::Queues));
+        // 0 1 2 3 4 5
+        let mut table = StayTable::new(&grid(3, 2, &[]), 4);
+        table.insert(0, trip(4, &[0, 1], Rules::DisappearAtTarget));
+        table.insert(1, trip(4, &[1, 4], Rules::DisappearAtTarget));
+        table.insert(2, trip(4, &[4, 3], Rules::DisappearAtTarget));
         assert_eq!(table.closes_ring(v(3), v(0), 5), Some(0), "it would rotate");
         assert_eq!(table.closes_ring(v(1), v(0), 5), Some(0), "a swap");
         table.remove(2);
         assert_eq!(table.closes_ring(v(3), v(0), 5), None, "4 stays free");
-        table.insert(2, trip(5, &[3, 4], Rules::Queues));
+        table.insert(2, trip(5, &[3, 4], Rules::DisappearAtTarget));
         assert_eq!(table.closes_ring(v(3), v(0), 5), None, "out of its queue");
     }
 }

@@ -24,7 +24,7 @@ pub(crate) struct Case {
 
 /// Grids of up to `columns` x `rows` with holes, and up to so many rovers.
 pub(crate) fn case(columns: u32, rows: u32, rovers: usize) -> impl Strategy<Value = Case> {
-    let rules = prop_oneof![Just(Rules::Queues), Just(Rules::OnMap)];
+    let rules = prop_oneof![Just(Rules::DisappearAtTarget), Just(Rules::StayAtTarget)];
     let picks = prop::collection::vec((0..64u32, 0..64u32), 1..=rovers);
     let parts = (2..=columns, 1..=rows, any::<u64>(), picks, rules);
     parts.prop_map(|(columns, rows, cuts, picks, rules)| Case {
@@ -57,7 +57,7 @@ impl Case {
     pub(crate) fn missions(&self) -> Vec<Mission> {
         let count = self.columns * self.rows;
         let missions = self.picks.iter().map(|&(a, b)| (a % count, b % count));
-        if self.rules == Rules::Queues {
+        if self.rules == Rules::DisappearAtTarget {
             return missions.map(|(a, b)| Mission::new(v(a), v(b))).collect();
         }
         let (mut entries, mut goals) = (BTreeSet::new(), BTreeSet::new());
@@ -119,14 +119,14 @@ pub(crate) fn clash(moves: &[(Option<VertexId>, Option<VertexId>)]) -> bool {
 fn place(trip: &Trip, rules: Rules, cycle: Option<u32>) -> Option<VertexId> {
     let cycle = cycle?;
     match rules {
-        Rules::OnMap if cycle > trip.last_cycle() => Some(trip.end()),
+        Rules::StayAtTarget if cycle > trip.last_cycle() => Some(trip.end()),
         _ => trip.at(cycle),
     }
 }
 
-/// The first cycle in which a rover can be at its goal for good, in the midst of `others`: the set of
-/// all vertices where it can be is followed from cycle to cycle. It enters in `ready` or later if
-/// it may wait outside, else in `ready`.
+/// The first cycle in which a rover can be at its goal for good, in the midst of `others`: the set
+/// of all vertices where it can be is followed from cycle to cycle. It enters in `ready` or later
+/// if it may wait outside, else in `ready`.
 pub(crate) fn first_arrival(
     roadmap: &Roadmap,
     others: &[Trip],
@@ -166,7 +166,7 @@ pub(crate) fn first_arrival(
                     .all(|t| place(t, rules, Some(c)) != Some(mission.goal))
             })
         };
-        let stays = rules == Rules::OnMap;
+        let stays = rules == Rules::StayAtTarget;
         if here.contains(&mission.goal) && (!stays || free_from(cycle)) {
             return Some(cycle);
         }
@@ -184,7 +184,7 @@ pub(crate) fn walks(roadmap: &Roadmap, rules: Rules, seeds: &[u64]) -> Vec<Trip>
             bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (bits >> 33) as usize % n
         };
-        let entered = if rules == Rules::Queues {
+        let entered = if rules == Rules::DisappearAtTarget {
             draw(6) as u32
         } else {
             0
@@ -195,7 +195,7 @@ pub(crate) fn walks(roadmap: &Roadmap, rules: Rules, seeds: &[u64]) -> Vec<Trip>
             let near = roadmap.neighbors(here);
             vertices.push(near.get(draw(near.len() + 1)).copied().unwrap_or(here));
         }
-        if rules == Rules::Queues {
+        if rules == Rules::DisappearAtTarget {
             let goal = vertices[vertices.len() - 1];
             let first = vertices.iter().position(|&v| v == goal);
             vertices.truncate(first.map_or(1, |at| at + 1));
@@ -225,13 +225,14 @@ struct Pawn {
     rests: u32,
 }
 
-/// The least sum of costs or the least makespan, by uniform-cost search over all joint moves; none if
-/// there is no plan. A rover that rests at its goal pays nothing until it leaves it again, and then
-/// for all the time.
+/// The least sum of costs or the least makespan, by uniform-cost search over all joint moves; none
+/// if there is no plan. A rover that rests at its goal pays nothing until it leaves it again, and
+/// then for all the time.
 pub(crate) fn brute_force(problem: &Problem<'_>, makespan: bool) -> Option<u64> {
-    let stays = problem.rules() == Rules::OnMap;
+    let stays = problem.rules() == Rules::StayAtTarget;
     let missions = problem.missions();
-    // Where there is no plan rests would grow for ever; without them there are finitely many states.
+    // Where there is no plan rests would grow for ever; without them there are finitely many
+    // states.
     if stays && !makespan && brute_force(problem, true).is_none() {
         return None;
     }
@@ -293,7 +294,7 @@ fn pawn_moves(
     makespan: bool,
 ) -> Vec<(Pawn, u64)> {
     let (mission, pawn) = (problem.missions()[rover], pawns[rover]);
-    let stays = problem.rules() == Rules::OnMap;
+    let stays = problem.rules() == Rules::StayAtTarget;
     let to = |vertex: VertexId| Pawn {
         at: Some(vertex),
         left: false,

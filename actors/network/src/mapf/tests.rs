@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::plan::{Trip, visits};
 use super::safe_intervals::TimedVisit;
 use super::single::{self, Entry};
-use super::table::Table;
+use super::table::StayTable;
 use super::testing::{brute_force, case, first_arrival, walks};
 use super::*;
 use crate::testing::{grid, v};
@@ -26,11 +26,11 @@ fn amid<'a>(
     rules: Rules,
     others: &[Trip],
     mission: Mission,
-) -> (Problem<'a>, Table) {
+) -> (Problem<'a>, StayTable) {
     let ends = |trip: &Trip| Mission::new(trip.vertices[0], trip.end());
     let missions = others.iter().map(ends).chain([mission]).collect();
     let problem = Problem::new(map, missions, rules).unwrap();
-    let mut table = Table::new(map, others.len() + 1);
+    let mut table = StayTable::new(map, others.len() + 1);
     for (rover, trip) in others.iter().enumerate() {
         table.insert(rover, visits(trip, rules));
     }
@@ -75,7 +75,11 @@ fn check(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 400,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn safe_intervals_are_as_fast_as_can_be(
@@ -86,12 +90,12 @@ proptest! {
         let (map, rules) = (case.roadmap(), case.rules);
         let mission = case.missions()[0];
         let mut others = walks(&map, rules, &seeds);
-        if rules == Rules::OnMap {
+        if rules == Rules::StayAtTarget {
             others.retain(|trip| trip.vertices[0] != mission.entry && trip.end() != mission.goal);
         }
-        let ready = if rules == Rules::Queues { ready } else { 0 };
+        let ready = if rules == Rules::DisappearAtTarget { ready } else { 0 };
         let (problem, table) = amid(&map, rules, &others, mission);
-        let may_wait = rules == Rules::Queues;
+        let may_wait = rules == Rules::DisappearAtTarget;
         let expected = first_arrival(&map, &others, rules, mission, ready, may_wait);
         let entry = Entry::From(u64::from(ready));
         let found = single::search(&problem, &Pace::CYCLES, &table, others.len(), entry);
@@ -111,14 +115,14 @@ proptest! {
         let (map, rules) = (case.roadmap(), case.rules);
         let mission = case.missions()[0];
         let mut others = walks(&map, rules, &seeds);
-        if rules == Rules::OnMap {
+        if rules == Rules::StayAtTarget {
             others.retain(|trip| trip.vertices[0] != mission.entry && trip.end() != mission.goal);
         }
         let (problem, table) = amid(&map, rules, &others, mission);
         let occupied = |cycle: &u32| table.occupant(mission.entry, u64::from(*cycle)).is_some();
         let ready = match rules {
-            Rules::Queues => (0..).find(|cycle| !occupied(cycle)).unwrap(),
-            Rules::OnMap => 0,
+            Rules::DisappearAtTarget => (0..).find(|cycle| !occupied(cycle)).unwrap(),
+            Rules::StayAtTarget => 0,
         };
         let expected = first_arrival(&map, &others, rules, mission, ready, false);
         let rover = others.len();
@@ -145,12 +149,12 @@ proptest! {
         case in case(6, 5, 12),
         seed in any::<u64>(),
         lengths in prop::collection::vec(1u64..40, 16),
-        (enter, gap) in (0u64..20, 1u64..6),
+        (enter, headway) in (0u64..20, 1u64..6),
     ) {
         let map = case.roadmap();
         let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
         let travel = |a: VertexId, b: VertexId| lengths[(a.0 + b.0) as usize % lengths.len()];
-        let pace = Pace { travel: &travel, enter, gap };
+        let pace = Pace { travel: &travel, enter, headway };
         for order in orders(seed) {
             let table = reference_in_time(&problem, &pace, &order);
             if problem.ill_formed().is_empty() {
@@ -187,7 +191,9 @@ proptest! {
     }
 
     #[test]
-    fn prioritised_planning_names_whom_it_does_not_serve(case in case(6, 5, 12), seed in any::<u64>()) {
+    fn prioritised_planning_names_whom_it_does_not_serve(
+        case in case(6, 5, 12), seed in any::<u64>(),
+    ) {
         let map = case.roadmap();
         let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
         for order in orders(seed) {
@@ -224,7 +230,11 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_plan_is_better_than_the_coupled_one(case in case(3, 2, 3)) {
@@ -252,9 +262,11 @@ proptest! {
     }
 
     #[test]
-    fn the_reference_is_no_better_than_the_coupled_plan(case in case(4, 3, 4), seed in any::<u64>()) {
+    fn the_reference_is_no_better_than_the_coupled_plan(
+        case in case(4, 3, 4), seed in any::<u64>(),
+    ) {
         let map = case.roadmap();
-        let problem = Problem::new(&map, case.missions(), Rules::Queues);
+        let problem = Problem::new(&map, case.missions(), Rules::DisappearAtTarget);
         let Ok(problem) = problem else { return Ok(()) };
         let best = coupled(&problem, &CoupledConfig::default()).unwrap();
         for order in orders(seed) {
@@ -267,18 +279,17 @@ proptest! {
 #[test]
 fn a_full_ring_cannot_turn_and_one_with_a_gap_can() {
     let map = grid(2, 2, &[]);
-    // 0 1
-    // 2 3
+    // 0 1 2 3
     let turn = [(0, 1), (1, 3), (3, 2), (2, 0)].map(|(a, b)| Mission::new(v(a), v(b)));
     let config = CoupledConfig::default();
-    let full = Problem::new(&map, turn.to_vec(), Rules::OnMap).unwrap();
+    let full = Problem::new(&map, turn.to_vec(), Rules::StayAtTarget).unwrap();
     let error = coupled(&full, &config).unwrap_err();
     assert!(matches!(error, CoupledError::Unsolvable { .. }), "{error}");
     assert_eq!(brute_force(&full, false), None);
-    let gap = Problem::new(&map, turn[..3].to_vec(), Rules::OnMap).unwrap();
+    let gap = Problem::new(&map, turn[..3].to_vec(), Rules::StayAtTarget).unwrap();
     assert_eq!(coupled(&gap, &config).unwrap().cost, 3);
     // Out of queues each enters when it likes.
-    let queued = Problem::new(&map, turn.to_vec(), Rules::Queues).unwrap();
+    let queued = Problem::new(&map, turn.to_vec(), Rules::DisappearAtTarget).unwrap();
     assert_eq!(
         brute_force(&queued, false),
         Some(coupled(&queued, &config).unwrap().cost)
@@ -292,7 +303,7 @@ fn whoever_stands_at_its_goal_may_have_to_give_way_first() {
     text += "positions_m = [[0, 0], [5, 0], [9, 0], [5, 5]]\nedges = [[0, 1], [1, 2], [1, 3]]";
     let map = farside_worlds::Roadmap::from_toml(&text).unwrap();
     let missions = vec![Mission::new(v(1), v(1)), Mission::new(v(0), v(2))];
-    let problem = Problem::new(&map, missions, Rules::OnMap).unwrap();
+    let problem = Problem::new(&map, missions, Rules::StayAtTarget).unwrap();
     let best = coupled(&problem, &CoupledConfig::default()).unwrap();
     // It leaves in cycle 1, is passed, and is back in cycle 2 or 3; the other needs 2 at best.
     assert_eq!(best.cost, brute_force(&problem, false).unwrap());
@@ -314,7 +325,7 @@ fn whoever_stands_at_its_goal_may_have_to_give_way_first() {
 fn the_limit_holds() {
     let map = grid(5, 4, &[]);
     let missions = [(0, 19), (19, 0), (4, 15), (15, 4)].map(|(a, b)| Mission::new(v(a), v(b)));
-    let problem = Problem::new(&map, missions.to_vec(), Rules::Queues).unwrap();
+    let problem = Problem::new(&map, missions.to_vec(), Rules::DisappearAtTarget).unwrap();
     let config = |max_expansions| CoupledConfig {
         max_expansions,
         independence: false,

@@ -6,25 +6,27 @@ use super::plan::{Failure, Outcome, Plan, Trip};
 use super::problem::{Problem, Rules};
 use super::safe_intervals::{FOREVER, TimedVisit};
 
-/// How time passes for a rover on a roadmap, counted in ticks: cycles, nanoseconds, or what one likes.
+/// How time passes for a rover on a roadmap, counted in ticks: cycles, nanoseconds, or what one
+/// likes.
 ///
 /// ```
 /// use farside_network::mapf::Pace;
 /// use farside_worlds::VertexId as V;
 /// assert_eq!((Pace::CYCLES.travel)(V(3), V(4)), 1);
-/// let slow = Pace { travel: &|from, _| 10 + u64::from(from.0), enter: 5, gap: 2 };
+/// let slow = Pace { travel: &|from, _| 10 + u64::from(from.0), enter: 5, headway: 2 };
 /// assert_eq!((slow.travel)(V(3), V(4)), 13);
 /// ```
 #[derive(Clone, Copy)]
 pub struct Pace<'a> {
     /// From setting out along an edge to being ready to set out again; at least 1.
     pub travel: &'a dyn Fn(VertexId, VertexId) -> u64,
-    /// From coming in at the entry to being ready to set out. With [`Rules::OnMap`] it counts from the
-    /// start.
+    /// From coming in at the entry to being ready to set out. With [`Rules::StayAtTarget`] it
+    /// counts from the start.
     pub enter: u64,
-    /// The least time between one rover's leaving a vertex and the next one's setting out for it. With
-    /// none a rover may follow at once; but still no two may change places, nor several in a ring.
-    pub gap: u64,
+    /// The least time between one rover's leaving a vertex and the next one's setting out for it.
+    /// With none a rover may follow at once; but still no two may change places, nor several in a
+    /// ring.
+    pub headway: u64,
 }
 
 impl Pace<'static> {
@@ -32,7 +34,7 @@ impl Pace<'static> {
     pub const CYCLES: Pace<'static> = Pace {
         travel: &|_, _| 1,
         enter: 1,
-        gap: 0,
+        headway: 0,
     };
 }
 
@@ -44,7 +46,7 @@ impl Pace<'static> {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Timetable {
     /// Each rover's visits one after the other; none for a rover that is not on the roadmap at all.
-    /// The last visit has no end with [`Rules::OnMap`].
+    /// The last visit has no end with [`Rules::StayAtTarget`].
     pub ways: Vec<Vec<TimedVisit>>,
     /// Rovers that do not reach their goals, in the order in which they were planned.
     pub failures: Vec<Failure>,
@@ -60,9 +62,10 @@ pub struct Timetable {
 /// use farside_worlds::{Roadmap, VertexId as V};
 /// let text = "name = 'pair'\nboundary = [0, 1]\npositions_m = [[0, 0], [5, 0]]\nedges = [[0, 1]]";
 /// let map = Roadmap::from_toml(text)?;
-/// let problem = Problem::new(&map, vec![Mission::new(V(0), V(1))], Rules::Queues)?;
+/// let problem = Problem::new(&map, vec![Mission::new(V(0), V(1))], Rules::DisappearAtTarget)?;
 /// let visit = |vertex, start, end| TimedVisit { vertex: V(vertex), start, end };
-/// let hasty = Timetable { ways: vec![vec![visit(0, 0, 1), visit(1, 1, 3)]], ..Timetable::default() };
+/// let ways = vec![vec![visit(0, 0, 1), visit(1, 1, 3)]];
+/// let hasty = Timetable { ways, ..Timetable::default() };
 /// assert_eq!(hasty.errors(&problem, &Pace::CYCLES), []);
 /// let slow = Pace { travel: &|_, _| 7, ..Pace::CYCLES };
 /// assert_eq!(hasty.errors(&problem, &slow), [TimetableError::Way { rover: 0, visit: 1 }]);
@@ -142,7 +145,7 @@ impl Timetable {
         visits.sort_unstable();
         for pair in visits.windows(2) {
             let ((vertex, _, end, a), (then, start, _, b)) = (pair[0], pair[1]);
-            if vertex == then && start < end.saturating_add(pace.gap) {
+            if vertex == then && start < end.saturating_add(pace.headway) {
                 let rovers = (a, b);
                 errors.push(TimetableError::Meet { vertex, rovers });
             }
@@ -160,7 +163,7 @@ fn fits(
     at: usize,
 ) -> bool {
     let (mission, visit) = (problem.missions()[rover], way[at]);
-    let stays = problem.rules() == Rules::OnMap;
+    let stays = problem.rules() == Rules::StayAtTarget;
     let takes = match at.checked_sub(1).map(|before| way[before]) {
         None => {
             if visit.vertex != mission.entry || stays && visit.start != 0 {

@@ -1,5 +1,5 @@
-//! The keys of a scenario's `[network.max_plus]` table. Every reading of the paper that its text leaves open
-//! is a key.
+//! The keys of a scenario's `[network.max_plus]` table. Every reading of the paper that its text
+//! leaves open is a key.
 
 use std::ops::RangeInclusive;
 
@@ -37,31 +37,34 @@ settings! {
     pub struct MaxPlusConfig {
         /// The most iterations of max-plus in a cycle (the paper: 100).
         pub max_iterations: u32 = 100;
-        /// How fast each node computes: pairs of candidate paths a second, `"paper"` or `"unlimited"`.
-        /// The optimisation uses what is ready in its time.
+        /// How fast each node computes: pairs of candidate paths a second, `"paper"` or
+        /// `"unlimited"`. The optimisation uses what is ready in its time.
         pub processor: Speed [with = "processor"] = PAPER_SPEED,
             such_that("more than 0/s", Speed::to_string, |speed: &Speed| *speed != Speed::PerS(0));
-        /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as computed.
-        /// 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum on DCOPs
-        /// through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus oscillates.
+        /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as
+        /// computed. 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum
+        /// on DCOPs through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus
+        /// oscillates.
         pub damping: f64,
             0.0..1.0;
-        /// Anytime max-plus: a node whose optimisation has not converged when its time is over takes the
-        /// best of all iterations' assignments instead of the last. It judges by what it knows: its own
-        /// rovers' payoffs, alone, with each other, and with the paths that its neighbours announce
-        /// beside their vectors. After Vlassis, Elhorst and Kok (2004), who judge along a spanning
-        /// tree of the whole network.
+        /// Anytime max-plus: a node whose optimisation has not converged when its time is over
+        /// takes the best of all iterations' assignments instead of the last. It judges by what it
+        /// knows: its own rovers' payoffs, alone, with each other, and with the paths that its
+        /// neighbours announce beside their vectors. After Vlassis, Elhorst and Kok (2004), who
+        /// judge along a spanning tree of the whole network.
         pub anytime: bool;
         /// Outsourcing: a node with more to compute than its processor can do in the time has radio
-        /// neighbours with less of it compute for it: they make max-plus vectors to their own rovers from what
-        /// it sends instead of them. Does nothing where processors take no time.
+        /// neighbours with less of it compute for it: they make max-plus vectors to their own
+        /// rovers from what it sends instead of them. Does nothing where processors take no time.
         pub outsourcing: bool;
-        /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that leads into
-        /// a node's part of the roadmap with one rover more on each vertex; in [0, 1e9], 0 is the paper's.
+        /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that
+        /// leads into a node's part of the roadmap with one rover more on each vertex; in [0, 1e9],
+        /// 0 is the paper's.
         pub congestion_weight: f64,
             WEIGHTS;
-        /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in what it says of
-        /// its crowding. With 0 what its own rovers are is all, which neighbours know anyway.
+        /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in
+        /// what it says of its crowding. With 0 what its own rovers are is all, which neighbours
+        /// know anyway.
         pub congestion_spread: f64,
             0.0..1.0;
         /// C, the estimate of the longest path, in diameters of the roadmap.
@@ -70,10 +73,10 @@ settings! {
         /// What a path loses that leads back to the vertex just left.
         pub backtrack_penalty: f64 = 40.0,
             WEIGHTS;
-        /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait there.
-        /// Below `backtrack_penalty`, rovers that face each other wait for ever; near C, none
-        /// ever waits in a pocket for another to pass, and two of them go round in circles. A very
-        /// high one leaves only the zero path to wait by.
+        /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait
+        /// there. Below `backtrack_penalty`, rovers that face each other wait for ever; near C,
+        /// none ever waits in a pocket for another to pass, and two of them go round in circles. A
+        /// very high one leaves only the zero path to wait by.
         pub leaf_wait_penalty: f64 = 45.0,
             WEIGHTS;
         /// The payoff of a collision in the cycle to come is minus this many C.
@@ -92,7 +95,8 @@ settings! {
         pub acceleration: bool = true;
         /// Whether it may follow one that itself follows. The paper's implementation ignores this.
         pub acceleration_chains: bool;
-        /// Entry gates: an entry's owner lets a rover in only while its neighbourhood is not too full.
+        /// Entry gates: an entry's owner lets a rover in only while its neighbourhood is not too
+        /// full.
         pub entry_gates: bool;
         /// The share of the vertices of the owner's local neighbourhood graph up to which gates are
         /// open, from 0 to 1.
@@ -100,8 +104,8 @@ settings! {
             0.0..=1.0;
         /// Wait-for probes, which confirm deadlocks and name the rovers in them.
         pub deadlock_probes: bool;
-        /// A rover that has come no nearer to its goal for so many cycles waits, as probes see it; at
-        /// least 1. So often a probe is sent for it.
+        /// A rover that has come no nearer to its goal for so many cycles waits, as probes see it;
+        /// at least 1. So often a probe is sent for it.
         pub probe_after: u32 = 6,
             1..;
         /// Local resolution of confirmed deadlocks: one of the rovers goes aside. Sends probes too.

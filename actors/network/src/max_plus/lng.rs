@@ -1,7 +1,8 @@
 //! The local neighbourhood graph of a sensor node (*network-guided*, section 3.2): the part of the
 //! roadmap owned by the node and its radio neighbours, with its leaves and its shortest paths.
 //!
-//! Static: built once, from the roadmap and the network. Who stands where is no affair of this file.
+//! Static: built once, from the roadmap and the network. Who stands where is no affair of this
+//! file.
 
 use std::collections::VecDeque;
 use std::sync::OnceLock;

@@ -1,4 +1,5 @@
-//! What nodes say to each other in a planning cycle of the policy `max-plus`, and what they record of it.
+//! What nodes say to each other in a planning cycle of the policy `max-plus`, and what they record
+//! of it.
 
 use farside_worlds::NodeId;
 use serde::{Deserialize, Serialize};
@@ -6,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use super::candidates::CandidatePath;
 use crate::ids::RoverId;
 
-/// What a node has to compute in an iteration of max-plus, in pairs of candidate paths, as it was in the
-/// cycle before.
+/// What a node has to compute in an iteration of max-plus, in pairs of candidate paths, as it was
+/// in the cycle before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Load {
     /// Its own part, nothing handed over.
     pub pairs: u64,
-    /// By how much its neighbours' parts, as it heard of them, are more than their processors can do:
-    /// they all may want to hand over.
+    /// By how much its neighbours' parts, as it heard of them, are more than their processors can
+    /// do: they all may want to hand over.
     pub claims: u64,
 }
 
@@ -50,11 +51,12 @@ pub struct MaxPlus {
     pub settled: bool,
     /// The vectors.
     pub vectors: Vec<Vector>,
-    /// With `network.max_plus.outsourcing`: what the receiver is to make vectors of, from and to the same rovers.
-    /// The values are of the speaker's paths: what each is worth to it, the receiver's vector to it
-    /// left out.
+    /// With `network.max_plus.outsourcing`: what the receiver is to make vectors of, from and to
+    /// the same rovers. The values are of the speaker's paths: what each is worth to it, the
+    /// receiver's vector to it left out.
     pub bases: Vec<Vector>,
-    /// With `network.max_plus.anytime`: what the node's rovers would do as things stood before this iteration.
+    /// With `network.max_plus.anytime`: what the node's rovers would do as things stood before this
+    /// iteration.
     pub choices: Vec<Choice>,
 }
 

@@ -32,7 +32,7 @@ impl Payoffs {
     pub(crate) fn new(config: &NetworkConfig, roadmap: &Roadmap) -> Self {
         // On a large roadmap the diameter takes a while, and other policies have no payoffs.
         let diameter = match config.policy {
-            Policy::Paper => roadmap.diameter(),
+            Policy::MaxPlus => roadmap.diameter(),
             _ => 0,
         };
         let longest = config.max_plus.longest_path_factor * f64::from(diameter.max(1));
@@ -85,9 +85,9 @@ pub(crate) fn divisor(t: u32) -> f64 {
     libm::exp((10.0 - f64::from(t)).max(1.0))
 }
 
-/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where it
-/// is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero path, and
-/// the wait on a leaf) holds its vertex for ever; any other claims nothing after its end.
+/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where
+/// it is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero
+/// path, and the wait on a leaf) holds its vertex for ever; any other claims nothing after its end.
 pub(crate) fn collision_from(a: &CandidatePath, b: &CandidatePath, first: u32) -> Option<u32> {
     let stays = |path: &CandidatePath| path.length() == 0;
     let cycles = match (stays(a), stays(b)) {

@@ -48,7 +48,7 @@ pub(crate) struct Rules {
 /// What one node optimises in one cycle: its own rovers, its neighbours' rovers, and the edges
 /// between them that touch an own one.
 #[derive(Debug)]
-pub(crate) struct MaxPlus {
+pub(crate) struct Solver {
     payoffs: Payoffs,
     rules: Rules,
     agents: Vec<Agent>,
@@ -86,7 +86,7 @@ fn place_of(i: usize, j: usize) -> usize {
     j - usize::from(j > i)
 }
 
-impl MaxPlus {
+impl Solver {
     /// The problem of a node with its own `rovers`, whose paths have their unary payoffs.
     pub(crate) fn new(
         payoffs: Payoffs,
@@ -94,7 +94,7 @@ impl MaxPlus {
         rovers: Vec<(RoverId, Vec<CandidatePath>)>,
     ) -> Self {
         let own = rovers.len();
-        let mut problem = MaxPlus {
+        let mut problem = Solver {
             payoffs,
             rules,
             agents: Vec::new(),
@@ -185,8 +185,8 @@ impl MaxPlus {
         if self.anytime.is_none() {
             return Edge::handed_over((self.agents[i].paths().len(), self.agents[j].paths().len()));
         }
-        // Who judges assignments looks at one pair of it now and then. That all of them are made for
-        // that is a short cut, like others.
+        // Who judges assignments looks at one pair of it now and then. That all of them are made
+        // for that is a short cut, like others.
         let mut edge = self.edge_for_free(i, j);
         edge.hand_over();
         edge
@@ -315,8 +315,8 @@ impl MaxPlus {
         }
     }
 
-    /// The vectors for the rovers of `node` that changed in the last iteration; and of those that it
-    /// makes itself, the bases that did.
+    /// The vectors for the rovers of `node` that changed in the last iteration; and of those that
+    /// it makes itself, the bases that did.
     pub(crate) fn changed_for(&self, node: NodeId) -> (Vec<Vector>, Vec<Vector>) {
         let (mut vectors, mut bases) = (Vec::new(), Vec::new());
         let brought = || self.brought.iter().filter(|(by, _)| *by == node);

@@ -40,7 +40,8 @@ pub(crate) const ALL: [Metric; 38] = [
     ),
     Metric::new("cycles", "planning cycles", "cycles", Number, Lower),
     Metric::new("deadlock", "deadlock", "", Word, Neither),
-    Metric::new("deadlocked", "standstill", "", Rate, Lower),
+    Metric::new("deadlocked", "deadlock or livelock", "", Rate, Lower),
+    Metric::new("failovers", "failovers", "", Number, Neither),
     Metric::new(
         "intervention_rate",
         "cycles with an intervention",
@@ -147,7 +148,6 @@ pub(crate) const ALL: [Metric; 38] = [
         Number,
         Neither,
     ),
-    Metric::new("takeovers", "takeovers", "", Number, Neither),
     Metric::new(
         "time_ratio",
         "time of those that arrived over the shortest path",

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 use farside::SimDuration;
 use farside_worlds::VertexId;
 
-use super::Ways;
+use super::EdgeTimes;
 
 /// A rover that is about to drive along the edge from `here` to `next`.
 struct Start {
@@ -16,9 +16,9 @@ struct Start {
     speed: f64,
 }
 
-impl Ways<'_> {
-    /// The least time from standing at `from` to standing at `to`: on the fastest way, rolling through
-    /// each vertex where the rover may. One that is not certain where it is never rolls.
+impl EdgeTimes<'_> {
+    /// The least time from standing at `from` to standing at `to`: on the fastest way, rolling
+    /// through each vertex where the rover may. One that is not certain where it is never rolls.
     ///
     /// Of two rovers that set out along the same edge the one that is not later and not slower has
     /// no more time before it. So of those that are neither, all are followed.
@@ -100,12 +100,13 @@ mod tests {
 
     #[test]
     fn straight_on_it_stops_only_at_the_end() {
-        // 0 1 2 3
-        // 4 5 6 7, 10 m apart.
+        // 0 1 2 3 4 5 6 7, 10 m apart.
         let roadmap = grid(4, 2, &[]);
         let time = |config: &NetworkConfig, from, to| {
             let roadmap = &roadmap;
-            Ways { roadmap, config }.alone(v(from), v(to)).as_nanos()
+            EdgeTimes { roadmap, config }
+                .alone(v(from), v(to))
+                .as_nanos()
         };
         let config = config();
         // Up to 2 m/s and down again takes 2 s over 2 m each: 2 + 26 / 2 + 2.
@@ -123,7 +124,7 @@ mod tests {
     }
 
     /// Tries every simple way, driven as a rover drives that always holds the next grant.
-    fn walk(ways: &Ways<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
+    fn walk(ways: &EdgeTimes<'_>, path: &mut Vec<VertexId>, to: VertexId, best: &mut SimDuration) {
         let here = path[path.len() - 1];
         if here == to {
             let (mut speed, mut time) = (0.0, SimDuration::ZERO);
@@ -147,8 +148,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-        /// On grids that were shaken, so that ways turn by all angles: the way that comes to an edge
-        /// first need not be the one that comes to its end first.
+        /// On grids that were shaken, so that ways turn by all angles: the way that comes to an
+        /// edge first need not be the one that comes to its end first.
         #[test]
         fn no_way_is_faster(shifts_m in prop::collection::vec((-4.0..4.0f64, -4.0..4.0f64), 9)) {
             let even = grid(3, 3, &[]);
@@ -157,7 +158,7 @@ mod tests {
             let edges = even.edges().to_vec();
             let roadmap = Roadmap::new("shaken", places, edges, even.boundary().to_vec()).unwrap();
             let config = config();
-            let ways = Ways { roadmap: &roadmap, config: &config };
+            let ways = EdgeTimes { roadmap: &roadmap, config: &config };
             for from in roadmap.vertices() {
                 for to in roadmap.vertices().filter(|to| *to != from) {
                     let mut best = SimDuration::from_secs(1_000_000);

@@ -1,5 +1,5 @@
-//! What every node has, whatever its policy: its vertices and neighbours, and the ways to say something.
-//! What it says and hears of failover is in [`failover`](super::failover).
+//! What every node has, whatever its policy: its vertices and neighbours, and the ways to say
+//! something. What it says and hears of failover is in [`failover`](super::failover).
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 
 use super::Node;
-use super::failover::Wards;
+use super::failover::FailoverState;
 use super::messages::Locations;
 use crate::config::Sabotage;
 use crate::failover::messages::Content;
@@ -18,7 +18,7 @@ use crate::max_plus::messages::Load;
 use crate::reservation::Atlas;
 use crate::rover::Rover;
 use crate::safety::messages::{Departed, Grant, Holding, Whereabouts};
-use crate::safety::{Duty, Ledger};
+use crate::safety::{Duty, OccupancyTable};
 use crate::shared::Shared;
 
 /// A node without its policy.
@@ -29,8 +29,8 @@ pub(super) struct Base {
     pub(super) rovers: Vec<Address<Rover>>,
     /// The planning cycle.
     pub(super) cycle: u32,
-    /// Who answers for which node's vertices, with `network.takeover_after`.
-    pub(super) wards: Option<Wards>,
+    /// Who answers for which node's vertices, with `network.failover_after`.
+    pub(super) failover: Option<FailoverState>,
 }
 
 /// What a node knows of a neighbour.
@@ -54,7 +54,7 @@ impl Base {
             neighbors: Vec::new(),
             rovers: Vec::new(),
             cycle: 0,
-            wards: None,
+            failover: None,
         }
     }
 
@@ -81,8 +81,8 @@ impl Base {
         self.neighbors.binary_search_by_key(&id, |n| n.id).ok()
     }
 
-    /// Whether it may take part: where nodes are given the roadmap over the network, only with all of
-    /// it.
+    /// Whether it may take part: where nodes are given the roadmap over the network, only with all
+    /// of it.
     pub(super) fn knows_roadmap(&self, ctx: &mut Context<'_, Node>) -> bool {
         let source = self.site.roadmap_from;
         source.is_none() || ctx.durable::<Atlas>().is_known(source)
@@ -121,7 +121,7 @@ impl Base {
         let message = Locations {
             node: self.id,
             cycle: self.cycle,
-            holdings: ctx.durable::<Ledger>().holdings(),
+            holdings: ctx.durable::<OccupancyTable>().holdings(),
             load,
             crowding,
             answers: self.told_answers(),
@@ -136,16 +136,16 @@ impl Base {
         self.tell_partners(ctx, &Content::Locations(message));
     }
 
-    /// The same, for policies that have no exchange of locations: with failover, silence tells, and who
-    /// has lost a report is told again.
+    /// The same, for policies that have no exchange of locations: with failover, silence tells, and
+    /// who has lost a report is told again.
     pub(super) fn locate_for_failover(&self, ctx: &mut Context<'_, Node>) {
         if self.takes_over() {
             self.locate(ctx, None, None);
         }
     }
 
-    /// Takes the grant of a step for proof that it is being taken: what [`Sabotage::FreeOnGrant`] is
-    /// for. Returns what is free because of that: the vertex left, if it is one of this node's.
+    /// Takes the grant of a step for proof that it is being taken: what [`Sabotage::FreeOnGrant`]
+    /// is for. Returns what is free because of that: the vertex left, if it is one of this node's.
     pub(super) fn presume_left(
         &self,
         ctx: &mut Context<'_, Node>,
@@ -165,7 +165,7 @@ impl Base {
             self.tell_departure(ctx, self.site.sensors.owner(from), presumed);
             return Vec::new();
         }
-        ctx.durable::<Ledger>()
+        ctx.durable::<OccupancyTable>()
             .hear(&presumed, None, self.cycle)
             .freed
     }
@@ -195,7 +195,8 @@ impl Base {
         to: NodeId,
         whereabouts: Whereabouts,
     ) {
-        ctx.durable::<Ledger>().take_on(Duty { to, whereabouts });
+        ctx.durable::<OccupancyTable>()
+            .take_on(Duty { to, whereabouts });
         let (node, acting) = (self.id, self.acting(to));
         if acting != node {
             let message = Departed { node, whereabouts };

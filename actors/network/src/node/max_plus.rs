@@ -50,7 +50,7 @@ pub struct ProcessorDone {
 pub(super) struct MaxPlusPolicy {
     /// The node's local neighbourhood graph.
     graph: Arc<LocalGraph>,
-    /// The one over all homes that the node answers for, where it is another; and which homes.
+    /// The one over all regions that the node answers for, where it is another; and which regions.
     surveyed: Option<(Vec<NodeId>, Arc<LocalGraph>)>,
     phase: Phase,
     optimiser: Optimiser,
@@ -87,32 +87,38 @@ impl MaxPlusPolicy {
         }
     }
 
-    /// The graph to plan in: around all homes that this node answers for, as far as anybody does.
+    /// The graph to plan in: around all regions that this node answers for, as far as anybody does.
     pub(super) fn survey(&mut self, base: &Base) {
-        let Some(wards) = &base.wards else { return };
+        let Some(failover) = &base.failover else {
+            return;
+        };
         let sensors = &base.site.sensors;
-        let around = |&home: &NodeId| std::iter::once(home).chain(sensors.neighbors(home).to_vec());
-        let all = |homes: &[NodeId]| {
-            let mut all: Vec<NodeId> = homes.iter().flat_map(around).collect();
+        let around =
+            |&region: &NodeId| std::iter::once(region).chain(sensors.neighbors(region).to_vec());
+        let all = |regions: &[NodeId]| {
+            let mut all: Vec<NodeId> = regions.iter().flat_map(around).collect();
             all.sort_unstable();
             all.dedup();
             all
         };
-        let open = |home: &NodeId| {
-            let acting = wards.acting[home.0 as usize];
-            base.answers_for(*home) || acting != base.id && !base.is_silent(acting)
+        let open = |region: &NodeId| {
+            let acting = failover.acting[region.0 as usize];
+            base.answers_for(*region) || acting != base.id && !base.is_silent(acting)
         };
-        let mut homes = all(&wards.homes);
-        homes.retain(open);
-        let graph = if homes == all(&[base.id]) {
+        let mut regions = all(&failover.regions);
+        regions.retain(open);
+        let graph = if regions == all(&[base.id]) {
             None
         } else {
             match &self.surveyed {
-                Some((known, graph)) if *known == homes => Some((homes, graph.clone())),
+                Some((known, graph)) if *known == regions => Some((regions, graph.clone())),
                 _ => {
-                    let vertices = homes.iter().flat_map(|&home| sensors.owned(home)).copied();
+                    let vertices = regions
+                        .iter()
+                        .flat_map(|&region| sensors.owned(region))
+                        .copied();
                     let graph = LocalGraph::over(&base.site.roadmap, vertices.collect());
-                    Some((homes, Arc::new(graph)))
+                    Some((regions, Arc::new(graph)))
                 }
             }
         };

@@ -17,9 +17,10 @@ pub struct Locations {
     pub holdings: Vec<Holding>,
     /// With `network.max_plus.outsourcing`: how much the node has to compute.
     pub load: Option<Load>,
-    /// With `network.max_plus.congestion_spread`: how crowded it is at the node and behind it, in rovers a vertex.
+    /// With `network.max_plus.congestion_spread`: how crowded it is at the node and behind it, in
+    /// rovers a vertex.
     pub crowding: Option<f64>,
-    /// With `network.takeover_after`: the nodes for whose vertices it answers.
+    /// With `network.failover_after`: the nodes for whose vertices it answers.
     pub answers: Vec<NodeId>,
 }
 

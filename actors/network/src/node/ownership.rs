@@ -1,15 +1,15 @@
-//! The safety protocol's side of a node, the same for all policies: beacons, departures, and what has to
-//! be said again until it is heard.
+//! The safety protocol's side of a node, the same for all policies: beacons, departures, and what
+//! has to be said again until it is heard.
 
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 
 use super::Node;
 use super::messages::Locations;
-use crate::failover::Charter;
+use crate::failover::FailoverRecord;
 use crate::failover::messages::Content;
 use crate::safety::messages::{Beacon, Departed, DepartedAck, Whereabouts};
-use crate::safety::{Ledger, Occupant};
+use crate::safety::{OccupancyTable, Occupant};
 
 impl Node {
     /// Takes in a fact about a rover.
@@ -19,44 +19,51 @@ impl Node {
         fact: &Whereabouts,
         goal: Option<VertexId>,
     ) {
-        if self.base.wards.is_some() {
-            ctx.durable::<Charter>().note(fact);
+        if self.base.failover.is_some() {
+            ctx.durable::<FailoverRecord>().note(fact);
         }
-        let news = ctx.durable::<Ledger>().hear(fact, goal, self.base.cycle);
+        let news = ctx
+            .durable::<OccupancyTable>()
+            .hear(fact, goal, self.base.cycle);
         self.policy.heard(&self.base, ctx, fact, &news);
     }
 
     /// Repeats grants and departures that were not answered.
     pub(super) fn repeat(&mut self, ctx: &mut Context<'_, Self>) {
-        for (vertex, held) in ctx.durable::<Ledger>().unconfirmed(self.base.cycle) {
+        for (vertex, held) in ctx.durable::<OccupancyTable>().unconfirmed(self.base.cycle) {
             self.base
                 .send_grant(ctx, held.rover, held.step, Some(vertex));
         }
-        let ledger = ctx.durable::<Ledger>();
-        let stays = self.base.site.stays;
-        let at_goal =
-            |(v, held): &(VertexId, Occupant)| !stays && held.arrived && held.goal == Some(*v);
-        let leaving: Vec<_> = ledger.occupied().filter(at_goal).map(|(_, h)| h).collect();
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let stay_at_target = self.base.site.stay_at_target;
+        let at_goal = |(v, held): &(VertexId, Occupant)| {
+            !stay_at_target && held.arrived && held.goal == Some(*v)
+        };
+        let leaving: Vec<_> = occupancy
+            .occupied()
+            .filter(at_goal)
+            .map(|(_, h)| h)
+            .collect();
         for held in leaving {
             self.base.send_grant(ctx, held.rover, held.step + 1, None);
         }
-        for duty in ctx.durable::<Ledger>().duties().to_vec() {
+        for duty in ctx.durable::<OccupancyTable>().duties().to_vec() {
             self.send_departed(ctx, duty.to, duty.whereabouts);
         }
     }
 
-    /// Reports a departure to whoever answers for the vertices of `home`.
-    fn send_departed(&mut self, ctx: &mut Context<'_, Self>, home: NodeId, fact: Whereabouts) {
-        let (node, to) = (self.base.id, self.base.acting(home));
+    /// Reports a departure to whoever answers for the vertices of `region`.
+    fn send_departed(&mut self, ctx: &mut Context<'_, Self>, region: NodeId, fact: Whereabouts) {
+        let (node, to) = (self.base.id, self.base.acting(region));
         if to != node {
             let whereabouts = fact;
             let message = Departed { node, whereabouts };
             self.base.tell(ctx, to, Content::Departed(message));
-        } else if self.base.answers_for(home) {
+        } else if self.base.answers_for(region) {
             // It took over whom it had something to tell.
             self.hear(ctx, &fact, None);
-            ctx.durable::<Ledger>()
-                .acknowledged(home, fact.rover, fact.step);
+            ctx.durable::<OccupancyTable>()
+                .acknowledged(region, fact.rover, fact.step);
         }
     }
 }
@@ -68,15 +75,17 @@ impl Handler<Beacon> for Node {
         // A rover's first beacon from here may already say that it leaves again: the duty to the
         // node that it came from arises all the same.
         let here = fact.vertex.filter(|&v| self.base.owns(v));
-        let ledger = ctx.durable::<Ledger>();
-        let expected = here.and_then(|v| ledger.occupant(v)).is_some_and(|held| {
-            held.rover == fact.rover && held.step == fact.step && !held.arrived
-        });
+        let occupancy = ctx.durable::<OccupancyTable>();
+        let expected = here
+            .and_then(|v| occupancy.occupant(v))
+            .is_some_and(|held| {
+                held.rover == fact.rover && held.step == fact.step && !held.arrived
+            });
         self.hear(ctx, &fact, Some(goal));
         if expected {
             self.base.report_departure(ctx, fact, beacon.previous);
         }
-        if here == Some(goal) && fact.moving_to.is_none() && !self.base.site.stays {
+        if here == Some(goal) && fact.moving_to.is_none() && !self.base.site.stay_at_target {
             self.base.send_grant(ctx, fact.rover, fact.step + 1, None);
         }
         Ok(())
@@ -107,7 +116,7 @@ impl Handler<DepartedAck> for Node {
 impl Handler<Locations> for Node {
     fn handle(&mut self, message: Locations, ctx: &mut Context<'_, Self>) -> Outcome {
         let base = &mut self.base;
-        if base.wards.is_some() {
+        if base.failover.is_some() {
             base.correct(ctx, &message);
         }
         if let Some(at) = base.neighbor(message.node) {

@@ -2,8 +2,8 @@
 //!
 //! A node owns vertices, hears of rovers and takes part in failover in the same way whatever its
 //! policy ([`Base`], and the handlers of [`ownership`](super::ownership) and
-//! [`failover`](super::failover)). Which free vertex is granted to whom is its policy's to decide. A
-//! new policy is a new file beside this one, and a line in [`policy_of`](super::policy_of).
+//! [`failover`](super::failover)). Which free vertex is granted to whom is its policy's to decide.
+//! A new policy is a new file beside this one, and a line in [`policy_of`](super::policy_of).
 
 use std::any::Any;
 

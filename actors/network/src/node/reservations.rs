@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::Node;
 use super::base::Base;
 use super::messages::RoadmapKnown;
-use crate::failover::Charter;
+use crate::failover::FailoverRecord;
 use crate::failover::messages::{Account, Content};
 use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
 use crate::reservation::messages::{Between, ItineraryAnswer, Relay};
 use crate::reservation::{Atlas, Desk, Receipt, Registries, Registry};
 use crate::safety::messages::Whereabouts;
-use crate::safety::{Ledger, News};
+use crate::safety::{News, OccupancyTable};
 
 /// Timer: something is overdue, or a vertex is to be granted.
 #[derive(Serialize, Deserialize)]
@@ -33,9 +33,9 @@ impl Reservations {
     /// Opens the registries; after a crash, what was on its way is repeated.
     pub(super) fn open_registry(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
         if base.answers_for(base.id) && ctx.durable::<Registries>().all.is_empty() {
-            let home = base.id;
+            let region = base.id;
             ctx.durable::<Registries>()
-                .insert(home, Registry::default());
+                .insert(region, Registry::default());
         }
         self.with_registries(base, ctx, |registry, atlas, desk| {
             registry.open(desk);
@@ -43,7 +43,7 @@ impl Reservations {
         });
     }
 
-    /// A cycle begins: rovers that wait without a way apply for one.
+    /// A cycle begins: rovers that wait without a path apply for one.
     pub(super) fn apply(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
         self.with_registries(base, ctx, |registry, _, desk| registry.apply(desk));
     }
@@ -67,26 +67,26 @@ impl Reservations {
         if !news.freed.is_empty() {
             self.with_registries(base, ctx, |registry, _, _| {
                 for &vertex in &news.freed {
-                    registry.book.departed(vertex);
+                    registry.table.departed(vertex);
                 }
             });
         }
     }
 
-    /// Another one than before answers for `home`; with rovers' accounts, this node does.
+    /// Another one than before answers for `region`; with rovers' accounts, this node does.
     pub(super) fn succeed(
         &mut self,
         base: &Base,
         ctx: &mut Context<'_, Node>,
-        home: NodeId,
+        region: NodeId,
         accounts: Option<&[Account]>,
     ) {
-        self.with_registries(base, ctx, |registry, _, desk| registry.renew(desk, home));
+        self.with_registries(base, ctx, |registry, _, desk| registry.renew(desk, region));
         if let Some(accounts) = accounts {
             ctx.durable::<Registries>()
-                .insert(home, Registry::default());
+                .insert(region, Registry::default());
             self.with_registries(base, ctx, |registry, atlas, desk| {
-                if desk.home == home {
+                if desk.region == region {
                     *registry = Registry::succeed(desk, accounts);
                     atlas.share(registry, desk);
                 }
@@ -94,7 +94,7 @@ impl Reservations {
         }
     }
 
-    /// Takes what came for the home `to` from the home `from`.
+    /// Takes what came for the region `to` from the region `from`.
     fn take(
         &mut self,
         base: &Base,
@@ -119,7 +119,7 @@ impl Reservations {
         let knew = base.knows_roadmap(ctx);
         self.with_registries(base, ctx, |registry, atlas, desk| {
             let line = registry.lines.get_mut(&from);
-            let Some(line) = line.filter(|_| desk.home == to) else {
+            let Some(line) = line.filter(|_| desk.region == to) else {
                 return;
             };
             line.acknowledged(&receipt, desk.now);
@@ -152,36 +152,36 @@ impl Reservations {
         let site = base.site.clone();
         let now = ctx.now().as_nanos();
         let ranks = match base.takes_over() {
-            true => ctx.durable::<Charter>().ranks.clone(),
+            true => ctx.durable::<FailoverRecord>().ranks.clone(),
             false => Vec::new(),
         };
-        let desk = |home| Desk {
+        let desk = |region| Desk {
             site: &site,
-            home,
+            region,
             now,
             ranks: &ranks,
         };
-        for (home, registry) in &mut registries.all {
-            work(registry, &mut atlas, &desk(*home));
+        for (region, registry) in &mut registries.all {
+            work(registry, &mut atlas, &desk(*region));
         }
-        for (home, item) in atlas.release() {
-            if let Some(registry) = registries.find(home) {
-                registry.take(&desk(home), item);
+        for (region, item) in atlas.release() {
+            if let Some(registry) = registries.find(region) {
+                registry.take(&desk(region), item);
             }
         }
         hand_over(&mut registries, &mut atlas, &desk);
         let mut next_due = None;
-        for (home, registry) in &mut registries.all {
-            registry.decide_overdue(&desk(*home));
+        for (region, registry) in &mut registries.all {
+            registry.decide_overdue(&desk(*region));
             let next_grant = match atlas.is_known(site.roadmap_from) {
                 true => grant_heads(base, ctx, registry, now),
                 false => None,
             };
-            for itinerary in registry.proposals_due(&desk(*home), base.id) {
-                let RoverId(rover) = itinerary.way.walk.rover;
+            for itinerary in registry.proposals_due(&desk(*region), base.id) {
+                let RoverId(rover) = itinerary.path.request.rover;
                 ctx.send(base.rovers[rover as usize], itinerary);
             }
-            send_items(base, ctx, *home, registry, &ranks);
+            send_items(base, ctx, *region, registry, &ranks);
             let may_use = |to| base.acting(to) != base.id;
             let dues = [next_due, next_grant, registry.next_due(may_use)];
             next_due = dues.into_iter().flatten().min();
@@ -205,11 +205,11 @@ impl Reservations {
     }
 }
 
-/// Sends what is due on the lines of a home.
+/// Sends what is due on the lines of a region.
 fn send_items(
     base: &Base,
     ctx: &mut Context<'_, Node>,
-    home: NodeId,
+    region: NodeId,
     registry: &mut Registry,
     ranks: &[u32],
 ) {
@@ -217,16 +217,16 @@ fn send_items(
     for (&to, line) in &mut registry.lines {
         let acting = base.acting(to);
         if acting == base.id {
-            // It gave that home up, and has not heard to whom: until then it says nothing.
+            // It gave that region up, and has not heard to whom: until then it says nothing.
             continue;
         }
         let Some((receipt, items)) = line.due(now) else {
             continue;
         };
-        let rank = |home: NodeId| ranks.get(home.0 as usize).copied();
-        let between = rank(home).zip(rank(to));
+        let rank = |region: NodeId| ranks.get(region.0 as usize).copied();
+        let between = rank(region).zip(rank(to));
         let between = between.map(|(from_rank, to_rank)| Between {
-            from: home,
+            from: region,
             from_rank,
             to,
             to_rank,
@@ -255,18 +255,18 @@ fn grant_heads(
     let ahead = base.site.longest_step.as_nanos() * u64::from(config.grants_ahead);
     let mut next = None::<u64>;
     let mut left = Vec::new();
-    for (vertex, visit) in registry.book.heads() {
+    for (vertex, visit) in registry.table.heads() {
         let due = visit.start.saturating_sub(ahead);
-        if ctx.durable::<Ledger>().occupant(vertex).is_some() {
+        if ctx.durable::<OccupancyTable>().occupant(vertex).is_some() {
             continue;
         }
         if due > now {
             next = Some(next.map_or(due, |n| n.min(due)));
             continue;
         }
-        let (rover, step) = (visit.walk.rover, visit.step);
+        let (rover, step) = (visit.request.rover, visit.step);
         visit.granted = true;
-        ctx.durable::<Ledger>()
+        ctx.durable::<OccupancyTable>()
             .force(vertex, rover, step, visit.from, base.cycle);
         base.send_grant(ctx, rover, step, Some(vertex));
         let from = visit.from;
@@ -275,27 +275,27 @@ fn grant_heads(
         }
     }
     for vertex in left {
-        registry.book.departed(vertex);
+        registry.table.departed(vertex);
     }
     next
 }
 
-/// Homes that the same node answers for hear from each other at once.
+/// Regions that the same node answers for hear from each other at once.
 fn hand_over<'a>(
     registries: &mut Registries,
     atlas: &mut Atlas,
     desk: &impl Fn(NodeId) -> Desk<'a>,
 ) {
-    let homes: Vec<NodeId> = match registries.all.len() {
+    let regions: Vec<NodeId> = match registries.all.len() {
         0 | 1 => return,
-        _ => registries.all.iter().map(|(home, _)| *home).collect(),
+        _ => registries.all.iter().map(|(region, _)| *region).collect(),
     };
     loop {
         let mut local = Vec::new();
-        for (home, registry) in &mut registries.all {
+        for (region, registry) in &mut registries.all {
             for (&to, line) in &mut registry.lines {
-                if homes.contains(&to) {
-                    local.extend(line.hand_over().into_iter().map(|item| (*home, to, item)));
+                if regions.contains(&to) {
+                    local.extend(line.hand_over().into_iter().map(|item| (*region, to, item)));
                 }
             }
         }
@@ -325,19 +325,19 @@ impl Handler<RegistryDue> for Node {
 
 impl Handler<Relay> for Node {
     fn handle(&mut self, relay: Relay, ctx: &mut Context<'_, Self>) -> Outcome {
-        let Some(homes) = self.between(ctx, &relay) else {
+        let Some(regions) = self.between(ctx, &relay) else {
             return Ok(());
         };
         match self.policy.reservations() {
-            Some(reservations) => reservations.take(&self.base, ctx, homes, relay),
+            Some(reservations) => reservations.take(&self.base, ctx, regions, relay),
             None => Ok(()),
         }
     }
 }
 
 impl Node {
-    /// The homes between which a relay goes; none if it is not for this node, or one of the homes was
-    /// replaced since. What it says of replacements is learned.
+    /// The regions between which a relay goes; none if it is not for this node, or one of the
+    /// regions was replaced since. What it says of replacements is learned.
     fn between(&mut self, ctx: &mut Context<'_, Self>, relay: &Relay) -> Option<(NodeId, NodeId)> {
         let Some(between) = relay.between.filter(|_| self.base.takes_over()) else {
             return Some((relay.node, self.base.id));
@@ -348,11 +348,11 @@ impl Node {
             to,
             to_rank,
         } = between;
-        for (home, rank) in [(from, from_rank), (to, to_rank)] {
-            self.learn(ctx, Replacement { home, rank });
+        for (region, rank) in [(from, from_rank), (to, to_rank)] {
+            self.learn(ctx, Replacement { region, rank });
         }
-        let ranks = &ctx.durable::<Charter>().ranks;
-        let rank = |home: NodeId| ranks.get(home.0 as usize).copied();
+        let ranks = &ctx.durable::<FailoverRecord>().ranks;
+        let rank = |region: NodeId| ranks.get(region.0 as usize).copied();
         let holds = rank(from) == Some(from_rank) && rank(to) == Some(to_rank);
         holds.then_some((from, to))
     }

@@ -11,8 +11,8 @@ use crate::waits::Waits;
 
 /// Every corridor of a roadmap: a maximal chain of vertices with two neighbours each, and the
 /// vertices at its ends, which are junctions or dead ends. A chain that begins and ends at one
-/// junction, or has no junction at all, has its first vertex once. Sorted, each from the end with the
-/// lower number.
+/// junction, or has no junction at all, has its first vertex once. Sorted, each from the end with
+/// the lower number.
 pub(crate) fn corridors(roadmap: &Roadmap) -> Vec<Vec<VertexId>> {
     let inner = |v: VertexId| roadmap.neighbors(v).len() == 2;
     let mut done = BTreeSet::new();
@@ -268,7 +268,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn corridors_are_the_chains_between_junctions(kept in prop::collection::vec(any::<bool>(), 31)) {
+        fn corridors_are_the_chains_between_junctions(
+            kept in prop::collection::vec(any::<bool>(), 31),
+        ) {
             let Some(map) = maze(&kept) else { return Ok(()); };
             let found = corridors(&map);
             let inner = |v: &VertexId| map.neighbors(*v).len() == 2;
@@ -280,7 +282,8 @@ mod tests {
             prop_assert_eq!(&insides, &chains(&map));
             prop_assert_eq!(insides.len(), found.len());
             for line in &found {
-                prop_assert!(line.windows(2).all(|step| map.are_adjacent(step[0], step[1])), "{line:?}");
+                let is_line = line.windows(2).all(|step| map.are_adjacent(step[0], step[1]));
+                prop_assert!(is_line, "{line:?}");
                 prop_assert_eq!(line.iter().collect::<BTreeSet<_>>().len(), line.len());
                 // All but the ends are inner; ends are not, unless the line is closed.
                 let (first, last) = (&line[0], &line[line.len() - 1]);

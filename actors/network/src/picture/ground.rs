@@ -7,7 +7,7 @@ use farside_actors::system::{Files, SetupError};
 use farside_worlds::VertexId;
 use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
-use super::{Ground, Site};
+use super::{Site, Surroundings};
 use crate::Policy;
 use crate::scenario::NetworkScenario;
 use crate::waits::WaitRule;
@@ -20,19 +20,22 @@ pub(super) fn site(
     files: &mut Files,
 ) -> Result<Site, SetupError> {
     let (world, rovers) = (&scenario.world, scenario.team.rovers);
-    let stays = is_grid(world.roadmap.name());
-    let (roadmap, drawn) = if stays {
+    let stay_at_target = is_grid(world.roadmap.name());
+    let (roadmap, drawn) = if stay_at_target {
         let (map, made) = grid(world, rovers, files)?;
         let middles_m = walls(&map, &made, world.cell_m);
         let cell_m = world.cell_m;
-        (made.roadmap().clone(), Ground::Walls { middles_m, cell_m })
+        (
+            made.roadmap().clone(),
+            Surroundings::Walls { middles_m, cell_m },
+        )
     } else {
         let roadmap = ground(world, rovers, files)?.roadmap;
         if in_crater(world) {
             let terrain = Arc::new(crater()?.terrain().clone());
-            (roadmap, Ground::Heights(terrain))
+            (roadmap, Surroundings::Heights(terrain))
         } else {
-            (roadmap, Ground::Unknown)
+            (roadmap, Surroundings::Unknown)
         }
     };
     let sensors = place(world, &roadmap, problem_seed)?;
@@ -43,9 +46,9 @@ pub(super) fn site(
         // Left to the links it is a second, or longer over slow ones, which are not looked at here:
         // then the diagram counts seconds.
         cycle: scenario.network.cycle.unwrap_or(SimDuration::from_secs(1)),
-        coordinates: scenario.network.policy == Policy::Paper,
+        coordinates: scenario.network.policy == Policy::MaxPlus,
         rovers,
-        wait_rule: WaitRule::of(scenario.network.policy, stays),
+        wait_rule: WaitRule::of(scenario.network.policy, stay_at_target),
     })
 }
 

@@ -1,5 +1,5 @@
-//! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1), rovers,
-//! and who stands in whose way.
+//! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1),
+//! rovers, and who stands in whose way.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -12,7 +12,7 @@ use maud::{Markup, PreEscaped, html};
 use super::Site;
 use super::colouring;
 use super::relief::contours;
-use super::{Drawn, Ground};
+use super::{Drawn, Surroundings};
 use crate::tracks::Sighting;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
@@ -110,7 +110,7 @@ impl<'a> Sheet<'a> {
             .nodes()
             .map(|n| run.site.sensors.position_m(n));
         let mut all: Vec<[f64; 2]> = vertices.chain(posts).map(|p| [p.x, p.y]).collect();
-        if let Ground::Walls { middles_m, .. } = &run.site.ground {
+        if let Surroundings::Walls { middles_m, .. } = &run.site.ground {
             all.extend(middles_m);
         }
         let range = |axis: usize| {
@@ -159,8 +159,8 @@ impl<'a> Sheet<'a> {
             (0.0..=self.width).contains(&x) && (0.0..=self.height).contains(&y)
         };
         match &self.run.site.ground {
-            Ground::Unknown => html! {},
-            Ground::Walls { middles_m, cell_m } => {
+            Surroundings::Unknown => html! {},
+            Surroundings::Walls { middles_m, cell_m } => {
                 let side = cell_m * self.px_per_m;
                 let mut data = String::new();
                 for middle in middles_m {
@@ -172,7 +172,7 @@ impl<'a> Sheet<'a> {
                 }
                 html! { path class="wall" d=(data) {} }
             }
-            Ground::Heights(terrain) => {
+            Surroundings::Heights(terrain) => {
                 let heights_m = terrain.heights_m().iter().copied();
                 let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
                 let high_m = heights_m.fold(f64::NEG_INFINITY, f64::max);
@@ -395,8 +395,8 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// Whether rovers that hold these vertices share an edge of the coordination graph: their owners are
-/// the same node or neighbours.
+/// Whether rovers that hold these vertices share an edge of the coordination graph: their owners
+/// are the same node or neighbours.
 pub(crate) fn coordinated(
     sensors: &farside_worlds::SensorNetwork,
     u: VertexId,
@@ -484,12 +484,12 @@ fn exit_mark((x, y): (f64, f64)) -> String {
     format!("{}Z", path((0..6).map(corner)))
 }
 
-/// What the ends of a rover's way are called: on a map of cells it stands at the one from the start,
-/// and stays at the other.
-fn ends_of(ground: &Ground) -> (&'static str, &'static str) {
+/// What the ends of a rover's way are called: on a map of cells it stands at the one from the
+/// start, and stays at the other.
+fn ends_of(ground: &Surroundings) -> (&'static str, &'static str) {
     match ground {
-        Ground::Walls { .. } => ("start", "goal"),
-        Ground::Heights(_) | Ground::Unknown => ("entry", "exit"),
+        Surroundings::Walls { .. } => ("start", "goal"),
+        Surroundings::Heights(_) | Surroundings::Unknown => ("entry", "exit"),
     }
 }
 

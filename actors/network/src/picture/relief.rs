@@ -7,8 +7,8 @@ use farside_worlds::HeightField;
 /// A place on the edge of a cell: the sample it begins at, and whether it goes north.
 type Crossing = (usize, usize, bool);
 
-/// The lines at one height \[m\], each a chain of points (x, y) \[m\], found by marching over squares of
-/// `stride` samples. Closed lines end where they begin.
+/// The lines at one height \[m\], each a chain of points (x, y) \[m\], found by marching over
+/// squares of `stride` samples. Closed lines end where they begin.
 pub(super) fn contours(terrain: &HeightField, height_m: f64, stride: usize) -> Vec<Vec<[f64; 2]>> {
     let (columns, rows) = (terrain.columns() / stride, terrain.rows() / stride);
     let heights_m = terrain.heights_m();

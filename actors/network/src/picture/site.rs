@@ -15,7 +15,7 @@ pub(crate) struct Site {
     /// The nodes, and which vertices are whose.
     pub(crate) sensors: Arc<SensorNetwork>,
     /// What lies around.
-    pub(crate) ground: Ground,
+    pub(crate) ground: Surroundings,
     /// The length of a planning cycle.
     pub(crate) cycle: SimDuration,
     /// Rovers are coordinated by max-plus, and have a coordination graph.
@@ -28,7 +28,7 @@ pub(crate) struct Site {
 
 /// What lies around a roadmap.
 #[derive(Clone, Debug)]
-pub(crate) enum Ground {
+pub(crate) enum Surroundings {
     /// Nothing that is known.
     Unknown,
     /// Hills and hollows.

@@ -7,7 +7,7 @@ use farside_actors::invariants::Place;
 use farside_worlds::VertexId;
 use maud::{Markup, PreEscaped, html};
 
-use super::{Drawn, Line, PictureError, colouring, corridor};
+use super::{Drawn, PictureError, VertexLine, colouring, corridor};
 use crate::tracks::Mark;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
@@ -20,24 +20,28 @@ const WAIT: f64 = 1.25;
 
 /// Which way along the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum Heading {
     Up,
     Down,
     /// Onto the line or off it.
     Across,
 }
 
-impl Way {
+impl Heading {
     fn class(self) -> &'static str {
         match self {
-            Way::Up => "up",
-            Way::Down => "down",
-            Way::Across => "across",
+            Heading::Up => "up",
+            Heading::Down => "down",
+            Heading::Across => "across",
         }
     }
 
-    fn between(from: usize, to: usize) -> Way {
-        if to > from { Way::Up } else { Way::Down }
+    fn between(from: usize, to: usize) -> Heading {
+        if to > from {
+            Heading::Up
+        } else {
+            Heading::Down
+        }
     }
 }
 
@@ -49,17 +53,17 @@ pub(super) struct Piece {
     pub(super) from: usize,
     pub(super) to: usize,
     /// Where it moves; where it stands, where it wants to go.
-    pub(super) way: Way,
+    pub(super) way: Heading,
 }
 
 /// A rover on the line, from when it comes to when it leaves.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Visit {
+pub(super) struct LineVisit {
     pub(super) rover: u32,
     pub(super) pieces: Vec<Piece>,
 }
 
-impl Visit {
+impl LineVisit {
     fn span_ns(&self) -> (u64, u64) {
         let first = self.pieces.first().map_or(0, |piece| piece.from_ns);
         (first, self.pieces.last().map_or(0, |piece| piece.to_ns))
@@ -67,11 +71,11 @@ impl Visit {
 }
 
 /// The visits of all rovers to a line, by rover and time, up to `until_ns`.
-pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit> {
+pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<LineVisit> {
     let place: BTreeMap<VertexId, usize> = line.iter().copied().zip(0..).collect();
     let mut visits = Vec::new();
     for (rover, marks) in run.tracks.rovers() {
-        let mut visit = Visit {
+        let mut visit = LineVisit {
             rover,
             pieces: Vec::new(),
         };
@@ -97,12 +101,14 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
                         .push(piece(here, here, wanted(run, mark, &place, here)));
                 }
                 (Some(here), Place::Between(..), Some(to)) if here.abs_diff(to) == 1 => {
-                    visit.pieces.push(piece(here, to, Way::between(here, to)));
+                    visit
+                        .pieces
+                        .push(piece(here, to, Heading::between(here, to)));
                 }
                 // Off the line, or to it: a visit begins when the rover has come.
                 _ if !visit.pieces.is_empty() => {
                     let pieces = std::mem::take(&mut visit.pieces);
-                    visits.push(Visit { rover, pieces });
+                    visits.push(LineVisit { rover, pieces });
                 }
                 _ => {}
             }
@@ -115,14 +121,14 @@ pub(super) fn visits(run: &Drawn, line: &[VertexId], until_ns: u64) -> Vec<Visit
 }
 
 /// Which way a rover that stands on the line wants to go.
-fn wanted(run: &Drawn, mark: &Mark, place: &BTreeMap<VertexId, usize>, here: usize) -> Way {
+fn wanted(run: &Drawn, mark: &Mark, place: &BTreeMap<VertexId, usize>, here: usize) -> Heading {
     let Some(vertex) = mark.place.vertex() else {
-        return Way::Across;
+        return Heading::Across;
     };
     let nearer = nearer(&run.site.roadmap, vertex, mark.goal);
     let mut along = nearer.filter_map(|next| place.get(&next).copied());
     let next = along.find(|next| next.abs_diff(here) == 1);
-    next.map_or(Way::Across, |next| Way::between(here, next))
+    next.map_or(Heading::Across, |next| Heading::between(here, next))
 }
 
 /// The diagram and what it is drawn from.
@@ -139,7 +145,7 @@ struct Diagram<'a> {
 
 pub(super) fn figure(
     run: &Drawn,
-    line: &Line,
+    line: &VertexLine,
     from_ns: u64,
     to_ns: u64,
 ) -> Result<Figure, PictureError> {
@@ -148,8 +154,10 @@ pub(super) fn figure(
     let waits = run.waits(&rovers);
     let cycle_ns = run.site.cycle.as_nanos();
     let line = match line {
-        Line::Auto => corridor::busiest(roadmap, &run.tracks, &rovers, &waits, cycle_ns, to_ns)?,
-        Line::Through(vertices) => corridor::through(roadmap, vertices)?,
+        VertexLine::Auto => {
+            corridor::busiest(roadmap, &run.tracks, &rovers, &waits, cycle_ns, to_ns)?
+        }
+        VertexLine::Through(vertices) => corridor::through(roadmap, vertices)?,
     };
     let mut visits = visits(run, &line, to_ns);
     visits.retain(|visit| visit.span_ns().1 > from_ns);
@@ -194,7 +202,8 @@ pub(super) fn figure(
     })
 }
 
-/// When the last rover came to stand as it does in a circle on the line, and stood there to the end.
+/// When the last rover came to stand as it does in a circle on the line, and stood there to the
+/// end.
 fn locked(run: &Drawn, line: &[VertexId], waits: &Waits, to_ns: u64) -> Option<u64> {
     let rovers = run.tracks.at(to_ns);
     let on_line = |rover: &u32| {
@@ -219,7 +228,7 @@ impl Diagram<'_> {
         format!("{scenario}, seed {seed}: the line from vertex {first} to vertex {last}")
     }
 
-    fn says(&self, visits: &[Visit], locked: Option<u64>) -> String {
+    fn says(&self, visits: &[LineVisit], locked: Option<u64>) -> String {
         let mut rovers: Vec<u32> = visits.iter().map(|visit| visit.rover).collect();
         rovers.sort_unstable();
         rovers.dedup();
@@ -230,7 +239,8 @@ impl Diagram<'_> {
         if let Some(ns) = locked {
             let cycle = libm::floor(ns as f64 / self.cycle_ns);
             says.push_str(&format!(
-                " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it moves."
+                " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it \
+                 moves."
             ));
         }
         let rovers = self.run.tracks.at(self.to_ns);
@@ -325,7 +335,7 @@ impl Diagram<'_> {
     }
 
     /// A rover's line: thin where it drives, a bar where it waits.
-    fn visit(&self, visit: &Visit) -> Markup {
+    fn visit(&self, visit: &LineVisit) -> Markup {
         let waits = |piece: &Piece| {
             let cycles = (piece.to_ns - piece.from_ns) as f64 / self.cycle_ns;
             piece.from == piece.to && cycles > WAIT
@@ -335,7 +345,7 @@ impl Diagram<'_> {
             .iter()
             .filter(|piece| piece.to_ns > self.from_ns);
         let pieces: Vec<&Piece> = shown.collect();
-        let mut drives: Vec<(Way, Vec<(f64, f64)>)> = Vec::new();
+        let mut drives: Vec<(Heading, Vec<(f64, f64)>)> = Vec::new();
         let mut last = None;
         for piece in &pieces {
             let start = (self.x(piece.from_ns), self.y(piece.from));
@@ -373,7 +383,7 @@ impl Diagram<'_> {
 
     /// Numbers: at the right end for those that are there at the end, else where a line begins, if
     /// there is room.
-    fn names(&self, visits: &[Visit]) -> Markup {
+    fn names(&self, visits: &[LineVisit]) -> Markup {
         let mut taken: Vec<[f64; 4]> = Vec::new();
         let mut names = Vec::new();
         for visit in visits {

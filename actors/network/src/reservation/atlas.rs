@@ -1,5 +1,6 @@
-//! A roadmap that nodes are given over the network: one knows it and passes it on in parts, over the same
-//! lines as walks, each node to its neighbours. Who does not know all of it takes no part.
+//! A roadmap that nodes are given over the network: one knows it and passes it on in parts, over
+//! the same lines as requests, each node to its neighbours. Who does not know all of it takes no
+//! part.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +18,7 @@ pub(crate) struct Atlas {
     /// By number.
     parts: BTreeMap<u32, RoadmapPart>,
     complete: bool,
-    /// Steps of walks that came before the roadmap was known, and for which home.
+    /// Steps of requests that came before the roadmap was known, and for which region.
     held: Vec<(NodeId, Item)>,
     /// The first part that was wrong.
     wrong: Option<String>,
@@ -94,27 +95,27 @@ impl Atlas {
 
     /// The node that knows the roadmap from the start tells its neighbours.
     pub(crate) fn publish(&mut self, registry: &mut Registry, desk: &Desk<'_>) {
-        if desk.site.roadmap_from != Some(desk.home) || !self.parts.is_empty() {
+        if desk.site.roadmap_from != Some(desk.region) || !self.parts.is_empty() {
             return;
         }
         let (roadmap, sensors) = (&desk.site.roadmap, &desk.site.sensors);
         for part in 0..RoadmapPart::count(roadmap) {
             let part = RoadmapPart::of(roadmap, sensors, part);
-            self.take_in(registry, desk, desk.home, part);
+            self.take_in(registry, desk, desk.region, part);
         }
     }
 
-    /// Tells the neighbours of a home that was taken over, which may have missed parts.
+    /// Tells the neighbours of a region that was taken over, which may have missed parts.
     pub(crate) fn share(&self, registry: &mut Registry, desk: &Desk<'_>) {
         for part in self.parts.values() {
-            for &to in desk.site.sensors.neighbors(desk.home) {
+            for &to in desk.site.sensors.neighbors(desk.region) {
                 registry.post(to, Item::Roadmap(part.clone()));
             }
         }
     }
 
-    /// Takes an item that came from a neighbour of `desk`'s home. Returns it if it is the step of a walk
-    /// and the roadmap is known; keeps it until then.
+    /// Takes an item that came from a neighbour of `desk`'s region. Returns it if it is the step of
+    /// a request and the roadmap is known; keeps it until then.
     pub(crate) fn receive(
         &mut self,
         registry: &mut Registry,
@@ -129,7 +130,7 @@ impl Atlas {
             }
             item if self.is_known(desk.site.roadmap_from) => Some(item),
             item => {
-                self.held.push((desk.home, item));
+                self.held.push((desk.region, item));
                 None
             }
         }
@@ -156,7 +157,7 @@ impl Atlas {
             Err(wrong) => self.wrong = Some(wrong),
             Ok(false) => {}
             Ok(true) => {
-                let others = sensors.neighbors(desk.home).iter();
+                let others = sensors.neighbors(desk.region).iter();
                 for &to in others.filter(|&&to| to != from) {
                     registry.post(to, Item::Roadmap(part.clone()));
                 }

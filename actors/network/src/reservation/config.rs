@@ -5,7 +5,7 @@ use farside_actors::settings;
 settings! {
     /// The `[network.complete]` table: what only the policy `complete` reads.
     pub struct CompleteConfig {
-        /// Along how many routes a walk looks for a way; at least 1.
+        /// Along how many routes a request looks for a path; at least 1.
         pub routes: u32 = 8,
             1..;
     }

@@ -1,4 +1,4 @@
-//! What nodes say to each other on a reservation walk. Plain serde types: the log describes them
+//! What nodes say to each other on a reservation request. Plain serde types: the log describes them
 //! field by field.
 
 use farside_worlds::{NodeId, VertexId};
@@ -8,7 +8,8 @@ use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{Label, TimedVisit};
 
-/// Node to neighbour: items, each to be taken once, and a receipt for those that came the other way.
+/// Node to neighbour: items, each to be taken once, and a receipt for those that came the other
+/// way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Relay {
     /// The node.
@@ -23,17 +24,17 @@ pub struct Relay {
     pub echo: Option<u64>,
     /// New and repeated items.
     pub items: Vec<Numbered>,
-    /// With `network.takeover_after`: between whom this is, and who answers for them.
+    /// With `network.failover_after`: between whom this is, and who answers for them.
     pub between: Option<Between>,
 }
 
-/// The two homes that a [`Relay`] goes between, each with the rank that answers for it: numbers begin
-/// anew when one of them is replaced.
+/// The two regions that a [`Relay`] goes between, each with the rank that answers for it: numbers
+/// begin anew when one of them is replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Between {
     /// For whose vertices the sender speaks.
     pub from: NodeId,
-    /// Its place in that node's line of succession, from 0.
+    /// Its place in that node's backup list, from 0.
     pub from_rank: u32,
     /// Whose vertices this is about.
     pub to: NodeId,
@@ -41,34 +42,34 @@ pub struct Between {
     pub to_rank: u32,
 }
 
-/// Node to rover, with `network.takeover_after`: a way could be reserved for you. It is yours once you
-/// have taken it, which you do unless one of its vertices has been taken over since. Repeated each
-/// cycle until answered.
+/// Node to rover, with `network.failover_after`: a path could be reserved for you. It is yours once
+/// you have taken it, which you do unless one of its vertices has been taken over since. Repeated
+/// each cycle until answered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Itinerary {
-    /// The node that answers for where the way begins.
+    /// The node that answers for where the path begins.
     pub node: NodeId,
-    /// The way.
-    pub way: Way,
-    /// Who answered for the way's vertices as it was reserved: the nodes that were replaced by then. All
-    /// others by themselves.
+    /// The path.
+    pub path: TimedPath,
+    /// Who answered for the path's vertices as it was reserved: the nodes that were replaced by
+    /// then. All others by themselves.
     pub replaced: Vec<Replacement>,
 }
 
-/// Rover to node: whether it has taken the way of an [`Itinerary`].
+/// Rover to node: whether it has taken the path of an [`Itinerary`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ItineraryAnswer {
-    /// The rover's walk.
-    pub walk: Walk,
+    /// The rover's request.
+    pub request: ReservationRequest,
     /// It has, for good.
     pub taken: bool,
 }
 
-/// A reserved way.
+/// A reserved path.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Way {
-    /// The walk that reserved it.
-    pub walk: Walk,
+pub struct TimedPath {
+    /// The request that reserved it.
+    pub request: ReservationRequest,
     /// The step of the first visit; each further one is one step on.
     pub first_step: u32,
     /// All visits, in order.
@@ -84,20 +85,20 @@ pub struct Numbered {
     pub item: Item,
 }
 
-/// One step of a walk.
+/// One step of a request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Item {
     /// Forward: where and when the rover could be.
     Probe(Probe),
-    /// Backward: the way chosen, to be entered in the books.
+    /// Backward: the path chosen, to be entered in the tables.
     Reserve(Reserve),
     /// Forward or backward: what became of it.
     Settle(Settle),
     /// Backward: who stands for ever on this path is asked to step aside for a while.
-    Yield(Yield),
+    Displace(Displace),
     /// To all: a part of the roadmap, for nodes that are given it over the network.
     Roadmap(RoadmapPart),
-    /// Forward: where and when the rover could be if others made way.
+    /// Forward: where and when the rover could be if others made room.
     Wish(Wish),
 }
 
@@ -127,41 +128,41 @@ pub struct MapVertex {
     pub owner: NodeId,
 }
 
-/// A rover that stays at its goal would have a way if nobody stood on it.
+/// A rover that stays at its goal would have a path if nobody stood on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Yield {
-    /// The walk that found no other way.
-    pub walk: Walk,
+pub struct Displace {
+    /// The request that found no other way.
+    pub request: ReservationRequest,
     /// The path that it would take.
     pub path: Vec<VertexId>,
     /// The nodes along it.
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
-    /// For whom way is made: when the first attempt of its walk began \[ns\], and the rover. This one,
-    /// or, where this one is to make way itself, the one it makes way for.
-    pub elder: (u64, RoverId),
+    /// For whom way is made: when the first attempt of its request began \[ns\], and the rover.
+    /// This one, or, where this one is to make room itself, the one it makes room for.
+    pub priority: (u64, RoverId),
 }
 
-/// One attempt to reserve a way for a rover.
+/// One attempt to reserve a path for a rover.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Walk {
+pub struct ReservationRequest {
     /// The rover.
     pub rover: RoverId,
     /// The attempt, from 1.
     pub attempt: u32,
-    /// When its first attempt began \[ns\]: of two walks that want the same, the older one wins.
+    /// When its first attempt began \[ns\]: of two requests that want the same, the older one wins.
     pub since: u64,
 }
 
-impl Walk {
-    /// Whether this is an earlier attempt of the same walk.
-    pub(crate) fn is_before(&self, other: &Walk) -> bool {
+impl ReservationRequest {
+    /// Whether this is an earlier attempt of the same request.
+    pub(crate) fn is_before(&self, other: &ReservationRequest) -> bool {
         (self.rover, self.since) == (other.rover, other.since) && self.attempt < other.attempt
     }
 
-    /// Whether this walk goes before `other`.
-    pub fn is_older_than(&self, other: &Walk) -> bool {
+    /// Whether this request goes before `other`.
+    pub fn is_older_than(&self, other: &ReservationRequest) -> bool {
         self.age() < other.age()
     }
 
@@ -171,11 +172,11 @@ impl Walk {
     }
 }
 
-/// The forward half of a walk along one of several routes.
+/// The forward half of a request along one of several routes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
-    /// The walk.
-    pub walk: Walk,
+    /// The request.
+    pub request: ReservationRequest,
     /// How many probes of this attempt there are, one for each route.
     pub probes: u32,
     /// When the attempt began \[ns\].
@@ -186,9 +187,9 @@ pub struct Probe {
     pub at: u32,
     /// Where the rover wants to go.
     pub goal: VertexId,
-    /// The step with which the way begins.
+    /// The step with which the path begins.
     pub first_step: u32,
-    /// Only asks what the way would be if nobody stood still for ever.
+    /// Only asks what the path would be if nobody stood still for ever.
     pub wishful: bool,
     /// Where the rover can be, and when.
     pub labels: Vec<Label>,
@@ -196,63 +197,63 @@ pub struct Probe {
     pub frontier: Vec<u32>,
 }
 
-/// A probe that only asks what the way would be if nobody stood still for ever.
+/// A probe that only asks what the path would be if nobody stood still for ever.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wish {
     /// The probe.
     pub probe: Probe,
-    /// As in [`Yield`].
-    pub elder: (u64, RoverId),
+    /// As in [`Displace`].
+    pub priority: (u64, RoverId),
 }
 
-/// The backward half: the way is entered in the books of all that own a part of it.
+/// The backward half: the path is entered in the tables of all that own a part of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reserve {
-    /// The walk.
-    pub walk: Walk,
+    /// The request.
+    pub request: ReservationRequest,
     /// The step of the first visit; each further one is one step on.
     pub first_step: u32,
     /// All visits, from the rover's place to its goal.
-    pub way: Vec<TimedVisit>,
+    pub path: Vec<TimedVisit>,
     /// The last visit that is not entered yet.
     pub at: u32,
-    /// With `network.takeover_after`: the ranks of those who have entered a part as deputies.
+    /// With `network.failover_after`: the ranks of those who have entered a part as backups.
     pub replaced: Vec<Replacement>,
 }
 
 impl Reserve {
-    /// The way, for its rover.
-    pub(crate) fn into_way(self) -> Way {
-        Way {
-            walk: self.walk,
+    /// The path, for its rover.
+    pub(crate) fn into_path(self) -> TimedPath {
+        TimedPath {
+            request: self.request,
             first_step: self.first_step,
-            visits: self.way,
+            visits: self.path,
         }
     }
 }
 
-/// What became of a walk, passed on along its route.
+/// What became of a request, passed on along its route.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settle {
-    /// The walk.
-    pub walk: Walk,
+    /// The request.
+    pub request: ReservationRequest,
     /// What became of it.
     pub verdict: Verdict,
-    /// The nodes along its way.
+    /// The nodes along its path.
     pub route: Vec<NodeId>,
     /// The place in `route` of the node that this is for.
     pub at: u32,
 }
 
-/// What became of a walk.
+/// What became of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
-    /// All of the way is reserved: it is irrevocable. Goes forward.
+    /// All of the path is reserved: it is irrevocable. Goes forward.
     Confirmed,
     /// A part could not be had: what was entered is struck out. Goes forward.
     Released,
     /// The same, for the node that began: it tries again. Goes backward.
     Failed,
-    /// There is no way as things stand. Goes backward.
-    NoWay,
+    /// There is no path as things stand. Goes backward.
+    NoPath,
 }

@@ -1,47 +1,47 @@
-//! What is kept for the vertices of one home with the `complete` policy, all of it durable, and who
-//! seeks a way from where. A node keeps a registry for itself, and one for each home that it takes over.
-//! Pure: items go to `lines`, grants to the caller. What is done with items is in [`walks`], what
-//! becomes of it when a node is replaced in [`succession`].
+//! What is kept for the vertices of one region with the `complete` policy, all of it durable, and
+//! who seeks a path from where. A node keeps a registry for itself, and one for each region that it
+//! takes over. Pure: items go to `lines`, grants to the caller. What is done with items is in
+//! [`requests`], what becomes of it when a node is replaced in [`failover`].
 
-mod making_way;
-mod succession;
-mod walks;
+mod displacement;
+mod failover;
+mod requests;
 
 use std::collections::BTreeMap;
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::book::{Book, Visit};
-use super::messages::{Item, Probe, Reserve, Walk};
+use super::messages::{Item, Probe, ReservationRequest, Reserve};
 use super::relay::Line;
 use super::routes::routes;
+use super::table::{ReservationTable, Visit};
 use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
-use crate::mapf::safe_intervals::{FOREVER, Ground, Label, TimedVisit};
+use crate::mapf::safe_intervals::{FOREVER, Label, SearchSpace, TimedVisit};
 use crate::shared::Shared;
-use making_way::{Aside, Claims};
-use succession::Succession;
+use displacement::{Aside, Claims};
+use failover::RegionFailover;
 
-/// A rover, or a queue of rovers, for which a way is sought.
+/// A rover, or a queue of rovers, for which a path is sought.
 #[derive(Debug)]
 struct Applicant {
     origin: Origin,
     aim: Aim,
-    /// The walk under way, and when its attempt began.
-    walk: Option<(Walk, u64)>,
+    /// The request under way, and when its attempt began.
+    request: Option<(ReservationRequest, u64)>,
     /// The next attempt, and when it begins.
-    again: Option<(Walk, u64)>,
-    /// Attempts that found no way at all.
+    again: Option<(ReservationRequest, u64)>,
+    /// Attempts that found no path at all.
     in_vain: u32,
 }
 
 impl Applicant {
-    fn is_on(&self, walk: &Walk) -> bool {
-        self.walk.is_some_and(|(mine, _)| mine == *walk)
+    fn is_on(&self, request: &ReservationRequest) -> bool {
+        self.request.is_some_and(|(mine, _)| mine == *request)
     }
 }
 
-/// Where a way is to lead.
+/// Where a path is to lead.
 #[derive(Debug)]
 enum Aim {
     /// To the rover's goal.
@@ -50,13 +50,13 @@ enum Aim {
     Aside(Aside),
 }
 
-/// Where a way begins.
+/// Where a path begins.
 #[derive(Clone, Copy, Debug)]
 enum Origin {
     /// At an entry; the rovers of its queue follow each other.
     Queue {
         entry: VertexId,
-        /// How many have a way.
+        /// How many have a path.
         served: usize,
         /// When the last of these is planned to come in.
         last_entry: u64,
@@ -74,12 +74,12 @@ enum Origin {
 /// What the owner of a goal has heard of the probes of one attempt.
 #[derive(Debug)]
 struct Offers {
-    walk: Walk,
+    request: ReservationRequest,
     heard: u32,
     probes: u32,
     first_step: u32,
     wishful: bool,
-    elder: (u64, RoverId),
+    priority: (u64, RoverId),
     route: Vec<NodeId>,
     best: Option<(u64, Vec<TimedVisit>)>,
     decided: bool,
@@ -91,26 +91,26 @@ struct Offers {
 #[derive(Debug, Default)]
 pub(crate) struct Registry {
     is_open: bool,
-    pub(crate) book: Book,
+    pub(crate) table: ReservationTable,
     pub(crate) lines: BTreeMap<NodeId, Line>,
     applicants: Vec<Applicant>,
     offers: BTreeMap<RoverId, Offers>,
-    /// What is kept free for those who asked others to make way.
+    /// What is kept free for those who asked others to make room.
     claims: Claims,
-    /// Ways that wait for younger walks to be settled.
+    /// Ways that wait for younger requests to be settled.
     parked: Vec<Reserve>,
-    /// How long a walk takes from its first probe to its confirmation, smoothed [ns].
-    walk_time: u64,
-    succession: Succession,
+    /// How long a request takes from its first probe to its confirmation, smoothed [ns].
+    request_time: u64,
+    failover: RegionFailover,
 }
 
 /// For whose vertices something is done, and when.
 pub(crate) struct Desk<'a> {
     pub(crate) site: &'a Shared,
     /// The node whose vertices are meant; another one may answer for them.
-    pub(crate) home: NodeId,
+    pub(crate) region: NodeId,
     pub(crate) now: u64,
-    /// The rank that answers for each home, with `network.takeover_after`; else none.
+    /// The rank that answers for each region, with `network.failover_after`; else none.
     pub(crate) ranks: &'a [u32],
 }
 
@@ -119,10 +119,10 @@ impl Desk<'_> {
         !self.ranks.is_empty()
     }
 
-    /// The rank that answers for this home, unless it does itself.
+    /// The rank that answers for this region, unless it does itself.
     fn replacement(&self) -> Option<Replacement> {
-        let (home, rank) = (self.home, *self.ranks.get(self.home.0 as usize)?);
-        (rank > 0).then_some(Replacement { home, rank })
+        let (region, rank) = (self.region, *self.ranks.get(self.region.0 as usize)?);
+        (rank > 0).then_some(Replacement { region, rank })
     }
 }
 
@@ -137,7 +137,7 @@ impl Registry {
             return;
         }
         self.open_empty(desk);
-        let own = |v: &VertexId| desk.site.sensors.owner(*v) == desk.home;
+        let own = |v: &VertexId| desk.site.sensors.owner(*v) == desk.region;
         let queues = desk.site.queues.iter().map(|(entry, _)| *entry);
         for entry in queues.filter(own) {
             self.seek(Origin::Queue {
@@ -152,7 +152,7 @@ impl Registry {
         }
         let standing = desk.site.standing().filter(|(_, vertex)| own(vertex));
         for (rover, vertex) in standing {
-            self.book.stand(vertex, rover, 1);
+            self.table.stand(vertex, rover, 1);
             if desk.site.missions[rover.0 as usize].1 != vertex {
                 self.seek(Origin::Stand {
                     rover,
@@ -166,8 +166,8 @@ impl Registry {
     fn open_empty(&mut self, desk: &Desk<'_>) {
         let sensors = &desk.site.sensors;
         self.is_open = true;
-        self.book.open(sensors.owned(desk.home));
-        for &neighbor in sensors.neighbors(desk.home) {
+        self.table.open(sensors.owned(desk.region));
+        for &neighbor in sensors.neighbors(desk.region) {
             self.lines.insert(neighbor, Line::default());
         }
     }
@@ -175,54 +175,54 @@ impl Registry {
     /// Enters what was planned before the start.
     fn preload(&mut self, desk: &Desk<'_>) {
         let schedule = desk.site.schedule.iter().flat_map(|s| &s.visits);
-        for &(rover, ref way) in schedule {
-            let walk = Walk {
+        for &(rover, ref path) in schedule {
+            let request = ReservationRequest {
                 rover,
                 attempt: 0,
                 since: 0,
             };
-            for (i, timed) in way.iter().enumerate() {
-                if desk.site.sensors.owner(timed.vertex) != desk.home {
+            for (i, timed) in path.iter().enumerate() {
+                if desk.site.sensors.owner(timed.vertex) != desk.region {
                     continue;
                 }
                 let visit = Visit {
-                    walk,
+                    request,
                     step: i as u32 + 1,
-                    from: i.checked_sub(1).map(|before| way[before].vertex),
+                    from: i.checked_sub(1).map(|before| path[before].vertex),
                     start: timed.start,
                     end: timed.end,
                     confirmed: true,
                     // Who stands on the map has its first vertex already.
-                    granted: i == 0 && desk.site.stays,
+                    granted: i == 0 && desk.site.stay_at_target,
                 };
-                self.book.enter(timed.vertex, visit);
+                self.table.enter(timed.vertex, visit);
             }
         }
     }
 
     /// The time that it takes to learn that a vertex is free and to grant it [ns].
-    fn gap(&self) -> u64 {
+    fn headway(&self) -> u64 {
         let measured = self.lines.values().filter(|line| line.is_measured());
         let (sum, count) = measured.fold((0, 0), |(sum, n), line| (sum + line.round_trip(), n + 1));
         let mean: Option<u64> = sum.checked_div(count);
-        mean.map_or(FIRST_GAP, |gap| gap.max(1))
+        mean.map_or(FIRST_HEADWAY, |headway| headway.max(1))
     }
 
     fn seek(&mut self, origin: Origin) {
         self.applicants.push(Applicant {
             origin,
             aim: Aim::Goal,
-            walk: None,
+            request: None,
             again: None,
             in_vain: 0,
         });
     }
 
-    /// Begins a walk for each applicant that has none under way.
+    /// Begins a request for each applicant that has none under way.
     pub(crate) fn apply(&mut self, desk: &Desk<'_>) {
         for at in 0..self.applicants.len() {
             let applicant = &self.applicants[at];
-            if applicant.walk.is_some() {
+            if applicant.request.is_some() {
                 continue;
             }
             let rover = match applicant.origin {
@@ -230,26 +230,26 @@ impl Registry {
                 Origin::Stand { rover, .. } => Some(rover),
                 Origin::Done => None,
             };
-            let first = |rover| Walk {
+            let first = |rover| ReservationRequest {
                 rover,
                 attempt: 1,
                 since: desk.now,
             };
             match (applicant.again, rover) {
-                (Some((walk, due)), _) if due <= desk.now => self.begin(desk, at, walk),
+                (Some((request, due)), _) if due <= desk.now => self.begin(desk, at, request),
                 (None, Some(rover)) => self.begin(desk, at, first(rover)),
                 _ => {}
             }
         }
     }
 
-    fn begin(&mut self, desk: &Desk<'_>, at: usize, walk: Walk) {
+    fn begin(&mut self, desk: &Desk<'_>, at: usize, request: ReservationRequest) {
         let applicant = &mut self.applicants[at];
-        applicant.walk = Some((walk, desk.now));
+        applicant.request = Some((request, desk.now));
         applicant.again = None;
         let in_vain = applicant.in_vain;
-        let mut goal = desk.site.missions[walk.rover.0 as usize].1;
-        let soon = desk.now + self.walk_time;
+        let mut goal = desk.site.missions[request.rover.0 as usize].1;
+        let soon = desk.now + self.request_time;
         let (labels, entry, first_step) = match applicant.origin {
             Origin::Queue {
                 entry, last_entry, ..
@@ -262,7 +262,7 @@ impl Registry {
             Origin::Stand { vertex, step, .. } => {
                 let step_time = desk.site.longest_step.as_nanos();
                 let came = self
-                    .book
+                    .table
                     .standing(vertex)
                     .map_or(0, |visit| visit.start + step_time);
                 let label = Label {
@@ -272,7 +272,7 @@ impl Registry {
                     until: FOREVER,
                     parent: None,
                 };
-                if let Some(elsewhere) = self.step_aside(desk, at, walk, label) {
+                if let Some(elsewhere) = self.step_aside(desk, at, request, label) {
                     match elsewhere {
                         Some(place) => goal = place,
                         None => return,
@@ -283,23 +283,23 @@ impl Registry {
             Origin::Done => return,
         };
         let site = desk.site;
-        // Every second time that there is no way it asks what the way would be without those who
+        // Every second time that there is no path it asks what the path would be without those who
         // stand still.
-        let wishful = site.stays && in_vain % 2 == 1;
+        let wishful = site.stay_at_target && in_vain % 2 == 1;
         let routes = routes(
             &site.roadmap,
             &site.sensors,
             (entry, goal),
             site.config.complete.routes,
         );
-        let elder = match &self.applicants[at].aim {
-            Aim::Aside(aside) => aside.elder,
-            Aim::Goal => walk.age(),
+        let priority = match &self.applicants[at].aim {
+            Aim::Aside(aside) => aside.priority,
+            Aim::Goal => request.age(),
         };
         let probes = routes.len() as u32;
         for route in routes {
             let probe = Probe {
-                walk,
+                request,
                 probes,
                 started: desk.now,
                 route,
@@ -310,23 +310,23 @@ impl Registry {
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
-            self.probe(desk, probe, elder);
+            self.probe(desk, probe, priority);
         }
     }
 
-    fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&Ground<'_>) -> T) -> T {
-        self.search_in(desk, &|v| self.book.busy(v), with)
+    fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&SearchSpace<'_>) -> T) -> T {
+        self.search_in(desk, &|v| self.table.busy(v), with)
     }
 
     fn search_in<T>(
         &self,
         desk: &Desk<'_>,
         busy: &dyn Fn(VertexId) -> Option<Vec<(u64, u64)>>,
-        with: impl FnOnce(&Ground<'_>) -> T,
+        with: impl FnOnce(&SearchSpace<'_>) -> T,
     ) -> T {
-        let ground = Ground {
+        let ground = SearchSpace {
             roadmap: &desk.site.roadmap,
-            gap: self.gap(),
+            headway: self.headway(),
             travel: &|u, v| desk.site.planned_step(u, v).as_nanos(),
             busy,
             covers: &|v| desk.site.sensors.covers(v),
@@ -337,13 +337,13 @@ impl Registry {
     pub(crate) fn take(&mut self, desk: &Desk<'_>, item: Item) {
         match item {
             Item::Probe(probe) => {
-                let elder = probe.walk.age();
-                self.probe(desk, probe, elder);
+                let priority = probe.request.age();
+                self.probe(desk, probe, priority);
             }
-            Item::Wish(wish) => self.probe(desk, wish.probe, wish.elder),
+            Item::Wish(wish) => self.probe(desk, wish.probe, wish.priority),
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
-            Item::Yield(request) => self.make_way(desk, request),
+            Item::Displace(request) => self.displace(desk, request),
             // Taken before: see `Atlas::receive`.
             Item::Roadmap(_) => {}
         }
@@ -355,16 +355,16 @@ impl Registry {
         }
     }
 
-    /// The rover of this walk has its way: the next one of the queue is served.
+    /// The rover of this request has its path: the next one of the queue is served.
     fn served(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
-        let current = |a: &Applicant| a.is_on(&reserve.walk);
+        let current = |a: &Applicant| a.is_on(&reserve.request);
         let Some(at) = self.applicants.iter().position(current) else {
             return;
         };
         let applicant = &mut self.applicants[at];
         let took = desk.now
             - applicant
-                .walk
+                .request
                 .take()
                 .map_or(desk.now, |(_, started)| started);
         applicant.in_vain = 0;
@@ -372,11 +372,11 @@ impl Registry {
             Origin::Queue { entry, served, .. } => Origin::Queue {
                 entry,
                 served: served + 1,
-                last_entry: reserve.way[0].start,
+                last_entry: reserve.path[0].start,
             },
             Origin::Stand { .. } | Origin::Done => Origin::Done,
         };
-        self.walk_time = match self.walk_time {
+        self.request_time = match self.request_time {
             0 => took,
             old => (3 * old + took) / 4,
         };
@@ -387,7 +387,7 @@ impl Registry {
     pub(crate) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
         let lines = self.lines.iter().filter(|(to, _)| may_use(**to));
         let lines = lines.filter_map(|(_, line)| line.next_due());
-        let proposals = self.succession.next_due();
+        let proposals = self.failover.next_due();
         let open = self
             .offers
             .values()
@@ -397,11 +397,11 @@ impl Registry {
 }
 
 /// The gap before anything was measured [ns].
-const FIRST_GAP: u64 = 10_000_000;
+const FIRST_HEADWAY: u64 = 10_000_000;
 
-/// The owners of the vertices of a way, in order, without repeats in a row.
-fn owners(desk: &Desk<'_>, way: &[TimedVisit]) -> Vec<NodeId> {
-    let mut owners: Vec<NodeId> = way
+/// The owners of the vertices of a path, in order, without repeats in a row.
+fn owners(desk: &Desk<'_>, path: &[TimedVisit]) -> Vec<NodeId> {
+    let mut owners: Vec<NodeId> = path
         .iter()
         .map(|visit| desk.site.sensors.owner(visit.vertex))
         .collect();

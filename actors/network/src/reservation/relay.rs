@@ -1,6 +1,6 @@
-//! Items that reach a neighbouring node exactly once, over links that are late, lose and repeat: each
-//! is numbered, repeated until it is acknowledged, and taken once. Order is not kept; nothing here
-//! needs it. All of it is durable, so that a crash is no more than a delay.
+//! Items that reach a neighbouring node exactly once, over links that are late, lose and repeat:
+//! each is numbered, repeated until it is acknowledged, and taken once. Order is not kept; nothing
+//! here needs it. All of it is durable, so that a crash is no more than a delay.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -63,7 +63,8 @@ impl Line {
         self.round_trip.is_some()
     }
 
-    /// What is to be sent now: items that are new or overdue, and a receipt. None if nothing is due.
+    /// What is to be sent now: items that are new or overdue, and a receipt. None if nothing is
+    /// due.
     pub(crate) fn due(&mut self, now: u64) -> Option<(Receipt, Vec<Numbered>)> {
         let patience = (2 * self.round_trip()).max(LEAST_PATIENCE);
         let mut items = Vec::new();
@@ -106,8 +107,8 @@ impl Line {
         }
     }
 
-    /// One of the ends is replaced: numbers begin anew, and what was not acknowledged is said again, to whom
-    /// that may have been news before.
+    /// One of the ends is replaced: numbers begin anew, and what was not acknowledged is said
+    /// again, to whom that may have been news before.
     pub(crate) fn renew(&mut self) {
         let pending = std::mem::take(&mut self.pending);
         *self = Line::default();
@@ -122,8 +123,8 @@ impl Line {
         pending.into_values().map(|pending| pending.item).collect()
     }
 
-    /// A receipt has come. What it echoes says how long a round trip takes, however often things were
-    /// repeated.
+    /// A receipt has come. What it echoes says how long a round trip takes, however often things
+    /// were repeated.
     pub(crate) fn acknowledged(&mut self, receipt: &Receipt, now: u64) {
         if let Some(sent) = receipt.echo {
             let sample = now.saturating_sub(sent);
@@ -152,17 +153,17 @@ impl Line {
 mod tests {
     use super::*;
     use crate::ids::RoverId;
-    use crate::reservation::messages::{Settle, Verdict, Walk};
+    use crate::reservation::messages::{ReservationRequest, Settle, Verdict};
     use proptest::prelude::*;
 
     fn item(attempt: u32) -> Item {
-        let walk = Walk {
+        let request = ReservationRequest {
             rover: RoverId(0),
             attempt,
             since: 0,
         };
         Item::Settle(Settle {
-            walk,
+            request,
             verdict: Verdict::Confirmed,
             route: Vec::new(),
             at: 0,
@@ -172,8 +173,8 @@ mod tests {
     type Flight = (u64, bool, u64, Receipt, Vec<Numbered>);
 
     proptest! {
-        /// Over a line that delays, reorders, loses and repeats, and with ends that crash, each item
-        /// is taken once.
+        /// Over a line that delays, reorders, loses and repeats, and with ends that crash, each
+        /// item is taken once.
         #[test]
         fn each_item_is_taken_once(
             fates in proptest::collection::vec((0u64..400, 0u8..4), 1..200),
@@ -217,7 +218,7 @@ mod tests {
                 }
             }
             let number = |item: &Item| match item {
-                Item::Settle(settle) => settle.walk.attempt,
+                Item::Settle(settle) => settle.request.attempt,
                 _ => u32::MAX,
             };
             let mut numbers: Vec<u32> = taken.iter().map(number).collect();

@@ -1,14 +1,15 @@
-//! Which nodes a walk passes: a few different ways from one vertex to another, each as the owners of
-//! the vertices on it. Known from the roadmap alone; who is where when is found on the walk.
+//! Which nodes a request passes: a few different ways from one vertex to another, each as the
+//! owners of the vertices on it. Known from the roadmap alone; who is where when is found on the
+//! request.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use farside_worlds::{DistancesTo, NodeId, Roadmap, SensorNetwork, VertexId};
 
-/// Up to `count` different sequences of owners, each of which has a way from `from` to `to` through
-/// its vertices in that order; the shortest way first. Each further one is a shortest way where edges
-/// already used cost more.
+/// Up to `count` different sequences of owners, each of which has a path from `from` to `to`
+/// through its vertices in that order; the shortest way first. Each further one is a shortest way
+/// where edges already used cost more.
 pub(crate) fn routes(
     roadmap: &Roadmap,
     sensors: &SensorNetwork,
@@ -18,14 +19,14 @@ pub(crate) fn routes(
     let mut found = Vec::<Vec<NodeId>>::new();
     let mut cost = vec![PLAIN; roadmap.len()];
     let left = roadmap.distances_to(to);
-    let mut ways = Vec::<Vec<VertexId>>::new();
+    let mut paths = Vec::<Vec<VertexId>>::new();
     let mut most = PLAIN * left.from(from);
     for _ in 0..count.saturating_mul(3) {
-        let way = cheapest(roadmap, &cost, (from, to), &left, most);
-        for v in &way {
+        let path = cheapest(roadmap, &cost, (from, to), &left, most);
+        for v in &path {
             cost[v.0 as usize] += PLAIN / 2;
         }
-        let mut owners: Vec<NodeId> = way.iter().map(|&v| sensors.owner(v)).collect();
+        let mut owners: Vec<NodeId> = path.iter().map(|&v| sensors.owner(v)).collect();
         owners.dedup();
         if !found.contains(&owners) {
             found.push(owners);
@@ -34,14 +35,14 @@ pub(crate) fn routes(
             break;
         }
         // The next way costs no more than any of those that are known.
-        ways.push(way);
-        let price = |way: &Vec<VertexId>| way[1..].iter().map(|v| cost[v.0 as usize]).sum();
-        most = ways.iter().map(price).min().unwrap_or(u32::MAX);
+        paths.push(path);
+        let price = |path: &Vec<VertexId>| path[1..].iter().map(|v| cost[v.0 as usize]).sum();
+        most = paths.iter().map(price).min().unwrap_or(u32::MAX);
     }
     found
 }
 
-/// What a vertex costs that no way uses yet.
+/// What a vertex costs that no path uses yet.
 const PLAIN: u32 = 16;
 
 /// A cheapest path, both ends included, which costs at most `most`. The roadmap is connected.
@@ -76,12 +77,12 @@ fn cheapest(
             }
         }
     }
-    let mut way = vec![to];
-    while way[way.len() - 1] != from {
-        way.push(before[way[way.len() - 1].0 as usize]);
+    let mut path = vec![to];
+    while path[path.len() - 1] != from {
+        path.push(before[path[path.len() - 1].0 as usize]);
     }
-    way.reverse();
-    way
+    path.reverse();
+    path
 }
 
 #[cfg(test)]
@@ -113,11 +114,11 @@ mod tests {
             let cost: Vec<u32> = (0..63).map(|_| PLAIN + PLAIN / 2 * draw(4)).collect();
             let ends = (v(draw(63)), v(draw(63)));
             let left = map.distances_to(ends.1);
-            let way = cheapest(&map, &cost, ends, &left, u32::MAX / 2);
-            let price: u32 = way[1..].iter().map(|v| cost[v.0 as usize]).sum();
+            let path = cheapest(&map, &cost, ends, &left, u32::MAX / 2);
+            let price: u32 = path[1..].iter().map(|v| cost[v.0 as usize]).sum();
             for slack in [0, 7] {
                 let found = cheapest(&map, &cost, ends, &left, price + slack);
-                assert_eq!(found, way, "round {round}");
+                assert_eq!(found, path, "round {round}");
             }
         }
     }

@@ -1,5 +1,5 @@
-//! What rovers and the owners of vertices say to each other so that no two rovers meet, and what rovers
-//! record of themselves.
+//! What rovers and the owners of vertices say to each other so that no two rovers meet, and what
+//! rovers record of themselves.
 
 use farside_actors::invariants::Place;
 use farside_worlds::{NodeId, VertexId};

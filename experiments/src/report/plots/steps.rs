@@ -42,8 +42,8 @@ const DISTRIBUTION: &str = "Distributions pool the lists of all runs of a cell. 
      99 % of each cell is past.";
 
 const SURVIVAL: &str = "Survival curves are those of Kaplan and Meier. What had not happened when a run's time was over \
-     is censored there, as it might still have. In a run that ended otherwise, such as a team at a \
-     standstill, it never happens, and stays at risk to the end. Bands take whole runs as what varies \
+     is censored there, as it might still have. In a run that ended otherwise, such as a team in a \
+     deadlock, it never happens, and stays at risk to the end. Bands take whole runs as what varies \
      by chance.";
 
 /// Survival curves, if anything listed had not happened when its run ended; the distribution if all

@@ -117,17 +117,13 @@ fn what_the_scenario_refuses_is_said_where_the_study_sets_it() {
         "x.toml:5:13: toy.lvl=3: ",
         "did you mean \"level\"?",
     );
-    let scenario =
-        study(&format!("{FACTOR}values = [1]")).replace("toy.toml", "network/crater-dnse");
+    let scenario = study(&format!("{FACTOR}values = [1]")).replace("toy.toml", "toy/plian");
     let message = refused(&scenario);
     assert!(
         message.starts_with("x.toml:2:12: scenario: unknown value"),
         "{message}"
     );
-    assert!(
-        message.contains("did you mean \"network/crater-dense\"?"),
-        "{message}"
-    );
+    assert!(message.contains("did you mean \"toy/plain\"?"), "{message}");
 }
 
 #[test]

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use farside::prelude::*;
-use farside_actors::system::{Assembly, Results, Section, Settings, Setup, SetupError, System};
+use farside_actors::system::{
+    Assembly, Builtin, Results, Section, Settings, Setup, SetupError, System,
+};
 use farside_actors::units;
 use serde::{Deserialize, Serialize};
 
@@ -87,6 +89,13 @@ impl System for ToySystem {
 
     fn sections(&self) -> Vec<Section> {
         vec![Section::named("toy")]
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &[Builtin {
+            name: "toy/plain",
+            text: "system = 'toy'",
+        }]
     }
 
     fn parse(

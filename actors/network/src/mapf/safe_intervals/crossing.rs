@@ -1,15 +1,15 @@
 //! Crossings: ways through vertices at which a rover cannot be reached, and so never waits.
 //!
-//! A crossing is like one edge from the last covered vertex to the next: all its visits begin at the
-//! instant S at which the rover sets out into it. A vertex that it comes to after driving for d it
-//! claims from S to S + d, where it goes on at once; so S has to lie in [f, u - d] for a safe interval
-//! [f, u] of each. A label within a crossing holds what is left of that: the first S (`start`), d as
-//! `ready` - `start`, and the last S as `until` - d. Thus a crossing can be searched vertex by vertex,
-//! and handed from one part of the roadmap to the next in the middle.
+//! A crossing is like one edge from the last covered vertex to the next: all its visits begin at
+//! the instant S at which the rover sets out into it. A vertex that it comes to after driving for d
+//! it claims from S to S + d, where it goes on at once; so S has to lie in [f, u - d] for a safe
+//! interval [f, u] of each. A label within a crossing holds what is left of that: the first S
+//! (`start`), d as `ready` - `start`, and the last S as `until` - d. Thus a crossing can be
+//! searched vertex by vertex, and handed from one part of the roadmap to the next in the middle.
 //!
-//! Of two labels at one such vertex the one is as good as the other in all that follows if it can be
-//! there at all of its times, with no longer a drive: for each of these times its S is as late, and
-//! visits have to begin after others have ended.
+//! Of two labels at one such vertex the one is as good as the other in all that follows if it can
+//! be there at all of its times, with no longer a drive: for each of these times its S is as late,
+//! and visits have to begin after others have ended.
 
 use std::collections::BTreeMap;
 
@@ -39,8 +39,8 @@ impl Course {
         }
     }
 
-    /// The earliest time to set out towards a vertex that is safe from `safe_from` on; none if that is
-    /// too late.
+    /// The earliest time to set out towards a vertex that is safe from `safe_from` on; none if that
+    /// is too late.
     pub(super) fn sets_out(&self, safe_from: u64) -> Option<u64> {
         let start = safe_from.max(self.earliest);
         let leaves = start.checked_add(self.driven)?;
@@ -186,7 +186,7 @@ fn is_as_good(a: &Label, b: &Label) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{Busy, STEP, brute_force, busy};
-    use super::super::{Ground, TimedVisit, prune, way_to};
+    use super::super::{SearchSpace, TimedVisit, prune, way_to};
     use super::*;
     use crate::testing::{grid, v};
     use farside_worlds::Roadmap;
@@ -242,7 +242,14 @@ mod tests {
         fn the_earliest_way_through_gaps_is_found(busy in busy(9), gaps in any::<u32>()) {
             let (map, covers) = (map(), covered(gaps));
             let look = |u: VertexId| Some(busy[u.0 as usize].clone());
-            let ground = Ground { roadmap: &map, gap: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+            let travel = |_, _| STEP;
+            let ground = SearchSpace {
+                roadmap: &map,
+                headway: 1,
+                travel: &travel,
+                busy: &look,
+                covers: &covers,
+            };
             let mut labels = ground.enter(v(0), 0, STEP);
             let open: Vec<u32> = (0..labels.len() as u32).collect();
             ground.expand(&mut labels, &open);
@@ -256,8 +263,8 @@ mod tests {
             }
         }
 
-        /// A search that is handed to and fro between two parts of the roadmap finds no less, also where
-        /// a gap lies across their border.
+        /// A search that is handed to and fro between two parts of the roadmap finds no less, also
+        /// where a gap lies across their border.
         #[test]
         fn a_crossing_is_handed_on(busy in busy(9), gaps in any::<u32>(), parts in any::<u32>()) {
             let (map, covers) = (map(), covered(gaps));
@@ -265,7 +272,14 @@ mod tests {
             for round in 0..9 {
                 let is_mine = |u: VertexId| parts >> u.0 & 1 == round % 2;
                 let look = |u: VertexId| is_mine(u).then(|| busy[u.0 as usize].clone());
-                let ground = Ground { roadmap: &map, gap: 1, travel: &|_, _| STEP, busy: &look, covers: &covers };
+                let travel = |_, _| STEP;
+                let ground = SearchSpace {
+                roadmap: &map,
+                headway: 1,
+                travel: &travel,
+                busy: &look,
+                covers: &covers,
+            };
                 if round < 2 && is_mine(v(0)) {
                     labels.extend(ground.enter(v(0), 0, STEP));
                 }
@@ -273,7 +287,8 @@ mod tests {
                 ground.expand(&mut labels, &open);
                 // Repetitions would double the labels each time.
                 let mut first = Best::new(map.len(), &covers);
-                let wanted: Vec<u32> = (0..).zip(&labels).filter(|(_, label)| first.improves(label)).map(|(at, _)| at).collect();
+                let better = (0..).zip(&labels).filter(|(_, label)| first.improves(label));
+                let wanted: Vec<u32> = better.map(|(at, _)| at).collect();
                 prune(&mut labels, &wanted);
             }
             let found = earliest(&labels);
@@ -285,16 +300,16 @@ mod tests {
         }
     }
 
-    /// A node that is handed a label within a crossing does not know where the crossing began but by
-    /// its labels.
+    /// A node that is handed a label within a crossing does not know where the crossing began but
+    /// by its labels.
     #[test]
     fn a_crossing_does_not_lead_back_to_where_it_began() {
         let map = grid(2, 1, &[]);
         let covers = |u: VertexId| u != v(1);
         let look = |_| Some(Vec::new());
-        let ground = Ground {
+        let ground = SearchSpace {
             roadmap: &map,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy: &look,
             covers: &covers,
@@ -310,12 +325,13 @@ mod tests {
     #[test]
     fn one_sets_out_late_enough_for_the_last_vertex() {
         let map = grid(4, 1, &[]);
-        // Vertex 3, beyond the gap, is busy until 50: all of the crossing waits for that, before it.
+        // Vertex 3, beyond the gap, is busy until 50: all of the crossing waits for that, before
+        // it.
         let look = |u: VertexId| Some(if u == v(3) { vec![(0, 50)] } else { Vec::new() });
         let covers = |u: VertexId| u != v(1) && u != v(2);
-        let ground = Ground {
+        let ground = SearchSpace {
             roadmap: &map,
-            gap: 1,
+            headway: 1,
             travel: &|_, _| STEP,
             busy: &look,
             covers: &covers,

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::ids::RoverId;
 
 /// Node to node: who waits for the holder of this vertex, and so on back to the rover that the
-/// probe was sent for. It ends where nobody waits; if it comes back, all of them wait for each other.
+/// probe was sent for. It ends where nobody waits; if it comes back, all of them wait for each
+/// other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WaitProbe {
     /// The node that sends, or passes it on.

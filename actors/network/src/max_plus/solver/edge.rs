@@ -138,7 +138,8 @@ impl Edge {
         true
     }
 
-    /// Makes the message from j, as [`refresh`](Edge::refresh) would at j's node. True if it changed.
+    /// Makes the message from j, as [`refresh`](Edge::refresh) would at j's node. True if it
+    /// changed.
     pub(super) fn make_incoming(&mut self, rules: &Rules, fresh: &mut Vec<f32>) -> bool {
         let Some(taken) = self.taken.as_mut().filter(|taken| taken.due) else {
             return false;
@@ -174,8 +175,8 @@ impl Edge {
         true
     }
 
-    /// The message to j: the best that i can do for each path of j by what i's paths are worth in all
-    /// (`room.total`), with j's own message left out; its mean is subtracted (on cyclic graphs
+    /// The message to j: the best that i can do for each path of j by what i's paths are worth in
+    /// all (`room.total`), with j's own message left out; its mean is subtracted (on cyclic graphs
     /// messages would grow without bound). True if it changed.
     pub(super) fn refresh(&mut self, rules: &Rules, room: &mut Room) -> bool {
         let Room {
@@ -231,8 +232,8 @@ fn best_of<const BLOCKS: usize>(base: &[f32], payoffs: &[Lanes]) -> [Lanes; BLOC
     best
 }
 
-/// Makes a message of what each path is worth at best: the mean subtracted, damped by the `old` one.
-/// True if it changed.
+/// Makes a message of what each path is worth at best: the mean subtracted, damped by the `old`
+/// one. True if it changed.
 fn settle(fresh: &mut [f32], old: &[f32], rules: &Rules) -> bool {
     let mean = fresh.iter().sum::<f32>() / fresh.len() as f32;
     let mut changed = false;

@@ -1,9 +1,9 @@
 //! Which of two rovers' candidate paths collide, and when: the other half of what planning costs.
 //!
-//! Shortest paths from one vertex share their beginnings, and what two beginnings do in a cycle they do
-//! for all paths that begin so. Hence paths are compared in lexicographic order: what the path before
-//! met within the beginning that both share, this one meets too, and if that was nothing, comparing
-//! goes on from there.
+//! Shortest paths from one vertex share their beginnings, and what two beginnings do in a cycle
+//! they do for all paths that begin so. Hence paths are compared in lexicographic order: what the
+//! path before met within the beginning that both share, this one meets too, and if that was
+//! nothing, comparing goes on from there.
 
 use crate::max_plus::candidates::CandidatePath;
 use crate::max_plus::payoff::collision_from;

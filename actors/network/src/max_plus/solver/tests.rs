@@ -75,19 +75,19 @@ fn exhaustive(rovers: &Team, pairs: &[(usize, usize)]) -> Vec<usize> {
     }
 }
 
-fn problem(rules: Rules, first: u32, rovers: &[Vec<CandidatePath>]) -> MaxPlus {
+fn problem(rules: Rules, first: u32, rovers: &[Vec<CandidatePath>]) -> Solver {
     let rovers = (first..).map(RoverId).zip(rovers.iter().cloned());
-    MaxPlus::new(payoffs(), rules, rovers.collect())
+    Solver::new(payoffs(), rules, rovers.collect())
 }
 
-fn iterate(problem: &mut MaxPlus) -> bool {
+fn iterate(problem: &mut Solver) -> bool {
     let changed = problem.compute();
     problem.deliver();
     changed
 }
 
 /// A node for each rover, with its own edges of `pairs`.
-fn nodes(rules: Rules, rovers: &Team, pairs: &[(usize, usize)]) -> Vec<MaxPlus> {
+fn nodes(rules: Rules, rovers: &Team, pairs: &[(usize, usize)]) -> Vec<Solver> {
     let alone = |i: usize| problem(rules, i as u32, &rovers[i..=i]);
     let mut nodes: Vec<_> = (0..rovers.len()).map(alone).collect();
     for &(a, b) in pairs {
@@ -100,7 +100,7 @@ fn nodes(rules: Rules, rovers: &Team, pairs: &[(usize, usize)]) -> Vec<MaxPlus> 
 }
 
 /// One iteration of all nodes; true if anything changed.
-fn iterate_all(nodes: &mut [MaxPlus]) -> bool {
+fn iterate_all(nodes: &mut [Solver]) -> bool {
     let mut changed = false;
     for node in nodes.iter_mut() {
         changed |= iterate(node);
@@ -110,7 +110,7 @@ fn iterate_all(nodes: &mut [MaxPlus]) -> bool {
 }
 
 /// All nodes' messages arrive.
-fn exchange(nodes: &mut [MaxPlus]) {
+fn exchange(nodes: &mut [Solver]) {
     for from in 0..nodes.len() {
         let choices = nodes[from].choices();
         for to in 0..nodes.len() {
@@ -129,7 +129,7 @@ fn exchange(nodes: &mut [MaxPlus]) {
 }
 
 /// What all nodes choose, as places in each rover's list.
-fn joint(nodes: &[MaxPlus], rovers: &Team, converged: bool) -> Vec<usize> {
+fn joint(nodes: &[Solver], rovers: &Team, converged: bool) -> Vec<usize> {
     let chosen = nodes.iter().flat_map(|node| node.best(converged));
     chosen
         .zip(rovers)
@@ -350,11 +350,11 @@ fn vectors_that_fit_no_edge_are_refused() {
 
 /// Three nodes with two rovers each, all of them neighbours, which hand over what `quotas` say: how
 /// many pairs each node hands the next one.
-fn three_nodes(rules: Rules, rovers: &Team, quotas: [u64; 3]) -> Vec<MaxPlus> {
+fn three_nodes(rules: Rules, rovers: &Team, quotas: [u64; 3]) -> Vec<Solver> {
     let of =
         |node: usize| (node * 2..node * 2 + 2).map(|at| (RoverId(at as u32), rovers[at].clone()));
     let mut nodes: Vec<_> = (0..3)
-        .map(|node| MaxPlus::new(payoffs(), rules, of(node).collect()))
+        .map(|node| Solver::new(payoffs(), rules, of(node).collect()))
         .collect();
     for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
         let quota = if b == (a + 1) % 3 { quotas[a] } else { 0 };
@@ -379,7 +379,7 @@ fn vectors_that_others_make_are_the_same_bit_for_bit() {
         let quotas = std::array::from_fn(|_| stream.below(200));
         let mut plain = three_nodes(rules, &rovers, [0; 3]);
         let mut handing = three_nodes(rules, &rovers, quotas);
-        handed += handing.iter().map(MaxPlus::handed).sum::<u64>();
+        handed += handing.iter().map(Solver::handed).sum::<u64>();
         for _ in 0..12 {
             for (plain, handing) in plain.iter_mut().zip(&mut handing) {
                 plain.compute();
@@ -406,7 +406,7 @@ fn what_is_handed_over_is_work_for_who_takes_it() {
     let first = sizes[0] * sizes[2];
     let mut plain = three_nodes(PLAIN, &rovers, [0; 3]);
     let mut handing = three_nodes(PLAIN, &rovers, [first, 0, 0]);
-    let compared = |node: &mut MaxPlus| node.take_compared();
+    let compared = |node: &mut Solver| node.take_compared();
     assert_eq!(handing[0].handed(), first);
     assert_eq!(compared(&mut plain[0]) - compared(&mut handing[0]), first);
     assert_eq!(compared(&mut plain[1]), compared(&mut handing[1]));

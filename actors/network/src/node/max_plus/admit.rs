@@ -12,7 +12,7 @@ use crate::max_plus::messages::{Assignments, NodeState};
 use crate::node::Node;
 use crate::node::base::Base;
 use crate::node::policy::Phase;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 impl MaxPlusPolicy {
     /// Grants each free vertex to one of those whose paths enter it now.
@@ -55,8 +55,8 @@ impl MaxPlusPolicy {
         vertex: VertexId,
         follows: bool,
     ) -> bool {
-        let ledger = ctx.durable::<Ledger>();
-        while ledger.occupant(vertex).is_none() {
+        let occupancy = ctx.durable::<OccupancyTable>();
+        while occupancy.occupant(vertex).is_none() {
             let asks = |r: &&Request| r.vertex == vertex && (follows || !r.follows);
             let all = self.requests.iter().filter(asks);
             let Some(best) = winner(all, base.site.config.max_plus.priority).copied() else {
@@ -64,7 +64,7 @@ impl MaxPlusPolicy {
             };
             self.requests.retain(|r| *r != best);
             let (rover, step) = (best.rover, best.step);
-            if ledger.grant(vertex, rover, step, Some(best.from), base.cycle) {
+            if occupancy.grant(vertex, rover, step, Some(best.from), base.cycle) {
                 base.send_grant(ctx, rover, step, Some(vertex));
                 self.presume_left(base, ctx, (rover, step), (best.from, vertex));
                 return true;
@@ -101,15 +101,15 @@ impl MaxPlusPolicy {
         let Sabotage::GrantOccupied(probability) = base.site.config.sabotage else {
             return;
         };
-        let held = ctx.durable::<Ledger>().occupant(vertex).is_some();
+        let held = ctx.durable::<OccupancyTable>().occupant(vertex).is_some();
         if held && ctx.random("sabotage").chance(probability) {
             let asks = self.requests.iter().find(|r| r.vertex == vertex).copied();
             if let Some(Request {
                 rover, step, from, ..
             }) = asks
             {
-                let ledger = ctx.durable::<Ledger>();
-                ledger.force(vertex, rover, step, Some(from), base.cycle);
+                let occupancy = ctx.durable::<OccupancyTable>();
+                occupancy.force(vertex, rover, step, Some(from), base.cycle);
                 base.send_grant(ctx, rover, step, Some(vertex));
             }
         }
@@ -142,8 +142,8 @@ impl MaxPlusPolicy {
                 vertex,
                 ..
             } = request;
-            let ledger = ctx.durable::<Ledger>();
-            if ledger.grant(vertex, rover, step, Some(from), base.cycle) {
+            let occupancy = ctx.durable::<OccupancyTable>();
+            if occupancy.grant(vertex, rover, step, Some(from), base.cycle) {
                 base.send_grant(ctx, rover, step, Some(vertex));
                 self.presume_left(base, ctx, (rover, step), (from, vertex));
             }

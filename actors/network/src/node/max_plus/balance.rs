@@ -1,19 +1,19 @@
-//! Even loads (*network-guided*, section 5, iii): work handed over to neighbours that have less of it,
-//! and paths that lead away from crowds.
+//! Even loads (*network-guided*, section 5, iii): work handed over to neighbours that have less of
+//! it, and paths that lead away from crowds.
 //!
-//! **What is handed over.** A max-plus vector from rover i of one node to rover j of a neighbour is the
-//! best that i can do for each path of j. What that takes beside the payoffs of the pair, which both
-//! nodes can make, is one number for each path of i: what it is worth without j's own message. A node
-//! that has too much to compute sends these instead of the vector, and j's node makes the vector. It takes
-//! no more messages and about the same bytes; what is lost or late is missing as the vector itself
-//! would be. In lockstep the same numbers come out, bit for bit.
+//! **What is handed over.** A max-plus vector from rover i of one node to rover j of a neighbour is
+//! the best that i can do for each path of j. What that takes beside the payoffs of the pair, which
+//! both nodes can make, is one number for each path of i: what it is worth without j's own message.
+//! A node that has too much to compute sends these instead of the vector, and j's node makes the
+//! vector. It takes no more messages and about the same bytes; what is lost or late is missing as
+//! the vector itself would be. In lockstep the same numbers come out, bit for bit.
 //!
-//! **To whom, and how much.** With its locations each node says how much it has to compute, and how much
-//! more than they can do its neighbours had. Who has more than it can do fills up those with less, as
-//! water would, and leaves room in each for the others that have a claim to it. A neighbour that said
-//! nothing in this cycle is left alone. Work goes to a node that said less than its own node
-//! did, by the same two numbers at both, and a vector is never passed on twice: so nothing goes to
-//! and fro.
+//! **To whom, and how much.** With its locations each node says how much it has to compute, and how
+//! much more than they can do its neighbours had. Who has more than it can do fills up those with
+//! less, as water would, and leaves room in each for the others that have a claim to it. A
+//! neighbour that said nothing in this cycle is left alone. Work goes to a node that said less than
+//! its own node did, by the same two numbers at both, and a vector is never passed on twice: so
+//! nothing goes to and fro.
 
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
@@ -24,7 +24,7 @@ use crate::max_plus::candidates::{CandidatePath, Destination};
 use crate::max_plus::messages::Load;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 /// How many iterations a node should have time for: max-plus needs about so many to converge.
 const ITERATIONS: u64 = 10;
@@ -50,8 +50,8 @@ impl Helper {
     }
 }
 
-/// What a node that has `own` pairs to look at in an iteration, and can do `limit` of them, hands each
-/// helper: up to the lowest level at which it is rid of what is above it.
+/// What a node that has `own` pairs to look at in an iteration, and can do `limit` of them, hands
+/// each helper: up to the lowest level at which it is rid of what is above it.
 fn fill_up(own: u64, limit: u64, helpers: &[Helper]) -> Vec<u64> {
     let excess = own.saturating_sub(limit);
     let takes = |level| helpers.iter().map(move |h| h.takes(level, excess));
@@ -69,8 +69,8 @@ fn fill_up(own: u64, limit: u64, helpers: &[Helper]) -> Vec<u64> {
 }
 
 impl MaxPlusPolicy {
-    /// How many pairs of candidate paths an iteration may have so that there is time for enough of them;
-    /// none if the processor takes no time.
+    /// How many pairs of candidate paths an iteration may have so that there is time for enough of
+    /// them; none if the processor takes no time.
     fn pairs_limit(&self, base: &Base, now: SimTime) -> Option<u64> {
         let pairs = self
             .processor
@@ -135,7 +135,11 @@ impl MaxPlusPolicy {
         if config.max_plus.congestion_weight == 0.0 || spread == 0.0 {
             return None;
         }
-        let own = self.occupancy(base, ctx.durable::<Ledger>().occupied().count(), base.id);
+        let own = self.occupancy(
+            base,
+            ctx.durable::<OccupancyTable>().occupied().count(),
+            base.id,
+        );
         let theirs = base.neighbors.iter().map(|n| self.crowding(base, n.id));
         let mean = theirs.sum::<f64>() / base.neighbors.len().max(1) as f64;
         Some((1.0 - spread) * own + spread * mean)

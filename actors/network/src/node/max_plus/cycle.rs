@@ -13,7 +13,7 @@ use crate::max_plus::candidates::{CandidatePath, FirstStep, candidates};
 use crate::max_plus::messages::{Assignment, Assignments, CandidatePaths, RoverPaths};
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::{Ledger, Occupant};
+use crate::safety::{OccupancyTable, Occupant};
 
 impl MaxPlusPolicy {
     /// Serves the queues of the entries that the node owns.
@@ -22,7 +22,9 @@ impl MaxPlusPolicy {
             if !base.owns(*entry) || !self.lets_in(base, ctx, *entry, queue) {
                 continue;
             }
-            let released = ctx.durable::<Ledger>().release(*entry, queue, base.cycle);
+            let released = ctx
+                .durable::<OccupancyTable>()
+                .release(*entry, queue, base.cycle);
             if let Some(rover) = released {
                 base.send_grant(ctx, rover, 1, Some(*entry));
             }
@@ -37,7 +39,10 @@ impl MaxPlusPolicy {
         entry: VertexId,
         queue: &[RoverId],
     ) -> bool {
-        ctx.durable::<Ledger>().next_in(entry, queue).is_some() && self.gate_is_open(base, ctx)
+        ctx.durable::<OccupancyTable>()
+            .next_in(entry, queue)
+            .is_some()
+            && self.gate_is_open(base, ctx)
     }
 
     /// Steps 2 and 3.
@@ -78,14 +83,14 @@ impl MaxPlusPolicy {
         base: &Base,
         ctx: &mut Context<'_, Node>,
     ) -> Vec<(VertexId, Occupant, VertexId)> {
-        let ledger = ctx.durable::<Ledger>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let mut movable = Vec::new();
-        for (here, held) in ledger.occupied() {
+        for (here, held) in occupancy.occupied() {
             let Some(goal) = held.goal.filter(|&goal| held.arrived && goal != here) else {
                 continue;
             };
             let is_next = |rover, step| rover == held.rover && step > held.step;
-            let granted_here = ledger.occupied().any(|(_, o)| is_next(o.rover, o.step));
+            let granted_here = occupancy.occupied().any(|(_, o)| is_next(o.rover, o.step));
             let mut theirs = base.reports();
             if !granted_here && !theirs.any(|h| is_next(h.rover, h.step)) {
                 movable.push((here, held, goal));
@@ -103,10 +108,10 @@ impl MaxPlusPolicy {
         held: &Occupant,
         goal: VertexId,
     ) -> Vec<CandidatePath> {
-        let ledger = ctx.durable::<Ledger>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let occupied = |v| {
             if base.owns(v) {
-                return ledger.occupant(v).is_some();
+                return occupancy.occupant(v).is_some();
             }
             base.reports().any(|holding| holding.vertex == v)
         };
@@ -117,7 +122,7 @@ impl MaxPlusPolicy {
         // Who was sent here goes back at no penalty.
         let previous = held.previous.filter(|_| !self.was_sent(held.rover, here));
         let key = u64::from(base.cycle) << 32 | u64::from(held.rover.0);
-        let here_now = ctx.durable::<Ledger>().occupied().count();
+        let here_now = ctx.durable::<OccupancyTable>().occupied().count();
         let mut draws = ctx.random_at("payoff_noise", key).stream();
         for path in &mut paths {
             let noise = draws.uniform_in(0.0, base.site.config.max_plus.noise);
@@ -130,12 +135,12 @@ impl MaxPlusPolicy {
 
     /// Step 5: the best paths as things stand.
     pub(super) fn assign(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
-        let ledger = ctx.durable::<Ledger>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let mut rovers = Vec::new();
         for (rover, path) in self.optimiser.best() {
             let here = path.vertices[0];
             let still_here = |o: &&Occupant| o.rover == rover && o.arrived;
-            let Some(held) = ledger.occupant(here).filter(still_here) else {
+            let Some(held) = occupancy.occupant(here).filter(still_here) else {
                 continue;
             };
             if path.first_step() != FirstStep::Stay {

@@ -4,21 +4,13 @@
 //! counts is its local neighbourhood graph, with its neighbours' holdings as last heard (step 1): a
 //! cycle old, and older still from a neighbour that is silent. So the limit is a damper and no
 //! guarantee; several owners may let in a rover each at the same time.
-//!
-//! An aid that was tried and made things worse: a token for each corridor (a chain of vertices where
-//! two rovers cannot pass each other), which opened it in one direction at a time. With it 73 % of
-//! the teams of 100 rovers deadlocked, without it 50 % (dense roadmap, 28 nodes, 15 seeds). Beyond a
-//! corridor there are only single junctions and other corridors, so that a rover that waits for a
-//! token waits in somebody's way, and the detours that would clear it need tokens too. What would
-//! help is to grant a corridor together with everything beyond it, up to the goal: that is what the
-//! policy `complete` does. Nor does a penalty for entering against the flow help: all teams deadlock.
 
 use farside::prelude::*;
 
 use super::MaxPlusPolicy;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 impl MaxPlusPolicy {
     /// Whether one more rover may come in here.
@@ -27,7 +19,7 @@ impl MaxPlusPolicy {
         if !config.max_plus.entry_gates {
             return true;
         }
-        let own = ctx.durable::<Ledger>().occupied().count();
+        let own = ctx.durable::<OccupancyTable>().occupied().count();
         let theirs: usize = base.neighbors.iter().map(|n| n.holdings.len()).sum();
         may_enter(
             own + theirs,

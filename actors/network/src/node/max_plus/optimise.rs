@@ -4,13 +4,13 @@
 //! when they are overdue; vectors that did not come stay as they were last heard, at first zero. A
 //! node whose vectors no longer change says so once and falls silent until something new comes in.
 //!
-//! Over links with a bit rate it sends nothing before the last is on the air, and nothing that comes
-//! too late: see [`pacing`].
+//! Over links with a bit rate it sends nothing before the last is on the air, and nothing that
+//! comes too late: see [`pacing`].
 //!
-//! With a finite `network.max_plus.processor` all this takes time. A node compares candidate paths as they
-//! come in, one neighbour's after the other's, and then iterates; an iteration takes what is there
-//! as it begins, and its messages go out when it is done. What is not done when the optimisation
-//! is over was in vain. A node may have neighbours make vectors for it: see `balance`.
+//! With a finite `network.max_plus.processor` all this takes time. A node compares candidate paths
+//! as they come in, one neighbour's after the other's, and then iterates; an iteration takes what
+//! is there as it begins, and its messages go out when it is done. What is not done when the
+//! optimisation is over was in vain. A node may have neighbours make vectors for it: see `balance`.
 
 use farside::MatchKey;
 use farside::prelude::*;
@@ -21,7 +21,7 @@ use crate::ids::RoverId;
 use crate::max_plus::candidates::CandidatePath;
 use crate::max_plus::messages::{CandidatePaths, Choice, MaxPlus};
 use crate::max_plus::payoff::Payoffs;
-use crate::max_plus::solver::{MaxPlus as Problem, Rules};
+use crate::max_plus::solver::{Rules, Solver};
 use crate::node::Node;
 use crate::node::base::Base;
 use crate::node::policy::Phase;
@@ -29,7 +29,7 @@ use crate::node::policy::Phase;
 /// A node's part in the optimisation of one cycle.
 #[derive(Default)]
 pub(super) struct Optimiser {
-    problem: Option<Problem>,
+    solver: Option<Solver>,
     /// The last iteration made.
     pub(super) iteration: u32,
     running: bool,
@@ -82,13 +82,13 @@ impl Optimiser {
 
     /// How many rovers the node plans for.
     pub(super) fn rovers(&self) -> u32 {
-        self.problem.as_ref().map_or(0, Problem::rovers) as u32
+        self.solver.as_ref().map_or(0, Solver::rovers) as u32
     }
 
     /// Pairs of candidate paths in an iteration, if nothing is handed over; and those that are.
     pub(super) fn load(&self) -> (u64, u64) {
-        let of = |problem: &Problem| (problem.pairs_of_its_own(), problem.handed());
-        self.problem.as_ref().map_or((0, 0), of)
+        let of = |solver: &Solver| (solver.pairs_of_its_own(), solver.handed());
+        self.solver.as_ref().map_or((0, 0), of)
     }
 
     /// What the processor is at will not be done in time.
@@ -99,9 +99,9 @@ impl Optimiser {
     /// The path of each own rover as things stand.
     pub(super) fn best(&self) -> Vec<(RoverId, &CandidatePath)> {
         let converged = self.settled && self.peers.iter().all(|peer| peer.settled);
-        self.problem
+        self.solver
             .as_ref()
-            .map_or_else(Vec::new, |problem| problem.best(converged))
+            .map_or_else(Vec::new, |solver| solver.best(converged))
     }
 
     fn peer(&mut self, node: NodeId) -> Option<&mut Peer> {
@@ -137,7 +137,7 @@ impl MaxPlusPolicy {
         };
         let payoffs: Payoffs = base.site.payoffs;
         self.optimiser.quotas = self.quotas(base, ctx.now(), &rovers);
-        self.optimiser.problem = Some(Problem::new(payoffs, rules, rovers));
+        self.optimiser.solver = Some(Solver::new(payoffs, rules, rovers));
         self.charge_payoffs(ctx);
     }
 
@@ -149,7 +149,7 @@ impl MaxPlusPolicy {
     /// The processor has more candidate paths to compare.
     fn charge_payoffs(&mut self, ctx: &Context<'_, Node>) {
         let (optimiser, processor) = (&mut self.optimiser, &self.processor);
-        let pairs = optimiser.problem.as_mut().map_or(0, Problem::take_compared);
+        let pairs = optimiser.solver.as_mut().map_or(0, Solver::take_compared);
         optimiser.pairs += pairs;
         let begins = optimiser.payoffs_done.max(ctx.now());
         optimiser.payoffs_done = begins + processor.time_for(begins, pairs);
@@ -188,15 +188,15 @@ impl MaxPlusPolicy {
         if let Some(timer) = optimiser.overdue.take() {
             ctx.cancel(timer);
         }
-        let Some(problem) = &mut optimiser.problem else {
+        let Some(solver) = &mut optimiser.solver else {
             return;
         };
-        if optimiser.iteration >= config.max_plus.max_iterations || problem.is_trivial() {
+        if optimiser.iteration >= config.max_plus.max_iterations || solver.is_trivial() {
             optimiser.running = false;
             return;
         }
         let cycle = base.cycle;
-        let pairs = problem.pairs();
+        let pairs = solver.pairs();
         let takes = self.processor.time_for(ctx.now(), pairs);
         let left = |until: SimTime| until.since(until.min(ctx.now()));
         // Its messages are to go out when the last are on the air, and not to be older than that.
@@ -208,7 +208,7 @@ impl MaxPlusPolicy {
             return;
         }
         optimiser.dirty = false;
-        let settled = !problem.compute();
+        let settled = !solver.compute();
         optimiser.pairs += pairs;
         if takes.is_zero() {
             self.complete(base, ctx, settled);
@@ -221,17 +221,17 @@ impl MaxPlusPolicy {
     /// An iteration is computed: its messages go out.
     fn complete(&mut self, base: &Base, ctx: &mut Context<'_, Node>, settled: bool) {
         let (optimiser, timing) = (&mut self.optimiser, base.site.timing);
-        let Some(problem) = &mut optimiser.problem else {
+        let Some(solver) = &mut optimiser.solver else {
             return;
         };
-        problem.deliver();
-        let choices = problem.choices();
+        solver.deliver();
+        let choices = solver.choices();
         // Others judge their paths by these.
         let rethought = choices != optimiser.announced;
         optimiser.iteration += 1;
         optimiser.settled = settled;
         for peer in &mut optimiser.peers {
-            let (vectors, bases) = problem.changed_for(peer.node);
+            let (vectors, bases) = solver.changed_for(peer.node);
             let is_silent = vectors.is_empty() && bases.is_empty();
             let awaited = !optimiser.settled && !peer.settled;
             let told = peer.told_settled == optimiser.settled && !rethought;
@@ -268,7 +268,7 @@ impl MaxPlusPolicy {
     fn take_paths(&mut self, base: &Base, ctx: &mut Context<'_, Node>, message: CandidatePaths) {
         let in_time = (Phase::Propose..=Phase::Optimise).contains(&self.phase);
         let optimiser = &mut self.optimiser;
-        let Some(problem) = optimiser.problem.as_mut().filter(|_| in_time) else {
+        let Some(solver) = optimiser.solver.as_mut().filter(|_| in_time) else {
             return;
         };
         if message.cycle != base.cycle || optimiser.peers.iter().any(|p| p.node == message.node) {
@@ -277,7 +277,7 @@ impl MaxPlusPolicy {
         let rovers = message.rovers.into_iter().map(|r| (r.rover, r.paths));
         let quotas = optimiser.quotas.iter();
         let quota = quotas.filter(|quota| quota.0 == message.node).map(|q| q.1);
-        problem.add(message.node, rovers.collect(), quota.sum());
+        solver.add(message.node, rovers.collect(), quota.sum());
         optimiser.peers.push(Peer {
             node: message.node,
             heard: 0,
@@ -325,15 +325,15 @@ impl MaxPlusPolicy {
         peer.settled = message.settled;
         // It expects an answer to new vectors.
         peer.told_settled &= message.vectors.is_empty() && message.bases.is_empty();
-        if let Some(problem) = &mut optimiser.problem {
+        if let Some(solver) = &mut optimiser.solver {
             for vector in &message.vectors {
-                optimiser.dirty |= problem.receive(vector);
+                optimiser.dirty |= solver.receive(vector);
             }
             for base in &message.bases {
-                optimiser.dirty |= problem.take(base);
+                optimiser.dirty |= solver.take(base);
             }
             for choice in &message.choices {
-                problem.note(choice);
+                solver.note(choice);
             }
         }
         // Who was silent, or late, joins the iteration that the others have reached.

@@ -1,5 +1,5 @@
-//! Max-plus over links with a bit rate. What a node says in one iteration is better than what it said in
-//! the one before, and vectors that queue behind each other are old when they come, while
+//! Max-plus over links with a bit rate. What a node says in one iteration is better than what it
+//! said in the one before, and vectors that queue behind each other are old when they come, while
 //! grants and beacons queue behind them. So a node computes no iteration before the vectors of the
 //! last are on the air, by its own reckoning with the slowest link's rate, and does not send what
 //! would not be on the air when the optimisation is over. Nothing changes where links have no rate.
@@ -13,10 +13,10 @@ use serde::Serialize;
 use crate::max_plus::messages::{CandidatePaths, MaxPlus};
 use crate::timing::Timing;
 
-type Known = LazyLock<Result<Schema, SchemaError>>;
+type LazySchema = LazyLock<Result<Schema, SchemaError>>;
 
-static PATHS: Known = LazyLock::new(Schema::of::<CandidatePaths>);
-static VECTORS: Known = LazyLock::new(Schema::of::<MaxPlus>);
+static PATHS: LazySchema = LazyLock::new(Schema::of::<CandidatePaths>);
+static VECTORS: LazySchema = LazyLock::new(Schema::of::<MaxPlus>);
 
 /// How long candidate paths are on the air.
 pub(super) fn paths_take(timing: &Timing, message: &CandidatePaths) -> SimDuration {
@@ -28,7 +28,7 @@ pub(super) fn vectors_take(timing: &Timing, message: &MaxPlus) -> SimDuration {
     takes(timing, &VECTORS, message)
 }
 
-fn takes<M: Serialize>(timing: &Timing, schema: &Known, message: &M) -> SimDuration {
+fn takes<M: Serialize>(timing: &Timing, schema: &LazySchema, message: &M) -> SimDuration {
     // Only a rate makes a size worth knowing.
     let (Some(_), Ok(schema)) = (timing.rate_bit_per_s, &**schema) else {
         return SimDuration::ZERO;

@@ -1,14 +1,14 @@
 //! Wait-for probes: who waits for whom in a ring, found with messages of one hop (after Chandy,
 //! Misra and Haas, *Distributed Deadlock Detection*, 1983, for a single resource each).
 //!
-//! A rover that has come no nearer to its goal for `network.max_plus.probe_after` cycles waits for whoever
-//! holds the vertex that comes first on its shortest way there. Its node sends a probe to the owner
-//! of that vertex, which adds the occupant, if that one waits too, and passes the probe on. The one
-//! that comes back to its initiator confirms a deadlock, and names it. Every rover waits for at most
-//! one, so that a ring is entered by many but closed only by its members; of these the one with
-//! the lowest number finds it, and the others' probes are dropped.
+//! A rover that has come no nearer to its goal for `network.max_plus.probe_after` cycles waits for
+//! whoever holds the vertex that comes first on its shortest way there. Its node sends a probe to
+//! the owner of that vertex, which adds the occupant, if that one waits too, and passes the probe
+//! on. The one that comes back to its initiator confirms a deadlock, and names it. Every rover
+//! waits for at most one, so that a ring is entered by many but closed only by its members; of
+//! these the one with the lowest number finds it, and the others' probes are dropped.
 //!
-//! "No nearer" and not "standing still", because most teams of the paper's policy do not freeze:
+//! "No nearer" and not "standing still", because most teams of the policy `max-plus` do not freeze:
 //! rovers push each other to and fro. A node knows it of each rover that it or its neighbours held.
 //! While a probe is under way rovers may move: at latencies of several cycles it may name a
 //! ring whose members did not all wait at the same time.
@@ -22,7 +22,7 @@ use crate::ids::RoverId;
 use crate::max_plus::aids::messages::{WaitProbe, Waiting};
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::Ledger;
+use crate::safety::OccupancyTable;
 
 /// What a node remembers of rovers' ways to their goals, and of deadlocks. Lost in a crash.
 #[derive(Default)]
@@ -100,7 +100,7 @@ impl MaxPlusPolicy {
             return;
         }
         let (site, cycle) = (base.site.clone(), base.cycle);
-        let own = ctx.durable::<Ledger>().holdings();
+        let own = ctx.durable::<OccupancyTable>().holdings();
         let theirs = base.neighbors.iter().flat_map(|n| &n.holdings);
         for holding in own.iter().chain(theirs) {
             if let Some(goal) = holding.goal {
@@ -124,7 +124,7 @@ impl MaxPlusPolicy {
         ctx: &mut Context<'_, Node>,
         vertex: VertexId,
     ) -> Option<Waiting> {
-        let held = *ctx.durable::<Ledger>().occupant(vertex)?;
+        let held = *ctx.durable::<OccupancyTable>().occupant(vertex)?;
         let goal = held.goal.filter(|&goal| held.arrived && goal != vertex)?;
         let kept = self.probes.kept(held.rover, base.cycle);
         (kept >= base.site.config.max_plus.probe_after).then_some(Waiting {
@@ -134,8 +134,8 @@ impl MaxPlusPolicy {
         })
     }
 
-    /// Asks for the occupant of the vertex that the last member wants: here if it is the node's own,
-    /// else its owner, a neighbour.
+    /// Asks for the occupant of the vertex that the last member wants: here if it is the node's
+    /// own, else its owner, a neighbour.
     fn pass_probe_on(
         &mut self,
         base: &Base,
@@ -258,10 +258,10 @@ mod tests {
     /// The rings by walking: who comes back to itself is in one.
     fn rings_by_walking(next: &[Option<usize>]) -> BTreeSet<Vec<usize>> {
         let ring = |start: usize| {
-            let walk = std::iter::successors(Some(start), |&i| next[i]);
-            let walk: Vec<_> = walk.take(next.len() + 1).collect();
-            let back = walk.iter().skip(1).position(|&i| i == start)?;
-            let mut ring = walk[..=back].to_vec();
+            let request = std::iter::successors(Some(start), |&i| next[i]);
+            let request: Vec<_> = request.take(next.len() + 1).collect();
+            let back = request.iter().skip(1).position(|&i| i == start)?;
+            let mut ring = request[..=back].to_vec();
             let least = (0..ring.len()).min_by_key(|&i| ring[i]).unwrap_or(0);
             ring.rotate_left(least);
             Some(ring)

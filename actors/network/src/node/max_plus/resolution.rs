@@ -4,11 +4,11 @@
 //!
 //! The node of the ring's lowest rover looks in its local neighbourhood graph for the nearest free
 //! vertex off the others' ways and sends its rover there; rovers that stand on the way, off the
-//! others' ways too, are pushed ahead. If there is no such place it hands the ring to the node of the
-//! next rover, one hop away, and so on once round. What is sent are orders to plan by: the rover's
-//! only paths are then the one aside, at no penalty for going back, and the zero path. Vertices
-//! are asked for and granted as ever, so that no collision can come of it, nor of two nodes that
-//! judge differently; a lost or late order is one that nobody follows.
+//! others' ways too, are pushed ahead. If there is no such place it hands the ring to the node of
+//! the next rover, one hop away, and so on once round. What is sent are orders to plan by: the
+//! rover's only paths are then the one aside, at no penalty for going back, and the zero path.
+//! Vertices are asked for and granted as ever, so that no collision can come of it, nor of two
+//! nodes that judge differently; a lost or late order is one that nobody follows.
 //!
 //! Two resolutions would push each other's rovers about. A node that has sent or heard orders does
 //! not begin another while they hold, and for a random time longer.
@@ -26,7 +26,7 @@ use crate::max_plus::candidates::{CandidatePath, Destination};
 use crate::max_plus::lng::LocalGraph;
 use crate::node::Node;
 use crate::node::base::Base;
-use crate::safety::{Ledger, Occupant};
+use crate::safety::{OccupancyTable, Occupant};
 
 /// The orders a node knows of. Lost in a crash.
 #[derive(Default)]
@@ -52,9 +52,9 @@ impl Resolution {
     }
 }
 
-/// Where each rover goes so that the one at `from` gets off the ways that others `need`: its own path
-/// first, then those of the rovers that it pushes. `holder` says who holds a vertex. `None` if no
-/// place in the graph is free for it.
+/// Where each rover goes so that the one at `from` gets off the ways that others `need`: its own
+/// path first, then those of the rovers that it pushes. `holder` says who holds a vertex. `None` if
+/// no place in the graph is free for it.
 pub(super) fn make_way(
     graph: &LocalGraph,
     from: VertexId,
@@ -126,7 +126,10 @@ impl MaxPlusPolicy {
             if base.cycle < self.resolution.quiet_until {
                 return;
             }
-            let held = ctx.durable::<Ledger>().occupant(member.vertex).copied();
+            let held = ctx
+                .durable::<OccupancyTable>()
+                .occupant(member.vertex)
+                .copied();
             if held.is_none_or(|held| held.rover != member.rover) {
                 return;
             }
@@ -149,10 +152,10 @@ impl MaxPlusPolicy {
         let needed: Vec<_> = others
             .flat_map(|(_, other)| roadmap.shortest_path(other.vertex, other.goal))
             .collect();
-        let ledger = ctx.durable::<Ledger>();
+        let occupancy = ctx.durable::<OccupancyTable>();
         let holder = |v| {
             if base.owns(v) {
-                return ledger.occupant(v).map(|held| held.rover);
+                return occupancy.occupant(v).map(|held| held.rover);
             }
             let mut theirs = base.neighbors.iter().flat_map(|n| &n.holdings);
             theirs.find(|h| h.vertex == v).map(|h| h.rover)
@@ -319,8 +322,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever stands where: each goes to a place of its own off the others' ways, along edges,
-        /// and nobody is pushed who is not asked.
+        /// Whatever stands where: each goes to a place of its own off the others' ways, along
+        /// edges, and nobody is pushed who is not asked.
         #[test]
         fn ways_aside_end_at_places_of_their_own(
             cuts in prop::collection::vec((0..20u32, 0..2u32), 0..6),
@@ -329,11 +332,13 @@ mod tests {
             from in 0..20u32,
         ) {
             // Cutting both edges of a corner would take the map apart: rungs only.
-            let rungs: Vec<_> = cuts.iter().map(|(i, _)| (*i, i + 5)).filter(|(i, _)| i % 5 != 0).collect();
+            let rungs = cuts.iter().map(|(i, _)| (*i, i + 5));
+            let rungs: Vec<_> = rungs.filter(|(i, _)| i % 5 != 0).collect();
             let map = grid(5, 4, &rungs);
             let graph = LocalGraph::over(&map, map.vertices().collect());
             let need = |u: VertexId| needed[u.0 as usize];
-            let holder = |u: VertexId| (u.0 == from || standing[u.0 as usize]).then_some(RoverId(u.0));
+            let is_held = |u: VertexId| u.0 == from || standing[u.0 as usize];
+            let holder = |u: VertexId| is_held(u).then_some(RoverId(u.0));
             let Some(ways) = make_way(&graph, v(from), need, holder) else {
                 // Only if no free place off the ways can be reached.
                 let mut reached = vec![v(from)];

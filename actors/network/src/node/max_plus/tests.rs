@@ -20,8 +20,8 @@ fn line_with_a_branch() -> Roadmap {
     Roadmap::new("line", places, edges, vec![v(0), v(8)]).unwrap()
 }
 
-/// Two rovers from the two ends, whose nodes have no time to agree on anything; `None` if this seed sends both
-/// the same way.
+/// Two rovers from the two ends, whose nodes have no time to agree on anything; `None` if this seed
+/// sends both the same way.
 fn head_on(seed: u64, network: &NetworkConfig) -> Option<NetworkMetrics> {
     let world = WorldConfig {
         nodes: 3,

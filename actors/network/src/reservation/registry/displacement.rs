@@ -1,15 +1,16 @@
 //! Local resolution on maps where rovers stay: who stands in another's way steps aside for a while.
 //!
-//! A rover that finds no way asks what its way would be if nobody stood still, and then those who
-//! stand on it to make way. Who began earlier goes first: a rover that is on its way to its goal
-//! itself makes way for older walks only, one that stands at its goal for all. It takes the nearest
-//! place where it may stay; where all are taken, it asks in turn, in the name of whom it makes way
-//! for. What was asked for is **claimed** for a while: nobody younger comes to stay there. So the
-//! oldest walk's way gets free, and stays free until it is reserved.
+//! A rover that finds no path asks what its path would be if nobody stood still, and then those who
+//! stand on it to make room. Who began earlier goes first: a rover that is on its way to its goal
+//! itself makes room for older requests only, one that stands at its goal for all. It takes the
+//! nearest place where it may stay; where all are taken, it asks in turn, in the name of whom it
+//! makes room for. What was asked for is **claimed** for a while: nobody younger comes to stay
+//! there. So the oldest request's way gets free, and stays free until it is reserved.
 //!
-//! This is the order of priority inheritance with backtracking (Okumura et al., *Priority inheritance
-//! with backtracking for iterative multi-agent path finding*, AIJ 310, 2022), over reserved ways.
-//! It guarantees nothing: a rover in a dead end behind another one's goal may still be stuck.
+//! This is the order of priority inheritance with backtracking (Okumura et al., *Priority
+//! inheritance with backtracking for iterative multi-agent path finding*, AIJ 310, 2022), over
+//! reserved paths. It guarantees nothing: a rover in a dead end behind another one's goal may still
+//! be stuck.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -18,15 +19,15 @@ use farside_worlds::{Roadmap, VertexId};
 use super::{Aim, Applicant, Desk, Origin, Registry};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, way_to};
-use crate::reservation::messages::{Item, Reserve, Settle, Verdict, Walk, Yield};
+use crate::reservation::messages::{Displace, Item, ReservationRequest, Reserve, Settle, Verdict};
 
 /// Out of whose way.
 #[derive(Clone, Debug)]
 pub(crate) struct Aside {
     /// What is to be left free.
     path: BTreeSet<VertexId>,
-    /// The age of the walk for which way is made.
-    pub(crate) elder: (u64, RoverId),
+    /// The age of the request for which way is made.
+    pub(crate) priority: (u64, RoverId),
     /// Then it is no longer asked for [ns].
     until: u64,
 }
@@ -49,27 +50,27 @@ impl Claims {
         }
     }
 
-    /// The rover has its way.
+    /// The rover has its path.
     pub(crate) fn give_up(&mut self, rover: RoverId) {
         self.0.retain(|_, ((_, by), _)| *by != rover);
     }
 }
 
 impl Registry {
-    /// When and for whom the vertex is taken, as far as who asks would have to put up with it: those
-    /// who stand there for ever make way, unless they go before.
-    pub(crate) fn busy_for_elders(
+    /// When and for whom the vertex is taken, as far as who asks would have to put up with it:
+    /// those who stand there for ever make room, unless they go before.
+    pub(crate) fn busy_for_priority(
         &self,
         v: VertexId,
         asked: (u64, RoverId),
     ) -> Option<Vec<(u64, u64)>> {
-        let mut busy = self.book.busy(v)?;
+        let mut busy = self.table.busy(v)?;
         let firm = |rover| {
             let on_its_way = self.applicants.iter().find(|a| a.is_of(rover));
             on_its_way.is_some_and(|a| a.goes_before(asked))
         };
-        if let Some(visit) = self.book.standing(v)
-            && !firm(visit.walk.rover)
+        if let Some(visit) = self.table.standing(v)
+            && !firm(visit.request.rover)
         {
             busy.pop();
         }
@@ -77,29 +78,29 @@ impl Registry {
     }
 
     /// Asks those of this node's rovers that stand on a path to step aside, and passes that on.
-    pub(crate) fn make_way(&mut self, desk: &Desk<'_>, request: Yield) {
-        let asked = request.elder;
+    pub(crate) fn displace(&mut self, desk: &Desk<'_>, ask: Displace) {
+        let asked = ask.priority;
         let until = desk.now + CLAIMED_FOR * desk.site.timing.cycle.as_nanos();
         let aside = Aside {
-            path: request.path.iter().copied().collect(),
-            elder: request.elder,
+            path: ask.path.iter().copied().collect(),
+            priority: ask.priority,
             until,
         };
-        for &vertex in &request.path {
-            if desk.site.sensors.owner(vertex) != desk.home {
+        for &vertex in &ask.path {
+            if desk.site.sensors.owner(vertex) != desk.region {
                 continue;
             }
             self.claims.claim(vertex, asked, desk.now, until);
-            let Some(visit) = self.book.standing(vertex) else {
+            let Some(visit) = self.table.standing(vertex) else {
                 continue;
             };
-            let (rover, step) = (visit.walk.rover, visit.step);
-            if rover == request.walk.rover {
+            let (rover, step) = (visit.request.rover, visit.step);
+            if rover == ask.request.rover {
                 continue;
             }
             match self.applicants.iter_mut().find(|a| a.is_of(rover)) {
                 Some(applicant) => {
-                    if applicant.walk.is_none() && !applicant.goes_before(asked) {
+                    if applicant.request.is_none() && !applicant.goes_before(asked) {
                         applicant.aim = Aim::Aside(aside.clone());
                     }
                 }
@@ -115,17 +116,17 @@ impl Registry {
                 }
             }
         }
-        let (walk, route) = (request.walk, request.route.clone());
-        match request.at.checked_sub(1) {
+        let (request, route) = (ask.request, ask.route.clone());
+        match ask.at.checked_sub(1) {
             Some(at) => {
                 let to = route[at as usize];
-                self.post(to, Item::Yield(Yield { at, ..request }));
+                self.post(to, Item::Displace(Displace { at, ..ask }));
             }
             None => self.fail(
                 desk,
                 Settle {
-                    walk,
-                    verdict: Verdict::NoWay,
+                    request,
+                    verdict: Verdict::NoPath,
                     route,
                     at: 0,
                 },
@@ -133,14 +134,14 @@ impl Registry {
         }
     }
 
-    /// Begins an attempt of a rover that may have been asked to step aside, from where it stands. None
-    /// if it goes to its goal; where else it is to try to go; nothing more if it has found a place or
-    /// need not go.
+    /// Begins an attempt of a rover that may have been asked to step aside, from where it stands.
+    /// None if it goes to its goal; where else it is to try to go; nothing more if it has found a
+    /// place or need not go.
     pub(crate) fn step_aside(
         &mut self,
         desk: &Desk<'_>,
         at: usize,
-        walk: Walk,
+        request: ReservationRequest,
         label: Label,
     ) -> Option<Option<VertexId>> {
         let applicant = &mut self.applicants[at];
@@ -152,10 +153,10 @@ impl Registry {
         };
         if aside.until < desk.now {
             applicant.aim = Aim::Goal;
-            if desk.site.missions[walk.rover.0 as usize].1 != vertex {
+            if desk.site.missions[request.rover.0 as usize].1 != vertex {
                 return None;
             }
-            (applicant.origin, applicant.walk) = (Origin::Done, None);
+            (applicant.origin, applicant.request) = (Origin::Done, None);
             return Some(None);
         }
         let (aside, in_vain) = (aside.clone(), applicant.in_vain);
@@ -167,16 +168,16 @@ impl Registry {
                 && place != vertex
                 && desk.site.sensors.covers(place)
                 && !aside.path.contains(&place)
-                && !self.claims.is_claimed(place, aside.elder, desk.now)
+                && !self.claims.is_claimed(place, aside.priority, desk.now)
         };
         let places = (0..).zip(&labels).filter(|(_, label)| may_stay(label));
         if let Some((last, _)) = places.min_by_key(|(at, label)| (label.ready, *at)) {
-            let way = way_to(&labels, last, FOREVER, |v| desk.site.sensors.covers(v));
+            let path = way_to(&labels, last, FOREVER, |v| desk.site.sensors.covers(v));
             let reserve = Reserve {
-                walk,
+                request,
                 first_step: step,
-                at: way.len() as u32 - 1,
-                way,
+                at: path.len() as u32 - 1,
+                path,
                 replaced: Vec::new(),
             };
             self.reserve(desk, reserve);
@@ -184,7 +185,7 @@ impl Registry {
         }
         // Of its own vertices the node knows that they are taken: others may be free, or are asked
         // for in every second attempt.
-        let own = |v: VertexId| desk.site.sensors.owner(v) == desk.home;
+        let own = |v: VertexId| desk.site.sensors.owner(v) == desk.region;
         let wishful = in_vain % 2 == 1;
         let is_place = |v| desk.site.sensors.covers(v) && (wishful || !own(v));
         let off = |v: VertexId| is_place(v) && !aside.path.contains(&v);
@@ -194,29 +195,29 @@ impl Registry {
 
     /// A rover that has stepped aside goes on to its goal, once the other one has had the time to
     /// pass.
-    pub(crate) fn return_later(&mut self, desk: &Desk<'_>, walk: &Walk) {
-        if !desk.site.stays {
+    pub(crate) fn return_later(&mut self, desk: &Desk<'_>, request: &ReservationRequest) {
+        if !desk.site.stay_at_target {
             return;
         }
-        let goal = desk.site.missions[walk.rover.0 as usize].1;
-        for &vertex in desk.site.sensors.owned(desk.home) {
-            let Some(visit) = self.book.standing(vertex) else {
+        let goal = desk.site.missions[request.rover.0 as usize].1;
+        for &vertex in desk.site.sensors.owned(desk.region) {
+            let Some(visit) = self.table.standing(vertex) else {
                 continue;
             };
-            if visit.walk != *walk || vertex == goal {
+            if visit.request != *request || vertex == goal {
                 continue;
             }
-            let (rover, step) = (walk.rover, visit.step);
+            let (rover, step) = (request.rover, visit.step);
             let due = visit.start + RETURN_AFTER * desk.site.timing.cycle.as_nanos();
             self.seek(Origin::Stand {
                 rover,
                 vertex,
                 step,
             });
-            let first = Walk {
+            let first = ReservationRequest {
                 rover,
-                attempt: walk.attempt + 1,
-                since: walk.since,
+                attempt: request.attempt + 1,
+                since: request.since,
             };
             if let Some(applicant) = self.applicants.last_mut() {
                 applicant.again = Some((first, due));
@@ -231,13 +232,13 @@ impl Applicant {
         matches!(self.origin, Origin::Stand { rover: mine, .. } if mine == rover)
     }
 
-    /// Whether it need not make way for who asks: it is on its way to its goal, and began before; or
-    /// makes way already, for one that did.
+    /// Whether it need not make room for who asks: it is on its way to its goal, and began before;
+    /// or makes room already, for one that did.
     fn goes_before(&self, asked: (u64, RoverId)) -> bool {
-        let walk = self.walk.or(self.again).map(|(walk, _)| walk);
+        let request = self.request.or(self.again).map(|(request, _)| request);
         match &self.aim {
-            Aim::Goal => walk.is_some_and(|walk| walk.age() < asked),
-            Aim::Aside(aside) => aside.elder < asked,
+            Aim::Goal => request.is_some_and(|request| request.age() < asked),
+            Aim::Aside(aside) => aside.priority < asked,
         }
     }
 }

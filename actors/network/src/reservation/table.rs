@@ -1,23 +1,23 @@
-//! The visits planned at a node's vertices, in order. Pure: what is in the book, and what may be
+//! The visits planned at a node's vertices, in order. Pure: what is in the table, and what may be
 //! entered; who is admitted when is the affair of `admit`.
 
 use farside_worlds::VertexId;
 
-use super::messages::Walk;
+use super::messages::ReservationRequest;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 
 /// A planned visit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Visit {
-    pub(crate) walk: Walk,
+    pub(crate) request: ReservationRequest,
     /// The step with which the rover comes.
     pub(crate) step: u32,
     /// Where it comes from; none from an entry queue.
     pub(crate) from: Option<VertexId>,
     pub(crate) start: u64,
     pub(crate) end: u64,
-    /// The whole way is reserved.
+    /// The whole path is reserved.
     pub(crate) confirmed: bool,
     /// The vertex was given to the rover: nothing may come before.
     pub(crate) granted: bool,
@@ -33,7 +33,7 @@ pub(crate) enum Clash {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Book {
+pub(crate) struct ReservationTable {
     /// The vertices, ascending, each with its visits in order.
     pages: Vec<(VertexId, Vec<Visit>)>,
     /// From the first vertex to the last: the page of each, [`NO_PAGE`] for those of others.
@@ -42,8 +42,8 @@ pub(crate) struct Book {
 
 const NO_PAGE: u32 = u32::MAX;
 
-impl Book {
-    /// An empty page for each vertex; a book that has pages stays as it is.
+impl ReservationTable {
+    /// An empty page for each vertex; a table that has pages stays as it is.
     pub(crate) fn open(&mut self, owned: &[VertexId]) {
         if self.pages.is_empty() {
             self.pages = owned.iter().map(|&v| (v, Vec::new())).collect();
@@ -61,7 +61,7 @@ impl Book {
         (*place != NO_PAGE).then_some(*place as usize)
     }
 
-    /// The visits at `v` as (start, end); none if it is not in the book.
+    /// The visits at `v` as (start, end); none if it is not in the table.
     pub(crate) fn busy(&self, v: VertexId) -> Option<Vec<(u64, u64)>> {
         let visits = &self.pages[self.page(v)?].1;
         Some(
@@ -74,13 +74,13 @@ impl Book {
 
     /// Enters a rover that stands at `v`, for ever as far as is known.
     pub(crate) fn stand(&mut self, v: VertexId, rover: RoverId, step: u32) {
-        let walk = Walk {
+        let request = ReservationRequest {
             rover,
             attempt: 0,
             since: 0,
         };
         let visit = Visit {
-            walk,
+            request,
             step,
             from: None,
             start: 0,
@@ -105,9 +105,13 @@ impl Book {
         }
     }
 
-    /// Whether `visits` (with their vertices) may all be entered: apart in time from all others, and
-    /// after those that were granted.
-    pub(crate) fn check(&self, walk: &Walk, visits: &[TimedVisit]) -> Result<(), Clash> {
+    /// Whether `visits` (with their vertices) may all be entered: apart in time from all others,
+    /// and after those that were granted.
+    pub(crate) fn check(
+        &self,
+        request: &ReservationRequest,
+        visits: &[TimedVisit],
+    ) -> Result<(), Clash> {
         let mut result = Ok(());
         for new in visits {
             let Some(page) = self.page(new.vertex) else {
@@ -118,7 +122,7 @@ impl Book {
                 if apart && !(old.granted && new.start < old.start) {
                     continue;
                 }
-                if old.confirmed || old.walk.is_older_than(walk) {
+                if old.confirmed || old.request.is_older_than(request) {
                     return Err(Clash::Firm);
                 }
                 result = Err(Clash::Younger);
@@ -127,11 +131,11 @@ impl Book {
         result
     }
 
-    /// Whether `walk` has entered these visits.
-    pub(crate) fn has(&self, walk: &Walk, visits: &[TimedVisit]) -> bool {
+    /// Whether `request` has entered these visits.
+    pub(crate) fn has(&self, request: &ReservationRequest, visits: &[TimedVisit]) -> bool {
         let entered = |new: &TimedVisit| {
             let page = self.page(new.vertex).map(|page| &self.pages[page].1);
-            let same = |old: &Visit| old.walk == *walk && old.start == new.start;
+            let same = |old: &Visit| old.request == *request && old.start == new.start;
             page.is_some_and(|visits| visits.iter().any(same))
         };
         !visits.is_empty() && visits.iter().all(entered)
@@ -145,27 +149,27 @@ impl Book {
         visits.insert(at, visit);
     }
 
-    /// The whole way is reserved.
-    pub(crate) fn confirm(&mut self, walk: &Walk) {
-        for visit in self.of(walk) {
+    /// The whole path is reserved.
+    pub(crate) fn confirm(&mut self, request: &ReservationRequest) {
+        for visit in self.of(request) {
             visit.confirmed = true;
         }
     }
 
-    fn of(&mut self, walk: &Walk) -> impl Iterator<Item = &mut Visit> {
-        let walk = *walk;
+    fn of(&mut self, request: &ReservationRequest) -> impl Iterator<Item = &mut Visit> {
+        let request = *request;
         let all = self.pages.iter_mut().flat_map(|page| &mut page.1);
-        all.filter(move |visit| visit.walk == walk)
+        all.filter(move |visit| visit.request == request)
     }
 
-    /// Strikes out what `walk` has entered.
-    pub(crate) fn strike(&mut self, walk: &Walk) {
-        self.retain(|visit| visit.walk != *walk);
+    /// Strikes out what `request` has entered.
+    pub(crate) fn strike(&mut self, request: &ReservationRequest) {
+        self.retain(|visit| visit.request != *request);
     }
 
     /// Strikes out what earlier attempts have entered: they have failed, if there is a later one.
-    pub(crate) fn strike_earlier(&mut self, walk: &Walk) {
-        self.retain(|visit| visit.confirmed || !visit.walk.is_before(walk));
+    pub(crate) fn strike_earlier(&mut self, request: &ReservationRequest) {
+        self.retain(|visit| visit.confirmed || !visit.request.is_before(request));
     }
 
     fn retain(&mut self, keep: impl Fn(&Visit) -> bool) {
@@ -198,23 +202,23 @@ mod tests {
     use super::*;
     use crate::testing::v;
 
-    fn walk(rover: u32, since: u64) -> Walk {
-        Walk {
+    fn request(rover: u32, since: u64) -> ReservationRequest {
+        ReservationRequest {
             rover: RoverId(rover),
             attempt: 1,
             since,
         }
     }
 
-    fn book() -> Book {
-        let mut book = Book::default();
-        book.open(&[v(1), v(4)]);
-        book
+    fn table() -> ReservationTable {
+        let mut table = ReservationTable::default();
+        table.open(&[v(1), v(4)]);
+        table
     }
 
-    fn visit(walk: Walk, start: u64, end: u64) -> Visit {
+    fn visit(request: ReservationRequest, start: u64, end: u64) -> Visit {
         Visit {
-            walk,
+            request,
             step: 3,
             from: None,
             start,
@@ -234,68 +238,68 @@ mod tests {
 
     #[test]
     fn visits_lie_apart_and_after_what_was_granted() {
-        let mut book = book();
-        let (young, old) = (walk(7, 50), walk(2, 10));
-        book.enter(v(4), visit(young, 100, 200));
-        let check = |start, end| book.check(&old, &[timed(4, start, end)]);
+        let mut table = table();
+        let (young, old) = (request(7, 50), request(2, 10));
+        table.enter(v(4), visit(young, 100, 200));
+        let check = |start, end| table.check(&old, &[timed(4, start, end)]);
         assert_eq!(check(10, 99), Ok(()));
         assert_eq!(check(201, FOREVER), Ok(()));
         for (start, end) in [(10, 100), (150, 160), (200, 300), (50, FOREVER)] {
             assert_eq!(check(start, end), Err(Clash::Younger), "{start}, {end}");
         }
         assert_eq!(
-            book.check(&walk(9, 60), &[timed(4, 150, 160)]),
+            table.check(&request(9, 60), &[timed(4, 150, 160)]),
             Err(Clash::Firm)
         );
-        book.confirm(&young);
-        assert_eq!(book.check(&old, &[timed(4, 150, 160)]), Err(Clash::Firm));
-        for (_, head) in book.heads() {
+        table.confirm(&young);
+        assert_eq!(table.check(&old, &[timed(4, 150, 160)]), Err(Clash::Firm));
+        for (_, head) in table.heads() {
             head.granted = true;
         }
-        assert_eq!(book.check(&old, &[timed(4, 10, 99)]), Err(Clash::Firm));
-        assert_eq!(book.check(&old, &[timed(4, 300, 301)]), Ok(()));
+        assert_eq!(table.check(&old, &[timed(4, 10, 99)]), Err(Clash::Firm));
+        assert_eq!(table.check(&old, &[timed(4, 300, 301)]), Ok(()));
         assert_eq!(
-            book.check(&old, &[timed(2, 300, 301)]),
+            table.check(&old, &[timed(2, 300, 301)]),
             Err(Clash::Firm),
-            "not in this book"
+            "not in this table"
         );
     }
 
     #[test]
     fn only_the_first_visit_may_be_granted_and_only_once_it_is_confirmed() {
-        let mut book = book();
-        let (first, second) = (walk(1, 0), walk(2, 0));
-        book.enter(v(1), visit(second, 20, 30));
-        book.enter(v(1), visit(first, 10, 15));
-        book.confirm(&second);
-        assert_eq!(book.heads().count(), 0, "the first is not confirmed");
-        book.confirm(&first);
-        let (at, head) = book.heads().next().unwrap();
-        assert_eq!((at, head.walk), (v(1), first));
-        book.departed(v(1));
+        let mut table = table();
+        let (first, second) = (request(1, 0), request(2, 0));
+        table.enter(v(1), visit(second, 20, 30));
+        table.enter(v(1), visit(first, 10, 15));
+        table.confirm(&second);
+        assert_eq!(table.heads().count(), 0, "the first is not confirmed");
+        table.confirm(&first);
+        let (at, head) = table.heads().next().unwrap();
+        assert_eq!((at, head.request), (v(1), first));
+        table.departed(v(1));
         assert_eq!(
-            book.heads().next().unwrap().1.walk,
+            table.heads().next().unwrap().1.request,
             first,
             "it was never granted"
         );
-        book.heads().next().unwrap().1.granted = true;
-        book.departed(v(1));
-        assert_eq!(book.heads().next().unwrap().1.walk, second);
+        table.heads().next().unwrap().1.granted = true;
+        table.departed(v(1));
+        assert_eq!(table.heads().next().unwrap().1.request, second);
     }
 
     #[test]
     fn a_failed_attempt_leaves_nothing_behind() {
-        let mut book = book();
-        let first = walk(1, 5);
-        book.enter(v(1), visit(first, 10, 15));
-        book.enter(v(4), visit(walk(3, 9), 10, 15));
-        book.strike_earlier(&Walk {
+        let mut table = table();
+        let first = request(1, 5);
+        table.enter(v(1), visit(first, 10, 15));
+        table.enter(v(4), visit(request(3, 9), 10, 15));
+        table.strike_earlier(&ReservationRequest {
             attempt: 2,
             ..first
         });
-        assert_eq!(book.busy(v(1)), Some(Vec::new()));
-        assert_eq!(book.busy(v(4)).unwrap().len(), 1);
-        book.strike(&walk(3, 9));
-        assert_eq!(book.busy(v(4)), Some(Vec::new()));
+        assert_eq!(table.busy(v(1)), Some(Vec::new()));
+        assert_eq!(table.busy(v(4)).unwrap().len(), 1);
+        table.strike(&request(3, 9));
+        assert_eq!(table.busy(v(4)), Some(Vec::new()));
     }
 }

@@ -1,5 +1,5 @@
-//! How walks proceed: what a node does with a probe, a way to be reserved, and the news of what became
-//! of it.
+//! How requests proceed: what a node does with a probe, a path to be reserved, and the news of what
+//! became of it.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,10 @@ use farside_worlds::VertexId;
 use super::{Desk, Offers, Registry, owners};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
-use crate::reservation::book::{Clash, Visit};
-use crate::reservation::messages::{Item, Probe, Reserve, Settle, Verdict, Walk, Wish, Yield};
+use crate::reservation::messages::{
+    Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
+};
+use crate::reservation::table::{Clash, Visit};
 
 /// The most labels that a probe hands on from one node to the next, so that messages stay small.
 const MAX_FRONTIER: usize = 24;
@@ -17,23 +19,23 @@ const MAX_FRONTIER: usize = 24;
 impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     ///
-    /// A wish is in the name of a walk that began with `elder`.
-    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, elder: (u64, RoverId)) {
+    /// A wish is in the name of a request that began with `priority`.
+    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, priority: (u64, RoverId)) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
-            let busy = |v| self.busy_for_elders(v, elder);
+            let busy = |v| self.busy_for_priority(v, priority);
             self.search_in(desk, &busy, |ground| ground.expand(&mut labels, open));
         } else {
             self.search(desk, |ground| ground.expand(&mut labels, open));
         }
         let Some(&next) = probe.route.get(probe.at as usize + 1) else {
-            self.offer(desk, &probe, &labels, elder);
+            self.offer(desk, &probe, &labels, priority);
             return;
         };
         let site = desk.site;
         let borders = |label: &Label| {
             let onward = site.roadmap.neighbors(label.vertex);
-            site.sensors.owner(label.vertex) == desk.home
+            site.sensors.owner(label.vertex) == desk.region
                 && onward.iter().any(|&v| site.sensors.owner(v) == next)
         };
         let has_gaps = !site.sensors.gaps().is_empty();
@@ -42,7 +44,7 @@ impl Registry {
         probe.labels = labels;
         probe.at += 1;
         let item = match probe.wishful {
-            true => Item::Wish(Wish { probe, elder }),
+            true => Item::Wish(Wish { probe, priority }),
             false => Item::Probe(probe),
         };
         self.post(next, item);
@@ -54,55 +56,59 @@ impl Registry {
         desk: &Desk<'_>,
         probe: &Probe,
         mut labels: &[Label],
-        elder: (u64, RoverId),
+        priority: (u64, RoverId),
     ) {
-        if self.succession.is_stale(probe.started) {
+        if self.failover.is_stale(probe.started) {
             return;
         }
-        let rover = probe.walk.rover;
-        // Of a rover's walks, and of their attempts, only the last counts.
-        let age = |walk: &Walk| Some((walk.since, walk.attempt));
-        let known = self.offers.get(&rover).and_then(|o| age(&o.walk));
-        if known > age(&probe.walk) {
+        let rover = probe.request.rover;
+        // Of a rover's requests, and of their attempts, only the last counts.
+        let age = |request: &ReservationRequest| Some((request.since, request.attempt));
+        let known = self.offers.get(&rover).and_then(|o| age(&o.request));
+        if known > age(&probe.request) {
             return;
         }
-        if known < age(&probe.walk) {
+        if known < age(&probe.request) {
             let offers = Offers {
-                walk: probe.walk,
+                request: probe.request,
                 heard: 0,
                 probes: probe.probes,
                 first_step: probe.first_step,
                 wishful: probe.wishful,
-                elder,
+                priority,
                 route: probe.route.clone(),
                 best: None,
                 decided: false,
                 // Other routes may be much slower, or lead past a node that is down.
-                deadline: desk.now + 2 * (desk.now - probe.started) + self.gap(),
+                deadline: desk.now + 2 * (desk.now - probe.started) + self.headway(),
             };
             self.offers.insert(rover, offers);
         }
-        let gap = self.gap();
+        let headway = self.headway();
         let Some(offers) = self.offers.get_mut(&rover) else {
             return;
         };
         offers.heard += 1;
         // Who stays needs the goal for ever, and leaves it to who has asked for it before.
-        let stays = desk.site.stays;
-        if !offers.wishful && self.claims.is_claimed(probe.goal, offers.elder, desk.now) {
+        let stay_at_target = desk.site.stay_at_target;
+        if !offers.wishful
+            && self
+                .claims
+                .is_claimed(probe.goal, offers.priority, desk.now)
+        {
             labels = &[];
         }
-        let arrivals = (0..)
-            .zip(labels)
-            .filter(|(_, label)| label.vertex == probe.goal && (!stays || label.until == FOREVER));
+        let arrivals = (0..).zip(labels).filter(|(_, label)| {
+            label.vertex == probe.goal && (!stay_at_target || label.until == FOREVER)
+        });
         if let Some((at, label)) = arrivals.min_by_key(|(_, label)| label.ready)
             && offers
                 .best
                 .as_ref()
                 .is_none_or(|(ready, _)| label.ready < *ready)
         {
-            let leaves = label.ready.saturating_add(gap).min(label.until);
-            let end = if stays { FOREVER } else { leaves };
+            let leaves = label.ready.saturating_add(headway).min(label.until);
+            let end = if stay_at_target { FOREVER } else { leaves };
             let covers = |v| desk.site.sensors.covers(v);
             offers.best = Some((label.ready, way_to(labels, at, end, covers)));
         }
@@ -129,25 +135,25 @@ impl Registry {
             return;
         };
         offers.decided = true;
-        let (walk, first_step, elder) = (offers.walk, offers.first_step, offers.elder);
+        let (request, first_step, priority) = (offers.request, offers.first_step, offers.priority);
         match offers.best.take() {
-            Some((_, way)) if offers.wishful => {
-                let route = owners(desk, &way);
-                let request = Yield {
-                    walk,
-                    elder,
-                    path: way.iter().map(|visit| visit.vertex).collect(),
+            Some((_, path)) if offers.wishful => {
+                let route = owners(desk, &path);
+                let ask = Displace {
+                    request,
+                    priority,
+                    path: path.iter().map(|visit| visit.vertex).collect(),
                     at: route.len() as u32 - 1,
                     route,
                 };
-                self.make_way(desk, request);
+                self.displace(desk, ask);
             }
-            Some((_, way)) => {
-                let at = way.len() as u32 - 1;
+            Some((_, path)) => {
+                let at = path.len() as u32 - 1;
                 let reserve = Reserve {
-                    walk,
+                    request,
                     first_step,
-                    way,
+                    path,
                     at,
                     replaced: Vec::new(),
                 };
@@ -156,8 +162,8 @@ impl Registry {
             None => {
                 let route = offers.route.clone();
                 let settle = Settle {
-                    walk,
-                    verdict: Verdict::NoWay,
+                    request,
+                    verdict: Verdict::NoPath,
                     at: route.len() as u32 - 1,
                     route,
                 };
@@ -166,39 +172,39 @@ impl Registry {
         }
     }
 
-    /// Enters this home's part of a way, from the back.
+    /// Enters this region's part of a path, from the back.
     pub(crate) fn reserve(&mut self, desk: &Desk<'_>, mut reserve: Reserve) {
         if desk.may_be_replaced() && self.is_taken(desk, &reserve) {
             return;
         }
-        self.book.strike_earlier(&reserve.walk);
-        self.succession.close(|open| open.is_before(&reserve.walk));
-        self.claims.give_up(reserve.walk.rover);
+        self.table.strike_earlier(&reserve.request);
+        self.failover.close(|open| open.is_before(&reserve.request));
+        self.claims.give_up(reserve.request.rover);
         let hi = reserve.at as usize;
-        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.home;
-        let part = reserve.way[..=hi]
+        let mine = |visit: &TimedVisit| desk.site.sensors.owner(visit.vertex) == desk.region;
+        let part = reserve.path[..=hi]
             .iter()
             .rev()
             .take_while(|visit| mine(visit))
             .count();
         let lo = hi + 1 - part;
-        let walk = reserve.walk;
+        let request = reserve.request;
         if lo == 0 && desk.may_be_replaced() {
-            if self.succession.is_proposed(&walk) {
+            if self.failover.is_proposed(&request) {
                 return;
             }
             // Given up meanwhile, because somebody was replaced.
-            if !self.applicants.iter().any(|a| a.is_on(&walk)) {
+            if !self.applicants.iter().any(|a| a.is_on(&request)) {
                 self.release(desk, &reserve, lo);
                 return;
             }
         }
         // A rover that stands on the map has its first vertex already.
-        let stands = lo == 0 && desk.site.stays;
+        let stands = lo == 0 && desk.site.stay_at_target;
         let first = lo + usize::from(stands);
-        // What was passed on to a home that is replaced may come a second time.
-        let again = desk.may_be_replaced() && self.book.has(&walk, &reserve.way[first..=hi]);
-        match self.book.check(&walk, &reserve.way[first..=hi]) {
+        // What was passed on to a region that is replaced may come a second time.
+        let again = desk.may_be_replaced() && self.table.has(&request, &reserve.path[first..=hi]);
+        match self.table.check(&request, &reserve.path[first..=hi]) {
             _ if again => {}
             Ok(()) => self.enter(&reserve, first, hi),
             Err(Clash::Younger) => {
@@ -214,9 +220,9 @@ impl Registry {
         if lo > 0 {
             reserve.at = lo as u32 - 1;
             if desk.may_be_replaced() {
-                self.succession.pass(&reserve);
+                self.failover.pass(&reserve);
             }
-            let to = desk.site.sensors.owner(reserve.way[lo - 1].vertex);
+            let to = desk.site.sensors.owner(reserve.path[lo - 1].vertex);
             self.post(to, Item::Reserve(reserve));
         } else if desk.may_be_replaced() {
             self.propose(reserve);
@@ -225,78 +231,78 @@ impl Registry {
         }
     }
 
-    /// Enters visits `first` to `last` of a way, tentatively.
+    /// Enters visits `first` to `last` of a path, tentatively.
     fn enter(&mut self, reserve: &Reserve, first: usize, last: usize) {
         for i in first..=last {
-            let TimedVisit { vertex, start, end } = reserve.way[i];
+            let TimedVisit { vertex, start, end } = reserve.path[i];
             let visit = Visit {
-                walk: reserve.walk,
+                request: reserve.request,
                 step: reserve.first_step + i as u32,
-                from: i.checked_sub(1).map(|before| reserve.way[before].vertex),
+                from: i.checked_sub(1).map(|before| reserve.path[before].vertex),
                 start,
                 end,
                 confirmed: false,
                 granted: false,
             };
-            self.book.enter(vertex, visit);
+            self.table.enter(vertex, visit);
         }
     }
 
-    /// The whole way is entered: from here on it holds.
+    /// The whole path is entered: from here on it holds.
     pub(crate) fn confirm(&mut self, desk: &Desk<'_>, reserve: &Reserve) {
-        self.settled(desk, &reserve.walk, Verdict::Confirmed);
-        if desk.site.stays {
-            let TimedVisit { vertex, end, .. } = reserve.way[0];
-            self.book.leave_by(vertex, end);
+        self.settled(desk, &reserve.request, Verdict::Confirmed);
+        if desk.site.stay_at_target {
+            let TimedVisit { vertex, end, .. } = reserve.path[0];
+            self.table.leave_by(vertex, end);
         }
         self.served(desk, reserve);
-        self.return_later(desk, &reserve.walk);
+        self.return_later(desk, &reserve.request);
         let settle = Settle {
-            walk: reserve.walk,
+            request: reserve.request,
             verdict: Verdict::Confirmed,
-            route: owners(desk, &reserve.way),
+            route: owners(desk, &reserve.path),
             at: 0,
         };
         self.forward(settle);
         self.unpark(desk);
     }
 
-    /// What this home has of a walk holds, or is struck out.
-    fn settled(&mut self, desk: &Desk<'_>, walk: &Walk, verdict: Verdict) {
+    /// What this region has of a request holds, or is struck out.
+    fn settled(&mut self, desk: &Desk<'_>, request: &ReservationRequest, verdict: Verdict) {
         match verdict {
-            Verdict::Confirmed => self.book.confirm(walk),
-            _ => self.book.strike(walk),
+            Verdict::Confirmed => self.table.confirm(request),
+            _ => self.table.strike(request),
         }
         if desk.may_be_replaced() {
-            self.succession.close(|open| open == walk);
+            self.failover.close(|open| open == request);
             if verdict == Verdict::Confirmed {
-                self.succession.take(*walk);
+                self.failover.take(*request);
             }
         }
     }
 
-    /// Strikes out all of a way that was entered, from visit `lo` on.
+    /// Strikes out all of a path that was entered, from visit `lo` on.
     pub(crate) fn release(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         let released = Settle {
-            walk: reserve.walk,
+            request: reserve.request,
             verdict: Verdict::Released,
-            route: owners(desk, &reserve.way),
-            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
         };
         self.forward(released);
-        // A route may pass this home twice.
-        self.settled(desk, &reserve.walk, Verdict::Released);
+        // A route may pass this region twice.
+        self.settled(desk, &reserve.request, Verdict::Released);
         self.unpark(desk);
     }
 
-    /// The first part of the way, from visit `lo` on, cannot be entered.
+    /// The first part of the path, from visit `lo` on, cannot be entered.
     pub(crate) fn refuse(&mut self, desk: &Desk<'_>, reserve: &Reserve, lo: usize) {
         self.release(desk, reserve, lo);
         let failed = Settle {
-            walk: reserve.walk,
+            request: reserve.request,
             verdict: Verdict::Failed,
-            route: owners(desk, &reserve.way),
-            at: owners(desk, &reserve.way[..=lo]).len() as u32 - 1,
+            route: owners(desk, &reserve.path),
+            at: owners(desk, &reserve.path[..=lo]).len() as u32 - 1,
         };
         self.fail(desk, failed);
     }
@@ -315,21 +321,21 @@ impl Registry {
             self.post(to, Item::Settle(Settle { at, ..settle }));
             return;
         }
-        let walk = settle.walk;
-        let Some(at) = self.applicants.iter().position(|a| a.is_on(&walk)) else {
+        let request = settle.request;
+        let Some(at) = self.applicants.iter().position(|a| a.is_on(&request)) else {
             return;
         };
-        let attempt = walk.attempt + 1;
-        let next = Walk { attempt, ..walk };
+        let attempt = request.attempt + 1;
+        let next = ReservationRequest { attempt, ..request };
         // Where it failed at once, at this node, it would fail in the same way again.
-        let began = self.applicants[at].walk.map(|(_, began)| began);
+        let began = self.applicants[at].request.map(|(_, began)| began);
         if settle.verdict == Verdict::Failed && began != Some(desk.now) {
             self.begin(desk, at, next);
             return;
         }
         // Nothing leads there as things stand: other rovers have to go first.
         let applicant = &mut self.applicants[at];
-        applicant.walk = None;
+        applicant.request = None;
         let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(1);
         applicant.in_vain += 1;
         applicant.again = Some((next, desk.now + pause));
@@ -337,12 +343,12 @@ impl Registry {
 
     pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
         match settle.verdict {
-            Verdict::Failed | Verdict::NoWay => return self.fail(desk, settle),
+            Verdict::Failed | Verdict::NoPath => return self.fail(desk, settle),
             Verdict::Confirmed => {
-                self.settled(desk, &settle.walk, Verdict::Confirmed);
-                self.return_later(desk, &settle.walk);
+                self.settled(desk, &settle.request, Verdict::Confirmed);
+                self.return_later(desk, &settle.request);
             }
-            Verdict::Released => self.settled(desk, &settle.walk, Verdict::Released),
+            Verdict::Released => self.settled(desk, &settle.request, Verdict::Released),
         }
         self.forward(settle);
         self.unpark(desk);
@@ -356,9 +362,9 @@ impl Registry {
     }
 }
 
-/// The labels from which to go on: the earliest of each vertex and interval, not too many, and always
-/// one of those that can be kept up for ever; with gaps all of these, since what lies within one need
-/// not lead out of it.
+/// The labels from which to go on: the earliest of each vertex and interval, not too many, and
+/// always one of those that can be kept up for ever; with gaps all of these, since what lies within
+/// one need not lead out of it.
 fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) -> Vec<u32> {
     let mut best = BTreeMap::<(VertexId, u64), (u64, u32)>::new();
     for (at, label) in (0..).zip(labels).filter(|(_, label)| borders(label)) {
