@@ -4,6 +4,7 @@
 mod hosts;
 mod names;
 mod planning;
+mod poses;
 mod processors;
 mod recipients;
 mod studies;

@@ -9,7 +9,7 @@ use prost_reflect::DynamicMessage;
 use serde::Serialize;
 
 use crate::LogError;
-use crate::envelope::RecordRef;
+use crate::envelope::{RecordRef, seconds};
 use crate::fields::body_descriptor;
 use crate::group;
 use crate::log::Head;
@@ -201,11 +201,6 @@ impl LogInfo {
             self.duration_s = seconds(last - first);
         }
     }
-}
-
-/// Nanoseconds as seconds.
-pub(crate) fn seconds(ns: u64) -> f64 {
-    ns as f64 / 1e9
 }
 
 /// Reads the whole of a log, and says what is in it. A cut or damaged file is read as far as it

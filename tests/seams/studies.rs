@@ -79,10 +79,8 @@ fn a_study_of_curves_from_its_text_to_its_page_and_back_to_a_run() {
     // Another curve in the record is found.
     let path = folder.join("runs/runs.jsonl");
     let records = std::fs::read_to_string(&path).expect("the records");
-    let line = records
-        .lines()
-        .find(|line| line.contains("\"seed\":17"))
-        .expect("a run");
+    let is_run = |line: &&str| line.contains("\"cell\":0,") && line.contains("\"seed\":17,");
+    let line = records.lines().find(is_run).expect("a run");
     let at = line.find("\"values\":[").expect("a curve") + "\"values\":[".len();
     let forged = format!("{}1{}", &line[..at], &line[at..]);
     std::fs::write(&path, records.replace(line, &forged)).expect("it can be written");
