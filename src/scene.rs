@@ -90,19 +90,36 @@ pub enum Drawing {
     },
 }
 
-/// A place and a heading in the plane.
+/// A place, and which way something faces there, both in a frame with x east, y north and z up.
 ///
 /// ```
-/// let pose = farside::scene::Pose::at([3.0, 4.0, 0.5]);
-/// assert_eq!(pose.heading, [1.0, 0.0]);
+/// use farside::scene::{Facing, Pose};
+/// let pose = Pose::at([3.0, 4.0, 0.5]);
+/// assert_eq!(pose.facing, Facing::Heading([1.0, 0.0]));
+/// // Nose up by 90 degrees: a turn about the axis y, against the right hand.
+/// let half = 0.5f64.sqrt();
+/// let pose = Pose::oriented([3.0, 4.0, 0.5], [0.0, -half, 0.0, half]);
+/// assert_ne!(pose.facing, Facing::Heading([1.0, 0.0]));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Where \[m\].
     pub position_m: [f64; 3],
-    /// The direction it faces, east and north. Only the direction counts; none is east. A vector
-    /// and not an angle, because angles differ by platform in their last digit, and logs must not.
-    pub heading: [f64; 2],
+    /// Which way it faces.
+    pub facing: Facing,
+}
+
+/// Which way something faces: in the plane, or in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Facing {
+    /// Upright, in this direction: east and north. Only the direction counts; none is east. A
+    /// vector and not an angle, because angles differ by platform in their last digit, and logs
+    /// must not.
+    Heading([f64; 2]),
+    /// Turned by this unit quaternion, x, y, z, w: what is ahead of the thing (its x), to its left
+    /// (y) and above it (z), turned by it, is where that is in the frame that the pose is told in.
+    /// Another length than 1 is made 1; without a length, as with no number, it is not turned.
+    Orientation([f64; 4]),
 }
 
 impl Pose {
@@ -110,7 +127,23 @@ impl Pose {
     pub fn at(position_m: [f64; 3]) -> Pose {
         Pose {
             position_m,
-            heading: [1.0, 0.0],
+            facing: Facing::Heading([1.0, 0.0]),
+        }
+    }
+
+    /// At a place, upright, facing in a direction: east and north.
+    pub fn heading(position_m: [f64; 3], heading: [f64; 2]) -> Pose {
+        Pose {
+            position_m,
+            facing: Facing::Heading(heading),
+        }
+    }
+
+    /// At a place, turned by a unit quaternion, x, y, z, w.
+    pub fn oriented(position_m: [f64; 3], orientation: [f64; 4]) -> Pose {
+        Pose {
+            position_m,
+            facing: Facing::Orientation(orientation),
         }
     }
 }

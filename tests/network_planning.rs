@@ -6,10 +6,11 @@ use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside_actors::processor::Speed;
 use farside_network::messages::{CandidatePaths, Locations, MaxPlus, RoverId};
 use farside_network::{
     ConfigError, MaxPlusConfig, Missions, NetworkConfig, NetworkError, NetworkMetrics, Parts,
-    Processor, TeamConfig, WorldConfig, assemble_over, missions,
+    TeamConfig, WorldConfig, assemble_over, missions,
 };
 use farside_worlds::{NodeId, Roadmap, SensorNetwork};
 
@@ -133,7 +134,7 @@ fn expected(heard: &Heard, sensors: &SensorNetwork, node: NodeId) -> SimDuration
 fn the_first_vectors_leave_when_they_are_computed() {
     let network = NetworkConfig {
         max_plus: MaxPlusConfig {
-            processor: Processor::PairsPerS(25_000),
+            processor: Speed::PerS(25_000),
             ..MaxPlusConfig::default()
         },
         cycle_limit: 30,
@@ -166,7 +167,7 @@ fn the_first_vectors_leave_when_they_are_computed() {
 fn a_processor_too_slow_for_anything_leaves_rovers_to_the_owners() {
     let network = NetworkConfig {
         max_plus: MaxPlusConfig {
-            processor: Processor::PairsPerS(1),
+            processor: Speed::PerS(1),
             ..MaxPlusConfig::default()
         },
         cycle_limit: 60,
@@ -178,7 +179,7 @@ fn a_processor_too_slow_for_anything_leaves_rovers_to_the_owners() {
     assert!(slow.metrics.max_plus_iterations < 0.2);
     let unlimited = NetworkConfig {
         max_plus: MaxPlusConfig {
-            processor: Processor::Unlimited,
+            processor: Speed::Unlimited,
             ..MaxPlusConfig::default()
         },
         ..network
@@ -266,7 +267,7 @@ fn choices_are_announced_for_anytime_only() {
 fn work_goes_from_the_busier_node_to_the_other_one_only() {
     let slow = NetworkConfig {
         max_plus: MaxPlusConfig {
-            processor: Processor::PairsPerS(100_000),
+            processor: Speed::PerS(100_000),
             ..MaxPlusConfig::default()
         },
         cycle_limit: 40,
@@ -295,7 +296,7 @@ fn work_goes_from_the_busier_node_to_the_other_one_only() {
     // Nobody says a word about it unless told to, or where processors are fast enough.
     let fast = NetworkConfig {
         max_plus: MaxPlusConfig {
-            processor: Processor::Unlimited,
+            processor: Speed::Unlimited,
             ..outsourcing.max_plus.clone()
         },
         ..outsourcing

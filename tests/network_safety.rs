@@ -7,14 +7,14 @@
 use std::cell::Cell;
 
 use farside::prelude::*;
+use farside_actors::processor::Speed;
 use farside_actors::system::{Files, Results};
 use farside_experiments::registry::Registry;
 use farside_experiments::scenario::Scenario;
 use farside_network::cases::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
 use farside_network::cases::{Case, Downtime};
 use farside_network::{
-    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Processor, Sabotage, TeamConfig,
-    WorldConfig,
+    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
 };
 use farside_worlds::{Ownership, VertexId};
 use proptest::prelude::*;
@@ -184,7 +184,7 @@ proptest! {
         let mut case = with_policy(case, Policy::MaxPlus);
         case.world.ownership = ownership;
         case.network.max_plus.outsourcing = true;
-        case.network.max_plus.processor = Processor::PairsPerS(500);
+        case.network.max_plus.processor = Speed::PerS(500);
         case.network.max_plus.congestion_weight = weight;
         case.network.max_plus.congestion_spread = 0.5;
         no_collision(&case)?;

@@ -3,7 +3,11 @@
 
 mod hosts;
 mod names;
+mod planning;
+mod poses;
+mod processors;
 mod recipients;
+mod studies;
 mod told;
 
 use farside::{Executor, Report, Simulation};

@@ -1,10 +1,12 @@
-//! What systems of actors share, for Farside: links, radios, units, invariants, figures, and what a
-//! system is.
+//! What systems of actors share, for Farside: links, radios, processors, units, teams, invariants,
+//! figures, and what a system is.
 
 pub mod figure;
 pub mod invariants;
 pub mod link;
+pub mod processor;
 pub mod radio;
 pub mod system;
+pub mod team;
 pub mod units;
 pub mod wiring;

@@ -99,7 +99,7 @@ use stage::{Draws, Purpose};
 
 pub use burst::Burst;
 pub use change::LinkChange;
-pub use config::{Degrade, LinkConfigError, LinksConfig};
+pub use config::{Degrade, Degraded, LinkConfigError, LinksConfig};
 pub use contacts::{Contact, Contacts, Window};
 pub use jitter::JitterShape;
 pub use params::{LinkOverrides, LinkParams};

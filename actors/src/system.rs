@@ -12,8 +12,11 @@ mod section;
 mod series;
 pub mod settings;
 
+use std::sync::Arc;
+
 use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
+use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
@@ -148,8 +151,12 @@ pub struct Setup<'a> {
     pub sim: &'a mut Simulation,
     /// Reads the files that the scenario names.
     pub files: &'a mut Files,
+    /// The scenario's contact plan, over hosts' names and in the run's time, for who plans by it.
+    /// Links follow it where `[links]` and `[[degrade]]` say nothing else: what one link has by all
+    /// that is planned, [`Links::nominal`] says.
+    pub contacts: Option<Arc<ContactPlan>>,
     links: Option<LinkBuilder>,
-    remarks: Vec<&'static str>,
+    remarks: Vec<String>,
 }
 
 impl<'a> Setup<'a> {
@@ -167,6 +174,7 @@ impl<'a> Setup<'a> {
             until,
             sim,
             files,
+            contacts: links.plan().cloned(),
             links: Some(links),
             remarks: Vec::new(),
         }
@@ -202,11 +210,11 @@ impl<'a> Setup<'a> {
         self.links.as_ref().is_some_and(LinkBuilder::has_radios)
     }
 
-    /// What the scenario says of links that has no effect, once the system is assembled.
+    /// What the scenario says of links and processors that has no effect, once the system is assembled.
     ///
     /// # Errors
     /// When the system has declared no links, and the scenario has patterns for some.
-    pub fn close(mut self) -> Result<Vec<&'static str>, LinkConfigError> {
+    pub fn close(mut self) -> Result<Vec<String>, LinkConfigError> {
         if self.links.is_some() {
             self.link(&Wiring::default())?;
         }

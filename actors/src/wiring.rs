@@ -1,19 +1,24 @@
-//! Which links a system wants, and what it may know of them once they are declared.
+//! Which links and processors a system wants, and what it may know of them once they are declared.
 
 mod build;
+mod pattern;
+mod processors;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use farside::actor::Target;
 use farside::{Carrier, HostId, SimDuration, Simulation};
 use farside_worlds::HeightField;
 use nalgebra::Point3;
 
 pub use build::LinkBuilder;
+use processors::Processors;
 
 use crate::link::{LinkConfigError, LinkParams};
+use crate::processor::{Processor, ProcessorChange, Speed};
 
-/// The links that a system wants, one way each, and where its hosts stand at first. A system lists
+/// The links and processors that a system wants, and where its hosts stand at first. A system lists
 /// them all and hands them over in one call, so that whatever it asks of links afterwards is asked
 /// of all of them.
 ///
@@ -38,6 +43,7 @@ pub struct Wiring {
     known: BTreeMap<HostId, usize>,
     pub(crate) places_m: BTreeMap<String, Point3<f64>>,
     pub(crate) terrain: Option<Arc<HeightField>>,
+    pub(crate) processors: Vec<(String, String, Speed)>,
 }
 
 impl Wiring {
@@ -71,6 +77,23 @@ impl Wiring {
         self.terrain = Some(terrain);
     }
 
+    /// Wants the processor `{host}/{name}`, this fast when nothing slows it down.
+    ///
+    /// ```
+    /// use farside::Simulation;
+    /// use farside_actors::processor::Speed;
+    /// use farside_actors::wiring::{LinkBuilder, Links, Wiring};
+    /// let mut wiring = Wiring::default();
+    /// wiring.processor("rover_02", "planner", Speed::PerS(1000));
+    /// let links = LinkBuilder::default().build(&mut Simulation::new(1), &wiring)?;
+    /// assert!(links.has_processor("rover_02/planner"));
+    /// # Ok::<(), farside_actors::link::LinkConfigError>(())
+    /// ```
+    pub fn processor(&mut self, host: &str, name: &str, speed: Speed) {
+        self.processors
+            .push((host.to_owned(), name.to_owned(), speed));
+    }
+
     /// The wanted links in order, each from one host and name to another.
     pub fn links(&self) -> impl Iterator<Item = ((HostId, &str), (HostId, &str))> {
         let host = |at: usize| (self.hosts[at].0, self.hosts[at].1.as_str());
@@ -84,13 +107,15 @@ impl Wiring {
 pub type Wire<'a> = dyn FnMut(&mut Simulation, &Wiring) -> Result<Links, LinkConfigError> + 'a;
 
 /// What is known of the links of a system before the run, by who plans: what they have when nothing
-/// degrades them. Links act by the truth, degradations included.
+/// degrades them. Links act by the truth, degradations included; so do processors, which are handed
+/// over here.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
     nominal: BTreeMap<(String, String), Arc<LinkParams>>,
     slowest: SimDuration,
     slowest_rate_bit_per_s: Option<u64>,
-    remarks: Vec<&'static str>,
+    processors: Processors,
+    remarks: Vec<String>,
 }
 
 impl Links {
@@ -113,7 +138,10 @@ impl Links {
         wiring: &Wiring,
         mut carrier: impl FnMut(&str, &str) -> C,
     ) -> Links {
-        let mut links = Links::default();
+        let mut links = Links {
+            processors: Processors::healthy(&wiring.processors),
+            ..Links::default()
+        };
         for ((a, from), (b, to)) in wiring.links() {
             let carrier = carrier(from, to);
             links.reckon(carrier.min_delay(), carrier.rate_bit_per_s());
@@ -134,18 +162,66 @@ impl Links {
             .insert((from.to_owned(), to.to_owned()), nominal);
     }
 
-    pub(crate) fn with_remarks(mut self, remarks: BTreeSet<&'static str>) -> Self {
-        self.remarks = remarks.into_iter().collect();
-        self
-    }
-
-    /// What the links are told that has no effect, for people.
-    pub fn remarks(&self) -> &[&'static str] {
+    /// What links and processors are told that has no effect, for people.
+    pub fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
-    /// What the link from one host to another has without degradations, its contacts included; none
-    /// if there is no such link.
+    /// Whether the wiring wanted the processor of this name, `{host}/{processor}`.
+    pub fn has_processor(&self, name: &str) -> bool {
+        self.processors.get(name).is_some()
+    }
+
+    /// Hands over a processor that the wiring wanted, by its name `{host}/{processor}`: `declare`
+    /// declares the actor that has it. When the processor becomes slower or faster this actor is
+    /// told, and with it the log.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use farside_actors::processor::{Processor, ProcessorChange, Speed};
+    /// use farside_actors::wiring::{LinkBuilder, Wiring};
+    /// struct Planner(Processor);
+    /// impl Actor for Planner { type Accepts = (ProcessorChange,); }
+    /// impl Handler<ProcessorChange> for Planner {
+    ///     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome { Ok(()) }
+    /// }
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_02");
+    /// let mut wiring = Wiring::default();
+    /// wiring.processor("rover_02", "planner", Speed::PerS(1000));
+    /// let links = LinkBuilder::default().build(&mut sim, &wiring)?;
+    /// links.processor(&mut sim, "rover_02/planner", |sim, processor| {
+    ///     sim.actor(host, "rover_02", move |_| Planner(processor.clone()))
+    /// });
+    /// # Ok::<(), farside_actors::link::LinkConfigError>(())
+    /// ```
+    ///
+    /// # Panics
+    /// When the wiring did not want it.
+    pub fn processor<T: Target<ProcessorChange> + Copy>(
+        &self,
+        sim: &mut Simulation,
+        name: &str,
+        declare: impl FnOnce(&mut Simulation, Processor) -> T,
+    ) -> T {
+        let processor = self.processors.get(name);
+        let processor = processor.unwrap_or_else(|| panic!("the wiring wants no {name}"));
+        let actor = declare(sim, processor.clone());
+        for (at, slowdown) in processor.slowdowns() {
+            let change = ProcessorChange {
+                processor: name.to_owned(),
+                slowdown: slowdown.factor(),
+            };
+            sim.tell_at(at, actor, change);
+        }
+        actor
+    }
+
+    /// What the link from one host to another has without degradations; none if there is no such
+    /// link. Its contacts are included: those of `[links]`, or else of the scenario's contact plan.
+    ///
+    /// Planners plan by this, and links act by the truth: a degradation is for the planner to find
+    /// out. What is nominal does not change during a run.
     pub fn nominal(&self, from: &str, to: &str) -> Option<&LinkParams> {
         let found = self.nominal.get(&(from.to_owned(), to.to_owned()));
         found.map(Arc::as_ref)

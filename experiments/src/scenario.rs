@@ -308,7 +308,7 @@ impl Scenario {
         let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
         let contacts = contacts.transpose().map_err(wrong)?;
         if let Some(contacts) = &contacts {
-            contacts::hand_over(contacts, &mut links);
+            links.set_plan(contacts.plan().clone());
         }
         let mut notes = Vec::new();
         let traces = links.read_traces(|name| {
@@ -322,8 +322,8 @@ impl Scenario {
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);
         self.check_places(&sim)?;
-        let remarks = remarks.iter().map(|remark| format!("links: {remark}"));
         let remarks = remarks
+            .into_iter()
             .chain(self.too_late())
             .chain(self.source.remarks())
             .collect();

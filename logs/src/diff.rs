@@ -407,7 +407,7 @@ impl Comparison {
                 first
             }
         };
-        first.time_s = crate::info::seconds(time_ns);
+        first.time_s = crate::envelope::seconds(time_ns);
         Ok(first)
     }
 }

@@ -17,6 +17,11 @@ use crate::wire::{
     Fields, put_bytes, put_double, put_number, put_signed, put_text, put_varint, signed, varint_len,
 };
 
+/// Nanoseconds as seconds.
+pub(crate) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}
+
 /// Field numbers of `farside.record.<Kind>` and `farside.log.Event`.
 pub(crate) mod field {
     pub(crate) const SENDER: u32 = 1;

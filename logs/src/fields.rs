@@ -3,7 +3,7 @@
 use prost_reflect::{DynamicMessage, Kind, MapKey, MessageDescriptor, ReflectMessage, Value};
 
 use crate::envelope::RecordRef;
-use crate::info::seconds;
+use crate::envelope::seconds;
 use crate::scan::ChannelInfo;
 
 /// The first field in which two things differ, with both values.

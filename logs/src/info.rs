@@ -5,9 +5,12 @@ use std::fmt;
 use std::path::Path;
 
 use farside::Counts;
+use prost_reflect::DynamicMessage;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::envelope::{RecordRef, seconds};
+use crate::fields::body_descriptor;
 use crate::group;
 use crate::log::Head;
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
@@ -60,6 +63,19 @@ pub struct TopicInfo {
     pub bytes: u64,
 }
 
+/// A control event of a run: a crash, a restart, a link's change, something that an actor is told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ControlInfo {
+    /// When, in seconds of virtual time.
+    pub time_s: f64,
+    /// What: `crash`, `restart`, `change`, `told`.
+    pub class: String,
+    /// Whom it happened to: an actor or a link.
+    pub to: String,
+    /// What it was told, as `Kind {...}` in JSON; empty for crashes and restarts.
+    pub body: String,
+}
+
 /// One attachment of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AttachmentInfo {
@@ -96,6 +112,10 @@ pub struct LogInfo {
     pub duration_s: f64,
     /// How many chunks there are, by compression.
     pub chunks: BTreeMap<String, u64>,
+    /// The first control events, in the order in which they happened, at most 20.
+    pub controls: Vec<ControlInfo>,
+    /// How many control events there are.
+    pub control_events: u64,
     /// The topics, in name order.
     pub topics: Vec<TopicInfo>,
     /// The attachments, in file order.
@@ -116,6 +136,25 @@ impl LogInfo {
         self.messages += 1;
         self.topics[at].messages += 1;
         self.topics[at].bytes += message.data.len() as u64;
+    }
+
+    /// Takes note of an event that the run's scenario planned, not an actor.
+    fn add_control(&mut self, message: &ScannedMessage<'_>) {
+        let Some(record) = RecordRef::read(message.data) else {
+            return;
+        };
+        if record.key.source != CONTROL {
+            return;
+        }
+        self.control_events += 1;
+        if self.controls.len() < CONTROLS_LIMIT {
+            self.controls.push(ControlInfo {
+                time_s: seconds(record.key.time_ns),
+                class: record.class.name().to_owned(),
+                to: record.receiver.to_owned(),
+                body: body(&record, message.channel),
+            });
+        }
     }
 
     fn finish(&mut self, times: Option<(u64, u64)>, path: &Path) -> Result<(), LogError> {
@@ -164,11 +203,6 @@ impl LogInfo {
     }
 }
 
-/// Nanoseconds as seconds.
-pub(crate) fn seconds(ns: u64) -> f64 {
-    ns as f64 / 1e9
-}
-
 /// Reads the whole of a log, and says what is in it. A cut or damaged file is read as far as it
 /// can be.
 ///
@@ -184,8 +218,9 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
     };
     let mut times = None;
     let mut index = TopicIndex::new();
-    // Which topic a channel counts for, by the channel's serial number.
-    let mut topic_of: Vec<Option<usize>> = Vec::new();
+    // Which topic a channel counts for, and whether control events are on it, by the channel's
+    // serial number.
+    let mut topic_of: Vec<Option<(usize, bool)>> = Vec::new();
     while let Some(item) = scanner.next()? {
         match item {
             Item::Header { profile, library } => {
@@ -205,9 +240,17 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                 if topic_of.len() <= serial {
                     topic_of.resize(serial + 1, None);
                 }
-                let at = *topic_of[serial]
-                    .get_or_insert_with(|| topic(&mut info.topics, &mut index, message.channel));
+                let (at, is_control) = *topic_of[serial].get_or_insert_with(|| {
+                    let is_control = is_control(&message.channel.topic);
+                    (
+                        topic(&mut info.topics, &mut index, message.channel),
+                        is_control,
+                    )
+                });
                 info.add_message(&mut times, &message, at);
+                if is_control {
+                    info.add_control(&message);
+                }
             }
             Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
                 name: attachment.name.to_owned(),
@@ -231,6 +274,33 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
     info.finish(times, path)?;
     info.topics.sort_by(|a, b| a.topic.cmp(&b.topic));
     Ok(info)
+}
+
+/// How many control events are named.
+const CONTROLS_LIMIT: usize = 20;
+
+/// The source of control events.
+const CONTROL: &str = "@control";
+
+/// Whether control events may be on a topic.
+fn is_control(topic: &str) -> bool {
+    let classes = ["told", "crash", "restart", "change"];
+    let event = topic
+        .strip_prefix("/event/")
+        .and_then(|rest| rest.split_once('/'));
+    event.is_some_and(|(class, _)| classes.contains(&class))
+}
+
+/// What an event said, in JSON, as far as the log's schemas tell.
+fn body(record: &RecordRef<'_>, channel: &ChannelInfo) -> String {
+    let decoded = body_descriptor(channel)
+        .and_then(|descriptor| DynamicMessage::decode(descriptor, record.body).ok())
+        .and_then(|message| serde_json::to_string(&message).ok());
+    match (record.kind, decoded) {
+        ("", _) => String::new(),
+        (kind, Some(json)) => format!("{kind} {json}"),
+        (kind, None) => kind.to_owned(),
+    }
 }
 
 /// How many damaged parts are named.
@@ -278,6 +348,27 @@ impl fmt::Display for LogInfo {
                 "{:<12} {start:.3} s to {end:.3} s, {:.3} s long",
                 "times", self.duration_s
             )?;
+        }
+        for control in &self.controls {
+            let ControlInfo {
+                time_s,
+                class,
+                to,
+                body,
+            } = control;
+            let colon = if body.is_empty() { "" } else { ": " };
+            writeln!(
+                f,
+                "{:<12} {time_s:.3} s: {class} {to}{colon}{body}",
+                "control"
+            )?;
+        }
+        match self
+            .control_events
+            .saturating_sub(self.controls.len() as u64)
+        {
+            0 => {}
+            more => writeln!(f, "{:<12} and {more} more", "control")?,
         }
         let chunks: Vec<_> = self
             .chunks

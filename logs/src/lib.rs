@@ -70,7 +70,7 @@ mod writer;
 pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;
-pub use info::{AttachmentInfo, LogInfo, RunSummary, TopicInfo, info};
+pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info};
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};

@@ -9,9 +9,9 @@ use prost_reflect::{DescriptorPool, MessageDescriptor};
 use serde::Serialize;
 
 use crate::LogError;
+use crate::envelope::seconds;
 use crate::envelope::{CheckpointRef, Encoder, RecordRef};
 use crate::fields::{self, FieldDiff};
-use crate::info::seconds;
 use crate::log::{Log, Records, Step};
 use crate::topics::Topics;
 

@@ -212,6 +212,46 @@ impl ContactPlan {
         found.map_or(&[], |at| self.windows_of(&self.pairs[at]))
     }
 
+    /// The windows from one node to another, where the plan has any say: `None` if it does not name
+    /// both, none at all if it does but has no contact between them.
+    ///
+    /// ```
+    /// use farside_worlds::contacts::ContactPlan;
+    /// let plan = ContactPlan::from_ion(b"a range +0 +60 1 2 1\na contact +0 +60 1 2 1000")?;
+    /// assert_eq!(plan.windows_between("1", "2").map(<[_]>::len), Some(1));
+    /// assert_eq!(plan.windows_between("2", "1"), Some(&[][..]));
+    /// assert_eq!(plan.windows_between("2", "3"), None);
+    /// # Ok::<(), farside_worlds::contacts::ContactError>(())
+    /// ```
+    pub fn windows_between(&self, from: &str, to: &str) -> Option<&[ContactWindow]> {
+        let names = |node: &str| self.node(node).is_some();
+        (names(from) && names(to)).then(|| self.contact_windows(from, to))
+    }
+
+    /// The plan with its nodes called `name` of theirs, as hosts are, and so much later. Contacts
+    /// of a node with itself, which some plans have, are left out. `None` if it would last longer
+    /// than virtual time, 584 years.
+    ///
+    /// ```
+    /// use farside::SimDuration;
+    /// use farside_worlds::contacts::ContactPlan;
+    /// let plan = ContactPlan::from_ion(b"a range +0 +60 1 2 1\na contact +0 +60 1 2 1000")?;
+    /// let hour = SimDuration::from_secs(3600);
+    /// let plan = plan.renamed(|node| format!("rover_{node}"), hour).unwrap()?;
+    /// assert_eq!(plan.contact_windows("rover_1", "rover_2")[0].start.to_string(), "3600s");
+    /// # Ok::<(), farside_worlds::contacts::ContactError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When two nodes get one name, and with that contacts that overlap.
+    pub fn renamed(
+        &self,
+        name: impl Fn(&str) -> String,
+        offset: SimDuration,
+    ) -> Option<Result<ContactPlan, ContactError>> {
+        build::renamed(self, name, offset)
+    }
+
     /// Each ordered pair of nodes with contacts, and their windows, in canonical order.
     pub fn pairs(&self) -> impl Iterator<Item = (&str, &str, &[ContactWindow])> {
         self.pairs.iter().map(|pair| {
@@ -241,8 +281,8 @@ impl ContactPlan {
             .map(|node| (node.name.as_str(), node.line))
     }
 
-    /// How many contacts there are; at least one.
-    #[expect(clippy::len_without_is_empty, reason = "no plan is empty")]
+    /// How many contacts there are; at least one in a plan that was read.
+    #[expect(clippy::len_without_is_empty, reason = "no file of a plan is empty")]
     pub fn len(&self) -> usize {
         self.windows.len()
     }

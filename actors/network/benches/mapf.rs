@@ -16,8 +16,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use farside::prelude::*;
+use farside_actors::processor::Speed;
 use farside_network::{
-    MaxPlusConfig, Missions, NetworkConfig, Parts, Policy, Processor, TeamConfig, WorldConfig,
+    MaxPlusConfig, Missions, NetworkConfig, PAPER_SPEED, Parts, Policy, TeamConfig, WorldConfig,
     assemble_over, missions,
 };
 use farside_worlds::Roadmap;
@@ -66,7 +67,7 @@ fn run(nodes: u32, network: &NetworkConfig, seed: u64) -> Cost {
     }
 }
 
-fn config(policy: Policy, processor: Processor, cycle_limit: Option<u32>) -> NetworkConfig {
+fn config(policy: Policy, processor: Speed, cycle_limit: Option<u32>) -> NetworkConfig {
     let default = NetworkConfig::default();
     NetworkConfig {
         policy,
@@ -80,7 +81,7 @@ fn config(policy: Policy, processor: Processor, cycle_limit: Option<u32>) -> Net
 }
 
 /// Runs with `SEEDS` seeds, and prints a line.
-fn row(nodes: u32, policy: Policy, processor: Processor, cycle_limit: Option<u32>) {
+fn row(nodes: u32, policy: Policy, processor: Speed, cycle_limit: Option<u32>) {
     let network = config(policy, processor, cycle_limit);
     let runs: Vec<Cost> = (1..=SEEDS).map(|seed| run(nodes, &network, seed)).collect();
     let per_cycle = runs
@@ -134,13 +135,13 @@ fn main() {
     );
     println!("at most {CYCLES} cycles:");
     for nodes in [14, 21, 28] {
-        for processor in [Processor::Unlimited, Processor::PAPER] {
+        for processor in [Speed::Unlimited, PAPER_SPEED] {
             row(nodes, Policy::MaxPlus, processor, Some(CYCLES));
         }
     }
     println!("whole runs:");
-    for processor in [Processor::Unlimited, Processor::PAPER] {
+    for processor in [Speed::Unlimited, PAPER_SPEED] {
         row(28, Policy::MaxPlus, processor, None);
     }
-    row(28, Policy::Complete, Processor::Unlimited, None);
+    row(28, Policy::Complete, Speed::Unlimited, None);
 }

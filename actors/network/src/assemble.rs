@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::carrier::Carrier;
 use farside::prelude::*;
+use farside_actors::processor::{Processor, Speed};
 use farside_actors::wiring::{Links, Wire, Wiring};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
 use nalgebra::Point3;
@@ -25,6 +26,7 @@ use crate::baseline::Schedule;
 use crate::ids::RoverId;
 use crate::max_plus::lng::LocalGraph;
 use crate::max_plus::payoff::Payoffs;
+use crate::max_plus::processor::PLANNER;
 
 /// An assembled system: its actors by name, and its score.
 pub struct Network {
@@ -152,8 +154,16 @@ pub fn assemble(
     if let Some(terrain) = &parts.terrain {
         wiring.terrain(terrain.clone());
     }
-    let links = wire(sim, &wiring)?;
-    let links = (links.slowest(), links.slowest_rate_bit_per_s());
+    let speed = match config.policy {
+        Policy::MaxPlus => config.max_plus.processor,
+        // What other policies compute takes no time.
+        _ => Speed::Unlimited,
+    };
+    for name in &node_names {
+        wiring.processor(name, PLANNER, speed);
+    }
+    let wired = wire(sim, &wiring)?;
+    let links = (wired.slowest(), wired.slowest_rate_bit_per_s());
     let timing = timing(&roadmap, config, links)?;
     let longest_step = longest_step(&roadmap, config, &timing)?;
     let planned: Vec<_> = (0..)
@@ -184,7 +194,7 @@ pub fn assemble(
         missions,
         stay_at_target,
     });
-    let nodes = declare_nodes(sim, &site);
+    let nodes = declare_nodes(sim, &site, &wired);
     let rovers = declare_rovers(sim, &site);
     let (monitor, score) = Monitor::new(site.clone());
     sim.observe(monitor);
@@ -301,14 +311,19 @@ fn names(kind: &str, count: usize) -> Vec<String> {
         .collect()
 }
 
-fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Node>> {
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>, wired: &Links) -> Vec<Address<Node>> {
     let declare = |(id, name): (NodeId, &String)| {
         let host = sim.host(name);
         sim.heavy(host);
         let graph = Arc::new(LocalGraph::new(&site.roadmap, &site.sensors, id));
         let site = site.clone();
-        let build = move |_: &str| Node::new(site.clone(), id, graph.clone());
-        sim.actor(host, name, build)
+        let node = |processor: Processor| {
+            move |_: &str| Node::new(site.clone(), id, graph.clone(), processor.clone())
+        };
+        let planner = format!("{name}/{PLANNER}");
+        wired.processor(sim, &planner, |sim, processor| {
+            sim.actor(host, name, node(processor))
+        })
     };
     site.sensors
         .nodes()

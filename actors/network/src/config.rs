@@ -1,6 +1,6 @@
 //! The settings of the network-guided system: the keys of a scenario's `[network]` table, with
 //! their defaults. Every reading of the paper that its text leaves open is a key here. `[world]`
-//! and `[team]` are in `world`.
+//! is in `world`; `[team]` is shared by systems.
 
 mod auto;
 mod world;
@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 use crate::max_plus::config::MaxPlusConfig;
 use crate::reservation::config::CompleteConfig;
 
-pub use world::{Gaps, RoadmapSource, TeamConfig, WorldConfig};
+pub use farside_actors::team::TeamConfig;
+pub use world::{Gaps, RoadmapSource, WorldConfig};
 
 /// Who decides which rover asks for which vertex.
 #[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]

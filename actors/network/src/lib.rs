@@ -51,7 +51,7 @@
 //! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team
 //! comes to a deadlock on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms
 //! of a core of 2006. With one constant for all cells, `network.max_plus.processor = "paper"`
-//! ([`Processor::PAPER`], the default), its pattern appears: teams come to a deadlock sooner with
+//! ([`PAPER_SPEED`], the default), its pattern appears: teams come to a deadlock sooner with
 //! fewer nodes, which compare more and longer candidate paths. With fewer than three iterations in
 //! a cycle nearly all do.
 //!
@@ -134,7 +134,7 @@ pub use config::{
 pub use error::NetworkError;
 pub use max_plus::candidates::{CandidatePath, Destination, FirstStep};
 pub use max_plus::config::{MaxPlusConfig, Priority};
-pub use max_plus::processor::Processor;
+pub use max_plus::processor::PAPER_SPEED;
 pub use metrics::{Costs, Deadlock, NetworkMetrics};
 pub use missions::missions;
 pub use node::Node;

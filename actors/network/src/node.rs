@@ -15,6 +15,7 @@ mod reservations;
 use std::sync::Arc;
 
 use farside::prelude::*;
+use farside_actors::processor::{Processor, ProcessorChange};
 use farside_worlds::{NodeId, VertexId};
 
 use self::messages::Locations;
@@ -44,9 +45,9 @@ pub struct Node {
 }
 
 /// The state machine of the policy that is configured.
-fn policy_of(base: &Base, graph: Arc<LocalGraph>) -> Box<dyn NodePolicy> {
+fn policy_of(base: &Base, graph: Arc<LocalGraph>, processor: Processor) -> Box<dyn NodePolicy> {
     match base.site.config.policy {
-        Policy::MaxPlus => Box::new(MaxPlusPolicy::new(base, graph)),
+        Policy::MaxPlus => Box::new(MaxPlusPolicy::new(base, graph, processor)),
         Policy::Complete => Box::new(CompletePolicy::default()),
         Policy::Reference | Policy::Prioritised | Policy::Coupled => {
             Box::new(PlannedPolicy::default())
@@ -55,9 +56,14 @@ fn policy_of(base: &Base, graph: Arc<LocalGraph>) -> Box<dyn NodePolicy> {
 }
 
 impl Node {
-    pub(crate) fn new(site: Arc<Shared>, id: NodeId, graph: Arc<LocalGraph>) -> Self {
+    pub(crate) fn new(
+        site: Arc<Shared>,
+        id: NodeId,
+        graph: Arc<LocalGraph>,
+        processor: Processor,
+    ) -> Self {
         let base = Base::new(site, id);
-        let policy = policy_of(&base, graph);
+        let policy = policy_of(&base, graph, processor);
         Node { base, policy }
     }
 
@@ -100,6 +106,7 @@ impl Actor for Node {
         Replaced,
         Passed,
         ItineraryAnswer,
+        ProcessorChange,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -127,6 +134,13 @@ impl Actor for Node {
         };
         let phase = Phase::Listen;
         ctx.timer(delay, PhaseBegins { phase });
+        Ok(())
+    }
+}
+
+impl Handler<ProcessorChange> for Node {
+    /// The processor knew it from the start: this is for the log.
+    fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome {
         Ok(())
     }
 }

@@ -311,10 +311,7 @@ impl NetworkScene {
             let [x, y, _] = self.place(to);
             drawn.heading = [x - position_m[0], y - position_m[1]];
         }
-        let pose = Pose {
-            position_m,
-            heading: drawn.heading,
-        };
+        let pose = Pose::heading(position_m, drawn.heading);
         out.push(Drawing::Transform {
             parent: MAP.to_owned(),
             child: base_link(name),

@@ -1,16 +1,18 @@
 //! Which link has which parameters, and when they change: the `[links]` table and the
 //! `[[degrade]]` entries of a scenario.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use farside::SimDuration;
-use serde::de::{Error as _, MapAccess, Visitor};
+use serde::de::{DeserializeSeed, Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use thiserror::Error;
 
 use super::params::{DEGRADE_KEYS, Key};
 use super::{LinkOverrides, LinkParams};
+use crate::processor::Slowdown;
 use crate::units;
 use farside::suggest::did_you_mean;
 
@@ -76,14 +78,19 @@ impl<'de> Deserialize<'de> for LinksConfig {
     }
 }
 
-/// A `[[degrade]]` entry: from `at` to `until` the links that match have other parameters. Where
-/// entries overlap, the last in the file wins, parameter by parameter.
+/// A `[[degrade]]` entry: from `at` to `until` the links that match have other parameters, or the
+/// processors that match are slower. Where entries overlap, the last in the file wins, parameter by
+/// parameter.
 ///
 /// ```
-/// use farside_actors::link::Degrade;
+/// use farside_actors::link::{Degrade, Degraded};
 /// let text = "at = '60s'\nuntil = '90s'\nlinks = 'node_*-*'\noutage = true";
 /// let degrade: Degrade = toml::from_str(text)?;
-/// assert_eq!(degrade.over.outage, Some(true));
+/// let Degraded::Links { over, .. } = degrade.what else { panic!("links") };
+/// assert_eq!(over.outage, Some(true));
+/// let degrade: Degrade = toml::from_str("at = '60s'\nprocessors = 'node_07'\nslowdown = 50")?;
+/// let Degraded::Processors { slowdown, .. } = degrade.what else { panic!("processors") };
+/// assert_eq!(slowdown.factor(), 50.0);
 /// # Ok::<(), toml::de::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -92,13 +99,38 @@ pub struct Degrade {
     pub at: SimDuration,
     /// When it ends; without, it lasts.
     pub until: Option<SimDuration>,
-    /// The pattern over link names.
-    pub links: String,
-    /// What the links have meanwhile.
-    pub over: LinkOverrides,
+    /// What is worse meanwhile.
+    pub what: Degraded,
+}
+
+/// What a degradation makes worse.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Degraded {
+    /// Links.
+    Links {
+        /// The pattern over link names.
+        pattern: String,
+        /// What the links have meanwhile.
+        over: LinkOverrides,
+    },
+    /// Processors.
+    Processors {
+        /// The pattern over names `{host}/{processor}`, or over hosts' names for all that a host
+        /// has.
+        pattern: String,
+        /// By how much the processors are slower meanwhile.
+        slowdown: Slowdown,
+    },
 }
 
 impl Degrade {
+    /// When any of these begins or ends, ascending.
+    pub(crate) fn instants<'a>(all: impl Iterator<Item = &'a Degrade>) -> BTreeSet<SimDuration> {
+        all.flat_map(|degrade| [Some(degrade.at), degrade.until])
+            .flatten()
+            .collect()
+    }
+
     pub(crate) fn is_active(&self, at: SimDuration) -> bool {
         self.at <= at && self.until.is_none_or(|until| at < until)
     }
@@ -127,9 +159,60 @@ impl Serialize for Degrade {
         if let Some(until) = self.until {
             map.serialize_entry("until", &Written(until))?;
         }
-        map.serialize_entry("links", &self.links)?;
-        self.over.write(&mut map)?;
+        match &self.what {
+            Degraded::Links { pattern, over } => {
+                map.serialize_entry("links", pattern)?;
+                over.write(&mut map)?;
+            }
+            Degraded::Processors { pattern, slowdown } => {
+                map.serialize_entry("processors", pattern)?;
+                map.serialize_entry("slowdown", slowdown)?;
+            }
+        }
         map.end()
+    }
+}
+
+/// Reads a key of an entry, and refuses one that is not for what the entry degrades, at its place.
+struct EntryKey<'a> {
+    seen: &'a mut Vec<&'static str>,
+}
+
+impl<'de> DeserializeSeed<'de> for EntryKey<'_> {
+    type Value = &'static str;
+
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<&'static str, D::Error> {
+        from.deserialize_identifier(self)
+    }
+}
+
+/// Keys that are for processors only.
+const OF_PROCESSORS: [&str; 2] = ["processors", "slowdown"];
+
+impl Visitor<'_> for EntryKey<'_> {
+    type Value = &'static str;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a key of a degradation")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<&'static str, E> {
+        let key = Key {
+            keys: DEGRADE_KEYS,
+            seen: &mut *self.seen,
+        }
+        .visit_str::<E>(name)?;
+        let specific = |key: &str| !["at", "until"].contains(&key);
+        let of_processors = |key: &str| OF_PROCESSORS.contains(&key);
+        let mut earlier = self.seen.iter().filter(|seen| specific(seen));
+        let other = earlier.find(|seen| of_processors(seen) != of_processors(key));
+        match other.filter(|_| specific(key)) {
+            None => Ok(key),
+            Some(other) => Err(E::custom(format!(
+                "{key} stands beside {other}: expected either links and their parameters, or \
+                 processors and slowdown"
+            ))),
+        }
     }
 }
 
@@ -141,29 +224,41 @@ impl<'de> Deserialize<'de> for Degrade {
             type Value = Degrade;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table of at, until, links and a link's parameters")
+                f.write_str(
+                    "a table of at, until, and links and their parameters or processors and \
+                     slowdown",
+                )
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Degrade, A::Error> {
                 let (mut at, mut until, mut links) = (None, None, None);
+                let (mut processors, mut slowdown) = (None, None);
                 let mut over = LinkOverrides::default();
                 let mut seen = Vec::new();
-                while let Some(key) = map.next_key_seed(Key {
-                    keys: DEGRADE_KEYS,
-                    seen: &mut seen,
-                })? {
+                while let Some(key) = map.next_key_seed(EntryKey { seen: &mut seen })? {
                     match key {
                         "at" => at = Some(map.next_value::<Written>()?.0),
                         "until" => until = Some(map.next_value::<Written>()?.0),
                         "links" => links = Some(map.next_value()?),
+                        "processors" => processors = Some(map.next_value()?),
+                        "slowdown" => slowdown = Some(map.next_value()?),
                         _ => over.read(key, &mut map)?,
                     }
                 }
+                let missing = A::Error::missing_field;
+                let what = match (processors, slowdown) {
+                    (Some(pattern), Some(slowdown)) => Degraded::Processors { pattern, slowdown },
+                    (Some(_), None) => return Err(missing("slowdown")),
+                    (None, Some(_)) => return Err(missing("processors")),
+                    (None, None) => Degraded::Links {
+                        pattern: links.ok_or_else(|| missing("links"))?,
+                        over,
+                    },
+                };
                 Ok(Degrade {
-                    at: at.ok_or_else(|| A::Error::missing_field("at"))?,
+                    at: at.ok_or_else(|| missing("at"))?,
                     until,
-                    links: links.ok_or_else(|| A::Error::missing_field("links"))?,
-                    over,
+                    what,
                 })
             }
         }
@@ -176,7 +271,7 @@ impl<'de> Deserialize<'de> for Degrade {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LinkConfigError {
     /// A pattern cannot be read.
-    #[error("{pattern:?} is no pattern over link names: {error}")]
+    #[error("{pattern:?} is no pattern over names: {error}")]
     BadPattern {
         /// Where in the scenario: the keys from the top, entries of arrays by number.
         key: Vec<String>,
@@ -193,6 +288,19 @@ pub enum LinkConfigError {
         /// The pattern.
         pattern: String,
         /// The link name or pattern closest to it in spelling, if there are links at all.
+        nearest: Option<String>,
+    },
+    /// A pattern matches no processor.
+    #[error("{pattern:?} matches no processor{}", match .nearest {
+        Some(_) => did_you_mean(.nearest.as_deref()),
+        None => ": this system has none".to_owned(),
+    })]
+    NoSuchProcessor {
+        /// Where in the scenario.
+        key: Vec<String>,
+        /// The pattern.
+        pattern: String,
+        /// The name or pattern closest to it in spelling, if there are processors at all.
         nearest: Option<String>,
     },
     /// A degradation ends before it begins.
@@ -237,6 +345,7 @@ impl LinkConfigError {
         match self {
             LinkConfigError::BadPattern { key, .. }
             | LinkConfigError::NoSuchLink { key, .. }
+            | LinkConfigError::NoSuchProcessor { key, .. }
             | LinkConfigError::EndsBeforeItBegins { key, .. }
             | LinkConfigError::TooMany { key, .. }
             | LinkConfigError::Value { key, .. }

@@ -124,7 +124,9 @@ macro_rules! parameters {
         pub(super) const KEYS: &[&str] = &["preset", $($key,)*];
 
         /// The keys of a `[[degrade]]` entry.
-        pub(super) const DEGRADE_KEYS: &[&str] = &["at", "until", "links", "preset", $($key,)*];
+        pub(super) const DEGRADE_KEYS: &[&str] = &[
+            "at", "until", "links", "processors", "slowdown", "preset", $($key,)*
+        ];
 
         /// The key that an alias stands for, or the key itself.
         pub(super) fn key_of(name: &str) -> Option<&'static str> {

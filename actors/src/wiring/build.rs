@@ -5,49 +5,18 @@ use std::sync::Arc;
 
 use farside::{HostId, SimDuration, SimTime, Simulation};
 use farside_worlds::HeightField;
-use farside_worlds::contacts::CapacityTrace;
-use globset::{Glob, GlobMatcher};
+use farside_worlds::contacts::{CapacityTrace, ContactPlan};
 use nalgebra::Point3;
 
+use super::pattern::{Pattern, shape};
+use super::processors::Slowdowns;
 use super::{Links, Wiring};
 use crate::link::{
-    Contacts, Degrade, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams, LinksConfig,
-    Timeline, Trace,
+    Contacts, Degrade, Degraded, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams,
+    LinksConfig, Timeline, Trace,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
 use farside::suggest::{closest, did_you_mean};
-
-/// A pattern, and whether any link has matched it.
-struct Pattern {
-    key: Vec<String>,
-    text: String,
-    glob: GlobMatcher,
-    used: bool,
-}
-
-impl Pattern {
-    fn new(key: Vec<String>, text: &str) -> Result<Self, LinkConfigError> {
-        match Glob::new(text) {
-            Ok(glob) => Ok(Pattern {
-                key,
-                text: text.to_owned(),
-                glob: glob.compile_matcher(),
-                used: false,
-            }),
-            Err(error) => Err(LinkConfigError::BadPattern {
-                key,
-                pattern: text.to_owned(),
-                error: error.kind().to_string(),
-            }),
-        }
-    }
-
-    fn matches(&mut self, name: &str) -> bool {
-        let yes = self.glob.is_match(name);
-        self.used |= yes;
-        yes
-    }
-}
 
 /// Builds links by name from [`LinksConfig`] and [`Degrade`]s, and checks that every pattern
 /// matches some link.
@@ -69,10 +38,13 @@ impl Pattern {
 /// assert!(error.to_string().ends_with("matches no link; did you mean \"base-rover_*\"?"));
 /// # Ok::<(), farside_actors::link::LinkConfigError>(())
 /// ```
+#[derive(Default)]
 pub struct LinkBuilder {
     default: LinkParams,
     overrides: Vec<(Pattern, LinkOverrides)>,
-    degrades: Vec<(Pattern, Degrade)>,
+    degrades: Vec<Worse>,
+    /// When processors are slower.
+    slowdowns: Slowdowns,
     names: Vec<String>,
     /// The radios that links may go through.
     radios: Vec<RadioBuilder>,
@@ -84,14 +56,18 @@ pub struct LinkBuilder {
     until: Option<SimDuration>,
     /// The first mistake that a link met.
     mistake: Option<LinkConfigError>,
-    /// The contacts from one host to another, where a plan has any say.
-    plan: Option<Box<Plan>>,
+    /// When which host hears which, where a plan has any say.
+    plan: Option<Arc<ContactPlan>>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<Known>,
 }
 
-/// The contacts from one host to another, by their names.
-type Plan = dyn Fn(&str, &str) -> Option<Contacts>;
+/// A degradation of links.
+struct Worse {
+    pattern: Pattern,
+    when: Degrade,
+    over: LinkOverrides,
+}
 
 /// The timeline of all links with one base and one set of degradations.
 struct Known {
@@ -122,16 +98,7 @@ impl LinkBuilder {
         }
         let mut builder = LinkBuilder {
             default: links.default.clone(),
-            overrides: Vec::new(),
-            degrades: Vec::new(),
-            names: Vec::new(),
-            radios: Vec::new(),
-            hosts: BTreeMap::new(),
-            places_m: BTreeMap::new(),
-            until: None,
-            mistake: None,
-            plan: None,
-            known: Vec::new(),
+            ..LinkBuilder::default()
         };
         for (text, over) in &links.patterns {
             let key = vec!["links".to_owned(), text.clone()];
@@ -147,26 +114,43 @@ impl LinkBuilder {
                     until: until.to_string(),
                 });
             }
-            if degrade.over.radio.is_some() {
+            let (pattern, over) = match &degrade.what {
+                Degraded::Links { pattern, over } => (pattern, over.clone()),
+                Degraded::Processors { pattern, slowdown } => {
+                    let pattern = Pattern::new(key("processors"), pattern)?;
+                    builder.slowdowns.add(pattern, degrade.clone(), *slowdown);
+                    continue;
+                }
+            };
+            if over.radio.is_some() {
                 return Err(LinkConfigError::Value {
                     key: key("radio"),
                     message: "a link cannot change its radio during a run".to_owned(),
                 });
             }
-            if degrade.over == LinkOverrides::default() {
+            if over == LinkOverrides::default() {
                 let key = vec!["degrade".to_owned(), index.to_string()];
                 return Err(LinkConfigError::ChangesNothing { key });
             }
-            let pattern = Pattern::new(key("links"), &degrade.links)?;
-            builder.degrades.push((pattern, degrade.clone()));
+            builder.degrades.push(Worse {
+                pattern: Pattern::new(key("links"), pattern)?,
+                when: degrade.clone(),
+                over,
+            });
         }
         Ok(builder)
     }
 
-    /// Gives links the contacts of a plan, beneath what `[links]` says of them: `contacts` there
-    /// replaces the plan's. `None` leaves a link alone; no contacts at all close it.
-    pub fn set_plan(&mut self, plan: impl Fn(&str, &str) -> Option<Contacts> + 'static) {
-        self.plan = Some(Box::new(plan));
+    /// Gives links the contacts of a plan over hosts' names, beneath what `[links]` says of them:
+    /// `contacts` there replaces the plan's. A link between hosts that the plan does not both name is
+    /// left alone; one between hosts that it names, without a contact, is closed.
+    pub fn set_plan(&mut self, plan: Arc<ContactPlan>) {
+        self.plan = Some(plan);
+    }
+
+    /// The contact plan, if there is one.
+    pub fn plan(&self) -> Option<&Arc<ContactPlan>> {
+        self.plan.as_ref()
     }
 
     /// Reads the traces that parameters name, each once.
@@ -241,9 +225,9 @@ impl LinkBuilder {
                     .map(|trace| (place(pattern), trace)),
             );
         }
-        for (pattern, degrade) in &mut self.degrades {
-            let trace = degrade.over.trace.iter_mut().flatten();
-            all.extend(trace.map(|trace| (place(pattern), trace)));
+        for worse in &mut self.degrades {
+            let trace = worse.over.trace.iter_mut().flatten();
+            all.extend(trace.map(|trace| (place(&worse.pattern), trace)));
         }
         all
     }
@@ -284,8 +268,12 @@ impl LinkBuilder {
             let nominal = self.connect(sim, from, to);
             links.add(from.1, to.1, nominal);
         }
+        links.processors = self.slowdowns.apply(&wiring.processors)?;
         self.finish(sim, wiring.terrain.as_ref())?;
-        Ok(links.with_remarks(self.remarks()))
+        let remarks = self.remarks().into_iter();
+        let remarks = remarks.map(|remark| format!("links: {remark}"));
+        links.remarks = remarks.chain(links.processors.remarks()).collect();
+        Ok(links)
     }
 
     /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations. A
@@ -348,7 +336,11 @@ impl LinkBuilder {
         let name = format!("{from}-{to}");
         let mut base = self.default.clone();
         if base.contacts.is_none() {
-            base.contacts = self.plan.as_ref().and_then(|plan| plan(from, to));
+            let windows = self
+                .plan
+                .as_ref()
+                .and_then(|plan| plan.windows_between(from, to));
+            base.contacts = windows.map(Contacts::of_plan);
         }
         for (pattern, over) in &mut self.overrides {
             if pattern.matches(&name) {
@@ -356,8 +348,8 @@ impl LinkBuilder {
             }
         }
         let mut degrades = Vec::new();
-        for (index, (pattern, _)) in self.degrades.iter_mut().enumerate() {
-            if pattern.matches(&name) {
+        for (index, worse) in self.degrades.iter_mut().enumerate() {
+            if worse.pattern.matches(&name) {
                 degrades.push(index);
             }
         }
@@ -371,19 +363,14 @@ impl LinkBuilder {
         if let Some(at) = self.known.iter().position(same) {
             return &self.known[at];
         }
-        let mine = degrades.iter().map(|&index| &self.degrades[index].1);
-        let mine: Vec<&Degrade> = mine.collect();
-        let instants: BTreeSet<SimDuration> = mine
-            .iter()
-            .flat_map(|degrade| [Some(degrade.at), degrade.until])
-            .flatten()
-            .collect();
+        let mine = degrades.iter().map(|&index| &self.degrades[index]);
+        let mine: Vec<&Worse> = mine.collect();
         let params_at = |at: SimDuration| {
-            let active = mine.iter().filter(|degrade| degrade.is_active(at));
-            active.fold(base.clone(), |params, degrade| params.with(&degrade.over))
+            let active = mine.iter().filter(|worse| worse.when.is_active(at));
+            active.fold(base.clone(), |params, worse| params.with(&worse.over))
         };
         let mut timeline = Timeline::new(base.clone());
-        for at in instants {
+        for at in Degrade::instants(mine.iter().map(|worse| &worse.when)) {
             timeline = timeline.then(SimTime::ZERO + at, params_at(at));
         }
         let at = self.known.len();
@@ -418,7 +405,7 @@ impl LinkBuilder {
             return Err(LinkConfigError::Value { key, message });
         }
         let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
-        let degrades = self.degrades.iter().map(|(pattern, _)| pattern);
+        let degrades = self.degrades.iter().map(|worse| &worse.pattern);
         match overrides.chain(degrades).find(|pattern| !pattern.used) {
             None => Ok(()),
             Some(unused) => Err(LinkConfigError::NoSuchLink {
@@ -449,16 +436,3 @@ impl LinkBuilder {
 
 /// How many letters a mistyped word may be off.
 const SLIP: usize = 3;
-
-/// The name with `*` for each run of digits.
-fn shape(name: &str) -> String {
-    let mut shape = String::with_capacity(name.len());
-    for c in name.chars() {
-        if !c.is_ascii_digit() {
-            shape.push(c);
-        } else if !shape.ends_with('*') {
-            shape.push('*');
-        }
-    }
-    shape
-}

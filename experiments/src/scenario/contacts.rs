@@ -10,11 +10,10 @@
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use farside::{SimDuration, SimTime, Simulation};
-use farside_actors::link::Contacts;
+use farside::{SimDuration, Simulation};
 use farside_actors::units;
-use farside_actors::wiring::LinkBuilder;
 use farside_worlds::contacts::{
     Builtin, CapacityTrace, ContactFormat, ContactPlan, ContactWindow, MAX_FILE_BYTES, PlanSummary,
 };
@@ -71,7 +70,7 @@ pub struct LinkContacts {
     file: String,
     format: ContactFormat,
     nodes: Vec<MappedNode>,
-    windows: BTreeMap<(String, String), Vec<ContactWindow>>,
+    plan: Arc<ContactPlan>,
 }
 
 /// A node of the plan, and the host that it is.
@@ -105,26 +104,17 @@ impl LinkContacts {
             .iter()
             .map(|node| (node.node.as_str(), node.host.as_str()))
             .collect();
-        let mut windows = BTreeMap::new();
-        for (from, to, of_pair) in plan.pairs() {
-            // ION plans say that a node hears itself; there is no such link.
-            if from == to {
-                continue;
-            }
-            let of_pair: Option<Vec<ContactWindow>> =
-                of_pair.iter().map(|w| later(w, config.offset)).collect();
-            let of_pair = of_pair.ok_or_else(|| {
-                let message = "with it, contacts end more than 584 years into the run";
-                SetupError::value("contacts.offset", message)
-            })?;
-            let pair = (hosts[from].to_owned(), hosts[to].to_owned());
-            windows.insert(pair, of_pair);
-        }
+        let host = |node: &str| hosts[node].to_owned();
+        let plan = plan.renamed(host, config.offset).ok_or_else(|| {
+            let message = "with it, contacts end more than 584 years into the run";
+            SetupError::value("contacts.offset", message)
+        })?;
+        let plan = plan.map_err(|error| wrong(format!("{}: {error}", config.file)))?;
         Ok(LinkContacts {
             file: config.file.clone(),
             format,
             nodes,
-            windows,
+            plan: Arc::new(plan),
         })
     }
 
@@ -132,19 +122,17 @@ impl LinkContacts {
     /// does not name both hosts, so that it says nothing about the link; none at all if it does,
     /// but has no contact between them.
     pub fn windows(&self, from: &str, to: &str) -> Option<&[ContactWindow]> {
-        let has = |host: &str| self.nodes.iter().any(|node| node.host == host);
-        let key = (from.to_owned(), to.to_owned());
-        match self.windows.get(&key) {
-            Some(windows) => Some(windows),
-            None if has(from) && has(to) => Some(&[]),
-            None => None,
-        }
+        self.plan.windows_between(from, to)
+    }
+
+    /// The plan, its nodes called as the hosts that they are, in the run's time.
+    pub fn plan(&self) -> &Arc<ContactPlan> {
+        &self.plan
     }
 
     /// Each ordered pair of hosts with contacts, sorted by their names.
     pub fn pairs(&self) -> impl Iterator<Item = (&str, &str, &[ContactWindow])> {
-        let pairs = self.windows.iter();
-        pairs.map(|((from, to), windows)| (from.as_str(), to.as_str(), windows.as_slice()))
+        self.plan.pairs()
     }
 
     /// What the contacts come to.
@@ -222,12 +210,6 @@ impl LinkContacts {
         }
         notes
     }
-}
-
-/// Hands the windows to what builds links, beneath what `[links]` says of them.
-pub(super) fn hand_over(contacts: &LinkContacts, links: &mut LinkBuilder) {
-    let contacts = contacts.clone();
-    links.set_plan(move |from, to| contacts.windows(from, to).map(Contacts::of_plan));
 }
 
 /// Reads a capacity trace: a mahimahi file, or without a dot, the name of a built-in trace.
@@ -309,14 +291,4 @@ fn mapped(config: &ContactsConfig, plan: &ContactPlan) -> Result<Vec<MappedNode>
             ))
         }
     }
-}
-
-/// The window so much later, if time reaches so far.
-fn later(window: &ContactWindow, offset: SimDuration) -> Option<ContactWindow> {
-    let at = |time: SimTime| time.as_nanos().checked_add(offset.as_nanos());
-    Some(ContactWindow {
-        start: SimTime::from_nanos(at(window.start)?),
-        end: SimTime::from_nanos(at(window.end)?),
-        ..*window
-    })
 }

@@ -27,7 +27,10 @@ pub fn shared_sections() -> Vec<Section> {
     });
     all.push(Section {
         name: "degrade".to_owned(),
-        about: &["Links whose names match a pattern have other parameters for a while."],
+        about: &[
+            "Links whose names match a pattern have other parameters for a while, or processors \
+                  are slower.",
+        ],
         keys: degrade_keys(),
         defaults: toml::Table::new(),
     });
@@ -50,6 +53,20 @@ fn degrade_keys() -> Vec<Key> {
             &["When it ends; without, it lasts as long as the run."],
         ),
         key("links", &["Which links: a pattern over their names."]),
+        key(
+            "processors",
+            &[
+                "Which processors, instead of links: a pattern over their names, {host}/{processor}, \
+               or over hosts.",
+            ],
+        ),
+        Key {
+            name: "slowdown",
+            about: &[
+                "By how much processors are slower meanwhile: 50 is a fiftieth of their speed.",
+            ],
+            expected: "a factor above 0, from 0.000001 to 1000000000".to_owned(),
+        },
     ];
     own.into_iter().chain(LinkParams::keys()).collect()
 }

@@ -7,5 +7,6 @@ mod pictures;
 mod report;
 mod running;
 mod scenarios;
+mod snapshots;
 mod studies;
 mod traffic;

@@ -6,9 +6,9 @@ use prost_reflect::MessageDescriptor;
 use super::index::{Entry, Index, Mode, Names};
 use super::{Cause, FirstDifference};
 use crate::LogError;
+use crate::envelope::seconds;
 use crate::envelope::{KeyRef, RecordRef};
 use crate::fields::{self, FieldDiff, bodies, body_descriptor, near};
-use crate::info::seconds;
 use crate::log::LoggedKey;
 use crate::scan::ScannedMessage;
 

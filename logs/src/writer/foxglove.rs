@@ -4,7 +4,7 @@ use prost::Message;
 use prost_reflect::prost_types::Timestamp;
 
 use crate::descriptors::SchemaOf;
-use farside::scene::{self, Drawing, Form, Shape};
+use farside::scene::{self, Drawing, Facing, Form, Shape};
 
 /// A published schema.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,7 +58,7 @@ impl Encoded {
                     parent_frame_id: parent.clone(),
                     child_frame_id: child.clone(),
                     translation: Some(pose.position_m.into()),
-                    rotation: Some(orientation(pose.heading)),
+                    rotation: Some(pose.facing.into()),
                 }),
                 Drawing::Entity { id, frame, shapes } => {
                     let mut entity = SceneEntity::of(shapes);
@@ -121,6 +121,35 @@ fn stamp(time_ns: u64) -> Timestamp {
         seconds: (time_ns / 1_000_000_000) as i64,
         nanos: (time_ns % 1_000_000_000) as i32,
     }
+}
+
+impl From<Facing> for Quaternion {
+    fn from(facing: Facing) -> Quaternion {
+        match facing {
+            Facing::Heading(heading) => orientation(heading),
+            Facing::Orientation(turn) => unit(turn),
+        }
+    }
+}
+
+/// The quaternion at length 1; no turn, if it has no length.
+fn unit(turn: [f64; 4]) -> Quaternion {
+    // Divided by the largest part first, so that squares neither overflow nor vanish.
+    let largest = turn
+        .iter()
+        .fold(0.0, |largest: f64, part| largest.max(part.abs()));
+    let scaled = turn.map(|part| part / largest);
+    let length = scaled.iter().map(|part| part * part).sum::<f64>().sqrt();
+    if !(length.is_finite() && largest > 0.0) {
+        return orientation([1.0, 0.0]);
+    }
+    let squares: f64 = turn.iter().map(|part| part * part).sum();
+    // What has length 1 but for rounding is written as it is.
+    let [x, y, z, w] = match (squares - 1.0).abs() < 1e-9 {
+        true => turn,
+        false => scaled.map(|part| part / length),
+    };
+    Quaternion { x, y, z, w }
 }
 
 /// The quaternion that turns east to `heading`, from the half-angle formulas: square roots are
@@ -194,7 +223,7 @@ impl From<&scene::Pose> for Pose {
     fn from(pose: &scene::Pose) -> Pose {
         Pose {
             position: Some(pose.position_m.into()),
-            orientation: Some(orientation(pose.heading)),
+            orientation: Some(pose.facing.into()),
         }
     }
 }
@@ -399,6 +428,42 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_heading_is_written_as_it_was_before_there_were_orientations() {
+        // By protobuf's encoding: two messages of three and of two doubles, zeros left out.
+        let double = |field: u8, value: f64| [&[field << 3 | 1][..], &value.to_le_bytes()].concat();
+        let inner =
+            |field: u8, bytes: Vec<u8>| [&[field << 3 | 2, bytes.len() as u8][..], &bytes].concat();
+        let half = 0.5f64.sqrt();
+        let place = [double(1, 3.0), double(2, 4.0), double(3, 0.5)].concat();
+        let turn = [double(3, -half), double(4, half)].concat();
+        let south = scene::Pose::heading([3.0, 4.0, 0.5], [0.0, -1.0]);
+        let found = Pose::from(&south).encode_to_vec();
+        assert_eq!(found, [inner(1, place), inner(2, turn)].concat());
+    }
+
+    #[test]
+    fn orientations_are_written_at_length_one() {
+        let half = 0.5f64.sqrt();
+        let none = [0.0, 0.0, 0.0, 1.0];
+        for (turn, expected) in [
+            ([0.0, -half, 0.0, half], [0.0, -half, 0.0, half]),
+            ([0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, 0.5]),
+            ([0.0, 3.0, 0.0, 4.0], [0.0, 0.6, 0.0, 0.8]),
+            ([1e300, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]),
+            ([0.0, 0.0, 1e-300, 0.0], [0.0, 0.0, 1.0, 0.0]),
+            ([0.0; 4], none),
+            ([f64::NAN, 0.0, 0.0, 1.0], none),
+            ([f64::INFINITY, 0.0, 0.0, 1.0], none),
+        ] {
+            let found = Quaternion::from(Facing::Orientation(turn));
+            let found = [found.x, found.y, found.z, found.w];
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-15, "{turn:?}: {found}");
+            }
+        }
+    }
+
     /// Every form and drawing, decoded by the published schemas: every field that is filled is one
     /// that they have, under the number and type that they give it.
     #[test]
@@ -421,10 +486,7 @@ mod tests {
                 thickness_m: 8.0,
             }),
         ];
-        let pose = scene::Pose {
-            position_m: [9.0; 3],
-            heading: [0.0, -1.0],
-        };
+        let pose = scene::Pose::heading([9.0; 3], [0.0, -1.0]);
         let text = |text: &str| text.to_owned();
         let drawings = [
             Drawing::Entity {

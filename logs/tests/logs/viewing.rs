@@ -46,10 +46,7 @@ impl Scene for Masts {
         assert!(record.class != RecordClass::InFlight);
         match record.class {
             RecordClass::Sample => {
-                let pose = Pose {
-                    position_m: [record.time().as_secs_f64(), 0.0, 0.0],
-                    heading: [0.0, 1.0],
-                };
+                let pose = Pose::heading([record.time().as_secs_f64(), 0.0, 0.0], [0.0, 1.0]);
                 out.push(Drawing::Transform {
                     parent: "map".to_owned(),
                     child: format!("{name}/base_link"),

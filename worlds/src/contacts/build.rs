@@ -34,14 +34,19 @@ pub(super) struct Nodes {
 impl Nodes {
     /// The node's number. `None` if the text is no name of a node.
     pub(super) fn number(&mut self, text: &str, line: usize) -> Option<u32> {
-        let name = canonical_name(text)?;
+        Some(self.taken(canonical_name(text)?, line))
+    }
+
+    /// The number of the node of this name, whatever that is.
+    fn taken(&mut self, name: String, line: usize) -> u32 {
         if let Some(number) = self.known.get(&name) {
-            return Some(*number);
+            return *number;
         }
-        let number = u32::try_from(self.all.len()).ok()?;
+        // Files are far too small to name so many.
+        let number = self.all.len() as u32;
         self.known.insert(name.clone(), number);
         self.all.push(Node { name, line });
-        Some(number)
+        number
     }
 
     pub(super) fn name(&self, number: u32) -> &str {
@@ -143,13 +148,52 @@ pub(super) fn push<T>(
 }
 
 /// The plan of these contacts.
-pub(super) fn plan(
-    mut nodes: Nodes,
-    mut contacts: Vec<RawContact>,
-) -> Result<ContactPlan, ContactError> {
+pub(super) fn plan(nodes: Nodes, contacts: Vec<RawContact>) -> Result<ContactPlan, ContactError> {
     if contacts.is_empty() {
         return Err(ContactError::Empty { what: "contact" });
     }
+    arranged(nodes, contacts)
+}
+
+/// The plan with its nodes called `name` of theirs, and so much later; contacts of a node with
+/// itself are left out. `None` if time does not reach so far.
+///
+/// # Errors
+/// When two nodes get one name, and with that contacts that overlap.
+pub(super) fn renamed(
+    plan: &ContactPlan,
+    name: impl Fn(&str) -> String,
+    offset: SimDuration,
+) -> Option<Result<ContactPlan, ContactError>> {
+    let mut nodes = Nodes::default();
+    let numbers: Vec<u32> = plan
+        .nodes
+        .iter()
+        .map(|node| nodes.taken(name(&node.name), node.line))
+        .collect();
+    let later = |time: SimTime| time.as_nanos().checked_add(offset.as_nanos());
+    let mut contacts = Vec::new();
+    for pair in plan.pairs.iter().filter(|pair| pair.from != pair.to) {
+        for at in pair.first..pair.end {
+            let window = plan.windows[at];
+            contacts.push(RawContact {
+                from: numbers[pair.from as usize],
+                to: numbers[pair.to as usize],
+                window: ContactWindow {
+                    start: SimTime::from_nanos(later(window.start)?),
+                    end: SimTime::from_nanos(later(window.end)?),
+                    ..window
+                },
+                confidence: plan.notes[at].confidence,
+                line: plan.notes[at].line,
+            });
+        }
+    }
+    Some(arranged(nodes, contacts))
+}
+
+/// Contacts in canonical order.
+fn arranged(mut nodes: Nodes, mut contacts: Vec<RawContact>) -> Result<ContactPlan, ContactError> {
     let mut order: Vec<u32> = (0..nodes.all.len() as u32).collect();
     order.sort_by(|a, b| node_order(nodes.name(*a)).cmp(&node_order(nodes.name(*b))));
     let mut rank = vec![0u32; order.len()];

@@ -24,7 +24,7 @@ use proptest::prelude::*;
 
 use super::case::{Case, Downtime};
 use crate::{Gaps, Policy, TeamConfig, WorldConfig};
-use farside_actors::link::{Degrade, LinkOverrides, LinkParams};
+use farside_actors::link::{Degrade, Degraded, LinkOverrides, LinkParams};
 
 /// How large and how bad cases may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,8 +243,10 @@ pub fn degradations(bounds: &Bounds) -> impl Strategy<Value = Vec<Degrade>> + us
         (instant(bounds), 1..100u64, links, over).prop_map(|(at, tenths, links, over)| Degrade {
             at,
             until: Some(at + SimDuration::from_millis(100 * tenths)),
-            links: links.to_owned(),
-            over,
+            what: Degraded::Links {
+                pattern: links.to_owned(),
+                over,
+            },
         });
     prop::collection::vec(degrade, 0..=bounds.degradations)
 }

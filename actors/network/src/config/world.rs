@@ -1,4 +1,4 @@
-//! The keys of a scenario's `[world]` and `[team]` tables.
+//! The keys of a scenario's `[world]` table.
 
 use std::fmt;
 
@@ -177,22 +177,5 @@ impl WorldConfig {
                 .owned_by(roadmap, self.ownership)
                 .with_coverage(roadmap, coverage_m),
         }
-    }
-}
-
-/// The most rovers: each has a link to and from each node, and memory is finite.
-const MAX_ROVERS: u32 = 10_000;
-
-settings! {
-    /// The `[team]` table: who drives.
-    ///
-    /// ```
-    /// assert_eq!(farside_network::TeamConfig::default().rovers, 50);
-    /// ```
-    pub struct TeamConfig {
-        /// How many rovers, all waiting at their entries at the start; at least 1. Where the world
-        /// has tasks, they do the first ones.
-        pub rovers: u32 = 50,
-            1..=MAX_ROVERS;
     }
 }

@@ -3,11 +3,12 @@
 
 use std::ops::RangeInclusive;
 
+use farside_actors::processor::Speed;
 use farside_actors::settings;
 use farside_actors::system::settings::{one_of, such_that};
 use serde::{Deserialize, Serialize};
 
-use super::processor::Processor;
+use super::processor::{self, PAPER_SPEED};
 
 /// Payoffs travel in single precision: what would overflow there is refused.
 const WEIGHTS: RangeInclusive<f64> = 0.0..=1e9;
@@ -38,12 +39,8 @@ settings! {
         pub max_iterations: u32 = 100;
         /// How fast each node computes: pairs of candidate paths a second, `"paper"` or
         /// `"unlimited"`. The optimisation uses what is ready in its time.
-        pub processor: Processor = Processor::PAPER,
-            such_that(
-                "more than 0/s",
-                Processor::to_string,
-                |processor: &Processor| *processor != Processor::PairsPerS(0),
-            );
+        pub processor: Speed [with = "processor"] = PAPER_SPEED,
+            such_that("more than 0/s", Speed::to_string, |speed: &Speed| *speed != Speed::PerS(0));
         /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as
         /// computed. 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum
         /// on DCOPs through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus

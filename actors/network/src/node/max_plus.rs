@@ -18,6 +18,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use farside::prelude::*;
+use farside_actors::processor::Processor;
 use farside_worlds::{NodeId, VertexId};
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,7 @@ pub(super) struct MaxPlusPolicy {
     load: u64,
     /// Requests for this node's vertices in this cycle.
     requests: Vec<Request>,
+    processor: Processor,
     /// Own rovers that leave their vertex in this cycle without accelerating.
     leaving: Vec<VertexId>,
     forced_stops: u32,
@@ -67,8 +69,9 @@ pub(super) struct MaxPlusPolicy {
 }
 
 impl MaxPlusPolicy {
-    pub(super) fn new(base: &Base, graph: Arc<LocalGraph>) -> Self {
+    pub(super) fn new(base: &Base, graph: Arc<LocalGraph>, processor: Processor) -> Self {
         MaxPlusPolicy {
+            processor,
             graph,
             surveyed: None,
             // A node that starts in the middle of a cycle waits for the next.
@@ -157,7 +160,8 @@ impl NodePolicy for MaxPlusPolicy {
         match phase {
             Phase::Listen => {}
             Phase::Locate => {
-                let (load, crowding) = (self.told_load(base), self.told_crowding(base, ctx));
+                let load = self.told_load(base, ctx.now());
+                let crowding = self.told_crowding(base, ctx);
                 base.locate(ctx, load, crowding);
             }
             Phase::Propose => self.propose(base, ctx),

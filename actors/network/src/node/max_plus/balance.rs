@@ -71,17 +71,18 @@ fn fill_up(own: u64, limit: u64, helpers: &[Helper]) -> Vec<u64> {
 impl MaxPlusPolicy {
     /// How many pairs of candidate paths an iteration may have so that there is time for enough of
     /// them; none if the processor takes no time.
-    fn pairs_limit(&self, base: &Base) -> Option<u64> {
-        let pairs = base.site.config.max_plus.processor;
-        let pairs = pairs.pairs_in(base.site.timing.optimisation);
+    fn pairs_limit(&self, base: &Base, now: SimTime) -> Option<u64> {
+        let pairs = self
+            .processor
+            .operations_in(now, base.site.timing.optimisation);
         // The payoffs take as long as an iteration.
         pairs.map(|pairs| pairs / (ITERATIONS + 1))
     }
 
     /// What neighbours are to know of this node's load, if it may hand work over.
-    pub(super) fn told_load(&self, base: &Base) -> Option<Load> {
+    pub(super) fn told_load(&self, base: &Base, now: SimTime) -> Option<Load> {
         let limit = self
-            .pairs_limit(base)
+            .pairs_limit(base, now)
             .filter(|_| base.site.config.max_plus.outsourcing)?;
         let recent = |told: u32| base.cycle.saturating_sub(told) <= 1;
         let heard = base
@@ -99,10 +100,11 @@ impl MaxPlusPolicy {
     pub(super) fn quotas(
         &self,
         base: &Base,
+        now: SimTime,
         rovers: &[(RoverId, Vec<CandidatePath>)],
     ) -> Vec<(NodeId, u64)> {
         let limit = self
-            .pairs_limit(base)
+            .pairs_limit(base, now)
             .filter(|_| base.site.config.max_plus.outsourcing);
         let Some(limit) = limit.filter(|&limit| self.load > limit) else {
             return Vec::new();

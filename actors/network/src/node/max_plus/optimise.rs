@@ -136,9 +136,9 @@ impl MaxPlusPolicy {
             anytime: config.max_plus.anytime,
         };
         let payoffs: Payoffs = base.site.payoffs;
-        self.optimiser.quotas = self.quotas(base, &rovers);
+        self.optimiser.quotas = self.quotas(base, ctx.now(), &rovers);
         self.optimiser.solver = Some(Solver::new(payoffs, rules, rovers));
-        self.charge_payoffs(base, ctx);
+        self.charge_payoffs(ctx);
     }
 
     /// Candidate paths are being sent to all neighbours.
@@ -147,12 +147,12 @@ impl MaxPlusPolicy {
     }
 
     /// The processor has more candidate paths to compare.
-    fn charge_payoffs(&mut self, base: &Base, ctx: &Context<'_, Node>) {
-        let optimiser = &mut self.optimiser;
+    fn charge_payoffs(&mut self, ctx: &Context<'_, Node>) {
+        let (optimiser, processor) = (&mut self.optimiser, &self.processor);
         let pairs = optimiser.solver.as_mut().map_or(0, Solver::take_compared);
         optimiser.pairs += pairs;
         let begins = optimiser.payoffs_done.max(ctx.now());
-        optimiser.payoffs_done = begins + base.site.config.max_plus.processor.time_for(pairs);
+        optimiser.payoffs_done = begins + processor.time_for(begins, pairs);
     }
 
     /// The optimisation begins.
@@ -197,7 +197,7 @@ impl MaxPlusPolicy {
         }
         let cycle = base.cycle;
         let pairs = solver.pairs();
-        let takes = config.max_plus.processor.time_for(pairs);
+        let takes = self.processor.time_for(ctx.now(), pairs);
         let left = |until: SimTime| until.since(until.min(ctx.now()));
         // Its messages are to go out when the last are on the air, and not to be older than that.
         let idle = left(optimiser.sent).saturating_sub(takes);
@@ -284,7 +284,7 @@ impl MaxPlusPolicy {
             settled: false,
             told_settled: false,
         });
-        self.charge_payoffs(base, ctx);
+        self.charge_payoffs(ctx);
         let optimiser = &mut self.optimiser;
         // It came late: the optimisation takes it in.
         if optimiser.running {
