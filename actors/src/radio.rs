@@ -115,7 +115,7 @@ struct Directed {
     free: SimTime,
 }
 
-struct Place {
+struct RadioStation {
     host: String,
     track: Track,
 }
@@ -124,7 +124,7 @@ struct Place {
 pub struct Radio {
     config: RadioConfig,
     terrain: Option<Arc<HeightField>>,
-    places: Vec<Place>,
+    places: Vec<RadioStation>,
     /// From a host's number to its station, from 1; 0 for none.
     station_of_host: Vec<u32>,
     directed: Vec<Directed>,
@@ -159,7 +159,7 @@ impl Radio {
         if self.station_of_host.len() <= index {
             self.station_of_host.resize(index + 1, 0);
         }
-        self.places.push(Place {
+        self.places.push(RadioStation {
             host: host.to_owned(),
             track: Track::fixed(place_m),
         });

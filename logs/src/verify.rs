@@ -100,7 +100,7 @@ pub struct Verifier {
     encoder: Option<Encoder>,
     envelope: Vec<u8>,
     /// The records since the last checkpoint, to name the one that a packed hash points at.
-    window: Vec<Seen>,
+    window: Vec<Compared>,
     /// A difference, and its place in the window; a filtered record before it may differ too.
     candidate: Option<(usize, Mismatch)>,
     /// A checkpoint of the log that came where the re-execution has another record.
@@ -117,7 +117,7 @@ type Shared = Arc<Mutex<Option<Result<VerifyOutcome, LogError>>>>;
 
 /// What is remembered of a record of the re-execution.
 #[derive(Clone, Copy)]
-struct Seen {
+struct Compared {
     flow: usize,
     time_ns: u64,
     ordinal: u64,
@@ -235,7 +235,7 @@ impl Verifier {
             return Ok(());
         };
         let index = encoder.flow(record);
-        let seen = Seen {
+        let seen = Compared {
             flow: index,
             time_ns: record.key.time.as_nanos(),
             ordinal: record.ordinal,
@@ -290,7 +290,7 @@ impl Verifier {
     }
 
     /// The log's run was over here, and the re-execution goes on.
-    fn log_is_in_flight(&mut self, seen: Seen) -> Result<(), LogError> {
+    fn log_is_in_flight(&mut self, seen: Compared) -> Result<(), LogError> {
         while self.peek()? != Step::End {
             self.peeked = None;
         }
@@ -305,7 +305,7 @@ impl Verifier {
         Ok(())
     }
 
-    fn at(&self, seen: Seen, diff: FieldDiff) -> Mismatch {
+    fn at(&self, seen: Compared, diff: FieldDiff) -> Mismatch {
         let flow = self
             .encoder
             .as_ref()
@@ -324,7 +324,7 @@ impl Verifier {
     }
 
     /// Names the difference between the log's record and the one in [`Verifier::envelope`].
-    fn mismatch(&self, seen: Seen, record: &Record<'_>) -> Result<Mismatch, LogError> {
+    fn mismatch(&self, seen: Compared, record: &Record<'_>) -> Result<Mismatch, LogError> {
         let (logged, message) = self.records.record()?;
         let diff = RecordRef::read(&self.envelope).and_then(|rerun| {
             let logged_body = fields::body_descriptor(message.channel);
@@ -406,7 +406,7 @@ impl Verifier {
                     |hash: Option<u32>| hash.map_or("nothing".to_owned(), |h| format!("{h:08x}"));
                 let diff = FieldDiff::new("digest", hash(logged), hash(Some(rerun)));
                 let seen = self.window.get(at).copied().or(self.window.last().copied());
-                let seen = seen.unwrap_or(Seen {
+                let seen = seen.unwrap_or(Compared {
                     flow: 0,
                     time_ns: 0,
                     ordinal: 0,

@@ -346,7 +346,7 @@ fn settled(map: Map) -> Option<u8> {
 
 /// The last state found: walks stop there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
+pub(super) struct KnownState {
     slot: i64,
     state: u8,
 }
@@ -387,16 +387,16 @@ impl Chain {
     pub(super) fn loss_at(
         &self,
         at: SimTime,
-        known: &mut Option<Known>,
+        known: &mut Option<KnownState>,
         draw: impl Fn(u64) -> f64,
     ) -> f64 {
         let slot = (at.as_nanos() / self.slot.as_nanos()) as i64;
         let state = self.state_at(slot, *known, draw);
-        *known = Some(Known { slot, state });
+        *known = Some(KnownState { slot, state });
         self.loss[usize::from(state)]
     }
 
-    fn state_at(&self, slot: i64, known: Option<Known>, draw: impl Fn(u64) -> f64) -> u8 {
+    fn state_at(&self, slot: i64, known: Option<KnownState>, draw: impl Fn(u64) -> f64) -> u8 {
         let mut maps = IDENTITY;
         let mut at = slot;
         for _ in 0..MAX_WALK {
@@ -430,7 +430,7 @@ mod tests {
         let mut known = None;
         let each = |slot: i64| {
             let state = burst.chain.state_at(slot, known, draw);
-            known = Some(Known { slot, state });
+            known = Some(KnownState { slot, state });
             state
         };
         (0..n).map(each).collect()

@@ -13,7 +13,7 @@ use farside::carrier::{Carriage, Parcel};
 use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
-use super::burst::Known;
+use super::burst::KnownState;
 use super::stage::{self, Draws, Purpose};
 use super::timeline::Timeline;
 use super::trace::{self, Opportunity, Trace};
@@ -88,7 +88,7 @@ pub struct Transmitter {
     /// The latest arrival so far.
     arrived: SimTime,
     /// Where the walk through the burst chain may stop, and for which span that holds.
-    known: Option<(usize, Known)>,
+    known: Option<(usize, KnownState)>,
     /// What is left of the last opportunity of a trace, and in which span.
     opportunity: Option<(usize, Opportunity)>,
 }

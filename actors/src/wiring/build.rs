@@ -59,7 +59,7 @@ pub struct LinkBuilder {
     /// When which host hears which, where a plan has any say.
     plan: Option<Arc<ContactPlan>>,
     /// What links were given before: most of them share a base and the degradations they meet.
-    known: Vec<Known>,
+    known: Vec<SharedTimeline>,
 }
 
 /// A degradation of links.
@@ -70,7 +70,7 @@ struct Worse {
 }
 
 /// The timeline of all links with one base and one set of degradations.
-struct Known {
+struct SharedTimeline {
     base: Arc<LinkParams>,
     /// Indices into the degradations.
     degrades: Vec<usize>,
@@ -332,7 +332,7 @@ impl LinkBuilder {
     }
 
     /// What the link `{from}-{to}` has, and when.
-    fn resolve(&mut self, from: &str, to: &str) -> &Known {
+    fn resolve(&mut self, from: &str, to: &str) -> &SharedTimeline {
         let name = format!("{from}-{to}");
         let mut base = self.default.clone();
         if base.contacts.is_none() {
@@ -358,8 +358,8 @@ impl LinkBuilder {
     }
 
     /// What such a link has from each instant on at which a degradation begins or ends.
-    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> &Known {
-        let same = |known: &Known| known.degrades == degrades && *known.base == base;
+    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> &SharedTimeline {
+        let same = |known: &SharedTimeline| known.degrades == degrades && *known.base == base;
         if let Some(at) = self.known.iter().position(same) {
             return &self.known[at];
         }
@@ -374,7 +374,7 @@ impl LinkBuilder {
             timeline = timeline.then(SimTime::ZERO + at, params_at(at));
         }
         let at = self.known.len();
-        self.known.push(Known {
+        self.known.push(SharedTimeline {
             base: Arc::new(base),
             degrades,
             timeline: Arc::new(timeline),

@@ -9,7 +9,7 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
 use farside::{RunInfo, SimTime};
 
 use super::route::TrafficPlan;
-use super::station::Seen;
+use super::station::SeenNumbers;
 
 /// The most delays that are kept, of all flows together. Beyond, each has the same chance to be
 /// among those kept.
@@ -43,8 +43,8 @@ pub(super) struct FlowTally {
     pub(super) delay_sum_ns: u128,
     pub(super) delay_max_ns: u64,
     pub(super) age: Age,
-    arrived: Seen,
-    pending: Seen,
+    arrived: SeenNumbers,
+    pending: SeenNumbers,
     /// When each message that reached the first relay was sent, by its number.
     sent_at: Vec<SimTime>,
     /// The highest number that has arrived.

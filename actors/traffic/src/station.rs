@@ -24,11 +24,11 @@ struct Sent(BTreeMap<u32, u32>);
 
 /// Which messages of a flow a relay has passed on, a bit for each.
 #[derive(Default)]
-pub(super) struct Seen {
+pub(super) struct SeenNumbers {
     bits: Vec<u64>,
 }
 
-impl Seen {
+impl SeenNumbers {
     /// Notes a number; false if it was noted before.
     pub(super) fn insert(&mut self, number: u32) -> bool {
         let (word, bit) = (number as usize / 64, 1 << (number % 64));
@@ -53,7 +53,7 @@ pub(super) struct Station {
     /// Whom the messages of each flow, by its id, go to from here.
     next: BTreeMap<u32, usize>,
     /// What was passed on, of each flow by its id.
-    passed: BTreeMap<u32, Seen>,
+    passed: BTreeMap<u32, SeenNumbers>,
 }
 
 impl Actor for Station {

@@ -151,6 +151,7 @@ pub(crate) fn with_curves(mut results: Results, steps: u32) -> Results {
                 unit: "s".to_owned(),
                 lengths_differ: false,
             }),
+            kind: None,
         },
     );
     let manifest = &results.manifest;
@@ -196,6 +197,7 @@ fn metrics() -> Vec<Metric> {
         label: label.to_owned(),
         unit: unit.to_owned(),
         index: None,
+        kind: None,
     };
     metrics.map(metric).to_vec()
 }

@@ -50,6 +50,7 @@ pub(super) fn metric<'a>(
         label: file.label.clone().unwrap_or_else(|| label.to_owned()),
         unit: file.unit.clone().unwrap_or_else(|| unit.to_owned()),
         index: index(file, known),
+        kind: known.map(|metric| metric.kind.into()),
     }
 }
 

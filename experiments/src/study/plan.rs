@@ -449,6 +449,13 @@ impl Plan {
                 let known = metrics::measurable(results);
                 return Err(blame.unknown(&format!("metrics.{index}"), name, &known));
             }
+            if let (Some(kind), Some(value)) = (metric.kind, results.get(name))
+                && !kind.holds(value)
+            {
+                let message =
+                    format!("{name}: its system declares {kind:?}, and a run has {value}");
+                return Err(blame.invalid(&format!("metrics.{index}"), message));
+            }
         }
         if let Some(stop) = &self.manifest.stop
             && let Some(Value::Array(_) | Value::String(_) | Value::Object(_)) =

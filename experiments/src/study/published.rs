@@ -22,7 +22,7 @@ const EXCEEDS: &str = "exceeds";
 const QUOTE: &str = "quote";
 
 /// What a figure is checked against.
-struct Known<'a> {
+struct StudyParts<'a> {
     factors: &'a [FactorPlan],
     cells: &'a [Cell],
     blame: &'a Blame<'a>,
@@ -40,7 +40,7 @@ pub(super) fn published(
     metrics: &[Metric],
     blame: &Blame<'_>,
 ) -> Result<Vec<Published>, ScenarioError> {
-    let known = Known {
+    let known = StudyParts {
         factors,
         cells,
         blame,
@@ -51,7 +51,7 @@ pub(super) fn published(
         .collect()
 }
 
-impl Known<'_> {
+impl StudyParts<'_> {
     fn table(
         &self,
         index: usize,

@@ -181,6 +181,59 @@ pub struct Metric {
     /// What the index of a curve is. None of a metric that is no curve, or of which nobody says it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub index: Option<SeriesIndex>,
+    /// What its system declares it to be. None of a metric that no system declares: then its values
+    /// tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<DeclaredKind>,
+}
+
+/// How the values of a metric are summed up over runs, as its system says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeclaredKind {
+    /// Numbers, by their mean.
+    Number,
+    /// True or false, as a rate.
+    Rate,
+    /// Lists of numbers, as a distribution.
+    List,
+    /// Curves, index by index.
+    Series,
+    /// Words, which are counted.
+    Word,
+}
+
+impl DeclaredKind {
+    /// Whether a run's value is of this kind; `null` is of each.
+    ///
+    /// ```
+    /// use farside_experiments::study::results::DeclaredKind;
+    /// assert!(DeclaredKind::Rate.holds(&true.into()));
+    /// assert!(!DeclaredKind::Number.holds(&"many".into()));
+    /// ```
+    pub fn holds(self, value: &serde_json::Value) -> bool {
+        match self {
+            _ if value.is_null() => true,
+            DeclaredKind::Number => value.is_number(),
+            DeclaredKind::Rate => value.is_boolean(),
+            DeclaredKind::List => value.is_array(),
+            DeclaredKind::Series => value.is_object(),
+            DeclaredKind::Word => value.is_string(),
+        }
+    }
+}
+
+impl From<farside_actors::system::MetricKind> for DeclaredKind {
+    fn from(kind: farside_actors::system::MetricKind) -> Self {
+        use farside_actors::system::MetricKind;
+        match kind {
+            MetricKind::Number => DeclaredKind::Number,
+            MetricKind::Rate => DeclaredKind::Rate,
+            MetricKind::Word => DeclaredKind::Word,
+            MetricKind::Sample => DeclaredKind::List,
+            MetricKind::Series(_) => DeclaredKind::Series,
+        }
+    }
 }
 
 /// What the index of a curve is.

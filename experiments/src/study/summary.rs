@@ -305,7 +305,7 @@ pub struct OverallSummary {
 /// # use farside_experiments::study::results::*;
 /// # use serde_json::json;
 /// # let metric = |name: &str| Metric { name: name.into(), label: name.into(), unit: "s".into(),
-/// index: None };
+/// #     index: None, kind: None };
 /// # let manifest = Manifest { format: FORMAT, code_version: "1".into(), study: "doc".into(),
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],

@@ -74,7 +74,7 @@ impl ContactPlan {
         let file: File<'_> = serde_json::from_str(text).map_err(|error| json(&error, 1, 1))?;
         let mut nodes = Nodes::default();
         let mut contacts = Vec::with_capacity(file.contacts.0.len());
-        let mut place = Place::new(text);
+        let mut place = JsonPlace::new(text);
         for raw in file.contacts.0 {
             place.move_to(raw.get());
             let object: Object<'_> = serde_json::from_str(raw.get())
@@ -197,16 +197,16 @@ struct Key<'a>(#[serde(borrow)] Cow<'a, str>);
 
 /// Finds the lines of parts of the text. Contacts come in order, so each search goes on where the
 /// last one ended; columns are counted for errors only.
-struct Place<'a> {
+struct JsonPlace<'a> {
     text: &'a str,
     offset: usize,
     line: usize,
     line_start: usize,
 }
 
-impl<'a> Place<'a> {
+impl<'a> JsonPlace<'a> {
     fn new(text: &'a str) -> Self {
-        Place {
+        JsonPlace {
             text,
             offset: 0,
             line: 1,
@@ -234,7 +234,7 @@ impl<'a> Place<'a> {
 
 /// Reads one contact.
 struct Reader<'a> {
-    place: &'a Place<'a>,
+    place: &'a JsonPlace<'a>,
     line: usize,
     object: Object<'a>,
 }
@@ -365,7 +365,7 @@ impl Reader<'_> {
     }
 
     fn at(&self, value: &RawValue, problem: ContactProblem) -> ContactError {
-        let mut place = Place { ..*self.place };
+        let mut place = JsonPlace { ..*self.place };
         place.move_to(value.get());
         ContactError::at_column(place.line, place.column(), problem)
     }

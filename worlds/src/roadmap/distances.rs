@@ -32,14 +32,14 @@ pub(super) enum Distances {
 
 /// Fields made on demand.
 pub(super) struct Fields {
-    known: RwLock<Known>,
+    known: RwLock<KnownField>,
     /// How many fields are kept.
     most: usize,
     diameter: OnceLock<u32>,
 }
 
 #[derive(Default)]
-struct Known {
+struct KnownField {
     /// By vertex.
     fields: Vec<Option<Arc<[u16]>>>,
     /// The vertices that have one, the oldest first.
@@ -121,7 +121,7 @@ impl Fields {
     fn new(vertices: usize, bytes: usize) -> Fields {
         let fields = vec![None; vertices];
         Fields {
-            known: RwLock::new(Known {
+            known: RwLock::new(KnownField {
                 fields,
                 order: VecDeque::new(),
             }),

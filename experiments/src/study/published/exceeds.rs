@@ -3,12 +3,12 @@
 use crate::scenario::ScenarioError;
 
 use super::super::results::{Cell, Comparison};
-use super::{EXCEEDS, Known};
+use super::{EXCEEDS, StudyParts};
 
 /// The keys that say from where on, and by how much.
 pub(super) const DETAILS: [&str; 4] = ["from_index", "by_at_least", "by_at_most", "equal_within"];
 
-impl Known<'_> {
+impl StudyParts<'_> {
     /// What a figure, which stands at `keys`, claims of its cells and others.
     pub(super) fn comparison(
         &self,

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use crate::stats::survival::Observation;
-use crate::study::results::{MessageCounts, Results, RunOutcome, RunRecord};
+use crate::study::results::{DeclaredKind, MessageCounts, Results, RunOutcome, RunRecord};
 use farside_actors::system::Series;
 
 /// What a metric's values are, in all cells alike.
@@ -24,6 +24,18 @@ pub enum Kind {
     Text,
     /// No run reports it.
     Absent,
+}
+
+impl From<DeclaredKind> for Kind {
+    fn from(declared: DeclaredKind) -> Kind {
+        match declared {
+            DeclaredKind::Number => Kind::Number,
+            DeclaredKind::Rate => Kind::Rate,
+            DeclaredKind::List => Kind::List,
+            DeclaredKind::Series => Kind::Series,
+            DeclaredKind::Word => Kind::Text,
+        }
+    }
 }
 
 /// What a run says under a metric's name: one of the system's, or, where the system has none of
@@ -81,9 +93,21 @@ pub fn number_of(run: &RunRecord, name: &str) -> Option<f64> {
     number.filter(|number| number.is_finite())
 }
 
-/// The kind of a metric, from what all runs say. One list makes it lists, one curve curves, one
-/// word makes it words; numbers and truth values together are numbers.
+/// The kind of a metric: what its system declares; of others, what all runs say. One list makes it
+/// lists, one curve curves, one word makes it words; numbers and truth values together are numbers.
 pub fn kind_of(results: &Results, name: &str) -> Kind {
+    let metrics = &results.manifest.metrics;
+    let declared = metrics.iter().find(|metric| metric.name == name);
+    let declared = declared.and_then(|metric| metric.kind);
+    if let Some(declared) = declared {
+        let mut runs = results.runs.iter();
+        let reported = runs.any(|run| value_of(&run.outcome, name).is_some());
+        return if reported {
+            declared.into()
+        } else {
+            Kind::Absent
+        };
+    }
     let mut kind = Kind::Absent;
     for run in &results.runs {
         let Some(value) = value_of(&run.outcome, name) else {
