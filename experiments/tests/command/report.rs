@@ -35,6 +35,7 @@ fn manifest() -> Manifest {
             label: "time ratio".to_owned(),
             unit: String::new(),
             index: None,
+            kind: None,
         }],
         baseline: Some(0),
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
