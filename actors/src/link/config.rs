@@ -111,7 +111,7 @@ pub enum Degraded {
         /// The pattern over link names.
         pattern: String,
         /// What the links have meanwhile.
-        over: LinkOverrides,
+        over: Box<LinkOverrides>,
     },
     /// Processors.
     Processors {
@@ -252,7 +252,7 @@ impl<'de> Deserialize<'de> for Degrade {
                     (None, Some(_)) => return Err(missing("processors")),
                     (None, None) => Degraded::Links {
                         pattern: links.ok_or_else(|| missing("links"))?,
-                        over,
+                        over: Box::new(over),
                     },
                 };
                 Ok(Degrade {

@@ -115,7 +115,7 @@ impl LinkBuilder {
                 });
             }
             let (pattern, over) = match &degrade.what {
-                Degraded::Links { pattern, over } => (pattern, over.clone()),
+                Degraded::Links { pattern, over } => (pattern, (**over).clone()),
                 Degraded::Processors { pattern, slowdown } => {
                     let pattern = Pattern::new(key("processors"), pattern)?;
                     builder.slowdowns.add(pattern, degrade.clone(), *slowdown);

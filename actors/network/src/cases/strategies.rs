@@ -245,7 +245,7 @@ pub fn degradations(bounds: &Bounds) -> impl Strategy<Value = Vec<Degrade>> + us
             until: Some(at + SimDuration::from_millis(100 * tenths)),
             what: Degraded::Links {
                 pattern: links.to_owned(),
-                over,
+                over: Box::new(over),
             },
         });
     prop::collection::vec(degrade, 0..=bounds.degradations)

@@ -1,5 +1,5 @@
-//! How fast a sensor node computes: its processor's operations are pairs of candidate paths. A pair is
-//! looked at once when its payoff is made (section 3.4 of the paper: do the paths collide?), and
+//! How fast a sensor node computes: its processor's operations are pairs of candidate paths. A pair
+//! is looked at once when its payoff is made (section 3.4 of the paper: do the paths collide?), and
 //! once for each max-plus vector that it has part in, in each iteration. Short cuts that this
 //! program takes do not count. For serde's `with`: `"paper"` is a speed too.
 
