@@ -171,25 +171,43 @@ fn is_same_file(_one: &Path, _other: &std::fs::Metadata) -> bool {
     false
 }
 
-/// What a file declares: for each id, what was declared first under it.
+/// What a file declares: for each id, what was declared first under it, preferably where no checksum
+/// says that it may be something else.
 #[derive(Default)]
 struct Known {
-    schemas: BTreeMap<u16, Declaration>,
-    channels: BTreeMap<u16, Declaration>,
+    schemas: BTreeMap<u16, (Declaration, bool)>,
+    channels: BTreeMap<u16, (Declaration, bool)>,
 }
 
 impl Known {
     fn add(&mut self, part: &Part<'_>) {
-        match part {
-            Part::Schema { record, .. } => {
-                let made = || Declaration::schema(record);
-                self.schemas.entry(record.id).or_insert_with(made);
+        let (of, id, declared, sure) = match part {
+            Part::Schema { record, sure, .. } => {
+                let declared = Declaration::schema(record);
+                (&mut self.schemas, record.id, declared, *sure)
             }
-            Part::Channel { record, .. } => {
-                let made = || Declaration::channel(record);
-                self.channels.entry(record.id).or_insert_with(made);
+            Part::Channel { record, sure, .. } => {
+                let declared = Declaration::channel(record);
+                (&mut self.channels, record.id, declared, *sure)
             }
-            _ => {}
+            _ => return,
+        };
+        let better = of.get(&id).is_none_or(|(_, known)| sure && !known);
+        if better {
+            of.insert(id, (declared, sure));
+        }
+    }
+
+    /// What is to be declared under an id where `declared` was read there, surely or not.
+    fn surest(
+        of: &BTreeMap<u16, (Declaration, bool)>,
+        id: u16,
+        declared: Declaration,
+        sure: bool,
+    ) -> Declaration {
+        match of.get(&id) {
+            Some((known, true)) if !sure => known.clone(),
+            _ => declared,
         }
     }
 }

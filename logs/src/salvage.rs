@@ -82,10 +82,12 @@ pub(crate) enum Part<'a> {
     Schema {
         record: SchemaRecord<'a>,
         in_summary: bool,
+        sure: bool,
     },
     Channel {
         record: ChannelRecord<'a>,
         in_summary: bool,
+        sure: bool,
     },
     Message {
         head: MessageHeader,
@@ -144,6 +146,8 @@ pub(crate) struct Salvage<'e> {
     /// The channels that messages may be on; any, while they are not known.
     channels: Option<BTreeSet<u16>>,
     in_summary: bool,
+    /// Something is lost already.
+    damaged: bool,
     unpacked: u64,
     most_unpacked: u64,
     /// What is read now is in a chunk whose checksum does not match.
@@ -166,6 +170,7 @@ impl<'e> Salvage<'e> {
             hints,
             channels,
             in_summary: false,
+            damaged: false,
             unpacked: 0,
             most_unpacked: most_unpacked(source.length()),
             unsure: false,
@@ -179,6 +184,7 @@ impl<'e> Salvage<'e> {
     }
 
     fn lose(&mut self, bytes: u64, what: String) -> Result<(), LogError> {
+        self.damaged = true;
         (self.each)(Part::Lost { bytes, what })
     }
 
@@ -245,29 +251,25 @@ impl<'e> Salvage<'e> {
     ) -> Result<u64, LogError> {
         let found = self.search(bytes, at + 1)?;
         let next = found.unwrap_or(bytes.length());
-        let mut from = at;
         if let Some(end) = whole.filter(|end| *end <= next) {
             // It is whole, and what follows it is not. If that does not even begin or end like a
             // record, the length of this one may be wrong.
-            let gap = next - end;
             let follows = record_head(bytes.at(end, HEAD_BYTES)?);
             let likely = follows.is_none_or(|(opcode, length)| {
-                (1..0x10).contains(&opcode) || length.checked_add(HEAD_BYTES) == Some(gap)
+                (1..0x10).contains(&opcode) || length.checked_add(HEAD_BYTES) == Some(next - end)
             });
             let sure = self.is_sure(at, place) && (likely || found.is_none());
             self.take(bytes, at, place, sure)?;
-            from = end;
+            return Ok(end);
         }
-        if next > from {
-            let what = match record_head(bytes.at(from, HEAD_BYTES)?) {
-                Some((opcode, length)) if (1..0x10).contains(&opcode) => {
-                    format!("a {} of {length} bytes that is not whole", describe(opcode))
-                }
-                _ => "bytes that are no record".to_owned(),
-            };
-            let (lost, byte) = (next - from, place.byte(from));
-            self.lose(lost, format!("{what}, {byte}: {lost} bytes"))?;
-        }
+        let what = match record_head(bytes.at(at, HEAD_BYTES)?) {
+            Some((opcode, length)) if (1..0x10).contains(&opcode) => {
+                format!("a {} of {length} bytes that is not whole", describe(opcode))
+            }
+            _ => "bytes that are no record".to_owned(),
+        };
+        let (lost, byte) = (next - at, place.byte(at));
+        self.lose(lost, format!("{what}, {byte}: {lost} bytes"))?;
         Ok(next)
     }
 
@@ -311,6 +313,30 @@ impl<'e> Salvage<'e> {
             .iter()
             .find(|(start, _)| *start == at);
         known.map(|(_, end)| *end)
+    }
+
+    /// Compares the checksum of all data, which ends here, unless damage was found before.
+    fn check_data(&mut self, bytes: &mut impl Bytes, end: u64) -> Result<(), LogError> {
+        let declared = bytes.at(end + HEAD_BYTES, 4)?;
+        let declared = declared.try_into().map(u32::from_le_bytes).unwrap_or(0);
+        if declared == 0 || self.damaged || self.channels.is_none() {
+            return Ok(());
+        }
+        let mut sum = crc32fast::Hasher::new();
+        let mut at = 0;
+        while at < end {
+            let part = bytes.at(at, (end - at).min(1 << 20))?;
+            if part.is_empty() {
+                break;
+            }
+            sum.update(part);
+            at += part.len() as u64;
+        }
+        if sum.finalize() == declared {
+            return Ok(());
+        }
+        let what = "the checksum of the data does not match: something in it was changed";
+        self.lose(0, what.to_owned())
     }
 
     /// What comes behind the footer.
@@ -357,7 +383,10 @@ impl<'e> Salvage<'e> {
                 return self.lose(length, what);
             }
             op::CHUNK => return self.chunk(bytes, at, content, length),
-            op::DATA_END => self.in_summary = true,
+            op::DATA_END => {
+                self.in_summary = true;
+                self.check_data(bytes, at)?;
+            }
             _ if length > LIMIT_BYTES => {
                 let byte = place.byte(at);
                 let what = format!(
@@ -377,11 +406,19 @@ impl<'e> Salvage<'e> {
                 library: parser.text().unwrap_or_default(),
             },
             op::SCHEMA => match SchemaRecord::parse(content) {
-                Some(record) => Part::Schema { record, in_summary },
+                Some(record) => Part::Schema {
+                    record,
+                    in_summary,
+                    sure,
+                },
                 None => return Ok(()),
             },
             op::CHANNEL => match ChannelRecord::parse(content) {
-                Some(record) => Part::Channel { record, in_summary },
+                Some(record) => Part::Channel {
+                    record,
+                    in_summary,
+                    sure,
+                },
                 None => return Ok(()),
             },
             op::MESSAGE => match message_header(content) {

@@ -75,7 +75,8 @@ impl Source {
         let bytes = bytes.min(self.length.saturating_sub(offset));
         let held = self.start + self.window.len() as u64;
         if offset < self.start || offset + bytes > held {
-            self.load(offset, bytes.max(WINDOW_BYTES))?;
+            // Some more, so that what comes next does not move the window again.
+            self.load(offset, bytes + WINDOW_BYTES)?;
         }
         Ok(self.held(offset, bytes))
     }

@@ -20,7 +20,7 @@ impl fmt::Display for DiffReport {
             writeln!(f, "note: {}", Shown(note))?;
         }
         for beside in &self.beside {
-            writeln!(f, "differs: {}", Shown(beside))?;
+            writeln!(f, "{}", Shown(beside))?;
         }
         let Some(first) = &self.first else {
             let word = match self.identical {

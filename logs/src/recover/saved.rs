@@ -134,14 +134,24 @@ impl<'a> Saved<'a> {
                 self.header.get_or_insert(header);
             }
             Part::Chunk => self.report.chunks += 1,
-            Part::Schema { record, in_summary } => {
+            Part::Schema {
+                record,
+                in_summary,
+                sure,
+            } => {
                 let declared = Declaration::schema(&record);
+                let declared = Known::surest(&self.known.schemas, record.id, declared, sure);
                 if !(in_summary && self.schemas.contains_key(&record.id)) {
                     self.schemas.insert(record.id, declared);
                 }
             }
-            Part::Channel { record, in_summary } => {
+            Part::Channel {
+                record,
+                in_summary,
+                sure,
+            } => {
                 let declared = Declaration::channel(&record);
+                let declared = Known::surest(&self.known.channels, record.id, declared, sure);
                 self.channel(record.id, declared, in_summary)?;
             }
             Part::Message { head, data, sure } => self.message(head, data, sure)?,
@@ -155,6 +165,9 @@ impl<'a> Saved<'a> {
                 let options = Default::default();
                 let written = self.writer()?.write_private_record(opcode, data, options);
                 written.map_err(refused)?;
+                let what = "kept as they are, whatever they mean";
+                self.report
+                    .note(format!("private records of opcode 0x{opcode:02x}: {what}"));
             }
             Part::Lost { bytes, what } => self.report.lose(bytes, what),
             Part::Note(what) => self.report.note(what),
@@ -197,11 +210,8 @@ impl<'a> Saved<'a> {
         else {
             return Ok(Err("it is no channel".to_owned()));
         };
-        let schema = self
-            .schemas
-            .get(schema_id)
-            .or_else(|| self.known.schemas.get(schema_id));
-        let schema = schema.cloned();
+        let known = || self.known.schemas.get(schema_id).map(|(known, _)| known);
+        let schema = self.schemas.get(schema_id).or_else(known).cloned();
         if schema.is_none() && *schema_id != 0 {
             let what = format!("the schema of {topic}, which is nowhere in the file");
             self.report.lose(0, what);
@@ -237,7 +247,7 @@ impl<'a> Saved<'a> {
     fn message(&mut self, head: MessageHeader, data: &[u8], sure: bool) -> Result<(), LogError> {
         let id = head.channel_id;
         if !self.channels.contains_key(&id)
-            && let Some(declared) = self.known.channels.get(&id).cloned()
+            && let Some((declared, _)) = self.known.channels.get(&id).cloned()
         {
             self.channel(id, declared, true)?;
         }

@@ -86,7 +86,16 @@ impl Salvage<'_> {
                 attached.and_then(|attached| attached.end()) == Some(end)
             }
             op::CHUNK => chunk_bytes(bytes.at(content, length.min(64))?) == Some(length),
-            op::MESSAGE_INDEX => length >= 6 && (length - 6).is_multiple_of(16),
+            op::SUMMARY_OFFSET => length == 17,
+            op::MESSAGE_INDEX
+            | op::CHUNK_INDEX
+            | op::ATTACHMENT_INDEX
+            | op::STATISTICS
+            | op::METADATA_INDEX
+                if length <= LIMIT_BYTES =>
+            {
+                is_index(opcode, bytes.at(content, length)?)
+            }
             op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA if length <= LIMIT_BYTES => {
                 let content = bytes.at(content, length)?;
                 let mut parser = Parser::new(content);
@@ -194,6 +203,30 @@ impl Salvage<'_> {
         // Of the others, an empty one proves nothing.
         Ok(length > 0 && self.may_follow(bytes, opcode, end)?)
     }
+}
+
+/// Whether the parts of an index, or of the statistics, fill their record.
+fn is_index(opcode: u8, content: &[u8]) -> bool {
+    // The bytes in front of the first part that has a length of its own, how many such parts there
+    // are, and the bytes between and behind them.
+    let (before, parts, behind) = match opcode {
+        op::MESSAGE_INDEX => (2, 1, [0, 0]),
+        op::STATISTICS => (42, 1, [0, 0]),
+        op::METADATA_INDEX => (16, 1, [0, 0]),
+        op::ATTACHMENT_INDEX => (40, 2, [0, 0]),
+        _ => (32, 2, [8, 16]),
+    };
+    let mut parser = Parser::new(content);
+    let mut read = || {
+        parser.bytes(before)?;
+        for bytes in &behind[..parts] {
+            let length = parser.u32()?;
+            parser.bytes(u64::from(length))?;
+            parser.bytes(*bytes)?;
+        }
+        Some(())
+    };
+    read().is_some() && parser.rest().is_empty()
 }
 
 /// How many bytes a chunk's record has by what its content says: head, name of the compression,
