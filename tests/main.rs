@@ -1,5 +1,6 @@
 //! The tests that cross crates, one module for each behaviour.
 
+mod cases;
 mod contacts;
 mod coupling;
 mod determinism;

@@ -1,12 +1,13 @@
 //! Comparing two logs: which messages differ, which one first, and what caused it.
 
+mod beside;
 mod detail;
 mod index;
 mod matching;
 mod scenario;
 mod text;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::Serialize;
@@ -15,7 +16,7 @@ use crate::LogError;
 use crate::fields::FieldDiff;
 use crate::log::Log;
 use crate::topics::Topics;
-use index::{Entry, Index, Mode, Names};
+use index::{Index, Mode, Names};
 
 /// How two logs are compared.
 ///
@@ -37,6 +38,8 @@ pub struct DiffOptions {
 pub struct Cause {
     /// When it happened, in seconds.
     pub time_s: f64,
+    /// When it happened, in nanoseconds.
+    pub time_ns: u64,
     /// Its topic.
     pub topic: String,
     /// Who sent the message, or whom the event happened to.
@@ -54,6 +57,8 @@ pub struct Cause {
 pub struct FirstDifference {
     /// When, in seconds: the earlier one of the two.
     pub time_s: f64,
+    /// When, in nanoseconds.
+    pub time_ns: u64,
     /// The topic; that of `a` where both have the message.
     pub topic: String,
     /// Who sent the message, or whom the event happened to.
@@ -110,9 +115,9 @@ pub struct DiffReport {
     pub file_a: String,
     /// The second log's file.
     pub file_b: String,
-    /// True if nothing that was compared differs.
+    /// True if nothing that was compared differs, neither messages nor what is beside them.
     pub identical: bool,
-    /// The first difference.
+    /// The first message that differs.
     pub first: Option<FirstDifference>,
     /// Messages in both that differ.
     pub changed: u64,
@@ -126,7 +131,16 @@ pub struct DiffReport {
     pub records_a: u64,
     /// How many records were compared in the second log.
     pub records_b: u64,
-    /// What else is to be known: a log that is cut, seeds that differ.
+    /// Metadata records that both files have.
+    pub metadata: u64,
+    /// Attachments that both files have.
+    pub attachments: u64,
+    /// What differs beside the messages: metadata, attachments, encodings.
+    pub beside: Vec<String>,
+    /// What was not compared: how many messages of either file, by what they are.
+    pub not_compared: BTreeMap<String, [u64; 2]>,
+    /// What else is to be known: a log that is cut, seeds or schemas that differ, what could be
+    /// compared by its bytes only.
     pub notes: Vec<String>,
     /// The topics that differ, most differences first.
     pub topics: Vec<TopicDiff>,
@@ -135,10 +149,16 @@ pub struct DiffReport {
 /// Compares two logs.
 ///
 /// Farside's logs are aligned by the identity of each message: sender, receiver, kind, and the
-/// match key where the protocol gave one, or else the ordinal. Other MCAP files are aligned by
-/// topic and place on the topic; protobuf and JSON are compared field by field, anything else by
-/// its bytes. State samples, what depends on the machine, and topics that one of the logs does
-/// not have because they were filtered are never compared.
+/// match key where the protocol gave one, or else the ordinal. The messages of other MCAP files are
+/// aligned on each topic: what is the same, and between these what says the same, what was at the
+/// same time, and last by place. Protobuf and JSON are compared field by field, anything else by its
+/// bytes; so is what cannot be read, and a note says why. Metadata and attachments are compared, and
+/// schemas: a field that is set and that the two do not declare alike differs.
+///
+/// In Farside's logs state samples, what is drawn and what depends on the machine are not compared,
+/// nor in any the topics that one of the logs does not have because they were filtered; the report
+/// counts them. Of numbers that are no number one is as good as another; 0 and -0 differ unless
+/// there is a tolerance; `null` in JSON is something else than nothing, and 1 the same as 1.0.
 ///
 /// ```no_run
 /// use farside_logs::{DiffOptions, diff};
@@ -184,16 +204,29 @@ pub fn diff(
         },
         topics: BTreeMap::new(),
         earliest: None,
+        by_field: BTreeSet::new(),
+        reasons: BTreeSet::new(),
         names,
     };
-    comparison.note_files(&text::short(a, b), strangers);
+    let short = text::short(a, b);
+    comparison.note_files(&short, strangers);
     if let [Some(a), Some(b)] = &starts {
         let notes = &mut comparison.report.notes;
         scenario::note(notes, a, b);
     }
+    comparison.by_field = beside::compare(
+        (&comparison.a, &comparison.b),
+        (&short.0, &short.1),
+        mode,
+        &comparison.names,
+        &mut comparison.report,
+    );
     comparison.compare()?;
     comparison.finish()
 }
+
+/// How much of one log is held while the other is read, in bytes.
+const HELD_BYTES: usize = 64 << 20;
 
 /// A difference, and where it is.
 #[derive(Clone, Copy)]
@@ -213,6 +246,10 @@ struct Comparison {
     report: DiffReport,
     topics: BTreeMap<u32, TopicDiff>,
     earliest: Option<Found>,
+    /// Topics whose schemas differ: their messages are read even where their bytes are the same.
+    by_field: BTreeSet<u32>,
+    /// Why messages on a topic were compared by their bytes only.
+    reasons: BTreeSet<(u32, String)>,
 }
 
 /// The order in which differences are sorted: time, step, whether an actor is the source, the
@@ -284,36 +321,29 @@ impl Comparison {
     }
 
     fn compare(&mut self) -> Result<(), LogError> {
-        let matching = matching::matching(&self.a, &self.b);
-        for at in 0..self.a.entries.len() {
-            let Entry { topic, ignored, .. } = self.a.entries[at];
-            if !ignored {
-                self.topic(topic).a += 1;
-                self.report.records_a += 1;
-            }
-        }
-        for at in 0..self.b.entries.len() {
-            let Entry { topic, ignored, .. } = self.b.entries[at];
-            if !ignored {
-                self.topic(topic).b += 1;
-                self.report.records_b += 1;
-            }
-        }
-        // The bytes of two messages may differ and their fields not.
+        let matching = match self.mode {
+            Mode::Farside => matching::matching(&self.a, &self.b),
+            Mode::Any => matching::aligned(&self.a, &self.b),
+        };
+        self.count_records();
+        // The bytes of two messages may differ and their fields not, or the other way round.
         let by_field = self.tolerance > 0.0 || self.mode == Mode::Any;
+        let mut to_read = Vec::new();
+        let mut renumbered = 0;
         for (x, y) in &matching.pairs {
-            let (a, b) = (self.a.entries[*x as usize], self.b.entries[*y as usize]);
-            if a.content == b.content {
-                continue;
+            let (a, b) = (&self.a.entries[*x as usize], &self.b.entries[*y as usize]);
+            renumbered += u64::from(a.sequence != b.sequence);
+            let differently = self.by_field.contains(&a.topic) || self.by_field.contains(&b.topic);
+            match a.content == b.content {
+                true if !differently => {}
+                false if !by_field => self.changed(*x, *y),
+                _ => to_read.push((*x, *y)),
             }
-            if by_field {
-                let (one, other) = ((&mut self.a, &a), (&mut self.b, &b));
-                if detail::pair(one, other, self.mode, self.tolerance)?.is_none() {
-                    continue;
-                }
-            }
-            self.topic(a.topic).changed += 1;
-            self.found(Found::Changed(*x, *y));
+        }
+        self.read(&to_read)?;
+        if renumbered > 0 {
+            let what = format!("{renumbered} messages have other sequence numbers: not compared");
+            self.report.notes.push(what);
         }
         for at in &matching.only_in_a {
             let topic = self.a.entries[*at as usize].topic;
@@ -326,6 +356,76 @@ impl Comparison {
             self.found(Found::OnlyInB(*at));
         }
         self.compare_order(&matching.pairs);
+        Ok(())
+    }
+
+    fn count_records(&mut self) {
+        let mut ignored = [0; 2];
+        for side in 0..2 {
+            let index = if side == 0 { &self.a } else { &self.b };
+            let entries: Vec<(u32, bool)> = index
+                .entries
+                .iter()
+                .map(|entry| (entry.topic, entry.ignored))
+                .collect();
+            for (role, count) in &index.left_out {
+                let role = if role.is_empty() { "other" } else { role };
+                let counts = self.report.not_compared.entry(role.to_owned());
+                counts.or_default()[side] = *count;
+            }
+            for (topic, is_ignored) in entries {
+                if is_ignored {
+                    ignored[side] += 1;
+                    continue;
+                }
+                let topic = self.topic(topic);
+                match side {
+                    0 => topic.a += 1,
+                    _ => topic.b += 1,
+                }
+                match side {
+                    0 => self.report.records_a += 1,
+                    _ => self.report.records_b += 1,
+                }
+            }
+        }
+        if ignored != [0; 2] {
+            self.report
+                .not_compared
+                .insert("ignored".to_owned(), ignored);
+        }
+    }
+
+    fn changed(&mut self, x: u32, y: u32) {
+        let topic = self.a.entries[x as usize].topic;
+        self.topic(topic).changed += 1;
+        self.found(Found::Changed(x, y));
+    }
+
+    /// Compares pairs of messages by their fields, a part of them at a time: within a part each
+    /// file is read from front to back, however differently the two are ordered.
+    fn read(&mut self, mut pairs: &[(u32, u32)]) -> Result<(), LogError> {
+        while !pairs.is_empty() {
+            let mut held = Vec::new();
+            let mut bytes = 0;
+            while let Some((x, y)) = pairs.get(held.len())
+                && bytes < HELD_BYTES
+            {
+                let message = detail::Held::fetch(&mut self.a, *x)?;
+                bytes += message.bytes() + 100;
+                held.push((self.b.entries[*y as usize].position, *x, *y, message));
+            }
+            pairs = &pairs[held.len()..];
+            held.sort_by_key(|(position, ..)| *position);
+            for (_, x, y, message) in held {
+                let (mode, tolerance) = (self.mode, self.tolerance);
+                if let Some(diff) = message.against(&mut self.b, y, mode, tolerance)? {
+                    self.changed(x, y);
+                    let topic = self.a.entries[x as usize].topic;
+                    self.reasons.extend(diff.why.map(|why| (topic, why)));
+                }
+            }
+        }
         Ok(())
     }
 
@@ -357,9 +457,14 @@ impl Comparison {
             self.report.only_in_b += topic.only_in_b;
             self.report.reordered += topic.reordered;
         }
-        self.report.identical = self.earliest.is_none();
+        self.report.identical = self.earliest.is_none() && self.report.beside.is_empty();
         if let Some(found) = self.earliest {
             self.report.first = Some(self.describe(found)?);
+        }
+        for (topic, why) in std::mem::take(&mut self.reasons) {
+            let topic = self.names.name(topic);
+            let note = format!("messages on {topic} were compared by their bytes: {why}");
+            self.report.notes.push(note);
         }
         let differing = |topic: &TopicDiff| topic.differences() > 0;
         self.report.topics = self.topics.into_values().filter(differing).collect();
@@ -392,8 +497,10 @@ impl Comparison {
             }
             Found::Changed(x, y) => {
                 let (a, b) = (self.a.entries[x as usize], self.b.entries[y as usize]);
-                let pair = ((&mut self.a, &a), (&mut self.b, &b));
-                let diff = detail::pair(pair.0, pair.1, mode, self.tolerance)?;
+                let held = detail::Held::fetch(&mut self.a, x)?;
+                let diff = held.against(&mut self.b, y, mode, self.tolerance)?;
+                let reason = diff.as_ref().and_then(|diff| diff.why.clone());
+                self.reasons.extend(reason.map(|why| (a.topic, why)));
                 let diff = diff.unwrap_or_else(|| FieldDiff::new("body", "one", "another"));
                 let mut first = detail::describe(&mut self.a, &a, mode, names, diff.clone())?;
                 let other = detail::describe(&mut self.b, &b, mode, names, diff)?;
@@ -408,6 +515,7 @@ impl Comparison {
             }
         };
         first.time_s = crate::envelope::seconds(time_ns);
+        first.time_ns = time_ns;
         Ok(first)
     }
 }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::shown::escaped;
+
 /// A log could not be written, read or compared.
 ///
 /// ```
@@ -32,6 +34,12 @@ pub enum LogError {
         expected: String,
         /// What is there instead, in words.
         actual: String,
+    },
+    /// A pipe or a device, which cannot be read from several places.
+    #[error("{path}: is a pipe or a device, not a file: write it to a file first")]
+    NotAFile {
+        /// What was to be read or written.
+        path: PathBuf,
     },
     /// A part of the file is damaged.
     #[error("{path}: damaged at byte {offset}: {what}")]
@@ -113,6 +121,12 @@ pub enum LogError {
         /// The file.
         path: PathBuf,
     },
+    /// The file to write is there already, and is something else than a log.
+    #[error("{path}: is there already and is no log: it is not replaced")]
+    InTheWay {
+        /// The file.
+        path: PathBuf,
+    },
 }
 
 impl LogError {
@@ -138,7 +152,7 @@ impl LogError {
         LogError::Damaged {
             path: path.to_owned(),
             offset,
-            what: what.into(),
+            what: escaped(&what.into()),
         }
     }
 }

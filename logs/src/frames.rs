@@ -1,83 +1,106 @@
 //! The outermost layer of an MCAP file: records one after the other, each with its opcode and
 //! length. Nothing here trusts a length.
 
-use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mcap::MAGIC;
 use mcap::records::op;
 
 use crate::LogError;
+use crate::source::{Attached, Source};
 
 /// The most that one record may have, compressed or not.
 pub(crate) const LIMIT_BYTES: u64 = 512 * 1024 * 1024;
 
 /// The bytes in front of each record: opcode and length.
-const HEAD_BYTES: u64 = 9;
+pub(crate) const HEAD_BYTES: u64 = 9;
 
 /// What came next in the file.
 pub(crate) enum Frame {
     /// A record; its content is in [`Frames::content`].
     Record { opcode: u8, offset: u64 },
-    /// The file is over, as it should be.
-    End,
+    /// An attachment, of which only the head was read; none if it makes no sense.
+    Attachment {
+        offset: u64,
+        attached: Option<Attached>,
+    },
+    /// The file is over, as it should be. So many bytes come behind its end, from this one on.
+    End { offset: u64, behind: u64 },
     /// The file is over, or makes no sense any more, from this byte on.
     Cut { offset: u64, what: String },
 }
 
+/// What is looked at beyond what is needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Care {
+    /// Nothing: attachments are passed over.
+    #[default]
+    Little,
+    /// Attachments are read, for their hashes and checksums.
+    Attachments,
+    /// The checksums of the data and of the summary too: every byte of the file is read.
+    Everything,
+}
+
 /// Reads records one after the other.
 pub(crate) struct Frames {
-    path: PathBuf,
-    file: BufReader<File>,
+    source: Source,
     /// Where the next record starts.
     offset: u64,
-    length: u64,
-    content: Vec<u8>,
+    /// Where the content of the last record is.
+    content: (u64, u64),
     after_footer: bool,
+    care: Care,
+    sums: Sums,
+}
+
+/// The checksums of all bytes so far: from the start of the file, and from the end of its data.
+#[derive(Default)]
+struct Sums {
+    data: crc32fast::Hasher,
+    summary: Option<crc32fast::Hasher>,
+    to: u64,
+    /// Checksums that do not match, in words.
+    wrong: Vec<String>,
+}
+
+impl Sums {
+    /// Compares a checksum with the one that was counted; a declared one of 0 says nothing.
+    fn compare(&mut self, of: &str, declared: u32, counted: u32) {
+        if declared != 0 && declared != counted {
+            self.wrong.push(format!(
+                "the checksum of the {of} does not match: {declared:08x} is declared, {counted:08x} \
+                 counted"
+            ));
+        }
+    }
 }
 
 impl Frames {
     /// Opens a file and checks its magic bytes.
-    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
-        let mut file = File::open(path).map_err(|error| LogError::io(path, "open", error))?;
-        let io = |error| LogError::io(path, "read", error);
-        let metadata = file.metadata().map_err(io)?;
-        if metadata.is_dir() {
-            let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
-            return Err(LogError::io(path, "read", error));
-        }
-        let mut magic = Vec::new();
-        (&mut file).take(8).read_to_end(&mut magic).map_err(io)?;
-        if magic != MAGIC {
-            return Err(LogError::NotMcap {
-                path: path.to_owned(),
-                expected: hex(MAGIC),
-                actual: match magic.len() {
-                    0 => "is empty".to_owned(),
-                    length if length < MAGIC.len() => format!("has only {length} bytes"),
-                    _ => format!("starts with {}", hex(&magic)),
-                },
-            });
-        }
+    pub(crate) fn open(path: &Path, care: Care) -> Result<Self, LogError> {
         Ok(Frames {
-            path: path.to_owned(),
-            file: BufReader::with_capacity(64 * 1024, file),
+            source: Source::open(path)?,
             offset: 8,
-            length: metadata.len(),
-            content: Vec::new(),
+            content: (8, 0),
             after_footer: false,
+            care,
+            sums: Sums::default(),
         })
     }
 
     /// The size of the file, in bytes.
     pub(crate) fn length(&self) -> u64 {
-        self.length
+        self.source.length()
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.source.path()
     }
 
     /// The content of the last record.
     pub(crate) fn content(&self) -> &[u8] {
-        &self.content
+        self.source.held(self.content.0, self.content.1)
     }
 
     /// Where the next record starts.
@@ -85,47 +108,98 @@ impl Frames {
         self.offset
     }
 
-    /// Goes to the record that starts at `offset`.
-    pub(crate) fn seek(&mut self, offset: u64) -> Result<(), LogError> {
-        let moved = self.file.seek(SeekFrom::Start(offset));
-        moved.map_err(|error| LogError::io(&self.path, "read", error))?;
+    /// Checksums that were found not to match.
+    pub(crate) fn wrong_sums(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.sums.wrong)
+    }
+
+    /// Goes to the record that starts at `offset`. Sums are no longer counted.
+    pub(crate) fn seek(&mut self, offset: u64) {
         self.offset = offset;
         self.after_footer = false;
+        self.care = Care::Little;
+    }
+
+    /// Hashes an attachment's data and compares its checksum.
+    pub(crate) fn sum(&mut self, attached: &mut Attached) -> Result<(), LogError> {
+        self.source.sum(attached)
+    }
+
+    /// The data of an attachment.
+    pub(crate) fn attachment_data(&mut self, attached: &Attached) -> Result<&[u8], LogError> {
+        self.source.at(attached.data, attached.data_bytes)
+    }
+
+    /// Counts the bytes up to `to` into the checksums.
+    fn sum_to(&mut self, to: u64) -> Result<(), LogError> {
+        if self.care != Care::Everything {
+            return Ok(());
+        }
+        let Sums {
+            data,
+            summary,
+            to: from,
+            ..
+        } = &mut self.sums;
+        self.source.each(*from, to, |part| {
+            match summary {
+                Some(summary) => summary.update(part),
+                None => data.update(part),
+            }
+            Ok(())
+        })?;
+        *from = to;
         Ok(())
     }
 
-    fn read(&mut self, length: u64) -> Result<bool, LogError> {
-        self.content.clear();
-        let read = (&mut self.file).take(length).read_to_end(&mut self.content);
-        let read = read.map_err(|error| LogError::io(&self.path, "read", error))?;
-        // A file that shrinks while it is read is cut, like any other.
-        Ok(read as u64 == length)
+    /// Compares the checksum that a record declares with the bytes before it.
+    fn check(&mut self, opcode: u8, offset: u64) -> Result<(), LogError> {
+        let word = |bytes: &[u8]| bytes.try_into().map(u32::from_le_bytes).unwrap_or(0);
+        let content = self.source.at(self.content.0, self.content.1)?;
+        match (opcode, content.len()) {
+            (op::DATA_END, 4..) => {
+                let declared = word(&content[..4]);
+                let counted = self.sums.data.clone().finalize();
+                self.sums.compare("data", declared, counted);
+                self.sum_to(self.offset)?;
+                self.sums.summary = Some(crc32fast::Hasher::new());
+            }
+            (op::FOOTER, 20..) => {
+                let declared = word(&content[16..20]);
+                let mut sum = self.sums.summary.clone().unwrap_or_default();
+                // The footer itself counts, up to its checksum.
+                sum.update(self.source.at(offset, HEAD_BYTES + 16)?);
+                self.sums.compare("summary", declared, sum.finalize());
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     /// The next record.
     pub(crate) fn next(&mut self) -> Result<Frame, LogError> {
         let offset = self.offset;
-        let remaining = self.length.saturating_sub(offset);
+        let remaining = self.length().saturating_sub(offset);
         let cut = |what: String| Ok(Frame::Cut { offset, what });
         if self.after_footer {
-            let whole = self.read(8)? && self.content == MAGIC;
-            return match whole {
-                true => Ok(Frame::End),
-                false => cut("the closing magic bytes are missing".to_owned()),
-            };
+            if self.source.at(offset, 8)? != MAGIC {
+                return cut("the closing magic bytes are missing".to_owned());
+            }
+            return Ok(Frame::End {
+                offset: offset + 8,
+                behind: remaining - 8,
+            });
         }
         if remaining == 0 {
             return cut("the file ends without a footer".to_owned());
         }
-        if remaining < HEAD_BYTES || !self.read(HEAD_BYTES)? {
+        self.sum_to(offset)?;
+        let head = self.source.at(offset, HEAD_BYTES)?;
+        let Some((opcode, length)) = record_head(head) else {
             return cut(format!(
                 "{remaining} bytes of a record's head, then the file ends"
             ));
-        }
-        let opcode = self.content[0];
-        let mut length = [0; 8];
-        length.copy_from_slice(&self.content[1..9]);
-        let length = u64::from_le_bytes(length);
+        };
         if opcode == 0 {
             return cut("opcode 0, which no record has".to_owned());
         }
@@ -136,83 +210,51 @@ impl Frames {
                 "{what} of {length} bytes, of which {available} are there"
             ));
         }
-        self.offset = offset + HEAD_BYTES + length;
+        let content = offset + HEAD_BYTES;
+        self.offset = content + length;
+        self.content = (content, length);
+        if opcode == op::ATTACHMENT {
+            return self.attachment(offset, length);
+        }
         if skipped(opcode) {
-            self.content.clear();
-            let next = self.offset;
-            self.seek_relative(length)?;
-            self.offset = next;
+            self.content = (content, 0);
             return Ok(Frame::Record { opcode, offset });
         }
         if length > LIMIT_BYTES {
             return Err(LogError::TooLarge {
-                path: self.path.clone(),
+                path: self.path().to_owned(),
                 what: describe(opcode),
                 offset,
                 actual: length,
                 limit: LIMIT_BYTES,
             });
         }
-        if !self.read(length)? {
+        if (self.source.at(content, length)?.len() as u64) < length {
             return cut("the file ends while it is read".to_owned());
+        }
+        if self.care == Care::Everything {
+            self.check(opcode, offset)?;
         }
         self.after_footer = opcode == op::FOOTER;
         Ok(Frame::Record { opcode, offset })
     }
 
-    fn seek_relative(&mut self, length: u64) -> Result<(), LogError> {
-        let length = i64::try_from(length).unwrap_or(i64::MAX);
-        let moved = self.file.seek_relative(length);
-        moved.map_err(|error| LogError::io(&self.path, "read", error))
-    }
-
-    /// The first offset from `from` on where a whole chunk seems to start, to go on behind damage.
-    pub(crate) fn find_chunk(&mut self, from: u64) -> Result<Option<u64>, LogError> {
-        const WINDOW: usize = 1 << 20;
-        let mut at = from;
-        while at + HEAD_BYTES < self.length {
-            self.seek(at)?;
-            let length = (self.length - at).min(WINDOW as u64 + 64);
-            if !self.read(length)? {
-                return Ok(None);
-            }
-            for start in 0..self.content.len().min(WINDOW) {
-                let offset = at + start as u64;
-                if looks_like_chunk(&self.content[start..], self.length - offset) {
-                    return Ok(Some(offset));
-                }
-            }
-            at += WINDOW as u64;
+    fn attachment(&mut self, offset: u64, length: u64) -> Result<Frame, LogError> {
+        let (content, _) = self.content;
+        let fits = |attached: &Attached| attached.end().is_some_and(|end| end <= content + length);
+        let mut attached = self.source.attachment(content, length)?.filter(fits);
+        if let Some(attached) = attached.as_mut().filter(|_| self.care != Care::Little) {
+            self.source.sum(attached)?;
         }
-        Ok(None)
+        Ok(Frame::Attachment { offset, attached })
     }
 }
 
-/// True if a chunk record that fits into `available` bytes seems to start here.
-fn looks_like_chunk(bytes: &[u8], available: u64) -> bool {
-    if bytes.first() != Some(&op::CHUNK) {
-        return false;
-    }
-    let number = |at: usize| {
-        let word = bytes.get(at..at + 8)?;
-        Some(u64::from_le_bytes(word.try_into().ok()?))
-    };
-    let Some(length) = number(1) else {
-        return false;
-    };
-    let Some(name) = bytes.get(37..41) else {
-        return false;
-    };
-    let name = u32::from_le_bytes([name[0], name[1], name[2], name[3]]) as usize;
-    let known = matches!(
-        bytes.get(41..41 + name.min(8)),
-        Some(b"" | b"lz4" | b"zstd")
-    );
-    let Some(size) = number(41 + name.min(8)) else {
-        return false;
-    };
-    // Head of the chunk: two times, two sizes, a checksum, the compression's name.
-    known && length <= available - HEAD_BYTES && size.checked_add(40 + name as u64) == Some(length)
+/// Takes the opcode and the length in front of a record apart.
+pub(crate) fn record_head(bytes: &[u8]) -> Option<(u8, u64)> {
+    let (opcode, length) = bytes.split_first()?;
+    let length = length.get(..8)?.try_into().ok()?;
+    Some((*opcode, u64::from_le_bytes(length)))
 }
 
 /// Records of which nothing is needed: indices, and whatever a later version of MCAP may add.
@@ -225,7 +267,6 @@ fn skipped(opcode: u8) -> bool {
             | op::CHANNEL
             | op::MESSAGE
             | op::CHUNK
-            | op::ATTACHMENT
             | op::METADATA
             | op::DATA_END
     )
@@ -245,8 +286,4 @@ pub(crate) fn describe(opcode: u8) -> &'static str {
         op::DATA_END => "end of data",
         _ => "record",
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -5,15 +5,17 @@ use std::fmt;
 use std::path::Path;
 
 use farside::Counts;
-use prost_reflect::DynamicMessage;
 use serde::Serialize;
 
 use crate::LogError;
 use crate::envelope::{RecordRef, seconds};
-use crate::fields::body_descriptor;
+use crate::fields::{self, Encoded};
+use crate::frames::{Care, HEAD_BYTES};
 use crate::group;
 use crate::log::Head;
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+use crate::shown::{Seconds, Shown};
+use crate::source::Sum;
 
 /// What a Farside log says about its run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -40,6 +42,8 @@ pub struct RunSummary {
     pub end_detail: String,
     /// The virtual time of the end, in seconds.
     pub end_time_s: Option<f64>,
+    /// The same in nanoseconds.
+    pub end_time_ns: Option<u64>,
     /// What the run counted.
     pub counts: Option<Counts>,
     /// The checkpoints in the log.
@@ -57,6 +61,8 @@ pub struct TopicInfo {
     pub encoding: String,
     /// What the topic is for, in Farside's logs: `message`, `event`, `state`, ...
     pub role: String,
+    /// How many channels it has: more than one where several programs publish on it.
+    pub channels: u64,
     /// How many messages it has.
     pub messages: u64,
     /// Their size before compression, in bytes.
@@ -85,6 +91,8 @@ pub struct AttachmentInfo {
     pub media_type: String,
     /// Its size, in bytes.
     pub bytes: u64,
+    /// False if its data does not match its checksum.
+    pub intact: bool,
 }
 
 /// What is in a log.
@@ -108,6 +116,10 @@ pub struct LogInfo {
     pub start_s: Option<f64>,
     /// The latest time of a message, in seconds.
     pub end_s: Option<f64>,
+    /// The earliest time of a message, in nanoseconds.
+    pub start_ns: Option<u64>,
+    /// The latest time of a message, in nanoseconds.
+    pub end_ns: Option<u64>,
     /// From the earliest to the latest message, in seconds.
     pub duration_s: f64,
     /// How many chunks there are, by compression.
@@ -120,11 +132,56 @@ pub struct LogInfo {
     pub topics: Vec<TopicInfo>,
     /// The attachments, in file order.
     pub attachments: Vec<AttachmentInfo>,
-    /// The metadata records, by name.
-    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// The metadata records, by name; of one name there may be several, in file order.
+    pub metadata: BTreeMap<String, Vec<BTreeMap<String, String>>>,
+    /// How many records there are of kinds that MCAP does not have, by opcode.
+    pub strange: BTreeMap<u8, u64>,
 }
 
 impl LogInfo {
+    /// Notes what is beside the messages.
+    fn add_other(&mut self, item: Item<'_>) {
+        match item {
+            Item::Attachment(attached) => {
+                let intact = !matches!(attached.sum, Sum::Differs(_));
+                if !intact {
+                    let (name, offset) = (&attached.name, attached.content - HEAD_BYTES);
+                    let what = "does not match its checksum";
+                    self.miss(format!("attachment {name} at byte {offset} {what}"));
+                }
+                self.attachments.push(AttachmentInfo {
+                    name: attached.name,
+                    media_type: attached.media_type,
+                    bytes: attached.data_bytes,
+                    intact,
+                });
+            }
+            Item::Metadata(name, entries) => {
+                self.metadata.entry(name).or_default().push(entries);
+            }
+            Item::Strange(opcode) => *self.strange.entry(opcode).or_default() += 1,
+            Item::Damage { offset, what, .. } => {
+                self.miss(format!("damaged at byte {offset}: {what}"));
+            }
+            Item::Cut { offset, what } => {
+                self.missing.push(format!("cut at byte {offset}: {what}"));
+            }
+            Item::WrongSum(what) => self.missing.push(what),
+            Item::Behind { offset, bytes } => {
+                let what = "behind the end of the log, which were not read";
+                self.missing
+                    .push(format!("{bytes} bytes from byte {offset} on, {what}"));
+            }
+            Item::Header { .. } | Item::Chunk { .. } | Item::Message(_) => {}
+        }
+    }
+
+    fn miss(&mut self, what: String) {
+        if self.missing.len() < MISSING_LIMIT && !self.missing.contains(&what) {
+            self.missing.push(what);
+        }
+    }
+
     fn add_message(
         &mut self,
         times: &mut Option<(u64, u64)>,
@@ -158,18 +215,24 @@ impl LogInfo {
     }
 
     fn finish(&mut self, times: Option<(u64, u64)>, path: &Path) -> Result<(), LogError> {
-        let Some(head) = self.metadata.get("farside") else {
+        let Some(head) = self
+            .metadata
+            .get("farside")
+            .and_then(|records| records.last())
+        else {
             self.set_times(times, 0);
             return Ok(());
         };
         let head = Head::read(path, head)?;
         self.set_times(times, head.epoch_ns);
         let end = self.metadata.get("farside.end");
+        let end = end.and_then(|records| records.last());
         let text = |key: &str| end.and_then(|end| end.get(key)).cloned();
         if end.is_none() && self.missing.is_empty() {
             self.missing
                 .push("no farside.end: the run did not end in this log".to_owned());
         }
+        let end_time_ns = text("end_time_ns").and_then(|ns| ns.parse().ok());
         let checkpoints = self
             .topics
             .iter()
@@ -178,9 +241,8 @@ impl LogInfo {
             digest: text("digest"),
             end: text("end"),
             end_detail: text("end_detail").unwrap_or_default(),
-            end_time_s: text("end_time_ns")
-                .and_then(|ns| ns.parse().ok())
-                .map(seconds),
+            end_time_s: end_time_ns.map(seconds),
+            end_time_ns,
             counts: text("counts").and_then(|counts| serde_json::from_str(&counts).ok()),
             checkpoints: checkpoints.map(|topic| topic.messages).sum(),
             format: head.format,
@@ -196,8 +258,9 @@ impl LogInfo {
 
     fn set_times(&mut self, times: Option<(u64, u64)>, epoch_ns: u64) {
         if let Some((first, last)) = times {
-            self.start_s = Some(seconds(first.saturating_sub(epoch_ns)));
-            self.end_s = Some(seconds(last.saturating_sub(epoch_ns)));
+            let [first_ns, last_ns] = [first, last].map(|ns| ns.saturating_sub(epoch_ns));
+            (self.start_ns, self.end_ns) = (Some(first_ns), Some(last_ns));
+            (self.start_s, self.end_s) = (Some(seconds(first_ns)), Some(seconds(last_ns)));
             self.duration_s = seconds(last - first);
         }
     }
@@ -210,7 +273,7 @@ impl LogInfo {
 /// If the file cannot be read, is no MCAP file, or is a Farside log of a format not known here.
 pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
     let path = path.as_ref();
-    let mut scanner = Scanner::open(path)?;
+    let mut scanner = Scanner::careful(path, Care::Everything)?;
     let mut info = LogInfo {
         path: path.display().to_string(),
         bytes: scanner.length(),
@@ -252,24 +315,13 @@ pub fn info(path: impl AsRef<Path>) -> Result<LogInfo, LogError> {
                     info.add_control(&message);
                 }
             }
-            Item::Attachment(attachment) => info.attachments.push(AttachmentInfo {
-                name: attachment.name.to_owned(),
-                media_type: attachment.media_type.to_owned(),
-                bytes: attachment.data.len() as u64,
-            }),
-            Item::Metadata(name, entries) => {
-                info.metadata.insert(name, entries);
-            }
-            Item::Damage { offset, what, .. } => {
-                let damage = format!("damaged at byte {offset}: {what}");
-                if info.missing.len() < MISSING_LIMIT && !info.missing.contains(&damage) {
-                    info.missing.push(damage);
-                }
-            }
-            Item::Cut { offset, what } => {
-                info.missing.push(format!("cut at byte {offset}: {what}"))
-            }
+            item => info.add_other(item),
         }
+    }
+    // Topics without messages: their channels are declared all the same.
+    for channel in scanner.channels() {
+        let at = topic(&mut info.topics, &mut index, channel);
+        info.topics[at].channels += 1;
     }
     info.finish(times, path)?;
     info.topics.sort_by(|a, b| a.topic.cmp(&b.topic));
@@ -293,12 +345,10 @@ fn is_control(topic: &str) -> bool {
 
 /// What an event said, in JSON, as far as the log's schemas tell.
 fn body(record: &RecordRef<'_>, channel: &ChannelInfo) -> String {
-    let decoded = body_descriptor(channel)
-        .and_then(|descriptor| DynamicMessage::decode(descriptor, record.body).ok())
-        .and_then(|message| serde_json::to_string(&message).ok());
+    let decoded = Encoded::body(record.body, fields::schema(channel)).shown();
     match (record.kind, decoded) {
         ("", _) => String::new(),
-        (kind, Some(json)) => format!("{kind} {json}"),
+        (kind, Some(text)) => format!("{kind} {text}"),
         (kind, None) => kind.to_owned(),
     }
 }
@@ -325,6 +375,7 @@ fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelI
         schema: schema.to_owned(),
         encoding: channel.encoding.clone(),
         role: channel.role().to_owned(),
+        channels: 0,
         messages: 0,
         bytes: 0,
     });
@@ -334,20 +385,19 @@ fn topic(topics: &mut Vec<TopicInfo>, index: &mut TopicIndex, channel: &ChannelI
 /// The alternate form, `{:#}`, lists every topic; else topics of numbered actors share a row.
 impl fmt::Display for LogInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:<12} {} ({} bytes)", "file", self.path, self.bytes)?;
-        writeln!(f, "{:<12} {}", "written by", self.library)?;
+        let path = Shown(&self.path);
+        writeln!(f, "{:<12} {path} ({} bytes)", "file", self.bytes)?;
+        writeln!(f, "{:<12} {}", "written by", Shown(&self.library))?;
         if let Some(run) = &self.run {
             write_run(f, run)?;
         }
         for missing in &self.missing {
-            writeln!(f, "{:<12} {missing}", "MISSING")?;
+            writeln!(f, "{:<12} {}", "MISSING", Shown(missing))?;
         }
-        if let (Some(start), Some(end)) = (self.start_s, self.end_s) {
-            writeln!(
-                f,
-                "{:<12} {start:.3} s to {end:.3} s, {:.3} s long",
-                "times", self.duration_s
-            )?;
+        if let (Some(start), Some(end)) = (self.start_ns, self.end_ns) {
+            let long = Seconds(end - start);
+            let (start, end) = (Seconds(start), Seconds(end));
+            writeln!(f, "{:<12} {start} s to {end} s, {long} s long", "times")?;
         }
         for control in &self.controls {
             let ControlInfo {
@@ -373,7 +423,7 @@ impl fmt::Display for LogInfo {
         let chunks: Vec<_> = self
             .chunks
             .iter()
-            .map(|(name, n)| format!("{n} {name}"))
+            .map(|(name, n)| format!("{n} {}", Shown(name)))
             .collect();
         writeln!(f, "{:<12} {}", "chunks", chunks.join(", "))?;
         writeln!(
@@ -384,12 +434,20 @@ impl fmt::Display for LogInfo {
             self.topics.len()
         )?;
         self.write_topics(f)?;
+        for (opcode, n) in &self.strange {
+            writeln!(f, "{:<12} {n} records of opcode 0x{opcode:02x}", "unknown")?;
+        }
+        // Farside's own are told above.
+        let foreign = |name: &&String| !(name.starts_with("farside") && self.run.is_some());
+        for (name, records) in self.metadata.iter().filter(|(name, _)| foreign(name)) {
+            for entries in records {
+                let (name, n) = (Shown(name), entries.len());
+                writeln!(f, "{:<12} {name} ({n} entries)", "metadata")?;
+            }
+        }
         for attachment in &self.attachments {
-            let AttachmentInfo {
-                name,
-                media_type,
-                bytes,
-            } = attachment;
+            let (name, media_type) = (Shown(&attachment.name), Shown(&attachment.media_type));
+            let bytes = attachment.bytes;
             writeln!(
                 f,
                 "{:<12} {name} ({media_type}, {bytes} bytes)",
@@ -421,10 +479,10 @@ impl LogInfo {
         writeln!(f, "{:>11}  {:>12}    topic", "messages", "bytes")?;
         let shown = if alone { rows.len() } else { group::UNGROUPED };
         for (bytes, messages, topics, name) in rows.iter().take(shown) {
-            write!(f, "{messages:>11}  {bytes:>12}    {name}")?;
+            write!(f, "{messages:>11}  {bytes:>12}    {}", Shown(name))?;
             match topics.as_slice() {
                 [topic] if topic.schema.is_empty() => writeln!(f)?,
-                [topic] => writeln!(f, "  {}", topic.schema)?,
+                [topic] => writeln!(f, "  {}", Shown(&topic.schema))?,
                 topics => writeln!(f, "  ({} topics)", topics.len())?,
             }
         }
@@ -443,25 +501,27 @@ fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
         "{:<12} {} ({})",
         "scenario", run.scenario, run.scenario_hash
     )?;
-    writeln!(f, "{:<12} {}", "code", run.code_version)?;
+    writeln!(f, "{:<12} {}", "code", Shown(&run.code_version))?;
     writeln!(f, "{:<12} {}", "seed", run.seed)?;
     if let Some(tie_seed) = run.tie_seed {
         writeln!(f, "{:<12} {tie_seed}", "tie seed")?;
     }
     if !run.exclude.is_empty() {
-        writeln!(f, "{:<12} {}", "not written", run.exclude.join(", "))?;
+        writeln!(
+            f,
+            "{:<12} {}",
+            "not written",
+            Shown(&run.exclude.join(", "))
+        )?;
     }
     if let Some(digest) = &run.digest {
         writeln!(f, "{:<12} {digest}", "digest")?;
     }
     if let Some(end) = &run.end {
         let colon = if run.end_detail.is_empty() { "" } else { ": " };
-        let at = run.end_time_s.unwrap_or_default();
-        writeln!(
-            f,
-            "{:<12} {end} at {at:.3} s{colon}{}",
-            "end", run.end_detail
-        )?;
+        let at = Seconds(run.end_time_ns.unwrap_or_default());
+        let (end, detail) = (Shown(end), Shown(&run.end_detail));
+        writeln!(f, "{:<12} {end} at {at} s{colon}{detail}", "end")?;
     }
     if let Some(counts) = &run.counts {
         let farside::Counts {
@@ -480,7 +540,7 @@ fn write_run(f: &mut fmt::Formatter<'_>, run: &RunSummary) -> fmt::Result {
             "counts"
         )?;
         for (reason, n) in &counts.lost_by_reason {
-            writeln!(f, "  {n:>9}  lost: {reason}")?;
+            writeln!(f, "  {n:>9}  lost: {}", Shown(reason))?;
         }
     }
     Ok(())

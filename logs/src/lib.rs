@@ -61,7 +61,11 @@ mod info;
 mod log;
 mod parse;
 mod recover;
+mod salvage;
 mod scan;
+mod schema;
+mod shown;
+mod source;
 mod topics;
 mod verify;
 mod wire;
@@ -74,5 +78,6 @@ pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
+pub use shown::escaped;
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

@@ -8,7 +8,9 @@ use farside::{Carriage, MatchKey};
 
 use crate::LogError;
 use crate::envelope::{CheckpointRef, KeyRef, RecordRef};
+use crate::frames::{HEAD_BYTES, LIMIT_BYTES};
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+use crate::source::{Attached, Sum};
 use crate::writer::{Attachment, FORMAT_MAJOR, FORMAT_MINOR, SCENARIO_ATTACHMENT};
 
 /// What a log says at its start.
@@ -89,25 +91,28 @@ impl Log {
     /// # Errors
     /// If the file cannot be read or is no log of a Farside run.
     pub fn open(path: impl AsRef<Path>) -> Result<Log, LogError> {
-        let path = path.as_ref().to_owned();
+        Log::read(path.as_ref(), |_| true)
+    }
+
+    /// Reads the start of a log, and those of its attachments that are `wanted` by name.
+    pub(crate) fn read(path: &Path, wanted: fn(&str) -> bool) -> Result<Log, LogError> {
+        let path = path.to_owned();
         let mut scanner = Scanner::open(&path)?;
         let mut metadata = BTreeMap::new();
-        let mut attachments = Vec::new();
+        let mut attached = Vec::new();
         while let Some(item) = scanner.next()? {
             match item {
                 Item::Metadata(name, entries) => {
                     metadata.insert(name, entries);
                 }
-                Item::Attachment(attachment) => attachments.push(Attachment {
-                    name: attachment.name.to_owned(),
-                    media_type: attachment.media_type.to_owned(),
-                    bytes: attachment.data.to_owned(),
-                }),
-                Item::Header { .. } => {}
+                Item::Attachment(attachment) if wanted(&attachment.name) => {
+                    attached.push(attachment);
+                }
                 Item::Damage { offset, what, .. } => {
                     return Err(LogError::damaged(&path, offset, what));
                 }
                 Item::Chunk { .. } | Item::Message(_) | Item::Cut { .. } => break,
+                _ => {}
             }
         }
         let Some(head) = metadata.get("farside") else {
@@ -118,6 +123,10 @@ impl Log {
             });
         };
         let head = Head::read(&path, head)?;
+        // Only now: other files' attachments are not held.
+        let read = |attached| attachment(&path, &mut scanner, attached);
+        let attachments: Result<_, _> = attached.into_iter().map(read).collect();
+        let attachments = attachments?;
         Ok(Log {
             path,
             head,
@@ -187,6 +196,34 @@ impl Log {
     pub(crate) fn head(&self) -> &Head {
         &self.head
     }
+}
+
+/// Reads an attachment whole and compares its checksum.
+fn attachment(
+    path: &Path,
+    scanner: &mut Scanner,
+    mut attached: Attached,
+) -> Result<Attachment, LogError> {
+    if attached.data_bytes > LIMIT_BYTES {
+        return Err(LogError::TooLarge {
+            path: path.to_owned(),
+            what: "attachment",
+            offset: attached.content - HEAD_BYTES,
+            actual: attached.data_bytes,
+            limit: LIMIT_BYTES,
+        });
+    }
+    scanner.sum(&mut attached)?;
+    if let Sum::Differs(_) = attached.sum {
+        let what = "an attachment whose checksum does not match";
+        return Err(LogError::damaged(path, attached.content - HEAD_BYTES, what));
+    }
+    let bytes = scanner.attachment_data(&attached)?.to_owned();
+    Ok(Attachment {
+        name: attached.name,
+        media_type: attached.media_type,
+        bytes,
+    })
 }
 
 /// How a log ends.

@@ -127,45 +127,16 @@ pub(crate) fn message_header(content: &[u8]) -> Option<MessageHeader> {
     })
 }
 
-/// An attachment record.
-pub(crate) struct AttachmentRecord<'a> {
-    pub(crate) log_time: u64,
-    pub(crate) create_time: u64,
-    pub(crate) name: &'a str,
-    pub(crate) media_type: &'a str,
-    pub(crate) data: &'a [u8],
-}
-
-impl<'a> AttachmentRecord<'a> {
-    /// Parses the record; `Err` says what is wrong with it.
-    pub(crate) fn parse(content: &'a [u8]) -> Result<Self, &'static str> {
-        let mut parser = Parser::new(content);
-        let mut fields = || {
-            Some(AttachmentRecord {
-                log_time: parser.u64()?,
-                create_time: parser.u64()?,
-                name: parser.text()?,
-                media_type: parser.text()?,
-                data: {
-                    let length = parser.u64()?;
-                    parser.bytes(length)?
-                },
-            })
-        };
-        let record = fields().ok_or("an attachment that is malformed")?;
-        let sum = parser.u32().ok_or("an attachment without a checksum")?;
-        let summed = &content[..content.len() - parser.rest().len() - 4];
-        if sum != 0 && crc32fast::hash(summed) != sum {
-            return Err("an attachment whose checksum does not match");
-        }
-        Ok(record)
-    }
-}
-
 /// Takes a metadata record apart: its name and its entries.
 pub(crate) fn metadata(content: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut parser = Parser::new(content);
     Some((parser.text()?.to_owned(), parser.map()?))
+}
+
+/// The most that so many compressed bytes may unpack to: what is more is no log, but made to keep
+/// its readers busy.
+pub(crate) fn most(compressed: u64) -> u64 {
+    compressed.saturating_mul(1000).max(64 << 20)
 }
 
 /// A chunk record, still compressed.
@@ -197,9 +168,11 @@ impl<'a> ChunkRecord<'a> {
     pub(crate) fn decompress(&self, limit: u64, out: &mut Vec<u8>) -> Result<(), String> {
         use std::io::Read;
         out.clear();
+        let limit = limit.min(most(self.data.len() as u64));
         if self.size > limit {
             return Err(format!(
-                "a chunk of {} bytes, more than the {limit} allowed",
+                "a chunk of {} bytes that unpacks to {}, more than the {limit} allowed",
+                self.data.len(),
                 self.size
             ));
         }

@@ -2,20 +2,19 @@
 //! reader that information, comparison and recovery are built on.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use mcap::records::{MessageHeader, op};
-use prost::Message;
-use prost_reflect::prost_types::FileDescriptorSet;
-use prost_reflect::{DescriptorPool, MessageDescriptor};
 
 use crate::LogError;
-use crate::frames::{Frame, Frames, LIMIT_BYTES, describe};
+use crate::frames::{Care, Frame, Frames, LIMIT_BYTES, describe};
 use crate::parse::{
-    AttachmentRecord, ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord,
-    message_header, metadata,
+    ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord, message_header,
+    metadata,
 };
+use crate::schema::Types;
+use crate::source::Attached;
 
 /// A schema of a log.
 #[derive(Debug, Default)]
@@ -26,27 +25,24 @@ pub struct SchemaInfo {
     pub encoding: String,
     /// The schema itself.
     pub data: Vec<u8>,
-    descriptor: OnceLock<Option<MessageDescriptor>>,
+    types: OnceLock<Result<Types, String>>,
 }
 
 impl SchemaInfo {
-    /// The descriptor of the messages, if the schema is a protobuf one that makes sense.
-    pub fn descriptor(&self) -> Option<&MessageDescriptor> {
-        let decode = || {
-            if self.encoding != "protobuf" {
-                return None;
-            }
-            let set = FileDescriptorSet::decode(self.data.as_slice()).ok()?;
-            // prost-reflect 0.16 panics on a syntax that it does not know, such as `editions`.
-            let is_known =
-                |syntax: Option<&str>| matches!(syntax, None | Some("proto2" | "proto3"));
-            if !set.file.iter().all(|file| is_known(file.syntax.as_deref())) {
-                return None;
-            }
-            let pool = DescriptorPool::from_file_descriptor_set(set).ok()?;
-            pool.get_message_by_name(&self.name)
+    /// The messages of the schema; `Err` says why they are not known.
+    pub(crate) fn types(&self) -> Result<&Types, &str> {
+        let read = || match self.encoding.as_str() {
+            "protobuf" => Types::read(&self.data, &self.name),
+            other => Err(format!(
+                "the schema is written as {other:?}, not as protobuf"
+            )),
         };
-        self.descriptor.get_or_init(decode).as_ref()
+        let types = self.types.get_or_init(read);
+        types.as_ref().map_err(String::as_str)
+    }
+
+    fn says_the_same(&self, other: &SchemaRecord<'_>) -> bool {
+        self.name == other.name && self.encoding == other.encoding && self.data == other.data
     }
 }
 
@@ -105,12 +101,20 @@ pub(crate) enum Item<'a> {
         compression: &'a str,
     },
     Message(ScannedMessage<'a>),
-    Attachment(AttachmentRecord<'a>),
+    Attachment(Attached),
     Metadata(String, BTreeMap<String, String>),
+    /// A record of a kind that MCAP does not have, or not yet.
+    Strange(u8),
+    /// So many bytes behind the end of the file, from this byte on.
+    Behind {
+        offset: u64,
+        bytes: u64,
+    },
+    /// A checksum that does not match.
+    WrongSum(String),
     /// Something that cannot be read; what comes behind it can.
     Damage {
         offset: u64,
-        bytes: u64,
         what: String,
     },
     /// Nothing behind this byte can be read.
@@ -124,18 +128,19 @@ pub(crate) enum Item<'a> {
 enum Found {
     Message(MessageHeader, Position),
     Other,
-    /// A message of so many bytes on a channel that is not declared, as behind damage: what
-    /// follows it can be read.
-    Stray(u64, String),
+    /// A message on a channel that is not declared, as behind damage: what follows it can be read.
+    Stray(String),
 }
 
 /// Reads a file from its start to its end.
 pub(crate) struct Scanner {
-    path: PathBuf,
     frames: Frames,
-    schemas: BTreeMap<u16, Arc<SchemaInfo>>,
-    channels: Vec<Option<Arc<ChannelInfo>>>,
-    serials: u32,
+    declared: Declared,
+    /// How many bytes chunks unpacked to, and how many they may.
+    unpacked: u64,
+    most_unpacked: u64,
+    /// What is to be yielded before the file goes on.
+    pending: Vec<Item<'static>>,
     /// The open chunk: where its frame starts, its records, and the place of the next one.
     chunk_frame: u64,
     chunk: Vec<u8>,
@@ -153,14 +158,26 @@ enum Within {
     Frame,
 }
 
+/// What all chunks of a file together may unpack to: what is more is no log, but made to keep its
+/// readers busy.
+pub(crate) fn most_unpacked(file_bytes: u64) -> u64 {
+    file_bytes.saturating_mul(200).saturating_add(512 << 20)
+}
+
 impl Scanner {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
+        Scanner::careful(path, Care::Little)
+    }
+
+    /// A scanner that looks at more than it needs.
+    pub(crate) fn careful(path: &Path, care: Care) -> Result<Self, LogError> {
+        let frames = Frames::open(path, care)?;
         Ok(Scanner {
-            path: path.to_owned(),
-            frames: Frames::open(path)?,
-            schemas: BTreeMap::new(),
-            channels: Vec::new(),
-            serials: 0,
+            most_unpacked: most_unpacked(frames.length()),
+            frames,
+            declared: Declared::default(),
+            unpacked: 0,
+            pending: Vec::new(),
             chunk_frame: 0,
             chunk: Vec::new(),
             next_inner: 0,
@@ -170,12 +187,27 @@ impl Scanner {
         })
     }
 
+    /// All channels that the file has declared so far, in the order of their serial numbers.
+    pub(crate) fn channels(&self) -> &[Arc<ChannelInfo>] {
+        &self.declared.all
+    }
+
+    /// Hashes an attachment's data and compares its checksum.
+    pub(crate) fn sum(&mut self, attached: &mut Attached) -> Result<(), LogError> {
+        self.frames.sum(attached)
+    }
+
+    /// The data of an attachment.
+    pub(crate) fn attachment_data(&mut self, attached: &Attached) -> Result<&[u8], LogError> {
+        self.frames.attachment_data(attached)
+    }
+
     pub(crate) fn length(&self) -> u64 {
         self.frames.length()
     }
 
     pub(crate) fn path(&self) -> &Path {
-        &self.path
+        self.frames.path()
     }
 
     /// The next thing in the file; `None` once it is over.
@@ -188,40 +220,55 @@ impl Scanner {
                         self.last = Some((head, position, Within::Chunk));
                         return Ok(self.current().map(Item::Message));
                     }
-                    Ok(Found::Stray(bytes, what)) => {
-                        let offset = self.chunk_frame;
-                        return Ok(Some(Item::Damage {
-                            offset,
-                            bytes,
-                            what,
-                        }));
+                    Ok(Found::Stray(what)) => {
+                        return Ok(Some(damage(self.chunk_frame, what)));
                     }
                     Err(what) => {
-                        let bytes = (self.chunk.len() - self.next_inner) as u64;
                         self.next_inner = self.chunk.len();
-                        let offset = self.chunk_frame;
-                        return Ok(Some(Item::Damage {
-                            offset,
-                            bytes,
-                            what,
-                        }));
+                        return Ok(Some(damage(self.chunk_frame, what)));
                     }
                 }
+            }
+            if let Some(item) = self.pending.pop() {
+                return Ok(Some(item));
             }
             if self.over {
                 return Ok(None);
             }
-            match self.frames.next()? {
-                Frame::End => {
+            let frame = self.frames.next()?;
+            let wrong = self.frames.wrong_sums().into_iter().map(Item::WrongSum);
+            self.pending.extend(wrong);
+            match frame {
+                Frame::End { offset, behind } => {
                     self.over = true;
-                    return Ok(None);
+                    if behind > 0 {
+                        let bytes = behind;
+                        self.pending.insert(0, Item::Behind { offset, bytes });
+                    }
                 }
                 Frame::Cut { offset, what } => {
                     self.over = true;
-                    return Ok(Some(Item::Cut { offset, what }));
+                    self.pending.insert(0, Item::Cut { offset, what });
                 }
-                // What follows the data repeats it.
-                Frame::Record { .. } if self.data_ended => {}
+                Frame::Attachment { offset, attached } => {
+                    return Ok(Some(match attached {
+                        Some(attached) if !self.data_ended => Item::Attachment(attached),
+                        Some(_) => damage(offset, "an attachment behind the end of the data"),
+                        None => damage(offset, "an attachment that is malformed"),
+                    }));
+                }
+                Frame::Record { opcode, offset } if self.data_ended => match opcode {
+                    // What follows the data repeats it, and may be all that is left of it.
+                    op::SCHEMA | op::CHANNEL => {
+                        let content = self.frames.content();
+                        self.declared.declare(opcode, content, Summary::Yes);
+                    }
+                    op::MESSAGE | op::CHUNK | op::METADATA => {
+                        let what = format!("a {} behind the end of the data", describe(opcode));
+                        return Ok(Some(damage(offset, what)));
+                    }
+                    _ => {}
+                },
                 Frame::Record {
                     opcode: op::DATA_END,
                     ..
@@ -233,14 +280,7 @@ impl Scanner {
                         return Ok(self.current().map(Item::Message));
                     }
                     Ok(None) => return Ok(Some(self.item(opcode))),
-                    Err(Some(what)) => {
-                        let bytes = self.frames.offset() - offset;
-                        return Ok(Some(Item::Damage {
-                            offset,
-                            bytes,
-                            what,
-                        }));
-                    }
+                    Err(Some(what)) => return Ok(Some(damage(offset, what))),
                 },
             }
         }
@@ -258,40 +298,30 @@ impl Scanner {
         }
     }
 
-    /// Goes on behind damage at `from`, at the next thing that looks like a chunk; false if there
-    /// is none.
-    pub(crate) fn resume(&mut self, from: u64) -> Result<bool, LogError> {
-        match self.frames.find_chunk(from)? {
-            Some(offset) => {
-                self.frames.seek(offset)?;
-                self.over = false;
-                self.data_ended = false;
-                Ok(true)
-            }
-            None => Ok(false),
-        }
-    }
-
     /// Where the next frame starts.
     pub(crate) fn offset(&self) -> u64 {
         self.frames.offset()
     }
 
-    /// Opens the frame at `position` again, and gives the message there. For a scanner that has
+    /// Opens the frame at `position` again, and gives the message there, which is on the channel with
+    /// this serial number. For a scanner that has
     /// read the file once, and so knows its channels.
     pub(crate) fn message_at(
         &mut self,
         position: Position,
+        serial: u32,
     ) -> Result<ScannedMessage<'_>, LogError> {
         const GONE: &str = "the file changed while it was read";
         if self.chunk_frame != position.frame || self.chunk.is_empty() {
-            self.frames.seek(position.frame)?;
+            self.frames.seek(position.frame);
+            // A chunk that is opened again does not count again.
+            self.unpacked = 0;
             let Frame::Record { opcode, offset } = self.frames.next()? else {
-                return Err(LogError::damaged(&self.path, position.frame, GONE));
+                return Err(LogError::damaged(self.path(), position.frame, GONE));
             };
             if opcode == op::CHUNK {
                 let opened = self.open_chunk(offset);
-                opened.map_err(|what| LogError::damaged(&self.path, offset, what))?;
+                opened.map_err(|what| LogError::damaged(self.path(), offset, what))?;
             } else {
                 // A message outside chunks is handled as a chunk of its own.
                 self.chunk_frame = offset;
@@ -308,7 +338,12 @@ impl Scanner {
             _ => None,
         };
         let message = found.and_then(|(head, position)| self.message(head, position));
-        message.ok_or_else(|| LogError::damaged(&self.path, position.frame, GONE))
+        let gone = || LogError::damaged(self.path(), position.frame, GONE);
+        // A later channel may have taken the id.
+        let channel = self.declared.all.get(serial as usize);
+        let channel = channel.ok_or_else(gone)?;
+        let message = message.ok_or_else(gone)?;
+        Ok(ScannedMessage { channel, ..message })
     }
 
     /// Handles a record outside chunks: `Ok(None)` if [`Scanner::item`] is to yield it.
@@ -320,13 +355,8 @@ impl Scanner {
                 Ok(None)
             }
             op::SCHEMA | op::CHANNEL => {
-                let declared = declare(
-                    opcode,
-                    self.frames.content(),
-                    &mut self.schemas,
-                    &mut self.channels,
-                    &mut self.serials,
-                );
+                let content = self.frames.content();
+                let declared = self.declared.declare(opcode, content, Summary::No);
                 declared.ok_or_else(malformed)?;
                 Ok(Some(Found::Other))
             }
@@ -339,10 +369,6 @@ impl Scanner {
                 };
                 Ok(Some(Found::Message(head, position)))
             }
-            op::ATTACHMENT => match AttachmentRecord::parse(self.frames.content()) {
-                Ok(_) => Ok(None),
-                Err(what) => Err(Some(what.to_owned())),
-            },
             op::METADATA => match metadata(self.frames.content()) {
                 Some(_) => Ok(None),
                 None => Err(malformed()),
@@ -353,6 +379,7 @@ impl Scanner {
                 read.ok_or_else(malformed)?;
                 Ok(None)
             }
+            0x10.. => Ok(None),
             _ => Ok(Some(Found::Other)),
         }
     }
@@ -361,23 +388,15 @@ impl Scanner {
     fn item(&self, opcode: u8) -> Item<'_> {
         let content = self.frames.content();
         let mut parser = Parser::new(content);
-        let lost = |what: &str| Item::Damage {
-            offset: self.frames.offset(),
-            bytes: 0,
-            what: what.to_owned(),
-        };
         match opcode {
             op::CHUNK => Item::Chunk {
                 compression: ChunkRecord::parse(content).map_or("", |chunk| chunk.compression),
             },
-            op::ATTACHMENT => match AttachmentRecord::parse(content) {
-                Ok(attachment) => Item::Attachment(attachment),
-                Err(what) => lost(what),
-            },
             op::METADATA => match metadata(content) {
                 Some((name, entries)) => Item::Metadata(name, entries),
-                None => lost("a metadata record that is malformed"),
+                None => damage(self.frames.offset(), "a metadata record that is malformed"),
             },
+            0x10.. => Item::Strange(opcode),
             _ => Item::Header {
                 profile: parser.text().unwrap_or_default(),
                 library: parser.text().unwrap_or_default(),
@@ -390,8 +409,12 @@ impl Scanner {
         self.next_inner = 0;
         let opened = match ChunkRecord::parse(self.frames.content()) {
             None => Err("a chunk that is malformed".to_owned()),
-            Some(chunk) => chunk.decompress(LIMIT_BYTES, &mut self.chunk),
+            Some(chunk) => {
+                let left = self.most_unpacked - self.unpacked;
+                chunk.decompress(LIMIT_BYTES.min(left), &mut self.chunk)
+            }
         };
+        self.unpacked += self.chunk.len() as u64;
         if opened.is_err() {
             self.chunk.clear();
         }
@@ -413,7 +436,7 @@ impl Scanner {
             op::MESSAGE => {
                 let head = message_header(content).ok_or_else(malformed)?;
                 if let Err(what) = self.check_channel(head.channel_id) {
-                    return Ok(Found::Stray(content.len() as u64, what));
+                    return Ok(Found::Stray(what));
                 }
                 let inner = u32::try_from(start).map_err(|_| malformed())?;
                 let position = Position {
@@ -423,13 +446,7 @@ impl Scanner {
                 Ok(Found::Message(head, position))
             }
             op::SCHEMA | op::CHANNEL => {
-                let declared = declare(
-                    opcode,
-                    content,
-                    &mut self.schemas,
-                    &mut self.channels,
-                    &mut self.serials,
-                );
+                let declared = self.declared.declare(opcode, content, Summary::No);
                 declared.ok_or_else(malformed)?;
                 Ok(Found::Other)
             }
@@ -439,7 +456,7 @@ impl Scanner {
     }
 
     fn channel(&self, id: u16) -> Option<&Arc<ChannelInfo>> {
-        self.channels.get(usize::from(id)).and_then(Option::as_ref)
+        self.declared.channel(id)
     }
 
     fn check_channel(&self, id: u16) -> Result<(), String> {
@@ -471,49 +488,90 @@ impl Scanner {
     }
 }
 
-fn declare(
-    opcode: u8,
-    content: &[u8],
-    schemas: &mut BTreeMap<u16, Arc<SchemaInfo>>,
-    channels: &mut Vec<Option<Arc<ChannelInfo>>>,
-    serials: &mut u32,
-) -> Option<()> {
-    if opcode == op::SCHEMA {
-        let schema = SchemaRecord::parse(content)?;
-        let same = |known: &Arc<SchemaInfo>| {
-            known.name == schema.name
-                && known.encoding == schema.encoding
-                && known.data == schema.data
-        };
-        if !schemas.get(&schema.id).is_some_and(same) {
-            let info = SchemaInfo {
-                name: schema.name.to_owned(),
-                encoding: schema.encoding.to_owned(),
-                data: schema.data.to_owned(),
-                descriptor: OnceLock::new(),
-            };
-            schemas.insert(schema.id, Arc::new(info));
+/// What is at `offset` cannot be used.
+fn damage(offset: u64, what: impl Into<String>) -> Item<'static> {
+    let what = what.into();
+    Item::Damage { offset, what }
+}
+
+/// Whether a declaration stands in the summary, which repeats what was declared before.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Summary {
+    Yes,
+    No,
+}
+
+/// What a file has declared so far.
+#[derive(Default)]
+struct Declared {
+    schemas: BTreeMap<u16, Arc<SchemaInfo>>,
+    channels: Vec<Option<Arc<ChannelInfo>>>,
+    /// Every channel there was, by serial number.
+    all: Vec<Arc<ChannelInfo>>,
+}
+
+impl Declared {
+    fn channel(&self, id: u16) -> Option<&Arc<ChannelInfo>> {
+        self.channels.get(usize::from(id)).and_then(Option::as_ref)
+    }
+
+    fn declare(&mut self, opcode: u8, content: &[u8], summary: Summary) -> Option<()> {
+        if opcode == op::SCHEMA {
+            let schema = SchemaRecord::parse(content)?;
+            let known = self.schemas.get(&schema.id);
+            let repeats = known.is_some_and(|known| known.says_the_same(&schema));
+            if !repeats && (known.is_none() || summary == Summary::No) {
+                self.add_schema(&schema);
+            }
+            return Some(());
         }
-        return Some(());
+        let channel = ChannelRecord::parse(content)?;
+        let known = self.channel(channel.id);
+        let repeats = known.is_some_and(|known| known.says_the_same(&channel));
+        if !repeats && (known.is_none() || summary == Summary::No) {
+            self.add_channel(channel);
+        }
+        Some(())
     }
-    let channel = ChannelRecord::parse(content)?;
-    let at = usize::from(channel.id);
-    if channels.len() <= at {
-        channels.resize(at + 1, None);
+
+    fn add_schema(&mut self, schema: &SchemaRecord<'_>) {
+        let info = Arc::new(SchemaInfo {
+            name: schema.name.to_owned(),
+            encoding: schema.encoding.to_owned(),
+            data: schema.data.to_owned(),
+            types: OnceLock::new(),
+        });
+        self.schemas.insert(schema.id, info.clone());
+        // Channels that came in front of their schema.
+        for channel in self.channels.iter_mut().flatten() {
+            if channel.schema_id == schema.id && channel.schema.is_none() {
+                let bound = ChannelInfo {
+                    schema: Some(info.clone()),
+                    topic: channel.topic.clone(),
+                    encoding: channel.encoding.clone(),
+                    metadata: channel.metadata.clone(),
+                    ..**channel
+                };
+                *channel = Arc::new(bound);
+                self.all[channel.serial as usize] = channel.clone();
+            }
+        }
     }
-    if !channels[at]
-        .as_ref()
-        .is_some_and(|known| known.says_the_same(&channel))
-    {
-        *serials += 1;
-        channels[at] = Some(Arc::new(ChannelInfo {
-            serial: *serials - 1,
+
+    fn add_channel(&mut self, channel: ChannelRecord<'_>) {
+        let at = usize::from(channel.id);
+        if self.channels.len() <= at {
+            self.channels.resize(at + 1, None);
+        }
+        let info = Arc::new(ChannelInfo {
+            serial: self.all.len() as u32,
             topic: channel.topic.to_owned(),
             encoding: channel.encoding.to_owned(),
-            schema: schemas.get(&channel.schema_id).cloned(),
+            schema: self.schemas.get(&channel.schema_id).cloned(),
             metadata: channel.metadata,
             schema_id: channel.schema_id,
-        }));
+        });
+        self.all.push(info.clone());
+        self.channels[at] = Some(info);
     }
-    Some(())
 }

@@ -5,14 +5,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{Kind, Report, RunInfo};
-use prost_reflect::{DescriptorPool, MessageDescriptor};
 use serde::Serialize;
 
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::envelope::{CheckpointRef, Encoder, RecordRef};
-use crate::fields::{self, FieldDiff};
+use crate::fields::{self, Encoded, FieldDiff};
 use crate::log::{Log, Records, Step};
+use crate::schema::Types;
 use crate::topics::Topics;
 
 /// The first record in which a log and a re-execution differ.
@@ -20,6 +20,8 @@ use crate::topics::Topics;
 pub struct Mismatch {
     /// The virtual time of the record, in seconds.
     pub time_s: f64,
+    /// The same in nanoseconds.
+    pub time_ns: u64,
     /// Its topic.
     pub topic: String,
     /// Who sent the message, or whom the event happened to.
@@ -34,6 +36,8 @@ pub struct Mismatch {
     pub logged: String,
     /// Its value in the re-execution.
     pub rerun: String,
+    /// Why only bytes were compared, where more was wanted; empty otherwise.
+    pub why: String,
 }
 
 /// What came of comparing a log with a re-execution.
@@ -57,6 +61,8 @@ pub enum VerifyOutcome {
         checkpoints: u64,
         /// The virtual time of the log's last record, in seconds.
         last_s: Option<f64>,
+        /// The same in nanoseconds.
+        last_ns: Option<u64>,
         /// The virtual time of the log's last checkpoint, in seconds: up to there filtered topics
         /// agree too.
         last_checkpoint_s: Option<f64>,
@@ -200,6 +206,7 @@ impl Verifier {
             records: self.compared,
             checkpoints: self.checkpoints,
             last_s: self.last_ns.map(seconds),
+            last_ns: self.last_ns,
             last_checkpoint_s: self.last_checkpoint_ns.map(seconds),
             missing,
         }));
@@ -313,6 +320,7 @@ impl Verifier {
         let text = |text: Option<&String>| text.cloned().unwrap_or_default();
         Mismatch {
             time_s: seconds(seen.time_ns),
+            time_ns: seen.time_ns,
             topic: text(flow.map(|flow| &flow.topic)),
             sender: text(flow.map(|flow| &flow.sender)),
             receiver: text(flow.map(|flow| &flow.receiver)),
@@ -320,6 +328,7 @@ impl Verifier {
             field: diff.field,
             logged: diff.a,
             rerun: diff.b,
+            why: diff.why.unwrap_or_default(),
         }
     }
 
@@ -327,12 +336,11 @@ impl Verifier {
     fn mismatch(&self, seen: Compared, record: &Record<'_>) -> Result<Mismatch, LogError> {
         let (logged, message) = self.records.record()?;
         let diff = RecordRef::read(&self.envelope).and_then(|rerun| {
-            let logged_body = fields::body_descriptor(message.channel);
-            let rerun_body = record.kind.and_then(|kind| kind_descriptor(kind));
+            let types = kind_types(record.kind.map(|kind| &**kind));
             let bodies = || {
-                let a = (logged.body, logged_body.as_ref());
-                let b = (rerun.body, rerun_body.as_ref());
-                fields::bodies("body", a, b, 0.0)
+                let a = Encoded::body(logged.body, fields::schema(message.channel));
+                let b = Encoded::of(rerun.body, &types);
+                fields::protobuf("body", &a, &b, 0.0)
             };
             fields::envelopes(&logged, &rerun)
                 .or_else(bodies)
@@ -365,6 +373,7 @@ impl Verifier {
                     let (logged, message) = self.records.record()?;
                     let mismatch = Mismatch {
                         time_s: seconds(logged.key.time_ns),
+                        time_ns: logged.key.time_ns,
                         topic: message.channel.topic.clone(),
                         sender: logged.sender.to_owned(),
                         receiver: logged.receiver.to_owned(),
@@ -372,6 +381,7 @@ impl Verifier {
                         field: "presence".to_owned(),
                         logged: "a further record".to_owned(),
                         rerun: "a checkpoint".to_owned(),
+                        why: String::new(),
                     };
                     self.candidate = Some((self.window.len(), mismatch));
                 }
@@ -415,6 +425,7 @@ impl Verifier {
             }
             (None, None) => Mismatch {
                 time_s: seconds(checkpoint.key.time.as_nanos()),
+                time_ns: checkpoint.key.time.as_nanos(),
                 field: "digest".to_owned(),
                 logged: "another digest at this checkpoint".to_owned(),
                 rerun: checkpoint.digest.to_string(),
@@ -468,6 +479,7 @@ impl Verifier {
             }
             Some(diff) => self.different(Mismatch {
                 time_s: seconds(report.end_time.as_nanos()),
+                time_ns: report.end_time.as_nanos(),
                 field: diff.field,
                 logged: diff.a,
                 rerun: diff.b,
@@ -487,9 +499,13 @@ impl Verifier {
     }
 }
 
-fn kind_descriptor(kind: &Kind) -> Option<MessageDescriptor> {
-    let pool = DescriptorPool::decode(kind.schema().file_descriptor_set().as_slice()).ok()?;
-    pool.get_message_by_name(&kind.schema().full_name())
+/// The messages of a kind's schema.
+fn kind_types(kind: Option<&Kind>) -> Result<Types, String> {
+    let kind = kind.ok_or("the record has no body")?;
+    Types::read(
+        &kind.schema().file_descriptor_set(),
+        &kind.schema().full_name(),
+    )
 }
 
 impl Observer for Verifier {

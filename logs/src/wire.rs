@@ -7,6 +7,8 @@ pub(crate) enum Value<'a> {
     Bytes(&'a [u8]),
     Fixed32(u32),
     Fixed64(u64),
+    /// The fields of a group, without its end.
+    Group(&'a [u8]),
 }
 
 impl<'a> Value<'a> {
@@ -104,7 +106,12 @@ impl<'a> Fields<'a> {
         Fields { rest: message }
     }
 
-    fn varint(&mut self) -> Option<u64> {
+    /// What is not read yet.
+    pub(crate) fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    pub(crate) fn varint(&mut self) -> Option<u64> {
         let mut value = 0u64;
         for (at, byte) in self.rest.iter().take(10).enumerate() {
             value |= u64::from(byte & 0x7f) << (7 * at).min(63);
@@ -123,10 +130,41 @@ impl<'a> Fields<'a> {
         Some(taken)
     }
 
+    /// The fields up to the end of the group that has just started; groups within it are passed
+    /// over without recursion, however deep they are.
+    fn group(&mut self, number: u32) -> Option<&'a [u8]> {
+        let start = self.rest;
+        let mut open = vec![number];
+        while let Some(inner) = open.last().copied() {
+            let before = self.rest.len();
+            let tag = self.varint()?;
+            let field = u32::try_from(tag >> 3).ok()?;
+            match tag & 7 {
+                0 => drop(self.varint()?),
+                1 => drop(self.take(8)?),
+                2 => {
+                    let length = self.varint()?;
+                    self.take(length)?;
+                }
+                3 => open.push(field),
+                4 if field == inner => {
+                    open.pop();
+                    if open.is_empty() {
+                        return start.get(..start.len() - before);
+                    }
+                }
+                5 => drop(self.take(4)?),
+                _ => return None,
+            }
+        }
+        None
+    }
+
     fn field(&mut self) -> Option<(u32, Value<'a>)> {
         let tag = self.varint()?;
         let number = u32::try_from(tag >> 3).ok()?;
         let value = match tag & 7 {
+            3 => Value::Group(self.group(number)?),
             0 => Value::Varint(self.varint()?),
             1 => Value::Fixed64(u64::from_le_bytes(self.take(8)?.try_into().ok()?)),
             2 => {

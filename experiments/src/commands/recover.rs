@@ -1,21 +1,35 @@
-//! `farside recover`: save what can be saved of a log.
+//! `farside recover`: save what can be saved of a log. It exits with 0 if nothing is lost, with 1
+//! if something is lost or doubtful.
 
 use std::path::PathBuf;
 
 use super::Exit;
-use super::{CommandError, print};
+use super::{CommandError, print, print_json};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The log that is cut or damaged
     #[arg(value_name = "BROKEN.mcap")]
     broken: PathBuf,
-    /// Where to write what is saved
+    /// Where to write what is saved; it appears there once it is whole
     #[arg(long, value_name = "FIXED.mcap")]
     out: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
-    print(farside_logs::recover(&args.broken, &args.out)?)?;
-    Ok(Exit::Done)
+    let report = farside_logs::recover(&args.broken, &args.out)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        print(&report)?;
+    }
+    // As with `diff`: 1 says that the two files do not hold the same.
+    Ok(if report.is_lossless() {
+        Exit::Done
+    } else {
+        Exit::Different
+    })
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::SimDuration;
-use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome};
+use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome, escaped};
 use serde::Serialize;
 
 use super::Exit;
@@ -179,11 +179,11 @@ fn text(path: &Path, outcome: &VerifyOutcome, notes: &[String]) -> String {
         ),
         VerifyOutcome::Prefix {
             records,
-            last_s,
+            last_ns,
             missing,
             ..
         } => {
-            let last = SimDuration::from_secs_f64(last_s.unwrap_or(0.0));
+            let last = SimDuration::from_nanos(last_ns.unwrap_or(0));
             format!(
                 "{path}: the same as far as it goes: {records} records, up to {last}\n  \
                  {missing}\n"
@@ -191,14 +191,24 @@ fn text(path: &Path, outcome: &VerifyOutcome, notes: &[String]) -> String {
         }
         VerifyOutcome::Different { records, first } => {
             let mut out = format!(
-                "{path}: DIFFERENT after {records} equal records\n  at {}s on {}: {} of {} to {} \
-                 (number {})\n",
-                first.time_s, first.topic, first.field, first.sender, first.receiver, first.ordinal
+                "{path}: DIFFERENT after {records} equal records\n  at {}.{:09}s on {}: {} of {} to \
+                 {} (number {})\n",
+                first.time_ns / 1_000_000_000,
+                first.time_ns % 1_000_000_000,
+                escaped(&first.topic),
+                escaped(&first.field),
+                escaped(&first.sender),
+                escaped(&first.receiver),
+                first.ordinal
             );
             out.push_str(&format!(
                 "  in the log  {}\n  run again   {}\n",
-                first.logged, first.rerun
+                escaped(&first.logged),
+                escaped(&first.rerun)
             ));
+            if !first.why.is_empty() {
+                out.push_str(&format!("  compared by bytes: {}\n", escaped(&first.why)));
+            }
             out
         }
     };

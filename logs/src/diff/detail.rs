@@ -1,16 +1,19 @@
 //! The details of one difference: its first field, and the chain of its causes.
 
+use std::sync::Arc;
+
 use farside::MatchKey;
-use prost_reflect::MessageDescriptor;
+use mcap::records::MessageHeader;
 
 use super::index::{Entry, Index, Mode, Names};
 use super::{Cause, FirstDifference};
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::envelope::{KeyRef, RecordRef};
-use crate::fields::{self, FieldDiff, bodies, body_descriptor, near};
+use crate::fields::{self, Encoded, FieldDiff, bodies, protobuf};
 use crate::log::LoggedKey;
-use crate::scan::ScannedMessage;
+use crate::scan::{ChannelInfo, ScannedMessage};
+use crate::shown::Seconds;
 
 /// Causes that are listed; beyond them only the last one is.
 const CAUSES_LISTED: usize = 50;
@@ -18,38 +21,63 @@ const CAUSES_LISTED: usize = 50;
 /// Steps back along a chain before it is given up: a bound on damage, far above any real chain.
 const CHAIN_LIMIT: u64 = 10_000_000;
 
-/// The first field in which two records differ by more than the tolerance.
-pub(super) fn pair(
-    a: (&mut Index, &Entry),
-    b: (&mut Index, &Entry),
-    mode: Mode,
-    tolerance: f64,
-) -> Result<Option<FieldDiff>, LogError> {
-    let message_a = a.0.scanner.message_at(a.1.position)?;
-    let message_b = b.0.scanner.message_at(b.1.position)?;
-    Ok(match mode {
-        Mode::Any => any(&message_a, &message_b, tolerance),
-        Mode::Farside => {
-            match (
-                RecordRef::read(message_a.data),
-                RecordRef::read(message_b.data),
-            ) {
-                (Some(x), Some(y)) => {
-                    let body_a = body_descriptor(message_a.channel);
-                    let body_b = body_descriptor(message_b.channel);
-                    farside((&x, body_a.as_ref()), (&y, body_b.as_ref()), tolerance)
-                }
-                _ => Some(fields::raw("record", message_a.data, message_b.data)),
-            }
-        }
-    })
+/// A message that is kept while others are read.
+pub(super) struct Held {
+    channel: Arc<ChannelInfo>,
+    head: MessageHeader,
+    data: Vec<u8>,
+}
+
+impl Held {
+    /// Fetches the message of an entry.
+    pub(super) fn fetch(index: &mut Index, at: u32) -> Result<Held, LogError> {
+        let entry = index.entries[at as usize];
+        let message = index.scanner.message_at(entry.position, entry.channel)?;
+        Ok(Held {
+            channel: message.channel.clone(),
+            head: message.head,
+            data: message.data.to_owned(),
+        })
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.data.len()
+    }
+
+    /// The first field in which it differs from the message of an entry by more than the tolerance.
+    pub(super) fn against(
+        &self,
+        index: &mut Index,
+        at: u32,
+        mode: Mode,
+        tolerance: f64,
+    ) -> Result<Option<FieldDiff>, LogError> {
+        let entry = index.entries[at as usize];
+        let message = index.scanner.message_at(entry.position, entry.channel)?;
+        let held = ScannedMessage {
+            channel: &self.channel,
+            head: self.head,
+            data: &self.data,
+            position: message.position,
+        };
+        Ok(match mode {
+            Mode::Any => any(&held, &message, tolerance),
+            Mode::Farside => farside(&held, &message, tolerance),
+        })
+    }
 }
 
 fn farside(
-    (a, body_a): (&RecordRef<'_>, Option<&MessageDescriptor>),
-    (b, body_b): (&RecordRef<'_>, Option<&MessageDescriptor>),
+    message_a: &ScannedMessage<'_>,
+    message_b: &ScannedMessage<'_>,
     tolerance: f64,
 ) -> Option<FieldDiff> {
+    let (Some(a), Some(b)) = (
+        RecordRef::read(message_a.data),
+        RecordRef::read(message_b.data),
+    ) else {
+        return Some(fields::raw("record", message_a.data, message_b.data));
+    };
     let text = [
         ("fate", a.class.name(), b.class.name()),
         ("link", a.link, b.link),
@@ -57,30 +85,33 @@ fn farside(
         ("note", a.note, b.note),
     ];
     let text = text.into_iter().find(|(_, a, b)| a != b);
-    text.map(|(field, a, b)| FieldDiff::new(field, a, b))
-        .or_else(|| bodies("body", (a.body, body_a), (b.body, body_b), tolerance))
+    let body_a = (a.body, fields::schema(message_a.channel));
+    let body_b = (b.body, fields::schema(message_b.channel));
+    text.map(|(field, a, b)| FieldDiff::texts(field, a, b))
+        .or_else(|| bodies(body_a, body_b, tolerance))
         .or_else(|| times("sent", a.sent_ns, b.sent_ns, tolerance))
         .or_else(|| times("log_time", a.key.time_ns, b.key.time_ns, tolerance))
 }
 
 fn any(a: &ScannedMessage<'_>, b: &ScannedMessage<'_>, tolerance: f64) -> Option<FieldDiff> {
-    let data = match (a.channel.encoding.as_str(), b.channel.encoding.as_str()) {
-        ("protobuf", "protobuf") => {
-            let descriptor = |message: &ScannedMessage<'_>| {
-                message.channel.schema.as_ref()?.descriptor().cloned()
-            };
-            let (x, y) = (descriptor(a), descriptor(b));
-            bodies("", (a.data, x.as_ref()), (b.data, y.as_ref()), tolerance)
+    let (x, y) = (a.channel.encoding.as_str(), b.channel.encoding.as_str());
+    let data = match (x, y) {
+        (x, y) if x != y => Some(FieldDiff::texts("encoding", x, y)),
+        ("protobuf", _) => {
+            let x = Encoded::new(a.data, fields::schema(a.channel));
+            let y = Encoded::new(b.data, fields::schema(b.channel));
+            protobuf("", &x, &y, tolerance)
         }
-        ("json", "json") => fields::json(a.data, b.data, tolerance),
+        ("json", _) => fields::json(a.data, b.data, tolerance),
         _ => (a.data != b.data).then(|| fields::raw("data", a.data, b.data)),
     };
-    data.or_else(|| times("log_time", a.head.log_time, b.head.log_time, tolerance))
+    let (one, other) = (&a.head, &b.head);
+    data.or_else(|| times("log_time", one.log_time, other.log_time, tolerance))
         .or_else(|| {
             times(
                 "publish_time",
-                a.head.publish_time,
-                b.head.publish_time,
+                one.publish_time,
+                other.publish_time,
                 tolerance,
             )
         })
@@ -88,13 +119,9 @@ fn any(a: &ScannedMessage<'_>, b: &ScannedMessage<'_>, tolerance: f64) -> Option
 
 fn times(field: &str, a_ns: u64, b_ns: u64, tolerance: f64) -> Option<FieldDiff> {
     let apart = seconds(a_ns.abs_diff(b_ns));
-    let same = a_ns == b_ns || (tolerance > 0.0 && (apart <= tolerance || near(apart, 0.0, 0.0)));
+    let same = a_ns == b_ns || (tolerance > 0.0 && apart <= tolerance);
+    let exact = |ns| format!("{} s", Seconds(ns));
     (!same).then(|| FieldDiff::new(field, exact(a_ns), exact(b_ns)))
-}
-
-/// Nanoseconds as seconds, with every digit.
-fn exact(ns: u64) -> String {
-    format!("{}.{:09} s", ns / 1_000_000_000, ns % 1_000_000_000)
 }
 
 /// Describes a record as a difference, and traces back what caused it.
@@ -105,9 +132,10 @@ pub(super) fn describe(
     names: &Names,
     diff: FieldDiff,
 ) -> Result<FirstDifference, LogError> {
-    let message = index.scanner.message_at(entry.position)?;
+    let message = index.scanner.message_at(entry.position, entry.channel)?;
     let mut first = FirstDifference {
         time_s: seconds(entry.time_ns),
+        time_ns: entry.time_ns,
         topic: message.channel.topic.clone(),
         ordinal: entry.ordinal,
         field: diff.field,
@@ -168,6 +196,7 @@ fn trace(
         let Some(at) = found else {
             origin = Some(Cause {
                 time_s: seconds(key.time_ns),
+                time_ns: key.time_ns,
                 sender: key.source.to_owned(),
                 fate: "not in the log".to_owned(),
                 ..Cause::default()
@@ -176,12 +205,14 @@ fn trace(
             break;
         };
         before = at;
-        let message = index.scanner.message_at(index.entries[at].position)?;
+        let entry = index.entries[at];
+        let message = index.scanner.message_at(entry.position, entry.channel)?;
         let Some(record) = RecordRef::read(message.data) else {
             break;
         };
         let cause = Cause {
             time_s: seconds(record.key.time_ns),
+            time_ns: record.key.time_ns,
             topic: message.channel.topic.clone(),
             sender: record.sender.to_owned(),
             receiver: record.receiver.to_owned(),

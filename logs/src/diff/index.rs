@@ -3,15 +3,19 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use farside::record::RecordClass;
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::LogError;
 use crate::envelope::{KeyRef, RecordRef};
+use crate::frames::Care;
 use crate::log::Log;
-use crate::scan::{Item, Position, ScannedMessage, Scanner};
+use crate::scan::{ChannelInfo, Item, Position, ScannedMessage, Scanner};
+use crate::source::Attached;
 use crate::topics::Topics;
+use crate::writer::SCENARIO_ATTACHMENT;
 
 /// Names of sources and topics, numbered: both logs share the numbers.
 #[derive(Default)]
@@ -36,10 +40,11 @@ impl Names {
     }
 }
 
-/// One record, in 80 bytes.
+/// One record, in 88 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// Hash of the identity, without the place in the flow where a match key stands for it.
+    /// Hash of the identity, without the place in the flow where a match key stands for it; in other
+    /// files than Farside's, of the message without its times.
     pub(super) identity: u64,
     /// The place among records of one identity.
     pub(super) ordinal: u64,
@@ -52,6 +57,10 @@ pub(super) struct Entry {
     pub(super) tie: u32,
     pub(super) source: u32,
     pub(super) topic: u32,
+    /// The serial number of the channel.
+    pub(super) channel: u32,
+    /// The number that the publisher gave the message.
+    pub(super) sequence: u32,
     /// False for the loss of a message and for one in flight: no event has their key.
     pub(super) event: bool,
     pub(super) ignored: bool,
@@ -63,6 +72,16 @@ pub(super) struct Index {
     pub(super) entries: Vec<Entry>,
     pub(super) end: Option<BTreeMap<String, String>>,
     pub(super) cut: Option<(u64, String)>,
+    /// What wrote the file: profile and library.
+    pub(super) header: (String, String),
+    pub(super) metadata: Vec<(String, BTreeMap<String, String>)>,
+    pub(super) attachments: Vec<Attached>,
+    /// The channels of each topic, whether they have messages or not.
+    pub(super) channels: BTreeMap<u32, Vec<Arc<ChannelInfo>>>,
+    /// How many messages were left out, by what their channels are for.
+    pub(super) left_out: BTreeMap<String, u64>,
+    /// What else there is that is not compared.
+    pub(super) others: Vec<String>,
 }
 
 /// How records are told apart.
@@ -70,13 +89,13 @@ pub(super) struct Index {
 pub(super) enum Mode {
     /// By sender, receiver, kind and match key or ordinal.
     Farside,
-    /// By topic and place on the topic.
+    /// By topic, and on a topic by what they say, when they were, and their place.
     Any,
 }
 
 /// What a Farside log says at its start; none for any other file.
 pub(super) fn start(path: &Path) -> Result<Option<Log>, LogError> {
-    match Log::open(path) {
+    match Log::read(path, |name| name == SCENARIO_ATTACHMENT) {
         Ok(log) => Ok(Some(log)),
         Err(LogError::NotFarside { .. } | LogError::Damaged { .. }) => Ok(None),
         Err(error) => Err(error),
@@ -90,6 +109,7 @@ impl Index {
         ignore: &Topics,
         names: &mut Names,
     ) -> Result<Index, LogError> {
+        let mut scanner = Scanner::careful(path, Care::Attachments)?;
         let mut builder = Builder {
             mode,
             ignore,
@@ -98,35 +118,45 @@ impl Index {
             places: BTreeMap::new(),
             scratch: Vec::new(),
             entries: Vec::new(),
+            left_out: BTreeMap::new(),
         };
-        let mut scanner = Scanner::open(path)?;
-        let (mut end, mut cut) = (None, None);
+        let mut beside = Beside::default();
         while let Some(item) = scanner.next()? {
             match item {
                 Item::Message(message) => {
-                    let frame = message.position.frame;
-                    let topic = || message.channel.topic.clone();
                     if !builder.add(&message) {
-                        let what = format!("a message on {} that is malformed", topic());
-                        return Err(LogError::damaged(path, frame, what));
+                        let topic = &message.channel.topic;
+                        let what = format!("a message on {topic} that is malformed");
+                        return Err(LogError::damaged(path, message.position.frame, what));
                     }
-                }
-                Item::Metadata(name, entries) if mode == Mode::Farside && name == "farside.end" => {
-                    end = Some(entries);
                 }
                 Item::Damage { offset, what, .. } => {
                     return Err(LogError::damaged(path, offset, what));
                 }
-                Item::Cut { offset, what } => cut = Some((offset, what)),
-                _ => {}
+                item => beside.add(item),
             }
         }
-        let entries = builder.entries;
+        let (entries, left_out) = (builder.entries, builder.left_out);
+        let mut channels: BTreeMap<u32, Vec<Arc<ChannelInfo>>> = BTreeMap::new();
+        for channel in scanner.channels() {
+            let topic = names.number(&channel.topic);
+            if !ignore.matches(&channel.topic) {
+                channels.entry(topic).or_default().push(channel.clone());
+            }
+        }
+        let ends = |(name, _): &&(String, _)| mode == Mode::Farside && name == "farside.end";
+        let end = beside.metadata.iter().filter(ends).next_back();
         Ok(Index {
+            end: end.map(|(_, entries)| entries.clone()),
             scanner,
             entries,
-            end,
-            cut,
+            cut: beside.cut,
+            header: beside.header,
+            metadata: beside.metadata,
+            attachments: beside.attachments,
+            channels,
+            left_out,
+            others: beside.others,
         })
     }
 
@@ -149,6 +179,40 @@ impl Index {
     }
 }
 
+/// What a file holds beside its messages.
+#[derive(Default)]
+struct Beside {
+    header: (String, String),
+    metadata: Vec<(String, BTreeMap<String, String>)>,
+    attachments: Vec<Attached>,
+    cut: Option<(u64, String)>,
+    others: Vec<String>,
+}
+
+impl Beside {
+    fn add(&mut self, item: Item<'_>) {
+        match item {
+            Item::Header { profile, library } => {
+                self.header = (profile.to_owned(), library.to_owned());
+            }
+            Item::Metadata(name, entries) => self.metadata.push((name, entries)),
+            Item::Attachment(attached) => self.attachments.push(attached),
+            Item::Cut { offset, what } => self.cut = Some((offset, what)),
+            Item::Strange(opcode) => {
+                let what = format!("records of opcode 0x{opcode:02x}, which MCAP does not have");
+                if !self.others.contains(&what) {
+                    self.others.push(what);
+                }
+            }
+            Item::Behind { offset, bytes } => {
+                let what = format!("{bytes} bytes behind its end, from byte {offset} on");
+                self.others.push(what);
+            }
+            _ => {}
+        }
+    }
+}
+
 /// What is the same for all messages of a channel.
 #[derive(Clone, Copy)]
 struct ChannelEntry {
@@ -166,6 +230,7 @@ struct Builder<'a> {
     places: BTreeMap<u64, u64>,
     scratch: Vec<u8>,
     entries: Vec<Entry>,
+    left_out: BTreeMap<String, u64>,
 }
 
 impl Builder<'_> {
@@ -180,7 +245,7 @@ impl Builder<'_> {
         let topic = &message.channel.topic;
         let compared = match self.mode {
             Mode::Farside => matches!(message.channel.role(), "message" | "event"),
-            Mode::Any => !matches!(message.channel.role(), "state" | "checkpoint" | "viewer"),
+            Mode::Any => true,
         };
         let entry = ChannelEntry {
             topic: self.names.number(topic),
@@ -195,6 +260,11 @@ impl Builder<'_> {
     fn add(&mut self, message: &ScannedMessage<'_>) -> bool {
         let channel = self.channel(message);
         if !channel.compared {
+            let role = message.channel.role();
+            match self.left_out.get_mut(role) {
+                Some(count) => *count += 1,
+                None => drop(self.left_out.insert(role.to_owned(), 1)),
+            }
             return true;
         }
         let entry = match self.mode {
@@ -215,18 +285,16 @@ impl Builder<'_> {
     }
 
     fn any(&mut self, message: &ScannedMessage<'_>, channel: ChannelEntry) -> Entry {
-        let identity = xxh3_64(message.channel.topic.as_bytes());
-        let ordinal = self.place(identity);
-        self.scratch.clear();
-        self.scratch
-            .extend_from_slice(&message.head.log_time.to_le_bytes());
-        self.scratch
-            .extend_from_slice(&message.head.publish_time.to_le_bytes());
-        self.scratch.extend_from_slice(message.data);
+        let ordinal = self.place(u64::from(channel.topic));
+        let identity = xxh3_64(message.data);
+        let mut content = [0; 24];
+        content[..8].copy_from_slice(&message.head.log_time.to_le_bytes());
+        content[8..16].copy_from_slice(&message.head.publish_time.to_le_bytes());
+        content[16..].copy_from_slice(&identity.to_le_bytes());
         Entry {
             identity,
             ordinal,
-            content: xxh3_64(&self.scratch),
+            content: xxh3_64(&content),
             time_ns: message.head.log_time,
             count: ordinal,
             position: message.position,
@@ -234,6 +302,8 @@ impl Builder<'_> {
             tie: 0,
             source: channel.topic,
             topic: channel.topic,
+            channel: message.channel.serial,
+            sequence: message.head.sequence,
             event: false,
             ignored: channel.ignored,
         }
@@ -270,6 +340,8 @@ impl Builder<'_> {
             tie: key.tie,
             source: self.names.number(key.source),
             topic: channel.topic,
+            channel: message.channel.serial,
+            sequence: 0,
             event: !matches!(record.class, RecordClass::Lost | RecordClass::InFlight),
             ignored: channel.ignored,
         }

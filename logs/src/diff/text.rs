@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::{Cause, DiffReport, FirstDifference, TopicDiff};
 use crate::group;
+use crate::shown::{Seconds, Shown};
 
 /// Rows of the table that people are shown, unless they ask for all.
 const ROWS_SHOWN: usize = 15;
@@ -16,14 +17,53 @@ const CAUSES_SHOWN: usize = 12;
 impl fmt::Display for DiffReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for note in &self.notes {
-            writeln!(f, "note: {note}")?;
+            writeln!(f, "note: {}", Shown(note))?;
+        }
+        for beside in &self.beside {
+            writeln!(f, "{}", Shown(beside))?;
         }
         let Some(first) = &self.first else {
-            return writeln!(f, "identical: {} records compared", self.records_a);
+            let word = match self.identical {
+                true => "identical",
+                false => "not identical, but the messages are the same",
+            };
+            writeln!(f, "{word}: {}", self.compared())?;
+            return self.write_not_compared(f);
         };
         write_first(f, first)?;
         write_causes(f, first)?;
-        self.write_table(f)
+        self.write_table(f)?;
+        self.write_not_compared(f)
+    }
+}
+
+impl DiffReport {
+    /// What was compared, in words.
+    fn compared(&self) -> String {
+        let messages = match self.records_a {
+            0 => "no messages to compare".to_owned(),
+            n => format!("{n} records compared"),
+        };
+        let others = [
+            (self.metadata, "metadata records"),
+            (self.attachments, "attachments"),
+        ];
+        let others = others.into_iter().filter(|(n, _)| *n > 0);
+        others.fold(messages, |text, (n, what)| format!("{text}, {n} {what}"))
+    }
+
+    fn write_not_compared(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (what, [a, b]) in &self.not_compared {
+            let what = match what.as_str() {
+                "state" => "state samples",
+                "viewer" => "messages for viewers",
+                "checkpoint" => "checkpoints",
+                "ignored" => "messages on topics that are left out",
+                _ => "messages of a kind that is not known",
+            };
+            writeln!(f, "not compared: {what} ({a} | {b})")?;
+        }
+        Ok(())
     }
 }
 
@@ -91,7 +131,7 @@ fn write_row(f: &mut fmt::Formatter<'_>, row: &TopicDiff, topics: usize) -> fmt:
         count(row.only_in_a),
         count(row.only_in_b),
         count(row.reordered),
-        row.topic
+        Shown(&row.topic)
     )?;
     if topics > 1 {
         write!(f, "  ({topics} topics)")?;
@@ -120,28 +160,32 @@ impl TopicDiff {
 fn write_first(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {
     write!(
         f,
-        "first difference at {:.9} s on {}",
-        first.time_s, first.topic
+        "first difference at {} s on {}",
+        Seconds(first.time_ns),
+        Shown(&first.topic)
     )?;
     if !first.sender.is_empty() {
         write!(
             f,
             ": {} to {}, message {}",
-            first.sender, first.receiver, first.ordinal
+            Shown(&first.sender),
+            Shown(&first.receiver),
+            first.ordinal
         )?;
     }
     if let Some(key) = &first.match_key {
         write!(f, ", key {key}")?;
     }
-    writeln!(f, "\n  {}: {} | {}", first.field, first.a, first.b)?;
+    let [field, a, b] = [&first.field, &first.a, &first.b].map(|text| Shown(text));
+    writeln!(f, "\n  {field}: {a} | {b}")?;
     if !first.link.is_empty() {
-        writeln!(f, "  on link {}", first.link)?;
+        writeln!(f, "  on link {}", Shown(&first.link))?;
     }
     if !first.carriage.is_empty() {
         writeln!(f, "  carried with {}", first.carriage)?;
     }
     if !first.reason.is_empty() {
-        writeln!(f, "  lost for {}", first.reason)?;
+        writeln!(f, "  lost for {}", Shown(&first.reason))?;
     }
     Ok(())
 }
@@ -158,21 +202,24 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
             writeln!(f, "  ... {omitted} more ...")?;
         }
         let Cause {
-            time_s,
+            time_ns,
             topic,
             sender,
             receiver,
             ordinal,
             fate,
+            ..
         } = cause;
+        let (time, topic) = (Seconds(*time_ns), Shown(topic));
         let who = if sender == receiver {
             sender.clone()
         } else {
             format!("{sender} to {receiver}")
         };
+        let who = Shown(&who);
         writeln!(
             f,
-            "  because {time_s:.9} s {fate} {topic} ({who}, number {ordinal})"
+            "  because {time} s {fate} {topic} ({who}, number {ordinal})"
         )?;
     }
     Ok(())

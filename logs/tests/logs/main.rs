@@ -6,6 +6,7 @@ mod hostile;
 mod python;
 mod reading;
 mod recovering;
+mod siblings;
 mod verifying;
 mod viewing;
 mod writing;

@@ -112,8 +112,10 @@ fn bodies_decode_field_by_field_and_back_to_their_types() {
             continue;
         }
         let typed: Odometry = schema.decode(record.body).unwrap();
-        let descriptor = channel.schema.as_ref().unwrap().descriptor().unwrap();
-        assert_eq!(descriptor.full_name(), "farside.record.Odometry");
+        let schema_of = channel.schema.as_ref().unwrap();
+        assert_eq!(schema_of.name, "farside.record.Odometry");
+        let pool = prost_reflect::DescriptorPool::decode(&schema_of.data[..]).unwrap();
+        let descriptor = pool.get_message_by_name(&schema_of.name).unwrap();
         let body = descriptor.get_field_by_name("body").unwrap();
         let prost_reflect::Kind::Message(body) = body.kind() else {
             panic!("no message")

@@ -1,0 +1,4 @@
+//! Small inputs that once were answered wrongly, each with its right answer. What the inputs are is
+//! told in `README.md` of their folder below `tests/cases`.
+
+mod logs;
