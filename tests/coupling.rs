@@ -1,5 +1,5 @@
-//! Coupled randomness, end to end: the same messages of open-loop traffic meet the same luck in runs
-//! whose links differ, so that what differs is what was changed.
+//! Coupled randomness, end to end: the same messages of open-loop traffic meet the same luck in
+//! runs whose links differ, so that what differs is what was changed.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -6,8 +6,8 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
 
-use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
+use farside_actors::link::{Link, LinkParams};
 use farside_network::mapf::{Mission, Order, Problem, Rules, reference};
 use farside_network::{
     Deadlock, Gaps, Missions, Network, NetworkConfig, NetworkError, NetworkMetrics, Parts, Policy,
@@ -27,21 +27,14 @@ const PERFECT: Radio = Radio {
     loss: 0.0,
 };
 
-impl Carrier for Radio {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        SimDuration::from_millis(self.latency_ms)
+impl Radio {
+    fn link(self) -> Link {
+        Link::new(LinkParams {
+            latency: SimDuration::from_millis(self.latency_ms),
+            loss: self.loss,
+            ..LinkParams::default()
+        })
     }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        if parcel.random(0, 0, 0).uniform() < self.loss {
-            return verdicts.lose("loss");
-        }
-        verdicts.deliver(self.min_delay());
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
 }
 
 fn config(policy: Policy) -> NetworkConfig {
@@ -62,7 +55,9 @@ fn queued(
     let mut sim = Simulation::new(seed);
     let parts = Parts::placed(world, roadmap, config, seed).unwrap();
     let missions = missions(world, &parts.roadmap, &TeamConfig { rovers }, seed).unwrap();
-    let network = assemble_over(&mut sim, &parts, &Missions::Queued(missions), |_, _| radio);
+    let network = assemble_over(&mut sim, &parts, &Missions::Queued(missions), |_, _| {
+        radio.link()
+    });
     (sim, network.unwrap())
 }
 
@@ -97,7 +92,9 @@ fn standing_with(
         config,
         terrain: None,
     };
-    let network = assemble_over(&mut sim, &parts, &Missions::Standing(tasks), |_, _| radio);
+    let network = assemble_over(&mut sim, &parts, &Missions::Standing(tasks), |_, _| {
+        radio.link()
+    });
     let network = match network {
         Err(NetworkError::NoPlan(_)) => return None,
         network => network.unwrap(),
@@ -162,12 +159,12 @@ fn nodes_and_rovers_that_crash_and_come_back() {
     let (mut sim, network) = queued(&world, 50, 2, radio, &config(Policy::Complete));
     let at = |tenths: u64| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
     for (i, name) in (0..).zip(network.node_names()) {
-        network.crash_at(&mut sim, at(1 + 9 * i), name).unwrap();
-        network.restart_at(&mut sim, at(60 + 9 * i), name).unwrap();
+        sim.crash_named_at(at(1 + 9 * i), name).unwrap();
+        sim.restart_named_at(at(60 + 9 * i), name).unwrap();
     }
     for (i, name) in (0..).zip(network.rover_names()).step_by(5) {
-        network.crash_at(&mut sim, at(100 + 7 * i), name).unwrap();
-        network.restart_at(&mut sim, at(180 + 7 * i), name).unwrap();
+        sim.crash_named_at(at(100 + 7 * i), name).unwrap();
+        sim.restart_named_at(at(180 + 7 * i), name).unwrap();
     }
     sim.run(Executor::Inline).unwrap();
     all_arrive(&network.metrics());
@@ -188,12 +185,12 @@ fn a_team_crosses_gaps_over_lossy_links_and_past_crashes() {
     let (mut sim, network) = queued(&world, 60, 2, radio, &config(Policy::Complete));
     let at = |tenths: u64| SimTime::ZERO + SimDuration::from_millis(tenths * 100 + 3);
     for (i, name) in (0..).zip(network.node_names()) {
-        network.crash_at(&mut sim, at(1 + 9 * i), name).unwrap();
-        network.restart_at(&mut sim, at(60 + 9 * i), name).unwrap();
+        sim.crash_named_at(at(1 + 9 * i), name).unwrap();
+        sim.restart_named_at(at(60 + 9 * i), name).unwrap();
     }
     for (i, name) in (0..).zip(network.rover_names()).step_by(3) {
-        network.crash_at(&mut sim, at(100 + 7 * i), name).unwrap();
-        network.restart_at(&mut sim, at(180 + 7 * i), name).unwrap();
+        sim.crash_named_at(at(100 + 7 * i), name).unwrap();
+        sim.restart_named_at(at(180 + 7 * i), name).unwrap();
     }
     sim.run(Executor::Inline).unwrap();
     let metrics = network.metrics();

@@ -3,32 +3,22 @@
 
 use std::sync::Arc;
 
-use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
+use farside_actors::link::{Link, LinkParams};
 use farside_network::{
     Deadlock, Missions, Network, NetworkConfig, NetworkError, Parts, TeamConfig, WorldConfig,
     assemble_over, missions,
 };
 use farside_worlds::Roadmap;
 
-struct Lossy;
-
-impl Carrier for Lossy {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        SimDuration::from_millis(5)
-    }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        if parcel.random(0, 0, 0).uniform() < 0.02 {
-            return verdicts.lose("loss");
-        }
-        let jitter = parcel.random(1, 0, 0).uniform() * 2e6;
-        verdicts.deliver(self.min_delay() + SimDuration::from_nanos(jitter as u64));
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+/// Six milliseconds, give or take one; a fiftieth is lost.
+fn lossy() -> Link {
+    Link::new(LinkParams {
+        latency: SimDuration::from_millis(6),
+        jitter: SimDuration::from_millis(1),
+        loss: 0.02,
+        ..LinkParams::default()
+    })
 }
 
 fn team(seed: u64, rovers: u32) -> Result<(Simulation, Network), NetworkError> {
@@ -38,7 +28,7 @@ fn team(seed: u64, rovers: u32) -> Result<(Simulation, Network), NetworkError> {
     let (team, network) = (TeamConfig { rovers }, NetworkConfig::default());
     let parts = Parts::placed(&world, roadmap, &network, seed).unwrap();
     let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
-    let network = assemble_over(&mut sim, &parts, &missions, |_, _| Lossy)?;
+    let network = assemble_over(&mut sim, &parts, &missions, |_, _| lossy())?;
     Ok((sim, network))
 }
 
@@ -62,15 +52,15 @@ fn the_team_arrives_after_crashes() {
     let nodes = network.node_names().iter().enumerate();
     for (i, name) in nodes.map(|(i, name)| (i as u64, name)) {
         if i % 3 == 0 {
-            network.crash_at(&mut sim, at(40 + 3 * i), name).unwrap();
-            network.restart_at(&mut sim, at(90 + 5 * i), name).unwrap();
+            sim.crash_named_at(at(40 + 3 * i), name).unwrap();
+            sim.restart_named_at(at(90 + 5 * i), name).unwrap();
         }
-        network.crash_at(&mut sim, at(304), name).unwrap();
-        network.restart_at(&mut sim, at(331), name).unwrap();
+        sim.crash_named_at(at(304), name).unwrap();
+        sim.restart_named_at(at(331), name).unwrap();
     }
     for (i, name) in (0..).zip(network.rover_names()).step_by(4) {
-        network.crash_at(&mut sim, at(150 + 7 * i), name).unwrap();
-        network.restart_at(&mut sim, at(200 + 7 * i), name).unwrap();
+        sim.crash_named_at(at(150 + 7 * i), name).unwrap();
+        sim.restart_named_at(at(200 + 7 * i), name).unwrap();
     }
     let report = sim.run(Executor::Inline).unwrap();
     let metrics = network.metrics();
@@ -85,12 +75,7 @@ fn the_team_arrives_after_crashes() {
 #[test]
 fn what_makes_no_sense_is_refused() {
     assert_eq!(team(1, 0).err(), Some(NetworkError::NoRovers));
-    let (mut sim, network) = team(1, 3).unwrap();
-    let error = network
-        .crash_at(&mut sim, SimTime::ZERO, "rover_4")
-        .unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "no node or rover is called rover_4; there are node_01 to rover_03"
-    );
+    let (mut sim, _) = team(1, 3).unwrap();
+    let error = sim.crash_named_at(SimTime::ZERO, "rover_4").unwrap_err();
+    assert!(error.to_string().contains("rover_4"), "{error}");
 }

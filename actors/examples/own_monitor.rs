@@ -1,6 +1,6 @@
 //! Two carts on a single track, watched by the library's monitors: which of them collide,
-//! and which wait for each other for ever. The carts know nothing of the monitors: they record where
-//! they are, and what they wait for.
+//! and which wait for each other for ever. The carts know nothing of the monitors: they record
+//! where they are, and what they wait for.
 //!
 //! ```text
 //! 0 --- 1 --- 2 --- 3 --- 4

@@ -2,10 +2,10 @@
 //! circle of those who wait for each other. They know no rover, no node and no protocol: only what
 //! actors record of themselves, so that they can find fault with all of these.
 //!
-//! Two parts are pure, and used where a state is at hand: [`Collisions`] keeps claims on the vertices
-//! and edges of a graph, [`WaitGraph`] keeps who waits for whom and finds the circles. Two are
-//! observers of a simulation made of them: [`CollisionMonitor`] and [`DeadlockMonitor`] read the state
-//! samples of a user's own actors with a closure.
+//! Two parts are pure, and used where a state is at hand: [`Collisions`] keeps claims on the
+//! vertices and edges of a graph, [`WaitGraph`] keeps who waits for whom and finds the circles. Two
+//! are observers of a simulation made of them: [`CollisionMonitor`] and [`DeadlockMonitor`] read
+//! the state samples of a user's own actors with a closure.
 //!
 //! # A run of one's own, watched
 //!

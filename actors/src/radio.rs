@@ -1,9 +1,9 @@
 //! Radios: what links share when they go through the air. Distance and terrain, the channel that
 //! stations contend for, and who spoils whose transmission.
 //!
-//! A link by itself ([`crate::link`]) knows neither where its ends are nor who else transmits. Links
-//! that name a radio are carried by a [`Radio`], a shared link and so a process of its own: it is
-//! told where stations are ([`RadioChange::Moves`]), keeps the channels, and asks each link's
+//! A link by itself ([`crate::link`]) knows neither where its ends are nor who else transmits.
+//! Links that name a radio are carried by a [`Radio`], a shared link and so a process of its own:
+//! it is told where stations are ([`RadioChange::Moves`]), keeps the channels, and asks each link's
 //! [`Transmitter`] for what is the link's own.
 //!
 //! On a channel, a message is a frame that waits in its link's line, contends, is on the air for

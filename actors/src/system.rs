@@ -1,6 +1,6 @@
-//! Systems: what a scenario can run. A [`System`] brings all that is its own: the keys that it reads,
-//! its metrics, its built-in scenarios and studies, its pictures, and how it is assembled. Whoever
-//! reads scenarios and runs studies knows this trait and no system.
+//! Systems: what a scenario can run. A [`System`] brings all that is its own: the keys that it
+//! reads, its metrics, its built-in scenarios and studies, its pictures, and how it is assembled.
+//! Whoever reads scenarios and runs studies knows this trait and no system.
 //!
 //! What this is not: the list of systems that a program knows, which is the program's.
 
@@ -67,8 +67,8 @@ pub trait System: Send + Sync {
         &[]
     }
 
-    /// Keys that once had other names. Scenarios, `--set` and studies may use the old ones: they are
-    /// read as the new ones, and whoever uses them is told.
+    /// Keys that once had other names. Scenarios, `--set` and studies may use the old ones: they
+    /// are read as the new ones, and whoever uses them is told.
     fn renamed(&self) -> Vec<Renamed> {
         Vec::new()
     }
@@ -180,8 +180,8 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// Declares all links of the system at once, as the scenario has them. What is asked of links is
-    /// asked of what this returns, so that no answer can come before all links are known.
+    /// Declares all links of the system at once, as the scenario has them. What is asked of links
+    /// is asked of what this returns, so that no answer can come before all links are known.
     ///
     /// # Errors
     /// When a pattern of the scenario matches no link, or a link cannot be.
@@ -210,7 +210,8 @@ impl<'a> Setup<'a> {
         self.links.as_ref().is_some_and(LinkBuilder::has_radios)
     }
 
-    /// What the scenario says of links and processors that has no effect, once the system is assembled.
+    /// What the scenario says of links and processors that has no effect, once the system is
+    /// assembled.
     ///
     /// # Errors
     /// When the system has declared no links, and the scenario has patterns for some.

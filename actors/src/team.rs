@@ -16,8 +16,8 @@ settings! {
     /// assert_eq!(error.to_string(), "team.rovers: 0: expected 1 to 10000");
     /// ```
     pub struct TeamConfig {
-        /// How many rovers there are. In the system `network` all wait at their entries at the start;
-        /// where its world has tasks, they do the first ones.
+        /// How many rovers there are. In the system `network` all wait at their entries at the
+        /// start; where its world has tasks, they do the first ones.
         pub rovers: u32 = 50,
             1..=MAX_ROVERS;
     }

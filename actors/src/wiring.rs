@@ -119,8 +119,8 @@ pub struct Links {
 }
 
 impl Links {
-    /// Declares each link of a wiring with the carrier that `carrier` makes for it, from the names of
-    /// its ends, for simulations without a scenario. Parameters are then not known.
+    /// Declares each link of a wiring with the carrier that `carrier` makes for it, from the names
+    /// of its ends, for simulations without a scenario. Parameters are then not known.
     ///
     /// ```
     /// use farside::{FixedDelay, SimDuration, Simulation};
@@ -183,7 +183,8 @@ impl Links {
     /// struct Planner(Processor);
     /// impl Actor for Planner { type Accepts = (ProcessorChange,); }
     /// impl Handler<ProcessorChange> for Planner {
-    ///     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome { Ok(()) }
+    ///     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome { Ok(())
+    ///     }
     /// }
     /// let mut sim = Simulation::new(1);
     /// let host = sim.host("rover_02");

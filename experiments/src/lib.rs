@@ -1,8 +1,9 @@
 //! Scenarios and the `farside` command.
 //!
-//! A [`scenario::Scenario`] is a TOML file that says what runs; a [`System`](farside_actors::system::System) reads the part
-//! of it that is its own and builds the actors; [`cli::main`] is the command line over both, for
-//! the `farside` binary and for binaries with systems of their own.
+//! A [`scenario::Scenario`] is a TOML file that says what runs; a
+//! [`System`](farside_actors::system::System) reads the part of it that is its own and builds the
+//! actors; [`cli::main`] is the command line over both, for the `farside` binary and for binaries
+//! with systems of their own.
 //!
 //! ```
 //! use farside::Executor;

@@ -1,5 +1,5 @@
-//! The systems that a program knows: those that are built in, and those that a user adds. This is the
-//! only file here that names a system.
+//! The systems that a program knows: those that are built in, and those that a user adds. This is
+//! the only file here that names a system.
 //!
 //! ```no_run
 //! use farside_experiments::{cli, registry::Registry};

@@ -1,8 +1,8 @@
 //! Scenarios: TOML files that say which system runs, in which world, over which links.
 //!
 //! The keys that every system shares are read here; `[world]`, `[team]` and whatever else a system
-//! has of its own are read by the system ([`farside_actors::system::System`]). A mistake is one message
-//! with its place, what was found, what was expected and the nearest valid name.
+//! has of its own are read by the system ([`farside_actors::system::System`]). A mistake is one
+//! message with its place, what was found, what was expected and the nearest valid name.
 
 mod blame;
 pub mod contacts;
@@ -53,8 +53,8 @@ settings! {
         pub description: String [skip_serializing_if = "String::is_empty"];
         /// The run's seed. TOML's integers are signed, so it has 63 bits.
         pub seed: u64;
-        /// What the problem is drawn from, where several runs are to share one: the world, the team,
-        /// the goals, as the system says. The run's seed unless given.
+        /// What the problem is drawn from, where several runs are to share one: the world, the
+        /// team, the goals, as the system says. The run's seed unless given.
         pub problem_seed: Option<u64> [skip_serializing_if = "Option::is_none"];
         /// Shuffles what happens at one instant, to see whether a result hangs on its order.
         /// Without, the order is that of the actors' names.
@@ -133,7 +133,8 @@ pub struct Assembled {
     pub files: Files,
     /// The contacts of its links, if the scenario has a plan.
     pub contacts: Option<LinkContacts>,
-    /// What became of the files that other programs wrote, and of the world, a line at a time, for people.
+    /// What became of the files that other programs wrote, and of the world, a line at a time, for
+    /// people.
     pub notes: Vec<String>,
     /// What the scenario says that has no effect or is called otherwise now, for people.
     pub remarks: Vec<String>,

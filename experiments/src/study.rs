@@ -22,8 +22,8 @@
 //!
 //! `design` says how cells are made of factors: `grid` (all combinations), `paired` (they advance
 //! together), `list` (`[[cell]]` tables give the values), `latin-hypercube` (`cells` points spread
-//! over ranges). With a `[stop]` table of `metric`, `width`, `min_seeds` and `max_seeds`, a cell runs
-//! until the 95 % interval of the metric is narrower than `width`.
+//! over ranges). With a `[stop]` table of `metric`, `width`, `min_seeds` and `max_seeds`, a cell
+//! runs until the 95 % interval of the metric is narrower than `width`.
 //!
 //! Instead of a key and values, a factor may have variants: names for what each sets, several keys
 //! or none. What one variant does not set is as the scenario has it.
@@ -33,7 +33,8 @@
 //! name = "policy"
 //! variants = [
 //!     { name = "paper", set = { network.policy = "paper" } },
-//!     { name = "chained", set = { network.policy = "paper", network.max_plus.acceleration_chains = true } },
+//!     { name = "chained", set = { network.policy = "paper", network.max_plus.acceleration_chains =
+//!     true } },
 //! ]
 //! ```
 //!

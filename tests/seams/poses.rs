@@ -1,5 +1,5 @@
-//! Poses: a scene may draw a heading in the plane or an orientation in space, and the log has both in
-//! the form that viewers read.
+//! Poses: a scene may draw a heading in the plane or an orientation in space, and the log has both
+//! in the form that viewers read.
 
 use farside::RunInfo;
 use farside::prelude::*;

@@ -1,5 +1,5 @@
-//! The generator of the built-in roadmaps: safe paths through a crater, nearly a tree, with an exact
-//! number of vertices and of loops.
+//! The generator of the built-in roadmaps: safe paths through a crater, nearly a tree, with an
+//! exact number of vertices and of loops.
 //!
 //! The paper gives the sizes of its two roadmaps and pictures of them, no more (*network-guided*,
 //! section 4). Here places are thrown over safe ground and joined by safe edges; out of this dense

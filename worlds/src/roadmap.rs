@@ -1,8 +1,8 @@
 //! Roadmaps: undirected, connected graphs embedded in the plane, on which rovers move.
 //!
-//! This file holds the graph and its distances; its checks are in `check`, the file format in `file`.
-//! The built-in maps are made by [`crate::generate`]; who owns which vertex is the affair of
-//! [`crate::sensors`].
+//! This file holds the graph and its distances; its checks are in `check`, the file format in
+//! `file`. The built-in maps are made by [`crate::generate`]; who owns which vertex is the affair
+//! of [`crate::sensors`].
 
 mod check;
 mod closed;
@@ -68,8 +68,8 @@ impl Roadmap {
     /// use nalgebra::Point2;
     /// let v = VertexId;
     /// let corners = vec![Point2::new(0.0, 0.0), Point2::new(9.0, 0.0), Point2::new(9.0, 9.0)];
-    /// let map = Roadmap::new("bend", corners, vec![(v(1), v(0)), (v(1), v(2))], vec![v(0), v(2)])?;
-    /// assert_eq!(map.shortest_path(v(0), v(2)), [v(0), v(1), v(2)]);
+    /// let map = Roadmap::new("bend", corners, vec![(v(1), v(0)), (v(1), v(2))], vec![v(0),
+    /// v(2)])?; assert_eq!(map.shortest_path(v(0), v(2)), [v(0), v(1), v(2)]);
     /// # Ok::<(), farside_worlds::RoadmapError>(())
     /// ```
     ///
@@ -132,7 +132,8 @@ impl Roadmap {
         })
     }
 
-    /// The same roadmap with the terrain's height at each vertex \[m\], for viewers and radio links.
+    /// The same roadmap with the terrain's height at each vertex \[m\], for viewers and radio
+    /// links.
     ///
     /// # Errors
     /// When there is not one finite height for each vertex.
@@ -197,8 +198,8 @@ impl Roadmap {
         &self.boundary
     }
 
-    /// The fewest edges between `u` and `v`; [`Roadmap::UNREACHABLE`] if none lead there, which only
-    /// happens where vertices are closed ([`Roadmap::without`]). Of many vertices to one goal,
+    /// The fewest edges between `u` and `v`; [`Roadmap::UNREACHABLE`] if none lead there, which
+    /// only happens where vertices are closed ([`Roadmap::without`]). Of many vertices to one goal,
     /// [`Roadmap::distances_to`] tells them faster.
     pub fn distance(&self, u: VertexId, v: VertexId) -> u32 {
         assert!(

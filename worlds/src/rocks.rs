@@ -144,7 +144,8 @@ impl RockAbundance {
     }
 }
 
-/// An exponential gap of mean 1, by inversion: how it is drawn is part of what the built-in maps are.
+/// An exponential gap of mean 1, by inversion: how it is drawn is part of what the built-in maps
+/// are.
 fn gap(stream: &mut Stream) -> f64 {
     -libm::log(1.0 - stream.uniform())
 }

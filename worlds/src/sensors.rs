@@ -2,8 +2,8 @@
 //!
 //! This file holds a network, its checks and who owns what; the search for a random one is in
 //! `placement`, how far nodes reach rovers in `coverage`, another division of the vertices in
-//! `ownership`. What the nodes compute and send is no affair of this crate, and neither is the radio:
-//! here two nodes are neighbours when they are within one radius of each other.
+//! `ownership`. What the nodes compute and send is no affair of this crate, and neither is the
+//! radio: here two nodes are neighbours when they are within one radius of each other.
 
 mod coverage;
 mod ownership;
@@ -55,17 +55,17 @@ impl SensorNetwork {
     /// use farside_worlds::{Roadmap, SensorError, SensorNetwork, VertexId};
     /// use nalgebra::Point2;
     /// let ends = vec![Point2::new(0.0, 0.0), Point2::new(10.0, 0.0)];
-    /// let map = Roadmap::new("pair", ends.clone(), vec![(VertexId(0), VertexId(1))], vec![VertexId(0)])?;
-    /// assert!(SensorNetwork::new(&map, ends.clone(), 10.0).is_ok());
+    /// let map = Roadmap::new("pair", ends.clone(), vec![(VertexId(0), VertexId(1))],
+    /// vec![VertexId(0)])?; assert!(SensorNetwork::new(&map, ends.clone(), 10.0).is_ok());
     /// let error = SensorNetwork::new(&map, ends, 9.0).unwrap_err();
     /// assert!(matches!(error, SensorError::InconsistentEdges { .. }));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
-    /// When there is no node or more nodes than vertices, the radius is not positive, a node owns no
-    /// vertex, vertices are out of their owners' range or edges inconsistent (the errors name them
-    /// all).
+    /// When there is no node or more nodes than vertices, the radius is not positive, a node owns
+    /// no vertex, vertices are out of their owners' range or edges inconsistent (the errors name
+    /// them all).
     pub fn new(
         roadmap: &Roadmap,
         positions_m: Vec<Point2<f64>>,

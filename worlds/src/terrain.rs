@@ -41,9 +41,9 @@ impl HeightField {
     /// from south to north.
     ///
     /// # Errors
-    /// When there are fewer than two rows or columns, the last row is cut short, there are more than
-    /// 2^24 samples, or the origin, the resolution or a height is not finite (the resolution must
-    /// be positive, too).
+    /// When there are fewer than two rows or columns, the last row is cut short, there are more
+    /// than 2^24 samples, or the origin, the resolution or a height is not finite (the resolution
+    /// must be positive, too).
     pub fn new(
         origin_m: Point2<f64>,
         resolution_m: f64,

@@ -16,8 +16,8 @@
 
 use std::sync::Arc;
 
-use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
+use farside_actors::link::{Link, LinkParams};
 use farside_actors::units::parse_duration;
 use farside_network::{
     Deadlock, Missions, Motion, NetworkConfig, NetworkMetrics, Parts, Policy, Priority, TeamConfig,
@@ -25,39 +25,13 @@ use farside_network::{
 };
 use farside_worlds::{Endpoints, Ownership, Roadmap};
 
-/// A link with uniform jitter and independent loss.
-#[derive(Clone)]
-struct Radio {
-    latency: SimDuration,
-    jitter: SimDuration,
-    loss: f64,
-}
-
-impl Carrier for Radio {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        self.latency
-    }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        if parcel.random(0, 0, 0).uniform() < self.loss {
-            return verdicts.lose("loss");
-        }
-        let share = parcel.random(1, 0, 0).uniform() * self.jitter.as_nanos() as f64;
-        verdicts.deliver(self.latency + SimDuration::from_nanos(share as u64));
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
-}
-
 struct Options {
     first_seed: u64,
     seeds: u64,
     maps: Vec<String>,
     nodes: Vec<u32>,
     rovers: Vec<u32>,
-    radio: Radio,
+    radio: LinkParams,
     digest: bool,
     endpoints: Endpoints,
     ownership: Ownership,
@@ -71,11 +45,7 @@ fn options() -> Result<Options, Box<dyn std::error::Error>> {
         maps: vec!["crater-dense".into(), "crater-sparse".into()],
         nodes: vec![14, 21, 28],
         rovers: vec![25, 50, 75, 100],
-        radio: Radio {
-            latency: SimDuration::from_millis(5),
-            jitter: SimDuration::ZERO,
-            loss: 0.0,
-        },
+        radio: LinkParams::default(),
         digest: false,
         endpoints: Endpoints::default(),
         ownership: Ownership::default(),
@@ -190,7 +160,9 @@ fn run(
         sim.without_digest();
     }
     let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
-    let network = assemble_over(&mut sim, &parts, &missions, |_, _| options.radio.clone())?;
+    let network = assemble_over(&mut sim, &parts, &missions, |_, _| {
+        Link::new(options.radio.clone())
+    })?;
     let report = sim.run(Executor::Inline)?;
     if let Some(fault) = report.fault() {
         return Err(fault.to_string().into());

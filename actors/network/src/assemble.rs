@@ -31,8 +31,6 @@ use crate::max_plus::processor::PLANNER;
 /// An assembled system: its actors by name, and its score.
 pub struct Network {
     site: Arc<Shared>,
-    nodes: Vec<Address<Node>>,
-    rovers: Vec<Address<Rover>>,
     score: Arc<Mutex<Score>>,
 }
 
@@ -194,16 +192,11 @@ pub fn assemble(
         missions,
         stay_at_target,
     });
-    let nodes = declare_nodes(sim, &site, &wired);
-    let rovers = declare_rovers(sim, &site);
+    declare_nodes(sim, &site, &wired);
+    declare_rovers(sim, &site);
     let (monitor, score) = Monitor::new(site.clone());
     sim.observe(monitor);
-    Ok(Network {
-        site,
-        nodes,
-        rovers,
-        score,
-    })
+    Ok(Network { site, score })
 }
 
 /// Who waits at each entry, in order: all rovers that have a way to their goals.
@@ -311,8 +304,8 @@ fn names(kind: &str, count: usize) -> Vec<String> {
         .collect()
 }
 
-fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>, wired: &Links) -> Vec<Address<Node>> {
-    let declare = |(id, name): (NodeId, &String)| {
+fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>, wired: &Links) {
+    for (id, name) in site.sensors.nodes().zip(&site.node_names) {
         let host = sim.host(name);
         sim.heavy(host);
         let graph = Arc::new(LocalGraph::new(&site.roadmap, &site.sensors, id));
@@ -323,26 +316,15 @@ fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>, wired: &Links) -> Vec
         let planner = format!("{name}/{PLANNER}");
         wired.processor(sim, &planner, |sim, processor| {
             sim.actor(host, name, node(processor))
-        })
-    };
-    site.sensors
-        .nodes()
-        .zip(&site.node_names)
-        .map(declare)
-        .collect()
+        });
+    }
 }
 
-fn declare_rovers(sim: &mut Simulation, site: &Arc<Shared>) -> Vec<Address<Rover>> {
-    let declare = |(id, name): (RoverId, &String)| {
-        let host = sim.host(name);
-        let site = site.clone();
-        sim.actor(host, name, move |_| Rover::new(site.clone(), id))
-    };
-    (0..)
-        .map(RoverId)
-        .zip(&site.rover_names)
-        .map(declare)
-        .collect()
+fn declare_rovers(sim: &mut Simulation, site: &Arc<Shared>) {
+    for (id, name) in (0..).map(RoverId).zip(&site.rover_names) {
+        let (host, site) = (sim.host(name), site.clone());
+        sim.actor(host, name, move |_| Rover::new(site.clone(), id));
+    }
 }
 
 /// Links both ways between neighbouring nodes, and between each node and each rover.
@@ -442,61 +424,4 @@ impl Network {
         let sentence = |r: &Refused| r.sentence(&self.site.rover_names);
         self.site.refused.iter().map(sentence).collect()
     }
-
-    /// Crashes the node or rover called `actor` at `time`: it loses its plans, keeps what is
-    /// durable, and a rover stops where it is.
-    ///
-    /// # Errors
-    /// When there is no such actor.
-    pub fn crash_at(
-        &self,
-        sim: &mut Simulation,
-        time: SimTime,
-        actor: &str,
-    ) -> Result<(), NetworkError> {
-        match self.find(actor)? {
-            Found::Node(address) => sim.crash_at(time, address),
-            Found::Rover(address) => sim.crash_at(time, address),
-        }
-        Ok(())
-    }
-
-    /// Restarts the node or rover called `actor` at `time`.
-    ///
-    /// # Errors
-    /// When there is no such actor.
-    pub fn restart_at(
-        &self,
-        sim: &mut Simulation,
-        time: SimTime,
-        actor: &str,
-    ) -> Result<(), NetworkError> {
-        match self.find(actor)? {
-            Found::Node(address) => sim.restart_at(time, address),
-            Found::Rover(address) => sim.restart_at(time, address),
-        }
-        Ok(())
-    }
-
-    fn find(&self, actor: &str) -> Result<Found, NetworkError> {
-        let place = |names: &[String]| names.iter().position(|name| name == actor);
-        if let Some(at) = place(&self.site.node_names) {
-            return Ok(Found::Node(self.nodes[at]));
-        }
-        if let Some(at) = place(&self.site.rover_names) {
-            return Ok(Found::Rover(self.rovers[at]));
-        }
-        let (nodes, rovers) = (&self.site.node_names, &self.site.rover_names);
-        Err(NetworkError::UnknownActor {
-            name: actor.to_owned(),
-            first: nodes.first().cloned().unwrap_or_default(),
-            last: rovers.last().cloned().unwrap_or_default(),
-        })
-    }
-}
-
-/// An actor found by its name.
-enum Found {
-    Node(Address<Node>),
-    Rover(Address<Rover>),
 }

@@ -92,16 +92,6 @@ pub enum NetworkError {
         /// The last.
         last: String,
     },
-    /// No actor has this name.
-    #[error("no node or rover is called {name}; there are {first} to {last}")]
-    UnknownActor {
-        /// The name asked for.
-        name: String,
-        /// The first name there is.
-        first: String,
-        /// The last.
-        last: String,
-    },
 }
 
 /// `3, 7`.

@@ -39,8 +39,8 @@
 //!   grants a vertex when its occupant is committed to leaving, so in a rotation each grant
 //!   would wait for the one before it, all the way round.
 //! - With [`Rules::DisappearAtTarget`] rovers wait in first-in-first-out queues outside their
-//!   entries, all present in cycle 0 and occupying nothing. A rover that reaches its goal in cycle t
-//!   occupies it in t and is gone in t + 1.
+//!   entries, all present in cycle 0 and occupying nothing. A rover that reaches its goal in cycle
+//!   t occupies it in t and is gone in t + 1.
 //! - With [`Rules::StayAtTarget`], for grid maps, rovers stand at their entries in cycle 0 and stay
 //!   at their goals for ever.
 

@@ -4,9 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
-use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside_actors::link::{Link, LinkParams};
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 use nalgebra::Point2;
 
@@ -17,24 +17,11 @@ use crate::safety::messages::{Beacon, RoverState};
 use crate::testing::grid;
 
 /// A link of 5 ms that loses some.
-#[derive(Clone)]
-struct Lossy(f64);
-
-impl Carrier for Lossy {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        SimDuration::from_millis(5)
-    }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        if parcel.random(0, 0, 0).uniform() < self.0 {
-            return verdicts.lose("loss");
-        }
-        verdicts.deliver(self.min_delay());
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+fn lossy(loss: f64) -> Link {
+    Link::new(LinkParams {
+        loss,
+        ..LinkParams::default()
+    })
 }
 
 /// What was seen of a run: rovers' changes, and what they said.
@@ -139,7 +126,7 @@ impl Case {
             terrain: None,
         };
         let missions = Missions::Queued(missions);
-        let network = assemble_over(&mut sim, &parts, &missions, |a, b| Lossy(loss(a, b)))?;
+        let network = assemble_over(&mut sim, &parts, &missions, |a, b| lossy(loss(a, b)))?;
         let report = sim.run(Executor::Inline).unwrap();
         assert!(report.fault().is_none(), "{:?}", report.fault());
         let seen = std::mem::take(&mut *seen.lock().unwrap());
@@ -603,7 +590,7 @@ mod gaps {
                 terrain: None,
             };
             let (mut sim, missions) = (Simulation::new(1), Missions::Standing(missions));
-            let made = assemble_over(&mut sim, &parts, &missions, |_, _| Lossy(0.0));
+            let made = assemble_over(&mut sim, &parts, &missions, |_, _| lossy(0.0));
             made.err().map(|error| error.to_string())
         };
         let text = assemble(Gaps::Refuse, &[(0, 2)]).unwrap();

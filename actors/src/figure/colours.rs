@@ -1,8 +1,8 @@
 //! Colours that the colour-blind can tell apart.
 
 /// How many series one plot shows: that many colours, dashes and markers there are. The colours are
-/// those of Okabe and Ito (*Color Universal Design*, 2008) without the yellow, which is too faint on
-/// paper; they are set in `style.css`.
+/// those of Okabe and Ito (*Color Universal Design*, 2008) without the yellow, which is too faint
+/// on paper; they are set in `style.css`.
 pub const SERIES: usize = 7;
 
 /// How the lines are dashed, so that no one needs colours.

@@ -96,7 +96,8 @@ impl<V: fmt::Display> fmt::Display for Collision<V> {
 /// It knows nothing of the graph but what agents claim, and nothing of why they do.
 ///
 /// A collision is counted when its second claim is made, once for each pair; two that stay where
-/// they met do not collide again. Each change costs a few map look-ups, whatever the number of agents.
+/// they met do not collide again. Each change costs a few map look-ups, whatever the number of
+/// agents.
 ///
 /// ```
 /// use farside::SimTime;

@@ -1,4 +1,5 @@
-//! Observers that keep [`Collisions`] and a [`WaitGraph`] from the state samples of a user's actors.
+//! Observers that keep [`Collisions`] and a [`WaitGraph`] from the state samples of a user's
+//! actors.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -179,8 +180,8 @@ pub struct DeadlockReport<V> {
     pub since: SimTime,
     /// When that was noticed.
     pub noticed: SimTime,
-    /// Who waits for each other, the shortest circle first. Empty if nobody moves and nobody waits in
-    /// a circle: they wait for something else.
+    /// Who waits for each other, the shortest circle first. Empty if nobody moves and nobody waits
+    /// in a circle: they wait for something else.
     pub cycles: Vec<WaitCycle<V>>,
     /// How many agents are not done.
     pub left: usize,
@@ -200,11 +201,11 @@ impl<V: fmt::Display> fmt::Display for DeadlockReport<V> {
     }
 }
 
-/// Finds those who wait for each other in a circle, among the actors that record samples of type `S`,
-/// and teams of which nobody moves.
+/// Finds those who wait for each other in a circle, among the actors that record samples of type
+/// `S`, and teams of which nobody moves.
 ///
-/// - **Circle**: each waits for the next, and none of them has moved or waited for anybody else for a
-///   window of virtual time. Others may still move: that is a deadlock of a part of the team.
+/// - **Circle**: each waits for the next, and none of them has moved or waited for anybody else for
+///   a window of virtual time. Others may still move: that is a deadlock of a part of the team.
 /// - **Nobody moves**: no agent that is not done has changed its place for the window.
 ///
 /// Both are looked for at each record that the run commits. When nothing at all is left to happen,
@@ -224,8 +225,8 @@ where
     V: Copy + Ord + fmt::Display + Send,
     R: FnMut(&str, &S) -> Seen<V> + Send,
 {
-    /// A monitor that asks `read` what an actor's latest sample says, by the actor's name; and what to
-    /// read the result from. It reports, and leaves the run alone.
+    /// A monitor that asks `read` what an actor's latest sample says, by the actor's name; and what
+    /// to read the result from. It reports, and leaves the run alone.
     pub fn new(window: SimDuration, read: R) -> (Self, Handle<Vec<DeadlockReport<V>>>) {
         let found = Handle::new(Vec::new());
         let monitor = DeadlockMonitor {

@@ -70,9 +70,9 @@ impl WaitGraph {
         self.waits[agent].iter().copied()
     }
 
-    /// The sets of agents of which each waits, in one step or several, for each other and for itself:
-    /// the strongly connected components that hold a cycle. Each ascending; the smallest set first, of
-    /// equals the one with the lowest numbers.
+    /// The sets of agents of which each waits, in one step or several, for each other and for
+    /// itself: the strongly connected components that hold a cycle. Each ascending; the smallest
+    /// set first, of equals the one with the lowest numbers.
     pub fn knots(&self) -> Vec<Vec<usize>> {
         let mut knots = Search::new(self).components();
         knots.retain(|knot| knot.len() > 1 || self.waits[knot[0]].contains(&knot[0]));

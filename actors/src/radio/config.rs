@@ -55,9 +55,9 @@ pub enum Sharing {
 /// | `queue` | messages that wait for a link that has no `queue` of its own, where a channel is shared (`queue_full`) | 64 |
 ///
 /// A link goes through a radio by `radio = "NAME"` among its own parameters, which go on to apply:
-/// its rate decides how long it is on the air, its retries what happens after a collision, its queue
-/// what waits. A station transmits one message at a time, whatever link it is for; a link with retries
-/// stops and waits for each answer, and the station's other links go on meanwhile.
+/// its rate decides how long it is on the air, its retries what happens after a collision, its
+/// queue what waits. A station transmits one message at a time, whatever link it is for; a link
+/// with retries stops and waits for each answer, and the station's other links go on meanwhile.
 ///
 /// ```
 /// use farside_actors::radio::{Access, RadioConfig};

@@ -92,8 +92,8 @@ impl Radio {
     }
 
     /// The soonest that a frame can have its turn behind the `first` of its line: when all ahead of
-    /// it have been on the air, as long as nothing changes airtimes; else, when something happens to
-    /// the first.
+    /// it have been on the air, as long as nothing changes airtimes; else, when something happens
+    /// to the first.
     fn turn_of(&self, at: u32, first: u32, now: SimTime) -> SimTime {
         let (frame, first) = (&self.frames[at as usize], &self.frames[first as usize]);
         let ahead = match first.phase {

@@ -23,8 +23,8 @@ pub struct SeriesIndex {
     pub label: &'static str,
     /// Its unit, empty for none.
     pub unit: &'static str,
-    /// Some runs of a cell may end at an earlier index than others. All have the same indices as far
-    /// as they go.
+    /// Some runs of a cell may end at an earlier index than others. All have the same indices as
+    /// far as they go.
     pub lengths_differ: bool,
 }
 

@@ -1,5 +1,6 @@
-//! Settings of a system, declared once: one list of keys gives the struct, its defaults, its reading
-//! and writing, range checks with the key's own place, and what `farside explain` says of each key.
+//! Settings of a system, declared once: one list of keys gives the struct, its defaults, its
+//! reading and writing, range checks with the key's own place, and what `farside explain` says of
+//! each key.
 //!
 //! ```
 //! use farside::SimDuration;
@@ -25,8 +26,8 @@
 //! let error = settings.check("ping").unwrap_err().to_string();
 //! assert_eq!(error, "ping.count: 0: expected 1 to 1000");
 //! let section = &PingSettings::sections("ping")[0];
-//! assert_eq!((section.keys[2].name, section.keys[0].expected.as_str()), ("distance", "1 to 1000"));
-//! assert_eq!(section.defaults["interval"].as_str(), Some("1s"));
+//! assert_eq!((section.keys[2].name, section.keys[0].expected.as_str()), ("distance", "1 to
+//! 1000")); assert_eq!(section.defaults["interval"].as_str(), Some("1s"));
 //! # Ok::<(), toml::de::Error>(())
 //! ```
 

@@ -34,8 +34,9 @@ use farside::suggest::{closest, did_you_mean};
 /// assert_eq!(links.nominal("base", "rover_1").unwrap().loss, 0.5);
 ///
 /// let config: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
-/// let error = LinkBuilder::new(&config, &[])?.build(&mut Simulation::new(1), &wiring).unwrap_err();
-/// assert!(error.to_string().ends_with("matches no link; did you mean \"base-rover_*\"?"));
+/// let error = LinkBuilder::new(&config, &[])?.build(&mut Simulation::new(1),
+/// &wiring).unwrap_err(); assert!(error.to_string().ends_with("matches no link; did you mean
+/// \"base-rover_*\"?"));
 /// # Ok::<(), farside_actors::link::LinkConfigError>(())
 /// ```
 #[derive(Default)]
@@ -142,8 +143,8 @@ impl LinkBuilder {
     }
 
     /// Gives links the contacts of a plan over hosts' names, beneath what `[links]` says of them:
-    /// `contacts` there replaces the plan's. A link between hosts that the plan does not both name is
-    /// left alone; one between hosts that it names, without a contact, is closed.
+    /// `contacts` there replaces the plan's. A link between hosts that the plan does not both name
+    /// is left alone; one between hosts that it names, without a contact, is closed.
     pub fn set_plan(&mut self, plan: Arc<ContactPlan>) {
         self.plan = Some(plan);
     }
@@ -252,8 +253,8 @@ impl LinkBuilder {
     /// that every pattern has matched some link.
     ///
     /// # Errors
-    /// When one has not (the error has the nearest name), a link names a radio that there is not, or
-    /// a radio must know where a host is that has no place; when a trace was not read.
+    /// When one has not (the error has the nearest name), a link names a radio that there is not,
+    /// or a radio must know where a host is that has no place; when a trace was not read.
     pub fn build(
         mut self,
         sim: &mut Simulation,
@@ -276,8 +277,8 @@ impl LinkBuilder {
         Ok(links)
     }
 
-    /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations. A
-    /// link through a radio is declared with it, by [`LinkBuilder::finish`].
+    /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations.
+    /// A link through a radio is declared with it, by [`LinkBuilder::finish`].
     fn connect(
         &mut self,
         sim: &mut Simulation,

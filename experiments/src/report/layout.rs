@@ -113,7 +113,8 @@ impl Layout {
     }
 
     /// Curves over the first factor of numbers (of words, if there are no others), one for each
-    /// level of the next; further factors make further plots. Only cells in a grid or a row have any.
+    /// level of the next; further factors make further plots. Only cells in a grid or a row have
+    /// any.
     pub(super) fn curves(&self) -> Option<Curves> {
         let numeric = self.axes.iter().position(|axis| axis.numeric);
         let x = numeric.unwrap_or(0);

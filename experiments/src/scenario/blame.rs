@@ -13,7 +13,8 @@ impl ScenarioError {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.start);
         let key = source.key_at(&span);
-        // Shortened only where it is shown: the names at its end are all needed to find the nearest.
+        // Shortened only where it is shown: the names at its end are all needed to find the
+        // nearest.
         let message = in_words(one_line(error.message()));
         let names = backticked(&message);
         let unknown = ["unknown field", "unknown variant"]

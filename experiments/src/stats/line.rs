@@ -8,13 +8,14 @@ pub struct Line {
     pub slope: f64,
     /// The y at x = 0.
     pub intercept: f64,
-    /// The coefficient of determination: 1 minus the ratio of the squared distances from the line to
-    /// those from the mean of y; 1 if all points are on the line. Not a number if all y are equal.
+    /// The coefficient of determination: 1 minus the ratio of the squared distances from the line
+    /// to those from the mean of y; 1 if all points are on the line. Not a number if all y are
+    /// equal.
     pub r_squared: f64,
 }
 
-/// The line through some points. Points that are no finite numbers are left out. None for fewer than
-/// two different x.
+/// The line through some points. Points that are no finite numbers are left out. None for fewer
+/// than two different x.
 ///
 /// Each point counts the same: a study's cells all have the same seeds.
 ///

@@ -47,10 +47,10 @@ pub struct Survival {
 ///
 /// The variance of the curve's logarithm sums the squared influence of each group, which is
 /// Greenwood's formula if every group is of one (Greenwood 1926; Williams, *Product-Limit Survival
-/// Functions with Correlated Survival Times*, 1995); the interval is laid over log(-log), so that it
-/// stays within 0 and 1 (Kalbfleisch and Prentice, 1980). Before anything happens it has no width.
-/// At 0 the formula says nothing, and the upper end stays where it was. With one group of several,
-/// nothing says how groups differ, and the interval is from 0 to 1.
+/// Functions with Correlated Survival Times*, 1995); the interval is laid over log(-log), so that
+/// it stays within 0 and 1 (Kalbfleisch and Prentice, 1980). Before anything happens it has no
+/// width. At 0 the formula says nothing, and the upper end stays where it was. With one group of
+/// several, nothing says how groups differ, and the interval is from 0 to 1.
 ///
 /// Observations whose time is not a number, or below 0, are left out.
 ///

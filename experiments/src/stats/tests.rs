@@ -122,8 +122,8 @@ fn mcnemar_agrees_with_statsmodels() {
     }
 }
 
-/// Pairs that go together, as runs of one seed do: the first holds with 0.8, the second with 0.6, and
-/// never the second alone.
+/// Pairs that go together, as runs of one seed do: the first holds with 0.8, the second with 0.6,
+/// and never the second alone.
 #[test]
 fn paired_rates_hold_the_truth_about_as_often_as_they_say() {
     let trials = 2000;
@@ -156,8 +156,8 @@ fn singles(times: &[f64], happened: &[u8]) -> Vec<Observation> {
     pairs.map(one).collect()
 }
 
-/// `lifelines.KaplanMeierFitter().fit(t, e)`, lifelines 0.30.3, whose intervals are Greenwood's over
-/// log(-log): the remission times of Freireich and others (1963).
+/// `lifelines.KaplanMeierFitter().fit(t, e)`, lifelines 0.30.3, whose intervals are Greenwood's
+/// over log(-log): the remission times of Freireich and others (1963).
 #[test]
 fn kaplan_meier_agrees_with_lifelines() {
     let times = [

@@ -168,7 +168,8 @@ pub struct Cell {
 
 /// What is measured. What a run reports under the metric's name decides how it is summed up:
 /// a number by its mean, true or false as a rate, a list of numbers as a distribution (`null`: it
-/// had not happened when the run ended), a curve ([`farside_actors::system::Series`]) index by index.
+/// had not happened when the run ended), a curve ([`farside_actors::system::Series`]) index by
+/// index.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Metric {

@@ -1,6 +1,6 @@
-//! What people read, as it stands: the help of every command, the texts of mistakes, and three small
-//! pictures. They are in `snapshots/`, and a difference fails: see `.config/insta.yaml` for how one
-//! that is meant is taken over.
+//! What people read, as it stands: the help of every command, the texts of mistakes, and three
+//! small pictures. They are in `snapshots/`, and a difference fails: see `.config/insta.yaml` for
+//! how one that is meant is taken over.
 
 use std::path::Path;
 use std::process::Command;

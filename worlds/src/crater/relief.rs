@@ -63,7 +63,8 @@ pub(super) fn height_field(
     )
 }
 
-/// The large crater: a bowl up to its crest, an apron beyond that falls with the cube of the distance.
+/// The large crater: a bowl up to its crest, an apron beyond that falls with the cube of the
+/// distance.
 fn bowl_m(settings: &CraterSettings, phases: &[f64], x_m: f64, y_m: f64) -> f64 {
     let angle = libm::atan2(y_m, x_m);
     let waves = OUTLINE.iter().zip(phases);

@@ -63,8 +63,8 @@ impl TaskList {
     /// ```
     ///
     /// # Errors
-    /// When there are more than [`MAX_TASKS`] tasks or more than half the region's cells, or the name
-    /// is empty or has white space other than single blanks in it.
+    /// When there are more than [`MAX_TASKS`] tasks or more than half the region's cells, or the
+    /// name is empty or has white space other than single blanks in it.
     pub fn random(
         map_name: &str,
         map: &GridMap,

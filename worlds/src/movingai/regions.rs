@@ -5,7 +5,8 @@ use super::{Cell, GridMap};
 /// No region: a wall.
 const NONE: u32 = u32::MAX;
 
-/// Each passable cell belongs to one region. They are numbered from 0 in order of their first cells.
+/// Each passable cell belongs to one region. They are numbered from 0 in order of their first
+/// cells.
 pub(super) struct Regions {
     of_cell: Vec<u32>,
     sizes: Vec<usize>,

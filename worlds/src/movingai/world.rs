@@ -13,11 +13,13 @@ use crate::roadmap::{Blocked, MAX_COORDINATE_M, MAX_VERTICES, Roadmap, well_form
 /// A roadmap made of a map's cells, with tasks over it.
 ///
 /// - There is a vertex for each passable cell of **one** region of the map, at the cell's centre.
-///   Vertices are numbered as cells stand in the file: row by row from the north, each from the west.
+///   Vertices are numbered as cells stand in the file: row by row from the north, each from the
+///   west.
 /// - Edges join cells that share a side. Rovers take no diagonal steps, as is the custom for
 ///   multi-agent path-finding.
 /// - x runs to the east and y to the **north**, from the map's south-western corner: the cell in
-///   column `x` and row `y` of a map of `h` rows lies at `((x + 0.5) * cell_m, (h - y - 0.5) * cell_m)`.
+///   column `x` and row `y` of a map of `h` rows lies at `((x + 0.5) * cell_m, (h - y - 0.5) *
+///   cell_m)`.
 /// - The boundary is what a roadmap must have; here rovers start on the map and stay on it. It is
 ///   the cells that lie furthest to the north, east, south or west of the region.
 ///
@@ -163,7 +165,8 @@ impl GridWorld {
     /// let world = GridWorld::new("a.map", &map, 1.0, tasks.tasks())?;
     /// assert_eq!(
     ///     world.explain(&world.blocked()[0]),
-    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another task; the \
+    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another task;
+    ///     the \
     ///      best over (1, 0) of line 3"
     /// );
     /// # Ok::<(), farside_worlds::movingai::GridError>(())

@@ -10,12 +10,13 @@ impl Roadmap {
     /// What [`Roadmap::distance`] says of two vertices between which no path leads.
     pub const UNREACHABLE: u32 = NO_WAY as u32;
 
-    /// The same roadmap with these vertices closed: no edge leads to one. All vertices, numbers and the
-    /// boundary stay; the rest may fall apart.
+    /// The same roadmap with these vertices closed: no edge leads to one. All vertices, numbers and
+    /// the boundary stay; the rest may fall apart.
     ///
     /// ```
     /// use farside_worlds::{Roadmap, VertexId as V};
-    /// let text = "name = 'bend'\nboundary = [0, 2]\npositions_m = [[0, 0], [5, 0], [9, 0], [5, 5]]\n\
+    /// let text = "name = 'bend'\nboundary = [0, 2]\npositions_m = [[0, 0], [5, 0], [9, 0], [5,
+    /// 5]]\n\
     ///             edges = [[0, 1], [1, 2], [0, 3], [2, 3]]";
     /// let map = Roadmap::from_toml(text)?;
     /// assert_eq!(map.without(&[V(1)]).shortest_path(V(0), V(2)), [V(0), V(3), V(2)]);

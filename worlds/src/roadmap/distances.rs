@@ -1,6 +1,6 @@
-//! How far it is from vertex to vertex. Small roadmaps have a table of all pairs; of large ones, for
-//! which that would take gigabytes, a vertex gets its **field** of distances when it is first asked
-//! about: a team asks about its goals, again and again, and about little else.
+//! How far it is from vertex to vertex. Small roadmaps have a table of all pairs; of large ones,
+//! for which that would take gigabytes, a vertex gets its **field** of distances when it is first
+//! asked about: a team asks about its goals, again and again, and about little else.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -261,10 +261,10 @@ fn diameter(neighbors: &[Vec<VertexId>], ends: usize) -> u32 {
     u32::from(longest)
 }
 
-/// The largest distance in the part of a graph that `first` is in, by searches from the rim inwards: two
-/// vertices that are both nearer to the middle than some depth are less than twice that depth apart
-/// (Crescenzi et al., *On computing the diameter of real-world undirected graphs*, TCS 514, 2013). The
-/// middle is sought between so many ends; the fewer, the more searches.
+/// The largest distance in the part of a graph that `first` is in, by searches from the rim
+/// inwards: two vertices that are both nearer to the middle than some depth are less than twice
+/// that depth apart (Crescenzi et al., *On computing the diameter of real-world undirected graphs*,
+/// TCS 514, 2013). The middle is sought between so many ends; the fewer, the more searches.
 fn diameter_around(neighbors: &[Vec<VertexId>], first: VertexId, ends: usize) -> u16 {
     // The middle is the vertex least far from some ends, each of which is the farthest from the
     // middle of those before it.

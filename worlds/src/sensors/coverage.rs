@@ -1,5 +1,5 @@
-//! How far nodes reach rovers, and the vertices where nobody does (*network-guided*, section 5, asks
-//! what to do "if there are gaps in the coverage of the workspace").
+//! How far nodes reach rovers, and the vertices where nobody does (*network-guided*, section 5,
+//! asks what to do "if there are gaps in the coverage of the workspace").
 
 use super::SensorNetwork;
 use crate::error::SensorError;
@@ -7,8 +7,8 @@ use crate::ids::VertexId;
 use crate::roadmap::Roadmap;
 
 impl SensorNetwork {
-    /// The same network with nodes that reach rovers as far as `coverage_m` \[m\], and each other as far
-    /// as before. Vertices farther than that from their owners are its gaps.
+    /// The same network with nodes that reach rovers as far as `coverage_m` \[m\], and each other
+    /// as far as before. Vertices farther than that from their owners are its gaps.
     ///
     /// ```
     /// use farside_worlds::{Roadmap, SensorNetwork, VertexId};

@@ -1,11 +1,12 @@
-//! Who owns what, evened out: vertices go from nodes that have much to neighbours that have less, as far
-//! as a network's promises allow.
+//! Who owns what, evened out: vertices go from nodes that have much to neighbours that have less,
+//! as far as a network's promises allow.
 //!
-//! A vertex may go from its owner to the owner of a vertex beside it, if that one is in range of it and
-//! everyone beside it stays the same node or a neighbour, the old owner keeps a vertex, and its part
-//! falls into no more pieces than before. A step is one such move, or a chain of them from a node over
-//! others to one that has less: what is between keeps as much as it had. Each step lowers the sum of the
-//! squares of what nodes have, so that there is an end; it need not be the best of all.
+//! A vertex may go from its owner to the owner of a vertex beside it, if that one is in range of it
+//! and everyone beside it stays the same node or a neighbour, the old owner keeps a vertex, and its
+//! part falls into no more pieces than before. A step is one such move, or a chain of them from a
+//! node over others to one that has less: what is between keeps as much as it had. Each step lowers
+//! the sum of the squares of what nodes have, so that there is an end; it need not be the best of
+//! all.
 
 use serde::{Deserialize, Serialize};
 
@@ -35,8 +36,8 @@ pub enum Ownership {
     Nearest,
     /// Nodes own as equally many vertices as radio range allows.
     Balanced,
-    /// The same, where a vertex counts as often as shortest paths between boundary vertices lead over it:
-    /// rovers are to be expected there.
+    /// The same, where a vertex counts as often as shortest paths between boundary vertices lead
+    /// over it: rovers are to be expected there.
     Traffic,
 }
 
@@ -74,7 +75,8 @@ impl SensorNetwork {
     }
 }
 
-/// One more than the number of pairs of boundary vertices whose shortest path leads over each vertex.
+/// One more than the number of pairs of boundary vertices whose shortest path leads over each
+/// vertex.
 fn traffic(roadmap: &Roadmap) -> Vec<u64> {
     let mut over = vec![1; roadmap.len()];
     let ends = roadmap.boundary();
@@ -171,8 +173,8 @@ impl<'a> Division<'a> {
         beside.filter(own).any(|u| !reached.contains(&u))
     }
 
-    /// The lightest vertex that may go from each node to each other one, of equals the lowest: by the
-    /// node it comes from, then by the one it goes to.
+    /// The lightest vertex that may go from each node to each other one, of equals the lowest: by
+    /// the node it comes from, then by the one it goes to.
     fn moves(&self) -> Vec<Vec<Move>> {
         let mut moves: Vec<Vec<Move>> = vec![Vec::new(); self.counts.len()];
         for v in self.roadmap.vertices() {
@@ -203,8 +205,8 @@ impl<'a> Division<'a> {
         moves
     }
 
-    /// Makes the division more even by a move or a chain of moves, from the node that has most if it can
-    /// be. False if there is none.
+    /// Makes the division more even by a move or a chain of moves, from the node that has most if
+    /// it can be. False if there is none.
     fn step(&mut self) -> bool {
         let moves = self.moves();
         let mut sources: Vec<NodeId> = self.network.nodes().collect();

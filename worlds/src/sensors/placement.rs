@@ -58,8 +58,8 @@ impl SensorNetwork {
         Self::place_covering(roadmap, nodes, radius_m, radius_m, seed)
     }
 
-    /// The same with nodes that reach rovers as far as `coverage_m` \[m\] only, and placed so that this
-    /// leaves no gap.
+    /// The same with nodes that reach rovers as far as `coverage_m` \[m\] only, and placed so that
+    /// this leaves no gap.
     ///
     /// # Errors
     /// The same; and when `coverage_m` is not a positive finite number.
@@ -101,8 +101,8 @@ impl SensorNetwork {
         })
     }
 
-    /// A radio radius \[m\] with which [`SensorNetwork::place`] finds a placement for (nearly) every
-    /// seed: a fixed multiple of the nodes' mean spacing over the roadmap.
+    /// A radio radius \[m\] with which [`SensorNetwork::place`] finds a placement for (nearly)
+    /// every seed: a fixed multiple of the nodes' mean spacing over the roadmap.
     pub fn default_radius_m(roadmap: &Roadmap, nodes: usize) -> f64 {
         libm::ceil(RADIUS_SPACINGS * mean_spacing_m(roadmap, nodes)).max(1.0)
     }

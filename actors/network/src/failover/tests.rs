@@ -190,10 +190,10 @@ fn run_on(
     for &(who, at, back) in &trial.crashes {
         let name = &names[who as usize % names.len()];
         let down = SimTime::ZERO + SimDuration::from_millis(at);
-        network.crash_at(&mut sim, down, name).unwrap();
+        sim.crash_named_at(down, name).unwrap();
         if let Some(back) = back {
             let up = down + SimDuration::from_millis(back);
-            network.restart_at(&mut sim, up, name).unwrap();
+            sim.restart_named_at(up, name).unwrap();
         }
     }
     if let Some(time) = stop {

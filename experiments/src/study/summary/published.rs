@@ -36,8 +36,8 @@ pub struct Beside {
     pub ci_high: f64,
     /// Ours less theirs. None beside a bound that ours keeps; else from the bound on.
     pub difference: Option<f64>,
-    /// Our interval holds the published figure, or reaches into what a bound allows. None if we have
-    /// no interval.
+    /// Our interval holds the published figure, or reaches into what a bound allows. None if we
+    /// have no interval.
     pub inside: Option<bool>,
 }
 
@@ -65,7 +65,8 @@ pub struct LineSummary {
     pub intercept: f64,
     /// The coefficient of determination.
     pub r_squared: f64,
-    /// How far the cell that is farthest from the line is off it, as a share of the greatest figure.
+    /// How far the cell that is farthest from the line is off it, as a share of the greatest
+    /// figure.
     pub farthest: f64,
 }
 
