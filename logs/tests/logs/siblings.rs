@@ -275,32 +275,59 @@ fn messages_are_aligned_by_what_they_say_and_when() {
 
 #[test]
 fn topics_stored_one_after_the_other_compare_as_fast_as_mixed_ones() {
-    // 40 topics in 40 chunks of 2 MB, all messages changed: reading a chunk for each message would
-    // unpack 400 MB forty times over.
-    let pad = " ".repeat(50_000);
-    let data = |side: &str, n: usize| format!("{{\"s\":\"{side}\",\"n\":{n}{pad}}}");
-    let declared: Vec<u8> = (0..40)
-        .flat_map(|at| channel(at, 0, &format!("/{at}"), "json"))
-        .collect();
-    let add = |side, topic: u16, n: usize| message(topic, n as u64, data(side, n).as_bytes());
-    let topics = |n: usize| {
-        (0..40)
-            .flat_map(move |topic| add("a", topic, n))
-            .collect::<Vec<u8>>()
-    };
-    let rounds = |topic: u16| {
-        (0..40)
-            .flat_map(move |n| add("b", topic, n))
-            .collect::<Vec<u8>>()
-    };
-    let mixed = (0..40).fold(File::new().with(&declared), |file, n| {
-        file.with(chunk("zstd", &topics(n)))
+    // 100 topics in 100 chunks of 2 MB, all messages changed: opening a chunk for each message
+    // would unpack 20 GB.
+    const TOPICS: u16 = 100;
+    let mut state = 1u64;
+    let letters = std::iter::repeat_with(|| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        char::from(b'a' + (state >> 60) as u8)
     });
-    let sorted = (0..40).fold(File::new().with(&declared), |file, topic| {
-        file.with(chunk("zstd", &rounds(topic)))
-    });
-    let report = compared(&mixed.end(), &sorted.end(), 0.0);
-    assert_eq!(report.changed, 1600, "{report}");
+    // Long, and not the same in any two messages, so that unpacking takes its time.
+    let letters: String = letters.take(80_000).collect();
+    let add = |side: &str, topic: u16, n: u16| {
+        let from = (usize::from(topic) * 593 + usize::from(n) * 419) % 60_000;
+        let pad = &letters[from..from + 20_000];
+        let data = format!("{{\"s\":\"{side}\",\"n\":{n},\"pad\":\"{pad}\"}}");
+        message(topic, u64::from(n), data.as_bytes())
+    };
+    let declared = |at| channel(at, 0, &format!("/{at}"), "json");
+    let declared: Vec<u8> = (0..TOPICS).flat_map(declared).collect();
+    let chunks = |side: &'static str, by_topic: bool| {
+        let file = File::new().with(&declared);
+        let of = |outer: u16, inner: u16| match by_topic {
+            true => add(side, outer, inner),
+            false => add(side, inner, outer),
+        };
+        let chunk_of = |outer| {
+            (0..TOPICS)
+                .flat_map(|inner| of(outer, inner))
+                .collect::<Vec<u8>>()
+        };
+        let add = |file: File, outer| file.with(chunk("zstd", &chunk_of(outer)));
+        (0..TOPICS).fold(file, add).end()
+    };
+    let (mixed, sorted) = (chunks("a", false), chunks("b", true));
+    let (done, answer) = std::sync::mpsc::channel();
+    std::thread::spawn(move || done.send(compared(&mixed, &sorted, 0.0)));
+    let report = answer.recv_timeout(std::time::Duration::from_secs(8));
+    let report = report.expect("it takes a fraction of that");
+    assert_eq!(report.changed, 10_000, "{report}");
+}
+
+#[test]
+fn topics_without_messages_are_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = File::new().with(channel(1, 0, "/never", "json")).end();
+    let told = info(file.write(folder.path(), "x")).unwrap();
+    assert_eq!((told.topics.len(), told.topics[0].messages), (1, 0));
+    let (report, saved) = recovered(&file);
+    assert!(
+        report.is_lossless() && saved.topics[0].topic == "/never",
+        "{report}"
+    );
 }
 
 /// Twenty messages, declared, in a chunk or not.
