@@ -1,5 +1,5 @@
-//! Compares two logs that are real but for the edits that the input makes in the messages of
-//! either. Whatever they are, there is an error or a report that is the same both ways; and logs
+//! Compares two different logs, which are real but for the edits that the input makes in the messages
+//! of either. Whatever they are, there is an error or a report that is the same both ways; and logs
 //! without edits are the same.
 #![no_main]
 
@@ -27,4 +27,34 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let tolerant = DiffOptions { tolerance: 1e-3, ignore: vec!["/state/**".to_owned()] };
     let _ = diff(&a, &b, &tolerant);
+    // And as somebody else's files, by topic: the same messages without what Farside's logs begin
+    // with.
+    let [a, b] = [&a, &b].map(|path| {
+        let foreign = path.with_extension("foreign");
+        std::fs::write(&foreign, without_metadata(path)).expect("a file");
+        foreign
+    });
+    if let Ok(report) = diff(&a, &b, &tolerant) {
+        assert!(!report.to_string().is_empty());
+    }
 });
+
+/// The log without its metadata, which says whose it is.
+fn without_metadata(path: &std::path::Path) -> Vec<u8> {
+    let bytes = std::fs::read(path).expect("it was written");
+    let mut out = bytes[..8].to_vec();
+    let mut rest = &bytes[8..];
+    while let Some((head, behind)) = rest.split_first_chunk::<9>() {
+        let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes")) as usize;
+        let Some((content, behind)) = behind.split_at_checked(length) else {
+            break;
+        };
+        if head[0] != mcap::records::op::METADATA {
+            out.extend_from_slice(head);
+            out.extend_from_slice(content);
+        }
+        rest = behind;
+    }
+    out.extend_from_slice(rest);
+    out
+}

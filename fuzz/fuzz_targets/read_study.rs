@@ -3,7 +3,7 @@
 #![no_main]
 
 use farside_experiments::study::Study;
-use farside_experiments::system::Registry;
+use farside_experiments::registry::Registry;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {

@@ -1,5 +1,6 @@
 //! Breaks a real log: the input overwrites, cuts out and puts in bytes. What is recovered is a
-//! whole file, and every message in it is one that the log had.
+//! whole file, and every message in it is one that the log had, or the report says that some are
+//! doubtful or lost.
 #![no_main]
 
 use std::collections::BTreeSet;
@@ -44,7 +45,10 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(!report.to_string().is_empty());
     let saved = std::fs::read(&out).expect("a file");
     let known = MESSAGES.get_or_init(|| messages(log()));
-    assert!(messages(&saved).is_subset(known), "a message that nobody wrote");
+    // Only what is named as unchecked may be something that nobody wrote, and what no checksum
+    // covers: messages that the input itself spells out between the chunks.
+    let strangers = messages(&saved).difference(known).count() as u64;
+    assert!(strangers == 0 || !report.is_lossless(), "messages that nobody wrote: {report}");
     if broken == log() {
         assert_eq!((report.losses, messages(&saved).len()), (0, known.len()));
     }

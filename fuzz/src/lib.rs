@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use farside::Executor;
+use farside_experiments::registry::Registry;
 use farside_experiments::scenario::Scenario;
-use farside_experiments::system::Registry;
 use farside_logs::{LogOptions, LogWriter};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader};

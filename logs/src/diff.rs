@@ -361,24 +361,22 @@ impl Comparison {
 
     fn count_records(&mut self) {
         let mut ignored = [0; 2];
-        for side in 0..2 {
+        for (side, ignored) in ignored.iter_mut().enumerate() {
             let index = if side == 0 { &self.a } else { &self.b };
-            let entries: Vec<(u32, bool)> = index
-                .entries
-                .iter()
-                .map(|entry| (entry.topic, entry.ignored))
-                .collect();
             for (role, count) in &index.left_out {
                 let role = if role.is_empty() { "other" } else { role };
                 let counts = self.report.not_compared.entry(role.to_owned());
-                counts.or_default()[side] = *count;
+                counts.or_default()[side] += *count;
             }
-            for (topic, is_ignored) in entries {
-                if is_ignored {
-                    ignored[side] += 1;
+            let entries = index.entries.len();
+            for at in 0..entries {
+                let index = if side == 0 { &self.a } else { &self.b };
+                let entry = index.entries[at];
+                if entry.ignored {
+                    *ignored += 1;
                     continue;
                 }
-                let topic = self.topic(topic);
+                let topic = self.topic(entry.topic);
                 match side {
                     0 => topic.a += 1,
                     _ => topic.b += 1,
@@ -390,9 +388,8 @@ impl Comparison {
             }
         }
         if ignored != [0; 2] {
-            self.report
-                .not_compared
-                .insert("ignored".to_owned(), ignored);
+            let what = "ignored".to_owned();
+            self.report.not_compared.insert(what, ignored);
         }
     }
 

@@ -229,7 +229,7 @@ pub(crate) fn what_it_is(first: &[u8]) -> String {
         ),
         (
             b"SQLite format 3\0",
-            "is an SQLite database, perhaps a ROS 2 bag: `ros2 bag convert` makes an MCAP file of it",
+            "is an SQLite database, perhaps a ROS 2 bag: `ros2 bag convert` makes MCAP of it",
         ),
         (b"\x1f\x8b", "is compressed with gzip: `gunzip` unpacks it"),
         (

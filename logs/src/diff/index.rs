@@ -145,7 +145,7 @@ impl Index {
             }
         }
         let ends = |(name, _): &&(String, _)| mode == Mode::Farside && name == "farside.end";
-        let end = beside.metadata.iter().filter(ends).next_back();
+        let end = beside.metadata.iter().rfind(ends);
         Ok(Index {
             end: end.map(|(_, entries)| entries.clone()),
             scanner,

@@ -58,8 +58,8 @@ impl Salvage<'_> {
         }
     }
 
-    /// A chunk whose record has a wrong length, is cut or was never closed. Gives the place to go on
-    /// at; none if its head makes no sense.
+    /// A chunk whose record has a wrong length, is cut or was never closed. Gives the place to go
+    /// on at; none if its head makes no sense.
     pub(super) fn broken_chunk(
         &mut self,
         bytes: &mut impl Bytes,

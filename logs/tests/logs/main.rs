@@ -1,5 +1,6 @@
 //! Logs of small simulations, from the outside: written, read, verified, compared, recovered.
 
+mod by_hand;
 mod common;
 mod comparing;
 mod hostile;

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use farside_logs::{DiffOptions, DiffReport, LogError, RecoverReport, diff, info, recover};
 use mcap::records::op;
@@ -11,100 +10,6 @@ use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
 use prost_reflect::prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
 };
-
-/// An MCAP file, written record by record.
-#[derive(Clone, Default)]
-struct File(Vec<u8>);
-
-fn text(text: &str) -> Vec<u8> {
-    [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
-}
-
-fn record(opcode: u8, content: &[u8]) -> Vec<u8> {
-    [
-        &[opcode][..],
-        &(content.len() as u64).to_le_bytes(),
-        content,
-    ]
-    .concat()
-}
-
-fn schema(id: u16, name: &str, encoding: &str, data: &[u8]) -> Vec<u8> {
-    let length = (data.len() as u32).to_le_bytes();
-    let head = [&id.to_le_bytes()[..], &text(name), &text(encoding)].concat();
-    record(op::SCHEMA, &[&head[..], &length, data].concat())
-}
-
-fn channel(id: u16, schema: u16, topic: &str, encoding: &str) -> Vec<u8> {
-    let ids = [id.to_le_bytes(), schema.to_le_bytes()].concat();
-    record(
-        op::CHANNEL,
-        &[&ids[..], &text(topic), &text(encoding), &[0; 4]].concat(),
-    )
-}
-
-fn message(channel: u16, time: u64, data: &[u8]) -> Vec<u8> {
-    let times = [time.to_le_bytes(), time.to_le_bytes()].concat();
-    record(
-        op::MESSAGE,
-        &[&channel.to_le_bytes()[..], &[0; 4], &times, data].concat(),
-    )
-}
-
-fn attachment(name: &str, data: &[u8]) -> Vec<u8> {
-    let length = (data.len() as u64).to_le_bytes();
-    let content = [&[0; 16][..], &text(name), &text(""), &length, data].concat();
-    let sum = crc32fast::hash(&content).to_le_bytes();
-    record(op::ATTACHMENT, &[&content[..], &sum].concat())
-}
-
-fn metadata(name: &str, key: &str, value: &str) -> Vec<u8> {
-    let map = [text(key), text(value)].concat();
-    let length = (map.len() as u32).to_le_bytes();
-    record(op::METADATA, &[&text(name)[..], &length, &map].concat())
-}
-
-fn chunk(compression: &str, records: &[u8]) -> Vec<u8> {
-    let data = match compression {
-        "zstd" => zstd::bulk::compress(records, 1).unwrap(),
-        "lz4" => {
-            let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
-            std::io::Write::write_all(&mut encoder, records).unwrap();
-            encoder.finish().unwrap()
-        }
-        _ => records.to_vec(),
-    };
-    let sizes = [&[0; 16][..], &(records.len() as u64).to_le_bytes()].concat();
-    let sum = crc32fast::hash(records).to_le_bytes();
-    let length = (data.len() as u64).to_le_bytes();
-    record(
-        op::CHUNK,
-        &[&sizes[..], &sum, &text(compression), &length, &data].concat(),
-    )
-}
-
-impl File {
-    fn new() -> File {
-        let header = record(op::HEADER, &[text(""), text("hand")].concat());
-        File([mcap::MAGIC, &header].concat())
-    }
-
-    fn with(mut self, record: impl AsRef<[u8]>) -> File {
-        self.0.extend_from_slice(record.as_ref());
-        self
-    }
-
-    fn end(self) -> File {
-        let end = [record(op::DATA_END, &[0; 4]), record(op::FOOTER, &[0; 20])].concat();
-        self.with(end).with(mcap::MAGIC)
-    }
-
-    fn write(&self, folder: &Path, name: &str) -> PathBuf {
-        let path = folder.join(name);
-        fs::write(&path, &self.0).unwrap();
-        path
-    }
-}
 
 fn compared(a: &File, b: &File, tolerance: f64) -> DiffReport {
     let folder = tempfile::tempdir().unwrap();
@@ -126,6 +31,8 @@ fn recovered(file: &File) -> (RecoverReport, farside_logs::LogInfo) {
     let report = recover(file.write(folder.path(), "in"), &out).unwrap();
     (report, info(out).unwrap())
 }
+
+use crate::by_hand::{File, attachment, channel, chunk, message, metadata, record, schema};
 
 /// A file of one JSON message.
 fn json(data: &str) -> File {
@@ -368,32 +275,59 @@ fn messages_are_aligned_by_what_they_say_and_when() {
 
 #[test]
 fn topics_stored_one_after_the_other_compare_as_fast_as_mixed_ones() {
-    // 40 topics in 40 chunks of 2 MB, all messages changed: reading a chunk for each message would
-    // unpack 400 MB forty times over.
-    let pad = " ".repeat(50_000);
-    let data = |side: &str, n: usize| format!("{{\"s\":\"{side}\",\"n\":{n}{pad}}}");
-    let declared: Vec<u8> = (0..40)
-        .flat_map(|at| channel(at, 0, &format!("/{at}"), "json"))
-        .collect();
-    let add = |side, topic: u16, n: usize| message(topic, n as u64, data(side, n).as_bytes());
-    let topics = |n: usize| {
-        (0..40)
-            .flat_map(move |topic| add("a", topic, n))
-            .collect::<Vec<u8>>()
-    };
-    let rounds = |topic: u16| {
-        (0..40)
-            .flat_map(move |n| add("b", topic, n))
-            .collect::<Vec<u8>>()
-    };
-    let mixed = (0..40).fold(File::new().with(&declared), |file, n| {
-        file.with(chunk("zstd", &topics(n)))
+    // 100 topics in 100 chunks of 2 MB, all messages changed: opening a chunk for each message
+    // would unpack 20 GB.
+    const TOPICS: u16 = 100;
+    let mut state = 1u64;
+    let letters = std::iter::repeat_with(|| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        char::from(b'a' + (state >> 60) as u8)
     });
-    let sorted = (0..40).fold(File::new().with(&declared), |file, topic| {
-        file.with(chunk("zstd", &rounds(topic)))
-    });
-    let report = compared(&mixed.end(), &sorted.end(), 0.0);
-    assert_eq!(report.changed, 1600, "{report}");
+    // Long, and not the same in any two messages, so that unpacking takes its time.
+    let letters: String = letters.take(80_000).collect();
+    let add = |side: &str, topic: u16, n: u16| {
+        let from = (usize::from(topic) * 593 + usize::from(n) * 419) % 60_000;
+        let pad = &letters[from..from + 20_000];
+        let data = format!("{{\"s\":\"{side}\",\"n\":{n},\"pad\":\"{pad}\"}}");
+        message(topic, u64::from(n), data.as_bytes())
+    };
+    let declared = |at| channel(at, 0, &format!("/{at}"), "json");
+    let declared: Vec<u8> = (0..TOPICS).flat_map(declared).collect();
+    let chunks = |side: &'static str, by_topic: bool| {
+        let file = File::new().with(&declared);
+        let of = |outer: u16, inner: u16| match by_topic {
+            true => add(side, outer, inner),
+            false => add(side, inner, outer),
+        };
+        let chunk_of = |outer| {
+            (0..TOPICS)
+                .flat_map(|inner| of(outer, inner))
+                .collect::<Vec<u8>>()
+        };
+        let add = |file: File, outer| file.with(chunk("zstd", &chunk_of(outer)));
+        (0..TOPICS).fold(file, add).end()
+    };
+    let (mixed, sorted) = (chunks("a", false), chunks("b", true));
+    let (done, answer) = std::sync::mpsc::channel();
+    std::thread::spawn(move || done.send(compared(&mixed, &sorted, 0.0)));
+    let report = answer.recv_timeout(std::time::Duration::from_secs(4));
+    let report = report.expect("it takes a fraction of that");
+    assert_eq!(report.changed, 10_000, "{report}");
+}
+
+#[test]
+fn topics_without_messages_are_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = File::new().with(channel(1, 0, "/never", "json")).end();
+    let told = info(file.write(folder.path(), "x")).unwrap();
+    assert_eq!((told.topics.len(), told.topics[0].messages), (1, 0));
+    let (report, saved) = recovered(&file);
+    assert!(
+        report.is_lossless() && saved.topics[0].topic == "/never",
+        "{report}"
+    );
 }
 
 /// Twenty messages, declared, in a chunk or not.
