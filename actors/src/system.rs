@@ -7,6 +7,7 @@
 mod builtin;
 mod files;
 mod metric;
+mod own_table;
 mod picture;
 mod section;
 mod series;
@@ -26,6 +27,7 @@ use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
 pub use files::{Files, no_file};
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};
+pub use own_table::OwnTable;
 pub use picture::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
 };

@@ -16,8 +16,8 @@ use farside::scene::{Drawing, Level, Scene};
 use farside_actors::figure::{Figure, svg};
 use farside_actors::system::settings::{Table, over};
 use farside_actors::system::{
-    Assembly, Better, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Results, Section, Series, SeriesIndex, Settings, Setup, SetupError, System,
+    Assembly, Better, Builtin, Metric, OwnTable, PictureError, PictureInfo, PictureRequest,
+    Recording, Results, Section, Series, SeriesIndex, Settings, Setup, SetupError, System,
 };
 use farside_actors::wiring::Wiring;
 use farside_actors::{settings, units};
@@ -37,12 +37,6 @@ settings! {
     }
 }
 
-#[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct BeaconScenario {
-    beacons: Beacons,
-}
-
 #[derive(Serialize, Deserialize)]
 struct Call {
     number: u32,
@@ -53,18 +47,17 @@ struct Beacon(Beacons);
 impl Actor for Beacon {
     type Accepts = (Call,);
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        ctx.timer(self.0.interval, Call { number: 0 });
+        for number in 0..self.0.calls {
+            ctx.timer(self.0.interval * u64::from(number + 1), Call { number });
+        }
         Ok(())
     }
 }
 
 impl Handler<Call> for Beacon {
-    fn handle(&mut self, Call { number }: Call, ctx: &mut Context<'_, Self>) -> Outcome {
+    fn handle(&mut self, call: Call, ctx: &mut Context<'_, Self>) -> Outcome {
         let lander = ctx.lookup::<Lander>("lander")?;
-        ctx.send(lander, Call { number });
-        if number + 1 < self.0.calls {
-            ctx.timer(self.0.interval, Call { number: number + 1 });
-        }
+        ctx.send(lander, call);
         Ok(())
     }
 }
@@ -167,24 +160,18 @@ impl System for BeaconSystem {
     }
 
     fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
-        Ok(Box::new(BeaconScenario::deserialize(keys)?))
+        Beacons::parse(keys)
     }
 }
 
-impl Settings for BeaconScenario {
-    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
-        toml::Table::try_from(self)
-    }
-
-    fn check(&self) -> Result<(), SetupError> {
-        self.beacons.check("beacons")
-    }
+impl OwnTable for Beacons {
+    const NAME: &'static str = "beacons";
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let (lander, mut wiring) = (setup.sim.host("lander"), Wiring::default());
         setup.sim.actor(lander, "lander", |_| Lander);
-        for name in (1..=self.beacons.count).map(|number| format!("beacon_{number}")) {
-            let (host, settings) = (setup.sim.host(&name), self.beacons.clone());
+        for name in (1..=self.count).map(|number| format!("beacon_{number}")) {
+            let (host, settings) = (setup.sim.host(&name), self.clone());
             setup
                 .sim
                 .actor(host, &name, move |_| Beacon(settings.clone()));
@@ -193,7 +180,7 @@ impl Settings for BeaconScenario {
         setup.link(&wiring)?;
         let heard = Heard::default();
         setup.sim.observe(heard.clone());
-        let settings = self.beacons.clone();
+        let settings = self.clone();
         let conclude = move |_: &Report| {
             let times = heard.0.lock().expect("the run is over").clone();
             let mut results = Results::default();
@@ -222,7 +209,6 @@ impl Settings for BeaconScenario {
         _picture: &str,
         run: &dyn Recording,
         _request: &PictureRequest,
-        _files: &mut Files,
     ) -> Result<Figure, PictureError> {
         let mut times = Vec::new();
         let end = run.for_each(&mut |record| {
