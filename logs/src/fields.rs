@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::envelope::RecordRef;
 use crate::scan::{ChannelInfo, SchemaInfo};
-use crate::shown::{Seconds, apart};
+use crate::shown::{Seconds, apart, hex};
 
 pub(crate) use json::json;
 pub(crate) use protobuf::{Encoded, protobuf};
@@ -92,10 +92,6 @@ pub(crate) fn raw(field: impl Into<String>, a: &[u8], b: &[u8]) -> FieldDiff {
         format!("{} bytes, from byte {at}: {}", bytes.len(), hex(shown))
     };
     FieldDiff::new(field, show(a), show(b))
-}
-
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// True if two numbers differ by at most the tolerance, absolutely or relative to the larger one.

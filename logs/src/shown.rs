@@ -90,6 +90,11 @@ pub(crate) fn apart(a: &str, b: &str) -> (String, String) {
     (tail(a), tail(b))
 }
 
+/// Bytes as two digits each.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -54,7 +54,7 @@ impl Source {
         if !first.starts_with(MAGIC) {
             return Err(LogError::NotMcap {
                 path: path.to_owned(),
-                expected: crate::fields::hex(MAGIC),
+                expected: crate::shown::hex(MAGIC),
                 actual: what_it_is(first),
             });
         }
@@ -279,7 +279,7 @@ pub(crate) fn what_it_is(first: &[u8]) -> String {
             .to_owned();
     }
     let start = &first[..first.len().min(MAGIC.len())];
-    format!("starts with {}", crate::fields::hex(start))
+    format!("starts with {}", crate::shown::hex(start))
 }
 
 #[cfg(test)]

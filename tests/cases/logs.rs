@@ -6,7 +6,7 @@ use std::time::Duration;
 use farside_logs::{DiffOptions, DiffReport, LogInfo, RecoverReport};
 
 /// Longer than any of these files needs, also where others work on the machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 fn input(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("cases/logs/{name}.mcap"))
@@ -16,6 +16,10 @@ fn input(name: &str) -> PathBuf {
 /// too long.
 fn in_time<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'static) -> T {
     let (done, answer) = std::sync::mpsc::channel();
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "a hang is to fail the test; nothing is simulated on that thread"
+    )]
     std::thread::spawn(move || done.send(work()));
     let answer = answer.recv_timeout(PATIENCE);
     answer.unwrap_or_else(|error| panic!("{name}: no answer: {error}"))
@@ -97,9 +101,8 @@ fn the_first_difference_is_named() {
             first.field == field || b == "no such field",
             "{name}: {first:?}"
         );
-        assert_eq!(
+        assert!(
             [back_a, back_b].contains(&&a.to_owned()),
-            true,
             "{name}: {first:?}"
         );
     }

@@ -64,8 +64,8 @@ fn info_shows_it_at_its_time_and_diff_names_it_first() {
     run(&[SLOW], Executor::Inline, Some(&slow));
     let text = info(&slow).expect("a log").to_string();
     for line in [
-        r#"5.000 s: told node_07: ProcessorChange {"processor":"node_07/planner","slowdown":50.0}"#,
-        r#"8.000 s: told node_07: ProcessorChange {"processor":"node_07/planner","slowdown":1.0}"#,
+        "5.000 s: told node_07: ProcessorChange {processor: node_07/planner, slowdown: 50}",
+        "8.000 s: told node_07: ProcessorChange {processor: node_07/planner, slowdown: 1}",
     ] {
         assert!(text.contains(line), "{text}");
     }

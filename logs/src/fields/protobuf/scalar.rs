@@ -5,8 +5,9 @@ use std::fmt;
 use prost_reflect::prost_types::field_descriptor_proto::Type;
 
 use super::content;
-use crate::fields::{FieldDiff, hex, raw};
+use crate::fields::{FieldDiff, raw};
 use crate::schema::Kind;
+use crate::shown::hex;
 use crate::shown::{SHOWN, apart, shorten};
 use crate::wire::{Value, signed};
 
