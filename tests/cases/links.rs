@@ -1,7 +1,10 @@
 //! Contact plans as other programs write them, and links whose keys have no effect.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside::{Executor, SimDuration};
 use farside_actors::system::Files;
 use farside_experiments::registry::Registry;
 use farside_experiments::scenario::{Assembled, Scenario, ScenarioError};
@@ -27,14 +30,20 @@ fn by_plan(file: &str, keys: &str) -> Result<Assembled, ScenarioError> {
 }
 
 /// A contact: when it begins and ends \[s\], its light time \[s\], and the bytes that fit through it.
-type Told = (f64, f64, f64, Option<u64>);
+type Told = (u64, u64, u64, Option<u64>);
 
 fn contacts(assembled: &Assembled, from: &str, to: &str) -> Vec<Told> {
     let contacts = assembled.contacts.as_ref().expect("it has a plan");
     let windows = contacts.windows(from, to).expect("the plan names both");
     let told = windows.iter().map(|window| {
-        let [start, end] = [window.start, window.end].map(|at| at.as_secs_f64());
-        (start, end, window.owlt.as_secs_f64(), window.volume_bytes())
+        let seconds = |nanos: u64| nanos / 1_000_000_000;
+        let [start, end] = [window.start, window.end].map(|at| seconds(at.as_nanos()));
+        (
+            start,
+            end,
+            seconds(window.owlt.as_nanos()),
+            window.volume_bytes(),
+        )
     });
     told.collect()
 }
@@ -42,36 +51,36 @@ fn contacts(assembled: &Assembled, from: &str, to: &str) -> Vec<Told> {
 /// Each plan, its contacts from `a` to `b`, and what the only remark on it begins with, if there
 /// is one.
 const PLANS: [(&str, Told, &str); 10] = [
-    ("combined.rc", (0.0, 60.0, 1.0, Some(60_000)), ""),
+    ("combined.rc", (0, 60, 1, Some(60_000)), ""),
     (
         "hypothetical.ionrc",
-        (0.0, 60.0, 1.0, Some(60_000)),
+        (0, 60, 1, Some(60_000)),
         "line 2: the contact is hypothetical: it is passed over",
     ),
-    ("announce.ionrc", (0.0, 60.0, 1.0, Some(60_000)), ""),
+    ("announce.ionrc", (0, 60, 1, Some(60_000)), ""),
     (
         "range-ends-early.ionrc",
-        (30.0, 200.0, 3.0, Some(170_000)),
+        (30, 200, 3, Some(170_000)),
         "line 2: no range covers the contact from 1 to 2 from 100s on: its light time stays",
     ),
-    ("no-owlt.json", (0.0, 60.0, 0.0, Some(60_000)), ""),
-    ("rate-0.json", (0.0, 60.0, 1.0, None), ""),
+    ("no-owlt.json", (0, 60, 0, Some(60_000)), ""),
+    ("rate-0.json", (0, 60, 1, None), ""),
     (
         "overlap-same-rate.json",
-        (0.0, 90.0, 1.0, Some(90_000)),
+        (0, 90, 1, Some(90_000)),
         "line 1: the contact overlaps that of line 1: they are one",
     ),
     (
         "empty-contact.json",
-        (0.0, 60.0, 1.0, Some(60_000)),
+        (0, 60, 1, Some(60_000)),
         "line 1: the contact ends as it begins: it is passed over",
     ),
     (
         "confidence.ionrc",
-        (0.0, 60.0, 1.0, Some(6_000_000)),
+        (0, 60, 1, Some(6_000_000)),
         "line 2: confidence 0.1 is not used: the contact takes place",
     ),
-    ("bom.ionrc", (0.0, 60.0, 1.0, Some(60_000)), ""),
+    ("bom.ionrc", (0, 60, 1, Some(60_000)), ""),
 ];
 
 #[test]
@@ -94,7 +103,7 @@ fn a_contact_without_a_range_is_passed_over_or_has_the_one_that_the_scenario_giv
     let file = "range-missing.ionrc";
     let without = by_plan(file, "").expect("the other contact has a range");
     assert_eq!(contacts(&without, "a", "b"), []);
-    let both = (0.0, 60.0, 1.0, Some(60_000));
+    let both = (0, 60, 1, Some(60_000));
     assert_eq!(contacts(&without, "b", "a"), [both]);
     let start = "contacts: range-missing.ionrc: line 3: no range covers the contact from 1 to 2";
     let remarks = &without.remarks;
@@ -103,7 +112,7 @@ fn a_contact_without_a_range_is_passed_over_or_has_the_one_that_the_scenario_giv
         "{remarks:?}"
     );
     let with = by_plan(file, "range = '2s'").expect("all contacts have a light time");
-    let given = (0.0, 60.0, 2.0, Some(60_000));
+    let given = (0, 60, 2, Some(60_000));
     assert_eq!(contacts(&with, "a", "b"), [given]);
     assert_eq!(contacts(&with, "b", "a"), [both]);
     assert_eq!(with.remarks, [""; 0]);
@@ -119,4 +128,48 @@ fn dates_beside_times_from_nowhere_are_named_as_the_cause() {
         error.contains("line 1: times such as +0 beside dates: expected an `@` line with a date"),
         "{error}"
     );
+}
+
+/// What is said of one of the scenarios, which is assembled.
+fn remarks(file: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(folder().join(file)).expect("the file is there");
+    assembled(text).expect("it is a scenario").remarks
+}
+
+#[test]
+fn what_a_contact_has_its_own_of_is_said_to_have_no_effect() {
+    let said = remarks("degrade-on-contact.toml");
+    for key in ["latency", "rate"] {
+        let what = format!("links: {key} has no effect in contacts that have their own");
+        assert!(said.contains(&what), "{key}: {said:?}");
+    }
+    let idle = by_plan("bom.ionrc", "range = '2s'").expect("it is a plan");
+    let what = "contacts.range has no effect: every contact has a light time of its own";
+    assert_eq!(idle.remarks, [what]);
+}
+
+#[test]
+fn a_packet_that_comes_in_the_millisecond_of_an_opportunity_misses_it() {
+    let text = std::fs::read_to_string(folder().join("mahimahi-tie.toml")).expect("it is there");
+    let mut assembled = assembled(text).expect("it is a scenario");
+    let delays = Arc::new(Mutex::new(Vec::new()));
+    assembled.sim.observe(Delays(delays.clone()));
+    assembled.sim.run(Executor::Inline).expect("it runs");
+    let delays = delays.lock().expect("nobody panicked");
+    assert!(delays.len() >= 200);
+    let wrong = delays.iter().find(|delay| delay.as_nanos() != 21_000_000);
+    assert_eq!(wrong, None);
+}
+
+/// The delays of all messages over links.
+struct Delays(Arc<Mutex<Vec<SimDuration>>>);
+
+impl Observer for Delays {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        if record.class == RecordClass::Delivered && record.link.is_some() {
+            let mut delays = self.0.lock().expect("nobody panicked");
+            delays.push(record.time().since(record.sent));
+        }
+        Ok(Flow::Continue)
+    }
 }

@@ -206,7 +206,7 @@ impl Transmitter {
             let used = self.opportunity.filter(|(span, _)| *span == index);
             let bytes = bytes(params, parcel);
             let used = used.map(|(_, used)| used);
-            let (end, rest) = trace::delivered(trace, start, bytes, used);
+            let (end, rest) = trace::delivered(trace, (parcel.sent(), start), bytes, used);
             return (end.since(start), Some(rest));
         }
         let link = own.or(params.rate);

@@ -81,6 +81,8 @@ pub struct LinkContacts {
     format: ContactFormat,
     nodes: Vec<MappedNode>,
     plan: Arc<ContactPlan>,
+    /// Whether a light time was given that no contact needs.
+    is_range_idle: bool,
 }
 
 /// A node of the plan, and the host that it is.
@@ -109,6 +111,9 @@ impl LinkContacts {
         let format = format.unwrap_or_else(|| ContactFormat::guess(&name, &bytes));
         let plan = ContactPlan::read(&bytes, format, config.range)
             .map_err(|error| wrong(format!("{}: {error}", config.file)))?;
+        // Without it there would be fewer contacts, or others.
+        let is_range_idle = config.range.is_some()
+            && ContactPlan::from_bytes(&bytes, format).is_ok_and(|bare| bare == plan);
         let nodes = mapped(config, &plan)?;
         let hosts: BTreeMap<&str, &str> = nodes
             .iter()
@@ -125,6 +130,7 @@ impl LinkContacts {
             format,
             nodes,
             plan: Arc::new(plan),
+            is_range_idle,
         })
     }
 
@@ -148,8 +154,12 @@ impl LinkContacts {
     /// What is to be said of the plan's file: contacts that were passed over, and what it says
     /// without effect.
     pub fn remarks(&self) -> impl Iterator<Item = String> + '_ {
+        let idle = self.is_range_idle.then(|| {
+            "contacts.range has no effect: every contact has a light time of its own".to_owned()
+        });
         let remarks = self.plan.remarks();
-        remarks.map(|remark| format!("contacts: {}: {remark}", self.file))
+        let remarks = remarks.map(|remark| format!("contacts: {}: {remark}", self.file));
+        remarks.chain(idle)
     }
 
     /// What the contacts come to.
