@@ -109,6 +109,8 @@ struct Directed {
     transmitter: Transmitter,
     /// Frames in order; the first contends or is on the air.
     line: VecDeque<u32>,
+    /// The bytes of all frames in it.
+    line_bytes: u64,
     /// The airtime of all messages so far.
     airtime: SimDuration,
     /// When the answer to the last frame is there, if it waits for answers.
@@ -199,6 +201,7 @@ impl Radio {
             channel,
             transmitter,
             line: VecDeque::new(),
+            line_bytes: 0,
             airtime: SimDuration::ZERO,
             free: SimTime::ZERO,
         });

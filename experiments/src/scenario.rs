@@ -327,6 +327,7 @@ impl Scenario {
             .into_iter()
             .chain(self.too_late())
             .chain(self.source.remarks())
+            .chain(contacts.iter().flat_map(LinkContacts::remarks))
             .collect();
         if let Some(contacts) = &contacts {
             contacts.check_hosts(&sim).map_err(wrong)?;

@@ -22,7 +22,7 @@
 //! let plan = ContactPlan::from_ion(text.as_bytes())?;
 //! let windows = plan.contact_windows("1", "2");
 //! assert_eq!(windows.len(), 1);
-//! assert_eq!(windows[0].rate_bit_per_s, 128_000);
+//! assert_eq!(windows[0].rate_bit_per_s, Some(128_000));
 //! assert_eq!(windows[0].owlt.to_string(), "1.28s");
 //! # Ok::<(), farside_worlds::contacts::ContactError>(())
 //! ```
@@ -39,8 +39,9 @@ use farside::{SimDuration, SimTime};
 use serde::{Deserialize, Serialize};
 
 pub use builtin::Builtin;
+use error::Remarks;
 pub(crate) use error::shown;
-pub use error::{ContactError, ContactProblem, Position};
+pub use error::{ContactError, ContactProblem, MAX_FAULTS, Position};
 pub use summary::{Gap, PairSummary, PlanSummary};
 pub use trace::CapacityTrace;
 
@@ -61,10 +62,10 @@ pub const MAX_RATE_BIT_PER_S: u64 = 1_000_000_000_000_000;
 /// let pass = ContactWindow {
 ///     start: SimTime::ZERO,
 ///     end: SimTime::ZERO + SimDuration::from_secs(480),
-///     rate_bit_per_s: 128_000,
+///     rate_bit_per_s: Some(128_000),
 ///     owlt: SimDuration::from_millis(2),
 /// };
-/// assert_eq!(pass.volume_bytes(), 7_680_000);
+/// assert_eq!(pass.volume_bytes(), Some(7_680_000));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ContactWindow {
@@ -72,8 +73,9 @@ pub struct ContactWindow {
     pub start: SimTime,
     /// The first instant at which it may no longer; after `start`.
     pub end: SimTime,
-    /// The rate of transmission \[bit/s\], from 1 to [`MAX_RATE_BIT_PER_S`].
-    pub rate_bit_per_s: u64,
+    /// The rate of transmission \[bit/s\], from 1 to [`MAX_RATE_BIT_PER_S`]; `None` where the plan
+    /// sets no limit.
+    pub rate_bit_per_s: Option<u64>,
     /// The one-way light time.
     pub owlt: SimDuration,
 }
@@ -84,14 +86,15 @@ impl ContactWindow {
         self.end.since(self.start)
     }
 
-    /// How many whole bytes fit through it.
-    pub fn volume_bytes(&self) -> u64 {
-        summary::whole_bytes(self.volume_nanobits())
+    /// How many whole bytes fit through it; `None` if any number does.
+    pub fn volume_bytes(&self) -> Option<u64> {
+        self.volume_nanobits().map(summary::whole_bytes)
     }
 
     /// The volume in units of 10^-9 bit, which is exact.
-    fn volume_nanobits(&self) -> u128 {
-        u128::from(self.rate_bit_per_s) * u128::from(self.open().as_nanos())
+    fn volume_nanobits(&self) -> Option<u128> {
+        let rate = u128::from(self.rate_bit_per_s?);
+        Some(rate * u128::from(self.open().as_nanos()))
     }
 }
 
@@ -132,6 +135,7 @@ pub struct ContactPlan {
     windows: Vec<ContactWindow>,
     /// Beside each window, what links do not need.
     notes: Vec<Note>,
+    remarks: Remarks,
 }
 
 #[derive(Clone, Debug)]
@@ -177,6 +181,7 @@ impl ContactFormat {
     /// What a file probably is, by its ending, or else by its first character.
     pub fn guess(file_name: &str, bytes: &[u8]) -> Self {
         let ending = file_name.rsplit_once('.').map_or("", |(_, ending)| ending);
+        let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
         let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
         match ending {
             "json" => ContactFormat::Hdtn,
@@ -193,10 +198,48 @@ impl ContactPlan {
     /// # Errors
     /// Those of [`ContactPlan::from_ion`] and [`ContactPlan::from_hdtn`].
     pub fn from_bytes(bytes: &[u8], format: ContactFormat) -> Result<ContactPlan, ContactError> {
+        ContactPlan::read(bytes, format, None)
+    }
+
+    /// Reads a plan of a format that is known, with a one-way light time for the contacts of which
+    /// the file tells none.
+    ///
+    /// ```
+    /// use farside::SimDuration;
+    /// use farside_worlds::contacts::{ContactFormat, ContactPlan};
+    /// let (text, second) = (b"a contact +0 +60 1 2 1000", SimDuration::from_secs(1));
+    /// assert!(ContactPlan::read(text, ContactFormat::Ion, None).is_err());
+    /// let plan = ContactPlan::read(text, ContactFormat::Ion, Some(second))?;
+    /// assert_eq!(plan.contact_windows("1", "2")[0].owlt, second);
+    /// # Ok::<(), farside_worlds::contacts::ContactError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`ContactPlan::from_ion`] and [`ContactPlan::from_hdtn`].
+    pub fn read(
+        bytes: &[u8],
+        format: ContactFormat,
+        light_time: Option<SimDuration>,
+    ) -> Result<ContactPlan, ContactError> {
         match format {
-            ContactFormat::Ion => ContactPlan::from_ion(bytes),
-            ContactFormat::Hdtn => ContactPlan::from_hdtn(bytes),
+            ContactFormat::Ion => ion::read(bytes, light_time),
+            ContactFormat::Hdtn => hdtn::read(bytes, light_time),
         }
+    }
+
+    /// What is to be said of the file, a line each: contacts that were passed over, and what it
+    /// says without effect.
+    ///
+    /// ```
+    /// use farside_worlds::contacts::ContactPlan;
+    /// let text = b"a range +0 +60 1 2 1\na contact +0 +60 1 2 1000 0.5";
+    /// let plan = ContactPlan::from_ion(text)?;
+    /// let said: Vec<String> = plan.remarks().collect();
+    /// assert_eq!(said, ["line 2: confidence 0.5 is not used: the contact takes place"]);
+    /// # Ok::<(), farside_worlds::contacts::ContactError>(())
+    /// ```
+    pub fn remarks(&self) -> impl Iterator<Item = String> + '_ {
+        self.remarks.all()
     }
 
     /// The windows of the contacts from one node to another, in order of time and without
@@ -331,7 +374,10 @@ impl PartialEq for ContactPlan {
     }
 }
 
-/// The file as text.
+/// What some editors put before text in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// The file as text, without a byte-order mark.
 fn text_of(bytes: &[u8]) -> Result<&str, ContactError> {
     if bytes.len() > MAX_FILE_BYTES {
         return Err(ContactError::TooLarge {
@@ -339,6 +385,7 @@ fn text_of(bytes: &[u8]) -> Result<&str, ContactError> {
             actual_bytes: bytes.len(),
         });
     }
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     std::str::from_utf8(bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let newlines = before.iter().filter(|byte| **byte == b'\n').count();

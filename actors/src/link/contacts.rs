@@ -197,11 +197,12 @@ impl Contacts {
     /// assert_eq!(contacts.windows()[0].rate, Some(128_000));
     /// ```
     pub fn of_plan(windows: &[ContactWindow]) -> Self {
-        // Plans keep the contacts of a pair in order and apart, and know no rate of zero.
+        // Plans keep the contacts of a pair in order and apart, and know no rate of zero. Where they
+        // set no limit, the link's own holds.
         let windows = windows.iter().map(|window| Contact {
             start: window.start.since(SimTime::ZERO),
             end: window.end.since(SimTime::ZERO),
-            rate: Some(window.rate_bit_per_s),
+            rate: window.rate_bit_per_s,
             owlt: Some(window.owlt),
         });
         Contacts {

@@ -300,8 +300,46 @@ impl LinkParams {
     /// # Ok::<(), toml::de::Error>(())
     /// ```
     pub fn remarks(&self) -> Vec<&'static str> {
-        let timed = self.rate.is_some() || self.trace.is_some() || self.contacts.is_some();
+        let windows = || self.contacts.iter().flat_map(Contacts::windows);
+        let own_rate = windows().any(|window| window.rate.is_some());
+        let own_light_time = windows().any(|window| window.owlt.is_some());
+        let timed = self.rate.is_some() || self.trace.is_some() || own_rate;
+        let default = LinkParams::default();
         let all = [
+            (
+                self.rate.is_some() && own_rate,
+                "rate has no effect in contacts that have their own",
+            ),
+            (
+                self.trace.is_some() && own_rate,
+                "trace has no effect in contacts that have a rate of their own",
+            ),
+            (
+                self.latency != default.latency && own_light_time,
+                "latency has no effect in contacts that have their own",
+            ),
+            (
+                self.rate.is_some() && self.trace.is_some(),
+                "rate beside a trace: the trace says when to transmit",
+            ),
+            (
+                self.overhead > 0
+                    && !timed
+                    && self.ber == 0.0
+                    && !matches!(self.queue, Some(QueueLimit::Bytes(_))),
+                "overhead without a rate: a transmission takes no time",
+            ),
+            (
+                self.jitter_shape != default.jitter_shape && self.jitter.is_zero(),
+                "jitter_shape without jitter: nothing scatters",
+            ),
+            (
+                self.retries > 0
+                    && self
+                        .timeout
+                        .is_some_and(|timeout| timeout < self.latency * 2),
+                "timeout below twice the latency: an answer takes longer",
+            ),
             (
                 self.tx_power_w > 0.0 && !timed,
                 "tx_power without a rate: a transmission takes no time, so no energy",

@@ -1,7 +1,9 @@
-//! How long a queue may get.
+//! How long a queue may get, and what waits in it.
 
+use std::collections::VecDeque;
 use std::fmt;
 
+use farside::SimTime;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -31,6 +33,65 @@ impl QueueLimit {
             QueueLimit::Messages(limit) => messages <= limit,
             QueueLimit::Bytes(limit) => bytes <= limit,
         }
+    }
+}
+
+/// The messages that wait, in the order in which they are transmitted. What all of them come to is
+/// kept up to date, so that one more costs the same however many there are.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Backlog {
+    waiting: VecDeque<Waiting>,
+    bytes: u64,
+}
+
+/// A message that waits.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    start: SimTime,
+    bytes: u64,
+}
+
+impl Waiting {
+    /// When it begins to be transmitted, and its bytes. Tests count how often that is asked.
+    fn look(&self) -> (SimTime, u64) {
+        #[cfg(test)]
+        LOOKS.with(|looks| looks.set(looks.get() + 1));
+        (self.start, self.bytes)
+    }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// How often anything was asked of a message that waits.
+    static LOOKS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
+}
+
+impl Backlog {
+    /// Forgets what is being transmitted at `now` or was before.
+    pub(super) fn begin_until(&mut self, now: SimTime) {
+        while let Some((start, bytes)) = self.waiting.front().map(Waiting::look) {
+            if start > now {
+                break;
+            }
+            self.waiting.pop_front();
+            self.bytes -= bytes;
+        }
+    }
+
+    /// Takes a message that begins at `start`, no sooner than those before it; `false` if the limit
+    /// leaves no room.
+    pub(super) fn push(&mut self, start: SimTime, bytes: u64, limit: Option<QueueLimit>) -> bool {
+        let messages = self.waiting.len() as u64 + 1;
+        let all = self.bytes.saturating_add(bytes);
+        if limit.is_some_and(|limit| !limit.allows(messages, all)) {
+            return false;
+        }
+        self.waiting.push_back(Waiting {
+            start,
+            bytes: all - self.bytes,
+        });
+        self.bytes = all;
+        true
     }
 }
 
@@ -76,5 +137,51 @@ impl<'de> Deserialize<'de> for QueueLimit {
         }
 
         from.deserialize_any(Limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How often messages that wait are looked at while `count` are taken, a thousand at a time,
+    /// and none begins before all are there.
+    fn looks(count: u64, limit: Option<QueueLimit>) -> u64 {
+        LOOKS.with(|looks| looks.set(0));
+        let mut backlog = Backlog::default();
+        for number in 0..count {
+            backlog.begin_until(SimTime::from_nanos(number / 1000));
+            let start = SimTime::from_nanos(count + number);
+            assert!(backlog.push(start, 200, limit));
+        }
+        assert_eq!(backlog.bytes, 200 * count);
+        backlog.begin_until(SimTime::from_nanos(2 * count));
+        assert_eq!((backlog.waiting.len(), backlog.bytes), (0, 0));
+        LOOKS.with(std::cell::Cell::get)
+    }
+
+    #[test]
+    fn a_message_costs_the_same_however_many_wait() {
+        let roomy = [QueueLimit::Messages(1 << 40), QueueLimit::Bytes(1 << 40)];
+        for limit in [None].into_iter().chain(roomy.map(Some)) {
+            for count in [1_000, 20_000, 160_000] {
+                let looks = looks(count, limit);
+                // One when it comes, one when it goes.
+                assert!(looks <= 2 * count, "{count} wait, {limit:?}: {looks} looks");
+            }
+        }
+    }
+
+    #[test]
+    fn a_message_that_is_refused_leaves_the_rest_alone() {
+        let mut backlog = Backlog::default();
+        let at = SimTime::from_nanos;
+        let limit = Some(QueueLimit::Bytes(500));
+        assert!(backlog.push(at(10), 300, limit));
+        assert!(!backlog.push(at(20), 201, limit));
+        assert!(backlog.push(at(20), 200, limit));
+        backlog.begin_until(at(10));
+        assert!(backlog.push(at(30), 300, limit));
+        assert!(!backlog.push(at(40), 1, limit));
     }
 }

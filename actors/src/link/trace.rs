@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use farside::SimTime;
+use farside::{SimDuration, SimTime};
 use farside_worlds::contacts::CapacityTrace;
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -73,15 +73,18 @@ impl Trace {
     }
 }
 
-/// When `bytes` that may go from `ready` on have gone, and what they leave of the last opportunity.
+/// When `bytes` that `came` then and may go from `ready` on have gone, and what they leave of the
+/// last opportunity. What comes in an opportunity's millisecond misses it: mahimahi's
+/// `LinkQueue::read_packet` uses up the opportunities of that millisecond before it takes a packet.
 pub(super) fn delivered(
     trace: &CapacityTrace,
-    ready: SimTime,
+    (came, ready): (SimTime, SimTime),
     bytes: u64,
     used: Option<Opportunity>,
 ) -> (SimTime, Opportunity) {
     let each = CapacityTrace::PACKET_BYTES;
-    let mut number = trace.first_from(ready);
+    let missed = trace.first_from(came + SimDuration::from_nanos(1));
+    let mut number = trace.first_from(ready).max(missed);
     let mut left_bytes = each;
     if let Some(used) = used.filter(|used| used.number >= number) {
         number = used.number;
@@ -150,8 +153,6 @@ impl<'de> Deserialize<'de> for Trace {
 
 #[cfg(test)]
 mod tests {
-    use farside::SimDuration;
-
     use super::*;
 
     fn at(ms: u64) -> SimTime {
@@ -162,15 +163,18 @@ mod tests {
     fn opportunities_are_shared_and_repeat() {
         let trace = CapacityTrace::from_mahimahi(b"2\n2\n5\n").unwrap();
         // 1000 bytes leave 500, which 500 more take at the same instant.
-        let (done, rest) = delivered(&trace, at(0), 1000, None);
+        let (done, rest) = delivered(&trace, (at(0), at(0)), 1000, None);
         assert_eq!(done, at(2));
-        let (done, rest) = delivered(&trace, at(1), 500, Some(rest));
+        let (done, rest) = delivered(&trace, (at(1), at(2)), 500, Some(rest));
         assert_eq!(done, at(2));
-        let (done, rest) = delivered(&trace, at(1), 1501, Some(rest));
+        let (done, rest) = delivered(&trace, (at(1), at(2)), 1501, Some(rest));
         assert_eq!(done, at(5));
         assert_eq!(rest.left_bytes, 1499);
         // Who comes after it has no part in it, and the trace begins anew after 5 ms.
-        assert_eq!(delivered(&trace, at(6), 10, Some(rest)).0, at(7));
+        assert_eq!(delivered(&trace, (at(6), at(6)), 10, Some(rest)).0, at(7));
+        // Who comes in the millisecond of an opportunity misses it, who waited does not.
+        assert_eq!(delivered(&trace, (at(2), at(2)), 10, None).0, at(5));
+        assert_eq!(delivered(&trace, (at(1), at(2)), 10, None).0, at(2));
     }
 
     #[test]

@@ -6,7 +6,6 @@
 
 mod outcome;
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use farside::carrier::{Carriage, Parcel};
@@ -14,6 +13,7 @@ use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
 use super::burst::KnownState;
+use super::queue::Backlog;
 use super::stage::{self, Draws, Purpose};
 use super::timeline::Timeline;
 use super::trace::{self, Opportunity, Trace};
@@ -81,8 +81,7 @@ pub struct Transmitter {
     floor: SimDuration,
     /// When the last message it took is done with.
     free: SimTime,
-    /// Of the messages that wait: when each begins to be transmitted, and its bytes.
-    waiting: VecDeque<(SimTime, u64)>,
+    waiting: Backlog,
     /// The last state of the correlated jitter.
     deviate: Option<f64>,
     /// The latest arrival so far.
@@ -102,7 +101,7 @@ impl Transmitter {
             floor: timeline.min_delay(),
             timeline,
             free: SimTime::ZERO,
-            waiting: VecDeque::new(),
+            waiting: Backlog::default(),
             deviate: None,
             arrived: SimTime::ZERO,
             known: None,
@@ -207,7 +206,7 @@ impl Transmitter {
             let used = self.opportunity.filter(|(span, _)| *span == index);
             let bytes = bytes(params, parcel);
             let used = used.map(|(_, used)| used);
-            let (end, rest) = trace::delivered(trace, start, bytes, used);
+            let (end, rest) = trace::delivered(trace, (parcel.sent(), start), bytes, used);
             return (end.since(start), Some(rest));
         }
         let link = own.or(params.rate);
@@ -460,19 +459,12 @@ impl Transmitter {
     fn enqueue(&mut self, parcel: &Parcel<'_>, start: SimTime) -> Option<Sent> {
         let now = parcel.now();
         let params = self.timeline.at(now);
-        while self.waiting.front().is_some_and(|(start, _)| *start <= now) {
-            self.waiting.pop_front();
-        }
+        self.waiting.begin_until(now);
         if start <= now {
             return None;
         }
         let own = bytes(params, parcel);
-        let messages = self.waiting.len() as u64 + 1;
-        let bytes = self.waiting.iter().map(|(_, bytes)| bytes).sum::<u64>() + own;
-        if params
-            .queue
-            .is_some_and(|limit| !limit.allows(messages, bytes))
-        {
+        if !self.waiting.push(start, own, params.queue) {
             let queue = now.since(parcel.sent());
             return Some(Sent {
                 at: now,
@@ -483,7 +475,6 @@ impl Transmitter {
                 },
             });
         }
-        self.waiting.push_back((start, own));
         None
     }
 

@@ -33,6 +33,7 @@ impl Radio {
             let link = &mut self.directed[directed as usize];
             link.airtime = link.airtime + airtime;
             link.line.push_back(at);
+            link.line_bytes += bytes;
             self.resume(parcel, at, verdicts);
         }
     }
@@ -51,9 +52,8 @@ impl Radio {
         match link.transmitter.timeline().at(now).queue {
             None => messages > u64::from(self.config.queue),
             Some(limit) => {
-                let waiting = link.line.iter().skip(on_air);
-                let waiting = waiting.map(|at| self.frames[*at as usize].bytes);
-                !limit.allows(messages, waiting.sum::<u64>() + bytes)
+                let sent = if on_air > 0 { first.bytes } else { 0 };
+                !limit.allows(messages, link.line_bytes - sent + bytes)
             }
         }
     }
@@ -293,7 +293,9 @@ impl Radio {
     /// Forgets a frame that came first in its line.
     fn done(&mut self, at: u32) {
         let directed = self.frames[at as usize].directed;
-        let first = self.directed[directed as usize].line.pop_front();
+        let link = &mut self.directed[directed as usize];
+        let first = link.line.pop_front();
+        link.line_bytes -= self.frames[at as usize].bytes;
         debug_assert_eq!(first, Some(at), "only the first of a line is sent");
         self.free.push(at);
     }

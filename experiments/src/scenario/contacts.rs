@@ -7,6 +7,7 @@
 //! format = "ion"                            # or "hdtn"; told from the file unless given
 //! nodes = { 1 = "earth", 2 = "orbiter" }    # which node of the plan is which host
 //! offset = "1h"                             # when in the run the plan begins
+//! range = "1.28s"                           # the light time of contacts of which it tells none
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,6 +50,15 @@ pub struct ContactsConfig {
     /// When in the run the plan begins.
     #[serde(default, with = "units::duration")]
     pub offset: SimDuration,
+    /// The one-way light time of contacts of which the plan tells none: in ION, those without a
+    /// range, which are passed over unless it is given; in HDTN, those without `owlt`, 0 unless it
+    /// is given.
+    #[serde(
+        default,
+        with = "units::duration::option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub range: Option<SimDuration>,
 }
 
 /// When which host hears which, by their names. Hosts that the plan names hear each other by its
@@ -71,6 +81,8 @@ pub struct LinkContacts {
     format: ContactFormat,
     nodes: Vec<MappedNode>,
     plan: Arc<ContactPlan>,
+    /// Whether a light time was given that no contact needs.
+    is_range_idle: bool,
 }
 
 /// A node of the plan, and the host that it is.
@@ -97,8 +109,11 @@ impl LinkContacts {
             open(&config.file, Builtin::find, plans(), "contact plan", files).map_err(wrong)?;
         let format = config.format;
         let format = format.unwrap_or_else(|| ContactFormat::guess(&name, &bytes));
-        let plan = ContactPlan::from_bytes(&bytes, format)
+        let plan = ContactPlan::read(&bytes, format, config.range)
             .map_err(|error| wrong(format!("{}: {error}", config.file)))?;
+        // Without it there would be fewer contacts, or others.
+        let is_range_idle = config.range.is_some()
+            && ContactPlan::from_bytes(&bytes, format).is_ok_and(|bare| bare == plan);
         let nodes = mapped(config, &plan)?;
         let hosts: BTreeMap<&str, &str> = nodes
             .iter()
@@ -115,6 +130,7 @@ impl LinkContacts {
             format,
             nodes,
             plan: Arc::new(plan),
+            is_range_idle,
         })
     }
 
@@ -133,6 +149,17 @@ impl LinkContacts {
     /// Each ordered pair of hosts with contacts, sorted by their names.
     pub fn pairs(&self) -> impl Iterator<Item = (&str, &str, &[ContactWindow])> {
         self.plan.pairs()
+    }
+
+    /// What is to be said of the plan's file: contacts that were passed over, and what it says
+    /// without effect.
+    pub fn remarks(&self) -> impl Iterator<Item = String> + '_ {
+        let idle = self.is_range_idle.then(|| {
+            "contacts.range has no effect: every contact has a light time of its own".to_owned()
+        });
+        let remarks = self.plan.remarks();
+        let remarks = remarks.map(|remark| format!("contacts: {}: {remark}", self.file));
+        remarks.chain(idle)
     }
 
     /// What the contacts come to.

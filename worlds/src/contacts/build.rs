@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use farside::{SimDuration, SimTime};
 
-use super::error::shown;
+use super::error::{Faults, Remarks, shown};
 use super::{
     ContactError, ContactPlan, ContactProblem, ContactWindow, MAX_CONTACTS, MAX_RATE_BIT_PER_S,
     Node, Note, Pair,
@@ -129,30 +129,51 @@ pub(super) fn bad_number(
     }
 }
 
-/// One more entry, unless there are too many.
-pub(super) fn push<T>(
-    entries: &mut Vec<T>,
-    entry: T,
-    what: &'static str,
-    line: usize,
-) -> Result<(), ContactError> {
-    if entries.len() == MAX_CONTACTS {
-        let limit = MAX_CONTACTS;
-        return Err(ContactError::at(
-            line,
-            ContactProblem::TooMany { what, limit },
-        ));
-    }
-    entries.push(entry);
-    Ok(())
+/// More entries than are read.
+pub(super) fn too_many(what: &'static str, line: usize) -> ContactError {
+    let limit = MAX_CONTACTS;
+    ContactError::at(line, ContactProblem::TooMany { what, limit })
 }
 
-/// The plan of these contacts.
-pub(super) fn plan(nodes: Nodes, contacts: Vec<RawContact>) -> Result<ContactPlan, ContactError> {
-    if contacts.is_empty() {
+/// Which contacts of one ordered pair may overlap: they become one.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Overlaps {
+    /// None.
+    Never,
+    /// Those that say the same: ION passes over the second.
+    IfEqual,
+    /// Those of one rate and light time: HDTN transmits while any is on.
+    IfAlike,
+}
+
+impl Overlaps {
+    fn allow(self, a: &RawContact, b: &RawContact) -> bool {
+        let alike = (a.window.rate_bit_per_s, a.window.owlt, a.confidence)
+            == (b.window.rate_bit_per_s, b.window.owlt, b.confidence);
+        match self {
+            Overlaps::Never => false,
+            Overlaps::IfEqual => alike && a.window == b.window,
+            Overlaps::IfAlike => alike,
+        }
+    }
+}
+
+/// What a reader found in a file.
+#[derive(Default)]
+pub(super) struct Found {
+    pub(super) nodes: Nodes,
+    pub(super) contacts: Vec<RawContact>,
+    pub(super) faults: Faults,
+    pub(super) remarks: Remarks,
+}
+
+/// The plan of what was found.
+pub(super) fn plan(found: Found, overlaps: Overlaps) -> Result<ContactPlan, ContactError> {
+    if found.contacts.is_empty() {
+        found.faults.check()?;
         return Err(ContactError::Empty { what: "contact" });
     }
-    arranged(nodes, contacts)
+    arranged(found, overlaps)
 }
 
 /// The plan with its nodes called `name` of theirs, and so much later; contacts of a node with
@@ -165,18 +186,20 @@ pub(super) fn renamed(
     name: impl Fn(&str) -> String,
     offset: SimDuration,
 ) -> Option<Result<ContactPlan, ContactError>> {
-    let mut nodes = Nodes::default();
+    let mut found = Found {
+        remarks: plan.remarks.clone(),
+        ..Found::default()
+    };
     let numbers: Vec<u32> = plan
         .nodes
         .iter()
-        .map(|node| nodes.taken(name(&node.name), node.line))
+        .map(|node| found.nodes.taken(name(&node.name), node.line))
         .collect();
     let later = |time: SimTime| time.as_nanos().checked_add(offset.as_nanos());
-    let mut contacts = Vec::new();
     for pair in plan.pairs.iter().filter(|pair| pair.from != pair.to) {
         for at in pair.first..pair.end {
             let window = plan.windows[at];
-            contacts.push(RawContact {
+            found.contacts.push(RawContact {
                 from: numbers[pair.from as usize],
                 to: numbers[pair.to as usize],
                 window: ContactWindow {
@@ -189,11 +212,17 @@ pub(super) fn renamed(
             });
         }
     }
-    Some(arranged(nodes, contacts))
+    Some(arranged(found, Overlaps::Never))
 }
 
 /// Contacts in canonical order.
-fn arranged(mut nodes: Nodes, mut contacts: Vec<RawContact>) -> Result<ContactPlan, ContactError> {
+fn arranged(found: Found, overlaps: Overlaps) -> Result<ContactPlan, ContactError> {
+    let Found {
+        mut nodes,
+        mut contacts,
+        mut faults,
+        mut remarks,
+    } = found;
     let mut order: Vec<u32> = (0..nodes.all.len() as u32).collect();
     order.sort_by(|a, b| node_order(nodes.name(*a)).cmp(&node_order(nodes.name(*b))));
     let mut rank = vec![0u32; order.len()];
@@ -208,18 +237,31 @@ fn arranged(mut nodes: Nodes, mut contacts: Vec<RawContact>) -> Result<ContactPl
     nodes
         .all
         .sort_by(|a, b| node_order(&a.name).cmp(&node_order(&b.name)));
+    let name = |number: u32| nodes.all[number as usize].name.clone();
     // Sorted by their start, contacts of which none overlaps the next do not overlap at all.
-    for two in contacts.windows(2) {
-        let (a, b) = (&two[0], &two[1]);
-        if (a.from, a.to) == (b.from, b.to) && b.window.start < a.window.end {
-            let problem = ContactProblem::Overlap {
-                from: nodes.all[a.from as usize].name.clone(),
-                to: nodes.all[a.to as usize].name.clone(),
-                other_line: a.line.min(b.line),
-            };
-            return Err(ContactError::at(a.line.max(b.line), problem));
+    contacts.dedup_by(|b, a| {
+        if (a.from, a.to) != (b.from, b.to) || b.window.start >= a.window.end {
+            return false;
         }
-    }
+        let (line, other_line) = (a.line.max(b.line), a.line.min(b.line));
+        let allowed = overlaps.allow(a, b);
+        if allowed {
+            a.window.end = a.window.end.max(b.window.end);
+            remarks.push(line, || {
+                format!("the contact overlaps that of line {other_line}: they are one")
+            });
+        } else {
+            let (from, to) = (name(a.from), name(a.to));
+            let problem = ContactProblem::Overlap {
+                from,
+                to,
+                other_line,
+            };
+            faults.push(ContactError::at(line, problem));
+        }
+        allowed
+    });
+    faults.check()?;
     let mut pairs: Vec<Pair> = Vec::new();
     for (at, contact) in contacts.iter().enumerate() {
         match pairs.last_mut() {
@@ -241,11 +283,17 @@ fn arranged(mut nodes: Nodes, mut contacts: Vec<RawContact>) -> Result<ContactPl
         pairs,
         windows: contacts.iter().map(|contact| contact.window).collect(),
         notes: contacts.iter().map(note).collect(),
+        remarks,
     })
 }
 
 /// A window from numbers that were checked.
-pub(super) fn window(start: u64, end: u64, rate_bit_per_s: u64, owlt: u64) -> ContactWindow {
+pub(super) fn window(
+    start: u64,
+    end: u64,
+    rate_bit_per_s: Option<u64>,
+    owlt: u64,
+) -> ContactWindow {
     ContactWindow {
         start: SimTime::from_nanos(start),
         end: SimTime::from_nanos(end),

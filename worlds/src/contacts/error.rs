@@ -45,7 +45,18 @@ pub enum ContactError {
         /// What.
         problem: ContactProblem,
     },
+    /// Several things are wrong, in the order of their lines.
+    #[error("{}{}", listed(.first), and_more(*.more))]
+    Several {
+        /// The first of them, at most [`MAX_FAULTS`].
+        first: Vec<ContactError>,
+        /// How many more there are.
+        more: usize,
+    },
 }
+
+/// The most faults of a file that are told one by one, and the most remarks on it.
+pub const MAX_FAULTS: usize = 20;
 
 impl ContactError {
     /// The line that is wrong, from 1, if it is one.
@@ -53,8 +64,36 @@ impl ContactError {
         match self {
             ContactError::NotText { line } => Some(*line),
             ContactError::At { at, .. } => Some(at.line),
+            ContactError::Several { first, .. } => first.first()?.line(),
             ContactError::TooLarge { .. } | ContactError::Empty { .. } => None,
         }
+    }
+
+    /// Each of the faults that are told, one if there is one.
+    ///
+    /// ```
+    /// use farside_worlds::contacts::ContactPlan;
+    /// let text = b"a contact +0 +60 1 2\na contact +60 +x 1 2 1000";
+    /// let error = ContactPlan::from_ion(text).unwrap_err();
+    /// let lines: Vec<_> = error.faults().iter().map(|fault| fault.line()).collect();
+    /// assert_eq!(lines, [Some(1), Some(2)]);
+    /// ```
+    pub fn faults(&self) -> &[ContactError] {
+        match self {
+            ContactError::Several { first, .. } => first,
+            one => std::slice::from_ref(one),
+        }
+    }
+
+    /// Whether a line ends too soon, or a file is too long: there is nothing more to look at.
+    pub(super) fn ends_it(&self) -> bool {
+        let ContactError::At { problem, .. } = self else {
+            return true;
+        };
+        matches!(
+            problem,
+            ContactProblem::MissingField { .. } | ContactProblem::TooMany { .. }
+        )
     }
 
     pub(super) fn at(line: usize, problem: ContactProblem) -> Self {
@@ -66,6 +105,78 @@ impl ContactError {
         let column = Some(column);
         let at = Position { line, column };
         ContactError::At { at, problem }
+    }
+}
+
+/// What was found wrong so far.
+#[derive(Default)]
+pub(super) struct Faults {
+    first: Vec<ContactError>,
+    more: usize,
+}
+
+impl Faults {
+    pub(super) fn push(&mut self, error: ContactError) {
+        match self.first.len() < MAX_FAULTS {
+            true => self.first.push(error),
+            false => self.more += 1,
+        }
+    }
+
+    /// The value, or `None` once the fault is noted.
+    pub(super) fn note<T>(&mut self, result: Result<T, ContactError>) -> Option<T> {
+        result.map_err(|error| self.push(error)).ok()
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.first.is_empty()
+    }
+
+    /// An error, if anything was wrong.
+    pub(super) fn check(mut self) -> Result<(), ContactError> {
+        self.first.sort_by_key(ContactError::line);
+        match (self.first.len(), self.more) {
+            (0, _) => Ok(()),
+            (1, 0) => Err(self.first.remove(0)),
+            (_, more) => Err(ContactError::Several {
+                first: self.first,
+                more,
+            }),
+        }
+    }
+}
+
+fn listed(faults: &[ContactError]) -> String {
+    let lines: Vec<String> = faults.iter().map(ContactError::to_string).collect();
+    lines.join("\n")
+}
+
+fn and_more(more: usize) -> String {
+    match more {
+        0 => String::new(),
+        more => format!("\nand {more} more"),
+    }
+}
+
+/// What is to be said of a plan that is read: what was passed over, and what has no effect.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Remarks {
+    first: Vec<String>,
+    more: usize,
+}
+
+impl Remarks {
+    /// One more, on a line of the file.
+    pub(super) fn push(&mut self, line: usize, text: impl FnOnce() -> String) {
+        match self.first.len() < MAX_FAULTS {
+            true => self.first.push(format!("line {line}: {}", text())),
+            false => self.more += 1,
+        }
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = String> + '_ {
+        let more = (self.more > 0).then(|| format!("and {} more remarks", self.more));
+        self.first.iter().cloned().chain(more)
     }
 }
 
@@ -194,9 +305,10 @@ pub enum ContactProblem {
         /// The line of the other range.
         other_line: usize,
     },
-    /// No range tells the light time of a contact, or of a part of it.
+    /// No range tells the light time of any contact; this is the first.
     #[error(
-        "no range covers the contact from {from} to {to} at {at}; expected `a range` over all of it"
+        "no range covers the contact from {from} to {to} at {at}, when it begins, and there is no \
+         other contact; expected `a range` over it, or range = \"...\" in [contacts]"
     )]
     NoRange {
         /// The sending node.
@@ -206,6 +318,12 @@ pub enum ContactProblem {
         /// The first instant without a range, from the plan's beginning.
         at: String,
     },
+    /// Some times are dates, others count from an instant that the file does not tell.
+    #[error(
+        "times such as +0 beside dates: expected an `@` line with a date before them, which says \
+         what +0 is"
+    )]
+    MixedTimes,
     /// More entries than anyone means.
     #[error("more than {limit} {what}; that is the most that is read")]
     TooMany {

@@ -17,7 +17,9 @@ use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
-use super::build::{self, Nodes, RawContact};
+use farside::SimDuration;
+
+use super::build::{self, Found, Overlaps, RawContact};
 use super::error::shown;
 use super::{ContactError, ContactPlan, ContactProblem, MAX_CONTACTS, text_of};
 use crate::decimal::scaled;
@@ -46,7 +48,9 @@ const MAX_STRANGERS: usize = 32;
 
 impl ContactPlan {
     /// Reads an HDTN contact plan. Rates are in bits per second (`rateBitsPerSec`), or, as in old
-    /// plans, in Mbit/s (`rate`). Keys that HDTN passes over are passed over.
+    /// plans, in Mbit/s (`rate`); 0 sets no limit. A contact without `owlt` has a light time of 0.
+    /// Contacts of one rate and light time that overlap are one, and those that end as they begin
+    /// are passed over, with a remark. Keys that HDTN passes over are passed over.
     ///
     /// ```
     /// use farside_worlds::contacts::ContactPlan;
@@ -61,33 +65,43 @@ impl ContactPlan {
     ///      found \"rateBytesPerSec\" instead"
     /// );
     /// let plan = ContactPlan::from_hdtn(text.replace("Bytes", "Bits").as_bytes())?;
-    /// assert_eq!(plan.contact_windows("1", "2")[0].rate_bit_per_s, 16_000);
+    /// assert_eq!(plan.contact_windows("1", "2")[0].rate_bit_per_s, Some(16_000));
     /// # Ok::<(), farside_worlds::contacts::ContactError>(())
     /// ```
     ///
     /// # Errors
     /// With the line, when the text is no such file, has more than 16 MiB or 200,000 contacts, or
-    /// says what cannot be: contacts of one ordered pair that overlap, a rate of zero (by which
-    /// HDTN means no limit).
+    /// says what cannot be: contacts of one ordered pair that overlap at different rates. All
+    /// faults are told at once, up to [`MAX_FAULTS`](super::MAX_FAULTS).
     pub fn from_hdtn(bytes: &[u8]) -> Result<ContactPlan, ContactError> {
-        let text = text_of(bytes)?;
-        let file: File<'_> = serde_json::from_str(text).map_err(|error| json(&error, 1, 1))?;
-        let mut nodes = Nodes::default();
-        let mut contacts = Vec::with_capacity(file.contacts.0.len());
-        let mut place = JsonPlace::new(text);
-        for raw in file.contacts.0 {
-            place.move_to(raw.get());
-            let object: Object<'_> = serde_json::from_str(raw.get())
-                .map_err(|error| json(&error, place.line, place.column()))?;
-            let reader = Reader {
-                place: &place,
-                line: place.line,
-                object,
-            };
-            contacts.push(reader.contact(&mut nodes)?);
-        }
-        build::plan(nodes, contacts)
+        read(bytes, None)
     }
+}
+
+/// Reads a plan; contacts without a light time have the one given, or none.
+pub(super) fn read(
+    bytes: &[u8],
+    light_time: Option<SimDuration>,
+) -> Result<ContactPlan, ContactError> {
+    let text = text_of(bytes)?;
+    let file: File<'_> = serde_json::from_str(text).map_err(|error| json(&error, 1, 1))?;
+    let mut found = Found::default();
+    let mut place = JsonPlace::new(text);
+    for raw in file.contacts.0 {
+        place.move_to(raw.get());
+        let object = serde_json::from_str::<Object<'_>>(raw.get())
+            .map_err(|error| json(&error, place.line, place.column()));
+        let Some(object) = found.faults.note(object) else {
+            continue;
+        };
+        let reader = Reader {
+            place: &place,
+            line: place.line,
+            object,
+        };
+        reader.contact(&mut found, light_time.unwrap_or_default());
+    }
+    build::plan(found, Overlaps::IfAlike)
 }
 
 /// An error of the JSON reader within a text that begins at `line` and `column`.
@@ -240,30 +254,57 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn contact(&self, nodes: &mut Nodes) -> Result<RawContact, ContactError> {
+    /// Adds the contact to what was found, or what is wrong with it.
+    fn contact(&self, found: &mut Found, light_time: SimDuration) {
+        let line = self.line;
         if let Some(key) = self.object.twice {
-            return Err(ContactError::at(
-                self.line,
-                ContactProblem::DuplicateKey { key },
-            ));
+            let problem = ContactProblem::DuplicateKey { key };
+            return found.faults.push(ContactError::at(line, problem));
         }
-        let from = self.node(SOURCE, nodes)?;
-        let to = self.node(DEST, nodes)?;
-        let start = self.number(START, 9, "seconds from the plan's beginning")?;
-        let end = self.number(END, 9, "seconds from the plan's beginning")?;
-        let rate_bit_per_s = self.rate()?;
-        let owlt = self.number(OWLT, 9, "seconds")?;
-        build::check_order(self.line, start, end)?;
-        Ok(RawContact {
+        let from = self.node(SOURCE, found);
+        let from = found.faults.note(from);
+        let to = self.node(DEST, found);
+        let to = found.faults.note(to);
+        let number = |key| self.number(key, 9, "seconds from the plan's beginning");
+        let [start, end] = [START, END].map(|key| found.faults.note(number(key)));
+        let rate_bit_per_s = found.faults.note(self.rate());
+        let owlt = match self.object.values[OWLT] {
+            Some(_) => found.faults.note(self.number(OWLT, 9, "seconds")),
+            None => {
+                if let Some(key) = self.stranger_near(KEYS[OWLT].0) {
+                    found.remarks.push(line, || {
+                        format!(
+                            "the contact has no \"owlt\": its light time is {light_time}; found \
+                             {key:?}"
+                        )
+                    });
+                }
+                Some(light_time.as_nanos())
+            }
+        };
+        let all = (from, to, start, end, rate_bit_per_s, owlt);
+        let (Some(from), Some(to), Some(start), Some(end), Some(rate_bit_per_s), Some(owlt)) = all
+        else {
+            return;
+        };
+        if start == end {
+            let text = || "the contact ends as it begins: it is passed over".to_owned();
+            return found.remarks.push(line, text);
+        }
+        if let Err(error) = build::check_order(line, start, end) {
+            return found.faults.push(error);
+        }
+        found.contacts.push(RawContact {
             from,
             to,
             window: build::window(start, end, rate_bit_per_s, owlt),
             confidence: None,
-            line: self.line,
-        })
+            line,
+        });
     }
 
-    fn rate(&self) -> Result<u64, ContactError> {
+    /// The rate in bit/s; `None` is no limit.
+    fn rate(&self) -> Result<Option<u64>, ContactError> {
         let (field, text, bit_per_s) = match (self.object.values[RATE], self.object.old_rate) {
             (None, Some(old)) => {
                 let text = self.text(OLD_RATE, old)?;
@@ -283,20 +324,20 @@ impl Reader<'_> {
         let bit_per_s = bit_per_s.map_err(|error| {
             self.at(text, build::bad_number(field, text.get(), error, expected))
         })?;
+        // To HDTN's router, 0 is "unlimited".
         if bit_per_s == 0 {
-            let expected = "a rate over 0; HDTN means no limit by it, a link needs one";
-            return Err(self.bad(text, field, expected));
+            return Ok(None);
         }
         if !build::is_sane_rate(bit_per_s) {
             return Err(self.bad(text, field, "at most 1e15 bits per second"));
         }
-        Ok(bit_per_s)
+        Ok(Some(bit_per_s))
     }
 
-    fn node(&self, key: usize, nodes: &mut Nodes) -> Result<u32, ContactError> {
+    fn node(&self, key: usize, found: &mut Found) -> Result<u32, ContactError> {
         let value = self.value(key)?;
         let text = self.text(KEYS[key].0, value)?;
-        let number = nodes.number(&text, self.line);
+        let number = found.nodes.number(&text, self.line);
         number.ok_or_else(|| self.bad(value, KEYS[key].0, build::NODE_EXPECTED))
     }
 

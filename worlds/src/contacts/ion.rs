@@ -9,17 +9,25 @@
 //!
 //! ION takes whole seconds, bytes per second and light seconds; this reader takes decimals, too.
 //! What does not touch the contacts of the plan is skipped: every other command, contacts that
-//! register a node (`-1` as start), and hypothetical ones (`0` as stop).
+//! register a node (`-1` as start), and hypothetical ones (`0` as start or stop). Of a file for
+//! several programs, the parts from `## begin ionadmin` to `## end ionadmin` are read, as ionstart
+//! does.
+//!
+//! Sources: ionrc(5); `ici/utils/ionadmin.c`, ION 4.1.
 
+mod edits;
 mod ranges;
 mod time;
 
 use std::fmt::Write;
 
-use super::build::{self, Nodes, RawContact};
+use farside::{SimDuration, SimTime};
+
+use super::build::{self, Found, Overlaps, RawContact};
 use super::error::shown;
-use super::{ContactError, ContactPlan, ContactProblem, text_of};
+use super::{ContactError, ContactPlan, ContactProblem, MAX_RATE_BIT_PER_S, text_of};
 use crate::decimal::{scaled, unscaled};
+use edits::Entries;
 use ranges::{Range, Ranges};
 use time::{Stamp, TimeLine};
 
@@ -28,9 +36,12 @@ const RANGE_FORM: &str = "a range start stop from to light_seconds";
 const AT_FORM: &str = "@ time";
 
 /// Commands of `ionadmin` that say nothing about contacts.
-const SKIPPED: [&str; 15] = [
-    "?", "1", "^", "e", "h", "i", "l", "m", "q", "r", "s", "t", "v", "w", "x",
+const SKIPPED: [&str; 17] = [
+    "!", "?", "1", "^", "b", "e", "h", "i", "l", "m", "q", "r", "s", "t", "v", "w", "x",
 ];
+
+/// What `contact` or `range` is expected behind, and what was meant if it is another word.
+const KINDS: [&str; 2] = ["contact", "range"];
 
 /// A contact whose times are not yet counted from the plan's beginning.
 struct Contact {
@@ -46,16 +57,23 @@ struct Contact {
 /// All that a file says.
 #[derive(Default)]
 struct Reader {
-    nodes: Nodes,
+    found: Found,
     times: TimeLine,
-    contacts: Vec<Contact>,
-    ranges: Vec<Range<Stamp>>,
+    contacts: Entries<Contact>,
+    ranges: Entries<Range<Stamp>>,
+    /// The first line that counts from an instant that the file does not tell.
+    relative: Option<usize>,
+    /// Whether a line has a date.
+    dated: bool,
 }
 
 impl ContactPlan {
-    /// Reads the contacts and ranges of an ION `ionrc` file. A contact has the light time of the
-    /// range that covers it; a range that changes within a contact splits it. A range from a lower
+    /// Reads the contacts and ranges of an ION `ionrc` file, or of the part for `ionadmin` of a file
+    /// for several programs. A contact has the light time of the range that covers its beginning,
+    /// also when that range ends; one that begins within a contact splits it. A range from a lower
     /// to a higher node number holds for the way back, too, while the file has none for that way.
+    /// A contact without a range is passed over, with a remark, unless
+    /// [`read`](ContactPlan::read) is given a light time.
     ///
     /// The plan counts from the time that the first `@` line with a date sets; without one, from
     /// the earliest date in the file; without dates, from what `+0` means.
@@ -78,19 +96,16 @@ impl ContactPlan {
     ///
     /// # Errors
     /// With the line, when the text is no such file, has more than 16 MiB or 200,000 contacts, or
-    /// says what cannot be: contacts of one ordered pair that overlap, a contact without a range.
+    /// says what cannot be: contacts of one ordered pair that overlap, no contact with a range. All
+    /// faults are told at once, up to [`MAX_FAULTS`](super::MAX_FAULTS).
     pub fn from_ion(bytes: &[u8]) -> Result<ContactPlan, ContactError> {
-        let text = text_of(bytes)?;
-        let mut reader = Reader::default();
-        for (index, line) in text.split('\n').enumerate() {
-            reader.line(Words::new(line, index + 1))?;
-        }
-        reader.finish()
+        read(bytes, None)
     }
 
     /// The plan as an ION file, which [`ContactPlan::from_ion`] reads back to an equal one, if the
     /// plan begins with a relative time as here. ION itself reads whole numbers only: it takes the
-    /// file if all times, light times and rates in bytes per second are whole.
+    /// file if all times, light times and rates in bytes per second are whole. ION knows no contact
+    /// without a limit of its rate: the highest there is stands in its place.
     ///
     /// ```
     /// use farside_worlds::contacts::ContactPlan;
@@ -110,7 +125,8 @@ impl ContactPlan {
             .map(|nanos| unscaled(nanos, 9));
             let times_and_nodes = format!("+{start} +{stop} {} {}", contact.from, contact.to);
             // A bit is 0.125 bytes, so three decimal places hold any rate.
-            let rate = unscaled(window.rate_bit_per_s * 125, 3);
+            let rate = window.rate_bit_per_s.unwrap_or(MAX_RATE_BIT_PER_S);
+            let rate = unscaled(rate * 125, 3);
             let confidence = contact.confidence;
             let confidence = confidence.map_or_else(String::new, |share| format!(" {share}"));
             writeln!(text, "a range {times_and_nodes} {owlt}").expect("a String takes any text");
@@ -118,6 +134,51 @@ impl ContactPlan {
                 .expect("a String takes any text");
         }
         text
+    }
+}
+
+/// Reads a plan; contacts without a range have the light time that is given, or are passed over.
+pub(super) fn read(
+    bytes: &[u8],
+    light_time: Option<SimDuration>,
+) -> Result<ContactPlan, ContactError> {
+    let text = text_of(bytes)?;
+    let mut reader = Reader::default();
+    let is_combined = text.lines().any(|line| program(line).is_some());
+    let mut is_ours = !is_combined;
+    for (index, line) in text.split('\n').enumerate() {
+        if let Some((is_begin, name)) = program(line) {
+            is_ours = is_begin && name == "ionadmin";
+        }
+        if !is_ours {
+            continue;
+        }
+        let read = reader.line(Words::new(line, index + 1));
+        if let Err(error) = read {
+            let is_last = matches!(
+                error,
+                ContactError::At {
+                    problem: ContactProblem::TooMany { .. },
+                    ..
+                }
+            );
+            reader.found.faults.push(error);
+            if is_last {
+                break;
+            }
+        }
+    }
+    reader.finish(light_time)
+}
+
+/// Of a line `## begin NAME` or `## end NAME` in a file for several programs: which of both, and
+/// the program.
+fn program(line: &str) -> Option<(bool, &str)> {
+    let mut words = line.trim_start().strip_prefix("##")?.split_whitespace();
+    match (words.next()?, words.next()?) {
+        ("begin", name) => Some((true, name)),
+        ("end", name) => Some((false, name)),
+        _ => None,
     }
 }
 
@@ -130,20 +191,16 @@ impl Reader {
             "a" => match words.next() {
                 Some(word) if word.text == "contact" => self.contact(&mut words),
                 Some(word) if word.text == "range" => self.range(&mut words),
-                Some(word) => Err(words.directive(word, "contact or range", &["contact", "range"])),
+                Some(word) => Err(words.directive(word, "contact or range", &KINDS)),
                 None => Err(words.missing("contact or range", CONTACT_FORM)),
             },
+            "c" | "d" => self.edit(command.text == "c", &mut words),
             "@" => {
                 let stamp = self.time(&mut words, "reference time", AT_FORM)?;
                 words.end(AT_FORM)?;
                 self.times.refer_to(stamp);
                 Ok(())
             }
-            "c" | "d" => Err(words.directive(
-                command,
-                "a plan as it stands; changing and deleting is not read",
-                &[],
-            )),
             skipped if SKIPPED.contains(&skipped) => Ok(()),
             _ => Err(words.directive(
                 command,
@@ -153,30 +210,45 @@ impl Reader {
         }
     }
 
+    /// Notes what is wrong with a field, so that the rest of its line is read, too.
+    fn note<T>(&mut self, field: Result<T, ContactError>) -> Result<Option<T>, ContactError> {
+        match field {
+            Err(error) if error.ends_it() => Err(error),
+            field => Ok(self.found.faults.note(field)),
+        }
+    }
+
     fn contact(&mut self, words: &mut Words<'_>) -> Result<(), ContactError> {
-        let registers = words.peek() == Some("-1");
-        let start = match registers {
-            true => words.next().map(|_| self.times.zero()),
-            false => Some(self.time(words, "start time", CONTACT_FORM)?),
-        };
-        let is_hypothetical = words.peek() == Some("0");
-        let stop = match registers || is_hypothetical {
-            true => words.next().map(|_| self.times.zero()),
-            false => Some(self.time(words, "stop time", CONTACT_FORM)?),
-        };
-        // Neither says when there is a contact.
-        let (Some(start), Some(stop), false) = (start, stop, registers || is_hypothetical) else {
+        // A node registers in a region: no contact.
+        if words.peek() == Some("-1") {
             return Ok(());
-        };
+        }
+        let is_hypothetical = |text: &str| text.starts_with('0') && !text.contains('/');
+        let hypothetical = || "the contact is hypothetical: it is passed over".to_owned();
+        let line = words.number;
+        if words.peek().is_some_and(is_hypothetical) {
+            self.found.remarks.push(line, hypothetical);
+            return Ok(());
+        }
+        let start = self.counted_time(words, "start time", CONTACT_FORM)?;
+        if words.peek().is_some_and(is_hypothetical) {
+            self.found.remarks.push(line, hypothetical);
+            return Ok(());
+        }
+        let stop = self.counted_time(words, "stop time", CONTACT_FORM)?;
         let from = self.node(words, "sending node", CONTACT_FORM)?;
         let to = self.node(words, "receiving node", CONTACT_FORM)?;
         let rate = words.field("rate in bytes per second", CONTACT_FORM)?;
-        let rate_bit_per_s = words.rate(rate)?;
-        let confidence = match words.next() {
-            Some(word) => Some(words.confidence(word)?),
-            None => None,
-        };
+        let rate_bit_per_s = self.note(words.rate(rate))?;
+        let confidence = words.next().map(|word| words.confidence(word));
+        let confidence = self.note(confidence.transpose())?;
         words.end(CONTACT_FORM)?;
+        let all = (start, stop, from, to, rate_bit_per_s, confidence);
+        let (Some(start), Some(stop), Some(from), Some(to), Some(rate_bit_per_s), Some(confidence)) =
+            all
+        else {
+            return Ok(());
+        };
         let contact = Contact {
             from,
             to,
@@ -184,14 +256,15 @@ impl Reader {
             stop,
             rate_bit_per_s,
             confidence,
-            line: words.number,
+            line,
         };
-        build::push(&mut self.contacts, contact, "contacts", words.number)
+        self.contacts
+            .push((from, to, start), contact, "contacts", line)
     }
 
     fn range(&mut self, words: &mut Words<'_>) -> Result<(), ContactError> {
-        let start = self.time(words, "start time", RANGE_FORM)?;
-        let stop = self.time(words, "stop time", RANGE_FORM)?;
+        let start = self.counted_time(words, "start time", RANGE_FORM)?;
+        let stop = self.counted_time(words, "stop time", RANGE_FORM)?;
         let from = self.node(words, "first node", RANGE_FORM)?;
         let to = self.node(words, "second node", RANGE_FORM)?;
         let owlt = words.field("distance in light seconds", RANGE_FORM)?;
@@ -201,8 +274,13 @@ impl Reader {
                 owlt,
                 build::bad_number("distance", owlt.text, error, expected),
             )
-        })?;
+        });
+        let owlt_ns = self.note(owlt_ns)?;
         words.end(RANGE_FORM)?;
+        let all = (start, stop, from, to, owlt_ns);
+        let (Some(start), Some(stop), Some(from), Some(to), Some(owlt_ns)) = all else {
+            return Ok(());
+        };
         let range = Range {
             from,
             to,
@@ -211,7 +289,8 @@ impl Reader {
             owlt_ns,
             line: words.number,
         };
-        build::push(&mut self.ranges, range, "ranges", words.number)
+        self.ranges
+            .push((from, to, start), range, "ranges", words.number)
     }
 
     fn time(
@@ -225,54 +304,133 @@ impl Reader {
         stamp.map_err(|expected| words.bad(word, field, expected))
     }
 
+    /// The time of a contact or range; `None` once it is noted what is wrong with it.
+    fn counted_time(
+        &mut self,
+        words: &mut Words<'_>,
+        field: &'static str,
+        form: &'static str,
+    ) -> Result<Option<Stamp>, ContactError> {
+        let stamp = self.time(words, field, form);
+        let stamp = self.note(stamp)?;
+        match stamp {
+            Some(Stamp::Relative(_)) => {
+                self.relative.get_or_insert(words.number);
+            }
+            Some(Stamp::Absolute(_)) => self.dated = true,
+            None => {}
+        }
+        Ok(stamp)
+    }
+
     fn node(
         &mut self,
         words: &mut Words<'_>,
         field: &'static str,
         form: &'static str,
-    ) -> Result<u32, ContactError> {
+    ) -> Result<Option<u32>, ContactError> {
         let word = words.field(field, form)?;
-        let number = self.nodes.number(word.text, words.number);
-        number.ok_or_else(|| words.bad(word, field, build::NODE_EXPECTED))
+        let number = self.found.nodes.number(word.text, words.number);
+        self.note(number.ok_or_else(|| words.bad(word, field, build::NODE_EXPECTED)))
     }
 
     /// Counts all times from the plan's beginning and gives contacts their light times.
-    fn finish(self) -> Result<ContactPlan, ContactError> {
+    fn finish(mut self, light_time: Option<SimDuration>) -> Result<ContactPlan, ContactError> {
+        if let (Some(line), true, false) = (self.relative, self.dated, self.times.is_dated()) {
+            let mixed = ContactError::at(line, ContactProblem::MixedTimes);
+            self.found.faults.push(mixed);
+            self.found.faults.check()?;
+            return Err(ContactError::Empty { what: "contact" });
+        }
         let contact_times = self.contacts.iter().flat_map(|c| [c.start, c.stop]);
         let range_times = self.ranges.iter().flat_map(|r| [r.start, r.stop]);
         let clock = self.times.clock(contact_times.chain(range_times));
-        let mut ranges = Vec::with_capacity(self.ranges.len());
-        for range in &self.ranges {
-            ranges.extend(range.counted(&clock)?);
+        let mut found = self.found;
+        let mut ranges = Vec::new();
+        for range in self.ranges.iter() {
+            ranges.extend(found.faults.note(range.counted(&clock)).flatten());
         }
-        let ranges = Ranges::new(ranges, &self.nodes)?;
-        let mut contacts = Vec::with_capacity(self.contacts.len());
-        for contact in &self.contacts {
-            let line = contact.line;
-            let start = clock.since_start(contact.start, "start time", line)?;
-            let stop = clock.since_start(contact.stop, "stop time", line)?;
-            build::check_order(line, start, stop)?;
-            let (from, to) = (contact.from, contact.to);
-            ranges
-                .split(from, to, start, stop, |start, stop, owlt_ns| {
-                    contacts.push(RawContact {
-                        from,
-                        to,
-                        window: build::window(start, stop, contact.rate_bit_per_s, owlt_ns),
-                        confidence: contact.confidence,
-                        line,
-                    });
-                })
-                .map_err(|at| {
-                    let problem = ContactProblem::NoRange {
-                        from: self.nodes.name(from).to_owned(),
-                        to: self.nodes.name(to).to_owned(),
-                        at: farside::SimTime::from_nanos(at).to_string(),
-                    };
-                    ContactError::at(line, problem)
-                })?;
+        let ranges = Ranges::new(ranges, &found.nodes, &mut found.faults);
+        let light_time = light_time.map(SimDuration::as_nanos);
+        let mut without_range = Vec::new();
+        for contact in self.contacts.iter() {
+            let span = contact.counted(&clock);
+            let Some(span) = found.faults.note(span) else {
+                continue;
+            };
+            contact.add_to(&mut found, &ranges, span, light_time, &mut without_range);
         }
-        build::plan(self.nodes, contacts)
+        if found.contacts.is_empty() && found.faults.is_empty() {
+            without_range
+                .into_iter()
+                .for_each(|error| found.faults.push(error));
+        }
+        build::plan(found, Overlaps::IfEqual)
+    }
+}
+
+impl Contact {
+    /// When it begins and ends, from the plan's beginning \[ns\].
+    fn counted(&self, clock: &time::Clock) -> Result<(u64, u64), ContactError> {
+        let start = clock.since_start(self.start, "start time", self.line)?;
+        let stop = clock.since_start(self.stop, "stop time", self.line)?;
+        build::check_order(self.line, start, stop)?;
+        Ok((start, stop))
+    }
+
+    /// Adds its parts of one light time to what was found, or says why it is passed over.
+    fn add_to(
+        &self,
+        found: &mut Found,
+        ranges: &Ranges,
+        span: (u64, u64),
+        light_time: Option<u64>,
+        without_range: &mut Vec<ContactError>,
+    ) {
+        let (from, to, line) = (self.from, self.to, self.line);
+        if let Some(share) = self.confidence.filter(|share| *share < 1.0) {
+            found.remarks.push(line, || {
+                format!("confidence {share} is not used: the contact takes place")
+            });
+        }
+        let contacts = &mut found.contacts;
+        let left_at = ranges.split((from, to), span, light_time, |start, stop, owlt_ns| {
+            contacts.push(RawContact {
+                from,
+                to,
+                window: build::window(start, stop, Some(self.rate_bit_per_s), owlt_ns),
+                confidence: self.confidence,
+                line,
+            });
+        });
+        let at = |nanos| SimTime::from_nanos(nanos).to_string();
+        let [from, to] = [from, to].map(|node| found.nodes.name(node).to_owned());
+        match left_at {
+            Some(None) => {}
+            Some(Some(left)) => found.remarks.push(line, || {
+                format!(
+                    "no range covers the contact from {from} to {to} from {} on: its light time \
+                     stays as it was",
+                    at(left)
+                )
+            }),
+            None => {
+                let text = || {
+                    format!(
+                        "no range covers the contact from {from} to {to} at {}: it is passed \
+                         over; range = \"...\" in [contacts] gives it a light time",
+                        at(span.0)
+                    )
+                };
+                found.remarks.push(line, text);
+                let problem = ContactProblem::NoRange {
+                    from: from.clone(),
+                    to: to.clone(),
+                    at: at(span.0),
+                };
+                without_range.push(ContactError::at(line, problem));
+            }
+        }
     }
 }
 

@@ -28,8 +28,8 @@ pub struct PlanSummary {
     pub end: SimTime,
     /// How many contacts there are.
     pub contacts: usize,
-    /// How many whole bytes fit through all of them.
-    pub volume_bytes: u64,
+    /// How many whole bytes fit through all of them; `None` if there is no limit.
+    pub volume_bytes: Option<u64>,
     /// Each ordered pair that has contacts, in canonical order.
     pub pairs: Vec<PairSummary>,
 }
@@ -43,8 +43,8 @@ pub struct PairSummary {
     pub to: String,
     /// How many contacts there are.
     pub contacts: usize,
-    /// How many whole bytes fit through them.
-    pub volume_bytes: u64,
+    /// How many whole bytes fit through them; `None` if there is no limit.
+    pub volume_bytes: Option<u64>,
     /// How long they last together.
     pub open: SimDuration,
     /// The longest time within the plan's horizon without a contact, if there is any; the first
@@ -97,9 +97,12 @@ impl PlanSummary {
     }
 }
 
-fn volume<'a>(windows: impl Iterator<Item = &'a ContactWindow>) -> u64 {
+fn volume<'a>(windows: impl Iterator<Item = &'a ContactWindow>) -> Option<u64> {
     // 200,000 contacts of 584 years at the highest rate are below 2^128 still.
-    whole_bytes(windows.map(ContactWindow::volume_nanobits).sum())
+    let nanobits = windows
+        .map(ContactWindow::volume_nanobits)
+        .sum::<Option<u128>>();
+    nanobits.map(whole_bytes)
 }
 
 /// How many whole bytes so many 10^-9 bit are.
@@ -131,12 +134,12 @@ impl fmt::Display for PlanSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} of {} from {} to {}: {} bytes in all",
+            "{} of {} from {} to {}: {} in all",
             counted(self.contacts, "contact"),
             counted(self.pairs.len(), "ordered pair"),
             self.start,
             self.end,
-            self.volume_bytes
+            bytes(self.volume_bytes)
         )?;
         self.pairs.iter().try_for_each(|pair| write!(f, "\n{pair}"))
     }
@@ -145,15 +148,20 @@ impl fmt::Display for PlanSummary {
 impl fmt::Display for PairSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let contacts = counted(self.contacts, "contact");
-        let (from, to, bytes, open) = (&self.from, &self.to, self.volume_bytes, self.open);
-        write!(
-            f,
-            "{from} -> {to}: {contacts}, {bytes} bytes, open for {open}, "
-        )?;
+        let (from, to, open) = (&self.from, &self.to, self.open);
+        let bytes = bytes(self.volume_bytes);
+        write!(f, "{from} -> {to}: {contacts}, {bytes}, open for {open}, ")?;
         match self.longest_gap {
             Some(gap) => write!(f, "longest gap {} from {}", gap.length(), gap.start),
             None => f.write_str("no gap"),
         }
+    }
+}
+
+fn bytes(volume: Option<u64>) -> String {
+    match volume {
+        Some(bytes) => format!("{bytes} bytes"),
+        None => "any number of bytes".to_owned(),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::super::build::{self, Nodes};
+use super::super::error::Faults;
 use super::super::{ContactError, ContactProblem};
 use super::time::{Clock, Stamp};
 
@@ -51,64 +52,72 @@ pub(super) struct Ranges {
 }
 
 impl Ranges {
-    pub(super) fn new(ranges: Vec<Range<u64>>, nodes: &Nodes) -> Result<Self, ContactError> {
+    pub(super) fn new(ranges: Vec<Range<u64>>, nodes: &Nodes, faults: &mut Faults) -> Self {
         let mut given: BTreeMap<(u32, u32), Vec<Range<u64>>> = BTreeMap::new();
         for range in ranges {
             given.entry((range.from, range.to)).or_default().push(range);
         }
         for ranges in given.values_mut() {
             ranges.sort_by_key(|range| (range.start, range.line));
-            let overlap = ranges.windows(2).find(|two| two[1].start < two[0].stop);
-            if let Some(two) = overlap {
+            let overlap = |two: &&[Range<u64>]| two[1].start < two[0].stop;
+            for two in ranges.windows(2).filter(overlap) {
                 let problem = ContactProblem::RangeOverlap {
                     from: nodes.name(two[0].from).to_owned(),
                     to: nodes.name(two[0].to).to_owned(),
                     other_line: two[0].line.min(two[1].line),
                 };
-                return Err(ContactError::at(two[0].line.max(two[1].line), problem));
+                faults.push(ContactError::at(two[0].line.max(two[1].line), problem));
             }
         }
         let implied = given
             .keys()
             .map(|&(from, to)| ((from, to), !nodes.is_one_way(from, to)));
         let implied = implied.collect();
-        Ok(Ranges { given, implied })
+        Ranges { given, implied }
     }
 
     /// Calls `piece(start, stop, owlt_ns)` for each part of a contact with one light time, in
-    /// order. An error is the first instant that no range covers.
+    /// order. Where no range covers it any more, its light time stays: ION asks for it when the
+    /// contact begins. Returns where that is for the first time. `None` if no range covers its
+    /// beginning, and there is none to take instead.
     pub(super) fn split(
         &self,
-        from: u32,
-        to: u32,
-        start: u64,
-        stop: u64,
+        (from, to): (u32, u32),
+        (start, stop): (u64, u64),
+        instead_ns: Option<u64>,
         mut piece: impl FnMut(u64, u64, u64),
-    ) -> Result<(), u64> {
-        let given = self.given.get(&(from, to)).map_or(&[][..], Vec::as_slice);
+    ) -> Option<Option<u64>> {
+        let of = |from, to| self.given.get(&(from, to)).map_or(&[][..], Vec::as_slice);
+        let given = of(from, to);
         let back_holds = self.implied.get(&(to, from)).copied().unwrap_or(false);
-        let back = match back_holds {
-            true => self.given.get(&(to, from)).map_or(&[][..], Vec::as_slice),
-            false => &[],
+        let back = if back_holds { of(to, from) } else { &[] };
+        let next_of = |ranges: &[Range<u64>], at| {
+            let next = ranges.partition_point(|range| range.stop <= at);
+            let next = ranges.get(next).copied();
+            // The range that covers `at`, or when the next one begins.
+            match next {
+                Some(range) if range.start <= at => (Some(range), range.stop),
+                next => (None, next.map_or(u64::MAX, |range| range.start)),
+            }
         };
         let mut at = start;
+        let mut left_at = None;
         // Pieces of equal light time are one: the range did not change.
         let mut open: Option<(u64, u64)> = None;
         while at < stop {
-            let next_given = given.partition_point(|range| range.stop <= at);
-            let next_given = given.get(next_given);
-            let (end, owlt_ns) = match next_given {
-                Some(range) if range.start <= at => (range.stop, range.owlt_ns),
-                _ => {
-                    let covering = back.partition_point(|range| range.stop <= at);
-                    let covering = back.get(covering).filter(|range| range.start <= at);
-                    let until = next_given.map_or(u64::MAX, |range| range.start);
-                    match covering {
-                        Some(range) => (range.stop.min(until), range.owlt_ns),
-                        // A node needs no range to know how far it is from itself.
-                        None if from == to => (until, 0),
-                        None => return Err(at),
+            let (own, own_until) = next_of(given, at);
+            let (other, other_until) = next_of(back, at);
+            let (end, owlt_ns) = match (own, other, open) {
+                (Some(range), ..) => (range.stop, range.owlt_ns),
+                (None, Some(range), _) => (range.stop.min(own_until), range.owlt_ns),
+                // A node needs no range to know how far it is from itself.
+                (None, None, _) if from == to => (own_until, 0),
+                (None, None, open) => {
+                    let owlt_ns = open.map(|(_, owlt_ns)| owlt_ns).or(instead_ns)?;
+                    if open.is_some() {
+                        left_at = left_at.or(Some(at));
                     }
+                    (own_until.min(other_until), owlt_ns)
                 }
             };
             match open {
@@ -124,6 +133,6 @@ impl Ranges {
         if let Some((begun, owlt)) = open {
             piece(begun, stop, owlt);
         }
-        Ok(())
+        Some(left_at)
     }
 }

@@ -9,7 +9,7 @@ use crate::decimal::{NumberError, scaled};
 const NANOS: i128 = 1_000_000_000;
 
 /// A time of the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stamp {
     /// Nanoseconds after the plan's beginning, wherever that lies.
     Relative(i128),
@@ -34,9 +34,9 @@ impl Default for TimeLine {
 }
 
 impl TimeLine {
-    /// Where relative times count from now.
-    pub(super) fn zero(&self) -> Stamp {
-        self.reference
+    /// Whether an `@` line has told a date.
+    pub(super) fn is_dated(&self) -> bool {
+        self.epoch.is_some()
     }
 
     /// Reads a time; an error says what was expected.
