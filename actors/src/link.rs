@@ -47,6 +47,7 @@
 //! | `trace` | | [`Trace`] | off | mahimahi's delivery opportunities, in place of `rate`: a file, a built-in name, milliseconds |
 //! | `contacts` | | [`Contacts`] | the scenario's plan | windows with rate and light time; reason `no_contact` |
 //! | `store_and_forward` | | bool | false | wait for the end of an outage, for a contact |
+//! | `lifetime` | | duration | unlimited | how long a message may wait until its transmission begins, retries too; reason `expired` |
 //! | `retries` | | number | 0 | stop-and-wait repetitions |
 //! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
 //! | `tx_power` | | power | 0 | `tx_power 8 (L + overhead) / rate` of the sender's energy each attempt |
@@ -121,6 +122,8 @@ pub const OUTAGE: &str = "outage";
 pub const NO_CONTACT: &str = "no_contact";
 /// Why a link loses a message when too many wait.
 pub const QUEUE_FULL: &str = "queue_full";
+/// Why a link drops a message that waited for longer than its lifetime.
+pub const EXPIRED: &str = "expired";
 /// Why a message is dropped where it arrives.
 pub const CORRUPT: &str = "corrupt";
 

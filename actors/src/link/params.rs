@@ -248,6 +248,8 @@ parameters! {
     /// Messages wait for the end of an outage, and for the next contact in which their whole
     /// transmission fits.
     store_and_forward: bool = false, key "store_and_forward", as Plain<bool>, IfOn;
+    /// A message whose transmission has not begun so long after it was sent is dropped.
+    lifetime: Option<SimDuration> = None, key "lifetime", as OrOff<Span>, IfOn;
     /// How often a lost message is sent again: stop and wait, so that those behind it wait.
     retries: u32 = 0, key "retries", as Retries, IfOn;
     /// How long after a transmission began it is given up. Never below what an answer takes:
@@ -351,6 +353,10 @@ impl LinkParams {
             (
                 self.queue.is_some() && !timed && !self.store_and_forward && self.retries == 0,
                 "queue without a rate: nothing ever waits",
+            ),
+            (
+                self.lifetime.is_some() && !timed && !self.store_and_forward && self.retries == 0,
+                "lifetime without a rate: nothing ever waits",
             ),
             (
                 self.timeout.is_some() && self.retries == 0,

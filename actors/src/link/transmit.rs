@@ -13,11 +13,13 @@ use farside::random::name_hash;
 use farside::{SimDuration, SimTime};
 
 use super::burst::KnownState;
-use super::queue::Backlog;
+use super::queue::{Backlog, WaitsFor};
 use super::stage::{self, Draws, Purpose};
 use super::timeline::Timeline;
 use super::trace::{self, Opportunity, Trace};
-use super::{BURST, CORRUPT, LOSS, LinkChange, LinkParams, QUEUE_FULL, jitter, packet_error_rate};
+use super::{
+    BURST, CORRUPT, EXPIRED, LOSS, LinkChange, LinkParams, QUEUE_FULL, jitter, packet_error_rate,
+};
 
 pub(crate) use outcome::difference;
 pub use outcome::{Attempt, Path, Sent};
@@ -217,6 +219,12 @@ impl Transmitter {
         (airtime, None)
     }
 
+    /// When the message is dropped if its transmission has not begun.
+    pub(crate) fn expires(&self, parcel: &Parcel<'_>) -> Option<SimTime> {
+        let lifetime = self.timeline.at(parcel.now()).lifetime;
+        lifetime.map(|lifetime| parcel.sent() + lifetime)
+    }
+
     /// Sends one copy of a message, no sooner than `from`, behind those it sends already.
     pub fn send(&mut self, parcel: &Parcel<'_>, copy: u32, from: SimTime, path: &Path) -> Sent {
         let now = parcel.now();
@@ -224,13 +232,25 @@ impl Transmitter {
         let ready = now.max(from).max(self.free);
         let start = self.opening(parcel, ready, path);
         let first = start.unwrap_or(ready);
-        if let Some(refused) = self.enqueue(parcel, first) {
+        let expires = self.expires(parcel).filter(|at| *at <= first);
+        let waits = match expires {
+            Some(at) => (WaitsFor::Expiry, at.max(now)),
+            None => (WaitsFor::Transmission, first),
+        };
+        if let Some(refused) = self.enqueue(parcel, waits) {
             return refused;
         }
         let carriage = Carriage {
-            queue: first.since(parcel.sent()),
+            queue: waits.1.since(parcel.sent()),
             ..Carriage::default()
         };
+        if waits.0 == WaitsFor::Expiry {
+            return Sent {
+                at: waits.1,
+                lost: Some(EXPIRED),
+                carriage,
+            };
+        }
         match start {
             Ok(_) => self.attempts(parcel, copy, first, path, deviate, carriage),
             Err(reason) => {
@@ -271,9 +291,14 @@ impl Transmitter {
                 && number < retries
                 && let Ok(next) = self.opening(parcel, gives_up, path)
             {
-                number += 1;
-                start = next;
-                continue;
+                let expires = self.expires(parcel).filter(|at| *at <= next);
+                let Some(expires) = expires else {
+                    number += 1;
+                    start = next;
+                    continue;
+                };
+                attempt.failed = Some(EXPIRED);
+                attempt.at = attempt.at.max(expires);
             }
             self.free = match (retries, attempt.failed) {
                 (0, _) => attempt.end,
@@ -455,16 +480,16 @@ impl Transmitter {
         }
     }
 
-    /// Puts a message that begins at `start` into the queue, or refuses it.
-    fn enqueue(&mut self, parcel: &Parcel<'_>, start: SimTime) -> Option<Sent> {
+    /// Puts a message into the queue until it has waited enough, or refuses it.
+    fn enqueue(&mut self, parcel: &Parcel<'_>, waits: (WaitsFor, SimTime)) -> Option<Sent> {
         let now = parcel.now();
         let params = self.timeline.at(now);
         self.waiting.begin_until(now);
-        if start <= now {
+        if waits.1 <= now {
             return None;
         }
         let own = bytes(params, parcel);
-        if !self.waiting.push(start, own, params.queue) {
+        if !self.waiting.push(waits, own, params.queue) {
             let queue = now.since(parcel.sent());
             return Some(Sent {
                 at: now,

@@ -6,7 +6,7 @@ use farside::{SimDuration, SimTime};
 
 use super::channel::Transmission;
 use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
-use crate::link::{Attempt, QUEUE_FULL, difference};
+use crate::link::{Attempt, EXPIRED, QUEUE_FULL, difference};
 
 impl Radio {
     /// Takes the copies of a message into its link's line.
@@ -117,20 +117,28 @@ impl Radio {
         let directed = self.frames[at as usize].directed;
         let path = self.path(parcel, directed, now);
         let link = &self.directed[directed as usize];
-        let opening = link.transmitter.opening(parcel, now, &path);
+        let expires = link.transmitter.expires(parcel);
+        let opening = match expires.filter(|at| *at <= now) {
+            Some(_) => Err(EXPIRED),
+            None => link.transmitter.opening(parcel, now, &path),
+        };
         let free = link.free;
         let next = match opening {
-            _ if free > now => Some(free),
-            Err(reason) => {
+            Ok(_) if free > now => Some(free),
+            Err(reason) if reason == EXPIRED || free <= now => {
                 let carriage = self.carriage(parcel, at, now);
                 verdicts.lose_as(SimDuration::ZERO, reason, carriage);
                 return self.done(at);
             }
+            Err(_) => Some(free),
             Ok(open) if open > now => Some(open),
             Ok(_) => self.wait_for(parcel, at, now),
         };
         match next {
-            Some(next) => self.hold_until(now, next, at, verdicts),
+            Some(next) => {
+                let next = expires.map_or(next, |expires| next.min(expires));
+                self.hold_until(now, next, at, verdicts);
+            }
             None => self.transmit(parcel, at, verdicts),
         }
     }

@@ -68,8 +68,8 @@ struct Reader {
 }
 
 impl ContactPlan {
-    /// Reads the contacts and ranges of an ION `ionrc` file, or of the part for `ionadmin` of a file
-    /// for several programs. A contact has the light time of the range that covers its beginning,
+    /// Reads the contacts and ranges of an ION `ionrc` file, or of the part for `ionadmin` of a
+    /// file for several programs. A contact has the light time of the range that covers its beginning,
     /// also when that range ends; one that begins within a contact splits it. A range from a lower
     /// to a higher node number holds for the way back, too, while the file has none for that way.
     /// A contact without a range is passed over, with a remark, unless
@@ -243,10 +243,11 @@ impl Reader {
         let confidence = words.next().map(|word| words.confidence(word));
         let confidence = self.note(confidence.transpose())?;
         words.end(CONTACT_FORM)?;
-        let all = (start, stop, from, to, rate_bit_per_s, confidence);
-        let (Some(start), Some(stop), Some(from), Some(to), Some(rate_bit_per_s), Some(confidence)) =
-            all
-        else {
+        let (Some(start), Some(stop)) = (start, stop) else {
+            return Ok(());
+        };
+        let all = (from, to, rate_bit_per_s, confidence);
+        let (Some(from), Some(to), Some(rate_bit_per_s), Some(confidence)) = all else {
             return Ok(());
         };
         let contact = Contact {

@@ -313,3 +313,39 @@ fn tables_and_tails_stay_in_their_bounds() {
     assert!(least >= SimDuration::from_secs_f64(0.050 - 0.01 / 3f64.sqrt()) && least < ms(45));
     assert!(seen.iter().any(|fate| fate.delay > ms(90)));
 }
+
+#[test]
+fn a_message_that_waits_for_longer_than_its_lifetime_expires() {
+    let text = "contacts = [{ start = '10s', end = '20s' }]\nstore_and_forward = true\n\
+                lifetime = '5s'\nlatency = '1s'";
+    let second = SimDuration::from_secs(1);
+    let seen = over(6, &each(second, 12, 0), Link::new(params(text)));
+    for fate in &seen {
+        let (reason, delay) = match fate.ordinal {
+            0..=5 => (EXPIRED, 5),
+            ordinal => ("", 1 + 10u64.saturating_sub(ordinal)),
+        };
+        assert_eq!(
+            (fate.reason, fate.delay),
+            (reason, second * delay),
+            "{fate:?}"
+        );
+    }
+    // Who has expired leaves its place in the queue.
+    let seen = over(
+        6,
+        &each(second, 9, 0),
+        Link::new(params(&format!("{text}\nqueue = 3"))),
+    );
+    let full: Vec<u64> = seen
+        .iter()
+        .filter(|f| f.reason == QUEUE_FULL)
+        .map(|f| f.ordinal)
+        .collect();
+    assert_eq!(full, [3, 4, 8]);
+    // Retries end with it: the first answer would be there after 2 s, the second after 4 s.
+    let lossy = params("latency = '1s'\nloss = 1.0\nretries = 9\nlifetime = '5s'");
+    let seen = over(6, &each(second, 1, 0), Link::new(lossy));
+    assert_eq!((seen[0].reason, seen[0].delay), (EXPIRED, second * 5));
+    assert_eq!(seen[0].parts().attempts, 3);
+}

@@ -129,6 +129,7 @@ fn any_params() -> impl Strategy<Value = LinkParams> {
         trace: air.3,
         contacts: air.4,
         store_and_forward: air.5,
+        lifetime: None,
         retries: more.0,
         timeout: more.1.filter(|timeout| !timeout.is_zero()),
         radio: None,
