@@ -183,7 +183,8 @@ impl Links {
     /// struct Planner(Processor);
     /// impl Actor for Planner { type Accepts = (ProcessorChange,); }
     /// impl Handler<ProcessorChange> for Planner {
-    ///     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome { Ok(())
+    ///     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome {
+    ///         Ok(())
     ///     }
     /// }
     /// let mut sim = Simulation::new(1);

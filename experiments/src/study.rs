@@ -33,8 +33,7 @@
 //! name = "policy"
 //! variants = [
 //!     { name = "paper", set = { network.policy = "paper" } },
-//!     { name = "chained", set = { network.policy = "paper", network.max_plus.acceleration_chains =
-//!     true } },
+//!     { name = "chained", set = { network.max_plus.acceleration_chains = true } },
 //! ]
 //! ```
 //!

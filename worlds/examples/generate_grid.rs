@@ -2,8 +2,8 @@
 //! built-in one was made by the line below; a test compares it with the generator.
 //!
 //! ```text
-//! cargo run -p farside-worlds --example generate_grid -- worlds/data/movingai rubble-32-32-10 32
-//! 32 0.1 200 4
+//! cargo run -p farside-worlds --example generate_grid -- \
+//!     worlds/data/movingai rubble-32-32-10 32 32 0.1 200 4
 //! ```
 
 use std::error::Error;

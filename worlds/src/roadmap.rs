@@ -68,8 +68,9 @@ impl Roadmap {
     /// use nalgebra::Point2;
     /// let v = VertexId;
     /// let corners = vec![Point2::new(0.0, 0.0), Point2::new(9.0, 0.0), Point2::new(9.0, 9.0)];
-    /// let map = Roadmap::new("bend", corners, vec![(v(1), v(0)), (v(1), v(2))], vec![v(0),
-    /// v(2)])?; assert_eq!(map.shortest_path(v(0), v(2)), [v(0), v(1), v(2)]);
+    /// let edges = vec![(v(1), v(0)), (v(1), v(2))];
+    /// let map = Roadmap::new("bend", corners, edges, vec![v(0), v(2)])?;
+    /// assert_eq!(map.shortest_path(v(0), v(2)), [v(0), v(1), v(2)]);
     /// # Ok::<(), farside_worlds::RoadmapError>(())
     /// ```
     ///

@@ -55,8 +55,9 @@ impl SensorNetwork {
     /// use farside_worlds::{Roadmap, SensorError, SensorNetwork, VertexId};
     /// use nalgebra::Point2;
     /// let ends = vec![Point2::new(0.0, 0.0), Point2::new(10.0, 0.0)];
-    /// let map = Roadmap::new("pair", ends.clone(), vec![(VertexId(0), VertexId(1))],
-    /// vec![VertexId(0)])?; assert!(SensorNetwork::new(&map, ends.clone(), 10.0).is_ok());
+    /// let edges = vec![(VertexId(0), VertexId(1))];
+    /// let map = Roadmap::new("pair", ends.clone(), edges, vec![VertexId(0)])?;
+    /// assert!(SensorNetwork::new(&map, ends.clone(), 10.0).is_ok());
     /// let error = SensorNetwork::new(&map, ends, 9.0).unwrap_err();
     /// assert!(matches!(error, SensorError::InconsistentEdges { .. }));
     /// # Ok::<(), Box<dyn std::error::Error>>(())

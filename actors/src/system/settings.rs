@@ -26,8 +26,9 @@
 //! let error = settings.check("ping").unwrap_err().to_string();
 //! assert_eq!(error, "ping.count: 0: expected 1 to 1000");
 //! let section = &PingSettings::sections("ping")[0];
-//! assert_eq!((section.keys[2].name, section.keys[0].expected.as_str()), ("distance", "1 to
-//! 1000")); assert_eq!(section.defaults["interval"].as_str(), Some("1s"));
+//! assert_eq!(section.keys[2].name, "distance");
+//! assert_eq!(section.keys[0].expected, "1 to 1000");
+//! assert_eq!(section.defaults["interval"].as_str(), Some("1s"));
 //! # Ok::<(), toml::de::Error>(())
 //! ```
 

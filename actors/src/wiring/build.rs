@@ -34,9 +34,9 @@ use farside::suggest::{closest, did_you_mean};
 /// assert_eq!(links.nominal("base", "rover_1").unwrap().loss, 0.5);
 ///
 /// let config: LinksConfig = toml::from_str("'base-rovre_*' = { loss = 0.5 }").unwrap();
-/// let error = LinkBuilder::new(&config, &[])?.build(&mut Simulation::new(1),
-/// &wiring).unwrap_err(); assert!(error.to_string().ends_with("matches no link; did you mean
-/// \"base-rover_*\"?"));
+/// let builder = LinkBuilder::new(&config, &[])?;
+/// let error = builder.build(&mut Simulation::new(1), &wiring).unwrap_err().to_string();
+/// assert!(error.ends_with("matches no link; did you mean \"base-rover_*\"?"));
 /// # Ok::<(), farside_actors::link::LinkConfigError>(())
 /// ```
 #[derive(Default)]

@@ -34,8 +34,9 @@ impl Results {
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
     /// #     block: 1, stop: None, published: vec![] };
-    /// let run = |seed| RunRecord { cell: 0, seed, outcome: RunOutcome::Failed { error: "x".into()
-    /// } }; let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
+    /// let failed = || RunOutcome::Failed { error: "x".into() };
+    /// let run = |seed| RunRecord { cell: 0, seed, outcome: failed() };
+    /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
     /// let whole = Results::merge([half(2), half(1)])?.unwrap();
     /// assert_eq!(whole.runs, [run(1), run(2)]);
     /// # Ok::<(), farside_experiments::study::StoreError>(())

@@ -314,8 +314,8 @@ pub struct OverallSummary {
 /// # let run = |seed: u64| RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
 /// #     timed_out: false, events: 1, messages: MessageCounts::default(),
-/// #     metrics: json!({"ratio": seed as f64}).as_object().unwrap().clone(), violations: vec![] }
-/// };
+/// #     metrics: json!({"ratio": seed as f64}).as_object().unwrap().clone(),
+/// #     violations: vec![] } };
 /// # let results = Results { manifest, runs: (0..8).map(run).collect() };
 /// use farside_experiments::study::summary::{MetricSummary, summarise};
 /// let summary = summarise(&results);

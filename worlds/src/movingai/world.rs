@@ -165,9 +165,8 @@ impl GridWorld {
     /// let world = GridWorld::new("a.map", &map, 1.0, tasks.tasks())?;
     /// assert_eq!(
     ///     world.explain(&world.blocked()[0]),
-    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another task;
-    ///     the \
-    ///      best over (1, 0) of line 3"
+    ///     "line 2: every way from (0, 0) to (2, 0) leads over the start or goal of another \
+    ///      task; the best over (1, 0) of line 3"
     /// );
     /// # Ok::<(), farside_worlds::movingai::GridError>(())
     /// ```

@@ -15,8 +15,8 @@ impl Roadmap {
     ///
     /// ```
     /// use farside_worlds::{Roadmap, VertexId as V};
-    /// let text = "name = 'bend'\nboundary = [0, 2]\npositions_m = [[0, 0], [5, 0], [9, 0], [5,
-    /// 5]]\n\
+    /// let text = "name = 'bend'\nboundary = [0, 2]\n\
+    ///             positions_m = [[0, 0], [5, 0], [9, 0], [5, 5]]\n\
     ///             edges = [[0, 1], [1, 2], [0, 3], [2, 3]]";
     /// let map = Roadmap::from_toml(text)?;
     /// assert_eq!(map.without(&[V(1)]).shortest_path(V(0), V(2)), [V(0), V(3), V(2)]);

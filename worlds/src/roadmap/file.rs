@@ -44,8 +44,9 @@ struct RoadmapFile {
 ///
 /// ```
 /// use farside_worlds::roadmap::RoadmapTable;
-/// let text = "boundary = [0, 2]\npositions_m = [[0, 0], [9, 0], [9, 9]]\nedges = [[0, 1], [1,
-/// 2]]"; let table: RoadmapTable = toml::from_str(text)?;
+/// let text = "boundary = [0, 2]\npositions_m = [[0, 0], [9, 0], [9, 9]]\n\
+///             edges = [[0, 1], [1, 2]]";
+/// let table: RoadmapTable = toml::from_str(text)?;
 /// let map = table.build("bend")?;
 /// assert_eq!((map.name(), map.len(), map.edge_count()), ("bend", 3, 2));
 /// assert_eq!(RoadmapTable::from(&map), table);
@@ -135,8 +136,9 @@ impl Roadmap {
     ///
     /// ```
     /// use farside_worlds::Roadmap;
-    /// let text = "name = 'pair'\nboundary = [0, 1]\npositions_m = [[0, 0], [5, 0]]\nedges = [[0,
-    /// 1]]"; let map = Roadmap::from_toml(text)?;
+    /// let text = "name = 'pair'\nboundary = [0, 1]\npositions_m = [[0, 0], [5, 0]]\n\
+    ///             edges = [[0, 1]]";
+    /// let map = Roadmap::from_toml(text)?;
     /// assert_eq!(Roadmap::from_toml(&map.to_toml())?, map);
     /// assert!(Roadmap::from_toml("edges = [[").is_err());
     /// # Ok::<(), farside_worlds::WorldError>(())
