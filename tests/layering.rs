@@ -82,8 +82,8 @@ fn misplaced_dependencies(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<Str
     found
 }
 
-/// The workspace's dependencies of every sort, as cargo sees them.
-fn workspace() -> BTreeMap<String, BTreeSet<String>> {
+/// The workspace as cargo sees it.
+fn metadata() -> serde_json::Value {
     let output = Command::new(env!("CARGO"))
         .args([
             "metadata",
@@ -97,7 +97,12 @@ fn workspace() -> BTreeMap<String, BTreeSet<String>> {
         .expect("cargo metadata starts");
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "cargo metadata: {text}");
-    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+    serde_json::from_slice(&output.stdout).expect("it is JSON")
+}
+
+/// The workspace's dependencies of every sort.
+fn workspace() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata = metadata();
     let list = |value: &serde_json::Value| value.as_array().cloned().unwrap_or_default();
     let name = |value: &serde_json::Value| value["name"].as_str().unwrap_or_default().to_owned();
     list(&metadata["packages"])
@@ -252,6 +257,20 @@ fn misplaced_names(path: &str, source: &str) -> Vec<String> {
         }
     }
     found
+}
+
+/// `cargo run` has to know what to run.
+#[test]
+fn there_is_one_binary() {
+    let metadata = metadata();
+    let packages = metadata["packages"].as_array().expect("a list");
+    let targets = packages
+        .iter()
+        .flat_map(|package| package["targets"].as_array());
+    let is_bin = |target: &&serde_json::Value| target["kind"][0] == "bin";
+    let names: Vec<_> = targets.flatten().filter(is_bin).collect();
+    let names: Vec<_> = names.iter().filter_map(|t| t["name"].as_str()).collect();
+    assert_eq!(names, ["farside"]);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Studies of curves, over blocks of seeds, with a claim that one cell exceeds another: by the
-//! command of a system that this program does not know (`src/bin/climber.rs`).
+//! command of a system that this program does not know (`examples/climber.rs`, which
+//! `cargo test` builds; an example, so that `cargo run` finds one binary).
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Two planners on six hills of five runs each.
@@ -13,8 +14,15 @@ const STUDY: &str = "question = 'From when on does cleverness pay?'\nscenario = 
     { planner = 'clever', exceeds = { planner = 'simple' }, from_index = 14 },\n\
     { planner = 'clever', exceeds = { planner = 'simple' }, from_index = 2 },\n]\n";
 
+/// The example's binary, beside that of this test.
+fn binary() -> PathBuf {
+    let test = std::env::current_exe().expect("this program has a path");
+    let profile = test.ancestors().nth(2).expect("it lies in deps");
+    profile.join("examples/climber")
+}
+
 fn climber(folder: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_climber"))
+    let output = Command::new(binary())
         .args(arguments)
         .current_dir(folder)
         .output()
@@ -85,7 +93,7 @@ fn a_study_of_curves_from_its_text_to_its_page_and_back_to_a_run() {
     let forged = format!("{}1{}", &line[..at], &line[at..]);
     std::fs::write(&path, records.replace(line, &forged)).expect("it can be written");
     let again = ["reproduce", "runs", "--cell", "0", "--seed", "17"];
-    let output = Command::new(env!("CARGO_BIN_EXE_climber"))
+    let output = Command::new(binary())
         .args(again)
         .current_dir(folder)
         .output()
