@@ -105,6 +105,9 @@ pub(super) fn put_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
 pub(super) fn put_packed_varint(out: &mut Vec<u8>, value: u64) {
     if value < 0x80 {
         out.push(value as u8);
+    } else if value < 0x4000 {
+        // Indices of vertices are mostly of this size.
+        out.extend_from_slice(&[value as u8 | 0x80, (value >> 7) as u8]);
     } else {
         put_long_varint(out, Tag::NONE, value);
     }
@@ -144,7 +147,9 @@ pub(super) fn put_fixed64(out: &mut Vec<u8>, tag: Tag, bits: u64) {
 /// Appends `tag` and four bytes.
 #[inline(always)]
 pub(super) fn put_fixed32(out: &mut Vec<u8>, tag: Tag, bits: u32) {
-    tag.put(out);
+    if tag.len != 0 {
+        tag.put(out);
+    }
     out.extend_from_slice(&bits.to_le_bytes());
 }
 
