@@ -24,11 +24,11 @@ struct Command {
 #[derive(Serialize, Deserialize)]
 struct Next;
 
-struct Ground {
+struct GroundStation {
     sent: u32,
 }
 
-impl Actor for Ground {
+impl Actor for GroundStation {
     type Accepts = (Next,);
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -37,7 +37,7 @@ impl Actor for Ground {
     }
 }
 
-impl Handler<Next> for Ground {
+impl Handler<Next> for GroundStation {
     fn handle(&mut self, _next: Next, ctx: &mut Context<'_, Self>) -> Outcome {
         let rover = ctx.lookup::<Rover>("rover")?;
         self.sent += 1;
@@ -89,7 +89,7 @@ fn main() {
     let seen = Arc::<Mutex<Vec<Life>>>::default();
     let mut sim = Simulation::new(1);
     let (earth, moon) = (sim.host("earth"), sim.host("moon"));
-    sim.actor(earth, "ground", |_name| Ground { sent: 0 });
+    sim.actor(earth, "ground", |_name| GroundStation { sent: 0 });
     let to_rover = seen.clone();
     // Called at the start, and again at the restart.
     sim.actor(moon, "rover", move |_name| Rover {

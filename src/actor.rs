@@ -5,7 +5,7 @@ use std::any::Any;
 use crate::engine::{AnyActor, Core};
 use crate::fault::Outcome;
 use crate::payload::Message;
-use crate::plan::Accepted;
+use crate::topology::Accepted;
 
 pub(crate) mod address;
 pub(crate) mod context;

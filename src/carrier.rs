@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use crate::encoding::Schema;
 use crate::ids::{EntityId, HostId, MatchKey};
 use crate::payload::{Encode, Message};
-use crate::plan::{Kind, Plan};
 use crate::random::RandomKey;
 use crate::time::{SimDuration, SimTime};
+use crate::topology::{Kind, Topology};
 
 /// A link: decides when each message arrives, how often, or why it does not.
 ///
@@ -44,7 +44,7 @@ pub trait Carrier: Send + 'static {
 /// A message as a link sees it: its size and kind, who sent it and who is to get it. Its content
 /// is not the link's business.
 pub struct Parcel<'a> {
-    pub(crate) plan: &'a Plan,
+    pub(crate) topology: &'a Topology,
     pub(crate) now: SimTime,
     pub(crate) sent: SimTime,
     pub(crate) link: EntityId,
@@ -68,27 +68,27 @@ impl Parcel<'_> {
 
     /// The name of the actor that sent it.
     pub fn sender(&self) -> &str {
-        self.plan.name(self.sender)
+        self.topology.name(self.sender)
     }
 
     /// The name of the actor it is for.
     pub fn receiver(&self) -> &str {
-        self.plan.name(self.receiver)
+        self.topology.name(self.receiver)
     }
 
     /// The name of the sender's host.
     pub fn sender_host(&self) -> &str {
-        self.plan.host_name(self.sender)
+        self.topology.host_name(self.sender)
     }
 
     /// The name of the receiver's host.
     pub fn receiver_host(&self) -> &str {
-        self.plan.host_name(self.receiver)
+        self.topology.host_name(self.receiver)
     }
 
     /// The sender's host and the receiver's.
     pub fn hosts(&self) -> (HostId, HostId) {
-        let host = |entity| HostId(self.plan.place(entity).host);
+        let host = |entity| HostId(self.topology.place(entity).host);
         (host(self.sender), host(self.receiver))
     }
 
@@ -141,19 +141,21 @@ impl Parcel<'_> {
     /// that matching messages of two runs meet the same luck.
     pub fn random(&self, purpose: u64, attempt: u32, copy: u32) -> RandomKey {
         let identity = match self.match_key {
-            Some(key) => RandomKey::new(self.plan.seed).number(key.bits()).number(
-                // Keeps a keyed message apart from an unkeyed one with an equal ordinal.
-                u64::from(self.repeat) | 1 << 63,
-            ),
-            None => RandomKey::new(self.plan.seed)
+            Some(key) => RandomKey::new(self.topology.seed)
+                .number(key.bits())
+                .number(
+                    // Keeps a keyed message apart from an unkeyed one with an equal ordinal.
+                    u64::from(self.repeat) | 1 << 63,
+                ),
+            None => RandomKey::new(self.topology.seed)
                 .number(self.ordinal)
                 .number(0),
         };
         identity
-            .number(self.plan.name_hash(self.link))
+            .number(self.topology.name_hash(self.link))
             .number(purpose)
-            .number(self.plan.name_hash(self.sender))
-            .number(self.plan.name_hash(self.receiver))
+            .number(self.topology.name_hash(self.sender))
+            .number(self.topology.name_hash(self.receiver))
             .number(self.kind.hash())
             .number(u64::from(attempt) << 32 | u64::from(copy))
     }
@@ -164,8 +166,8 @@ impl Parcel<'_> {
     /// number), where the number may be that of a slot of time. All messages that meet this slot
     /// then meet the same channel.
     pub fn random_at(&self, purpose: u64, number: u64) -> RandomKey {
-        RandomKey::new(self.plan.seed)
-            .number(self.plan.name_hash(self.link))
+        RandomKey::new(self.topology.seed)
+            .number(self.topology.name_hash(self.link))
             .number(purpose)
             .number(number)
     }

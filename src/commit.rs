@@ -10,17 +10,17 @@ use crate::engine::{FirstSample, Head, InFlight, Sink, hash_if_wanted};
 use crate::fault::ObserverError;
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::plan::{Kind, Plan};
 use crate::record::{Checkpoint, Flow, Observer, Record, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
 use crate::time::SimTime;
+use crate::topology::{Kind, Topology};
 
 /// Hashed records from one checkpoint to the next.
 const CHECKPOINT_RECORDS: usize = 8192;
 
 /// Takes records in key order, and is told nothing else.
 pub(crate) struct Committer {
-    plan: Arc<Plan>,
+    topology: Arc<Topology>,
     observers: Vec<(Wants, Box<dyn Observer>)>,
     digest: Digest,
     hashes: Vec<u32>,
@@ -36,17 +36,17 @@ pub(crate) struct Committer {
 
 impl Committer {
     pub(crate) fn new(
-        plan: Arc<Plan>,
+        topology: Arc<Topology>,
         observers: Vec<Box<dyn Observer>>,
         interrupt: Arc<AtomicBool>,
     ) -> Result<Self, ObserverError> {
         let mut observers: Vec<_> = observers.into_iter().map(|o| (o.wants(), o)).collect();
         for (_, observer) in &mut observers {
-            observer.begin(&plan.info)?;
+            observer.begin(&topology.info)?;
         }
         Ok(Committer {
-            last: plan.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
-            plan,
+            last: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            topology,
             observers,
             digest: Digest::EMPTY,
             hashes: Vec::with_capacity(CHECKPOINT_RECORDS),
@@ -82,10 +82,10 @@ impl Committer {
         mut in_flight: Vec<InFlight>,
     ) -> Report {
         in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
-        let plan = self.plan.clone();
+        let topology = self.topology.clone();
         for (key, head, body) in in_flight {
-            let record = head.record(&plan, RecordClass::InFlight, key, &body, None);
-            self.commit(&record, hash_if_wanted(&plan, &record));
+            let record = head.record(&topology, RecordClass::InFlight, key, &body, None);
+            self.commit(&record, hash_if_wanted(&topology, &record));
         }
         self.checkpoint();
         self.counts.lost_by_reason = self
@@ -175,7 +175,7 @@ impl Sink for Committer {
                 }
             }
         }
-        if self.plan.digest && record.class != RecordClass::Sample {
+        if self.topology.digest && record.class != RecordClass::Sample {
             self.digest.extend(hash);
             self.hashed += 1;
             self.hashes.push(hash as u32);
@@ -247,7 +247,7 @@ impl Batch {
 
     /// The messages that the uncommitted records from `at` on had taken from their way, though
     /// committed events before `fault` sent them.
-    pub(crate) fn undone(&self, at: usize, fault: EventKey, plan: &Plan) -> Vec<InFlight> {
+    pub(crate) fn undone(&self, at: usize, fault: EventKey, topology: &Topology) -> Vec<InFlight> {
         let mut found = Vec::new();
         let mut unit: Option<(EventKey, RecordClass)> = None;
         for kept in &self.kept[at..] {
@@ -267,7 +267,10 @@ impl Batch {
                     sender: record.sender,
                     receiver: record.receiver,
                     link: record.link,
-                    kind: kept.kind.as_ref().and_then(|kind| plan.kind_index(kind)),
+                    kind: kept
+                        .kind
+                        .as_ref()
+                        .and_then(|kind| topology.kind_index(kind)),
                     ordinal: record.ordinal,
                     copy: record.copy,
                     match_key: record.match_key,

@@ -28,7 +28,9 @@
 //! | serde | protobuf (proto3) |
 //! |---|---|
 //! | struct, tuple struct, tuple of mixed types | message; fields numbered in order from 1 |
-//! | `bool`, `i8` to `i32`, `i64`, `u8` to `u32`, `u64`, `f32`, `f64` | `bool`, `int32`, `int64`, `uint32`, `uint64`, `float`, `double`; always written, also when zero |
+//! | `bool`, `f32`, `f64` | `bool`, `float`, `double`; always written, also when zero |
+//! | `i8` to `i32`, `i64` | `int32`, `int64`; always written |
+//! | `u8` to `u32`, `u64` | `uint32`, `uint64`; always written |
 //! | `char`, strings | `string` |
 //! | `serialize_bytes` | `bytes` |
 //! | `i128`, `u128` | `bytes`: 16, little-endian |
@@ -37,7 +39,7 @@
 //! | `Option` | `optional` |
 //! | `Vec`, arrays, tuples of one type | `repeated`, packed where protobuf can |
 //! | maps | `map` where the key allows it, else repeated entries; sorted by encoded key |
-//! | `Option<Option<_>>`, `Vec<Vec<_>>`, `Option<Vec<_>>` and the like | a helper message around the inner one |
+//! | `Option<Option<_>>`, `Vec<Vec<_>>` and the like | a helper message around the inner one |
 //! | newtype structs | what they hold; the root, and one that contains itself, are messages |
 //!
 //! Every NaN is written as the same NaN. Recursive types work; values may nest up to 96 messages,
@@ -58,10 +60,10 @@ mod decode;
 mod descriptor;
 mod encode;
 mod error;
+mod flat;
 mod format;
 mod lower;
 mod names;
-mod plan;
 mod registry;
 mod samples;
 mod schema;

@@ -16,11 +16,11 @@ use crate::carrier::{AnyCarrier, SealedChange};
 use crate::fault::{Fault, FaultCause, Outcome};
 use crate::ids::{EntityId, KindIndex, MatchKey};
 use crate::key::{Bound, EventKey};
-use crate::plan::{FixedMap, Plan};
 use crate::queue::Entry;
 use crate::random::Stream;
 use crate::record::{Record, RecordClass, record_hash};
 use crate::time::SimTime;
+use crate::topology::{FixedMap, Topology};
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
@@ -138,19 +138,19 @@ pub(crate) struct Engine {
 
 impl Engine {
     pub(crate) fn new(
-        plan: Arc<Plan>,
+        topology: Arc<Topology>,
         index: u32,
         actors: Vec<ActorCell>,
         links: Vec<LinkCell>,
     ) -> Self {
         let mut engine = Engine {
             actors,
-            parts: Parts::new(plan, index, links),
+            parts: Parts::new(topology, index, links),
         };
         for cell in &mut engine.actors {
             let key = engine
                 .parts
-                .plan
+                .topology
                 .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
             cell.state.count += 1;
             let head = Head::of_entity(cell.entity);
@@ -191,7 +191,7 @@ impl Engine {
             self.parts.note_unfinished(key, class, head);
             return Err(fault);
         }
-        if key.step > self.parts.plan.step_limit {
+        if key.step > self.parts.topology.step_limit {
             return Err(self.step_limit_fault(key, class, &head));
         }
         if class == Class::Message && head.has_side {
@@ -202,7 +202,7 @@ impl Engine {
             Class::Start => RecordClass::Start,
             Class::Timer => RecordClass::Timer,
             Class::Message if self.is_crashed(head.receiver) => {
-                let reason = self.parts.plan.intern("crashed");
+                let reason = self.parts.topology.intern("crashed");
                 self.commit(RecordClass::Lost, key, &Head { reason, ..head }, sink);
                 return Ok(());
             }
@@ -213,10 +213,10 @@ impl Engine {
             Class::Tell => return self.tell(key, &head, letter, sink),
             Class::Charge => {
                 let charge = side.and_then(|side| side.carriage);
-                let local = self.parts.plan.place(head.receiver).local as usize;
+                let local = self.parts.topology.place(head.receiver).local as usize;
                 let charge_j = charge.map_or(0.0, |charge| charge.energy_j);
                 self.actors[local].state.charged_j += charge_j;
-                let host = self.parts.plan.place(head.receiver).host;
+                let host = self.parts.topology.place(head.receiver).host;
                 self.parts.energy(host).transmit_j += charge_j;
                 return Ok(());
             }
@@ -235,13 +235,13 @@ impl Engine {
         let carriage = side.and_then(|side| side.carriage);
         let charge_j = carriage.map_or(0.0, |carriage| carriage.receive_j);
         if charge_j != 0.0 {
-            let host = self.parts.plan.place(receiver).host;
+            let host = self.parts.topology.place(receiver).host;
             self.parts.energy(host).receive_j += charge_j;
         }
     }
 
     fn cell(&self, actor: EntityId) -> &ActorCell {
-        &self.actors[self.parts.plan.place(actor).local as usize]
+        &self.actors[self.parts.topology.place(actor).local as usize]
     }
 
     fn is_crashed(&self, actor: EntityId) -> bool {
@@ -268,7 +268,7 @@ impl Engine {
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let cell = &mut self.actors[self.parts.plan.place(head.receiver).local as usize];
+        let cell = &mut self.actors[self.parts.topology.place(head.receiver).local as usize];
         let result = invoke(cell, &mut self.parts, key, letter);
         if result.is_err() || self.parts.fault.is_some() {
             return Err(self.handler_fault(class, key, head, result));
@@ -289,7 +289,7 @@ impl Engine {
         let Some(cause) = result.err().or(kernels_own) else {
             unreachable!("called with a fault at hand");
         };
-        let message = head.message(&self.parts.plan);
+        let message = head.message(&self.parts.topology);
         self.parts.note_unfinished(key, class, *head);
         let blamed = self.parts.carrying.unwrap_or(head.receiver);
         self.parts.fault_at(key, blamed, message, *cause)
@@ -316,7 +316,7 @@ impl Engine {
         });
         if let Err(cause) = result {
             self.parts.note_unfinished(key, class, head);
-            let message = format!("a message from {}", self.parts.plan.name(head.sender));
+            let message = format!("a message from {}", self.parts.topology.name(head.sender));
             return Err(self.parts.fault_at(key, link, Some(message), *cause));
         }
         self.commit(RecordClass::HandOver, key, &head, sink);
@@ -354,7 +354,7 @@ impl Engine {
     ) -> Result<(), Box<Fault>> {
         let mut head = Head::of_entity(entity);
         head.sender = EntityId::CONTROL;
-        let local = self.parts.plan.place(entity).local as usize;
+        let local = self.parts.topology.place(entity).local as usize;
         self.parts.begin(key, None, None)?;
         match action {
             Action::Crash => {
@@ -367,8 +367,8 @@ impl Engine {
                 cell.state.incarnation += 1;
                 cell.state.streams.clear();
                 cell.actor = None;
-                let (plan, factory) = (&self.parts.plan, &cell.factory);
-                let built = catch_unwind(AssertUnwindSafe(|| factory(plan.name(entity))));
+                let (topology, factory) = (&self.parts.topology, &cell.factory);
+                let built = catch_unwind(AssertUnwindSafe(|| factory(topology.name(entity))));
                 match built {
                     Ok(actor) => cell.actor = Some(actor),
                     Err(payload) => {
@@ -381,7 +381,7 @@ impl Engine {
             Action::Change(change) => {
                 head.kind = self
                     .parts
-                    .plan
+                    .topology
                     .links
                     .get(&entity)
                     .map(|link| link.change_kind);
@@ -402,7 +402,7 @@ impl Engine {
         letter: Sealed,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let local = self.parts.plan.place(head.receiver).local as usize;
+        let local = self.parts.topology.place(head.receiver).local as usize;
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
         let (ordinal, _) = state.next_in_flow(EntityId::CONTROL.0, kind, None);
@@ -430,13 +430,13 @@ impl Engine {
     #[inline]
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
-        if parts.plan.recording() {
+        if parts.topology.recording() {
             let side = parts.side.as_ref().filter(|_| head.has_side);
-            let mut record = head.record(&parts.plan, class, key, &parts.body, side);
+            let mut record = head.record(&parts.topology, class, key, &parts.body, side);
             record.sends = parts.sends;
-            sink.commit(&record, hash_if_wanted(&parts.plan, &record));
+            sink.commit(&record, hash_if_wanted(&parts.topology, &record));
         } else {
-            let reason = parts.plan.reason(head.reason);
+            let reason = parts.topology.reason(head.reason);
             sink.count_event(class, key, head, reason, parts.sends);
         }
         if !parts.effects.is_empty() {
@@ -446,13 +446,13 @@ impl Engine {
 
     fn step_limit_fault(&mut self, key: EventKey, class: Class, head: &Head) -> Box<Fault> {
         // The hops that follow would show the same loop: name the ones still waiting here.
-        let plan = self.parts.plan.clone();
+        let topology = self.parts.topology.clone();
         let hop = |head: &Head| {
-            let kind = head.kind.map_or("start", |kind| plan.kind(kind).name());
+            let kind = head.kind.map_or("start", |kind| topology.kind(kind).name());
             format!(
                 "{} -> {} ({kind})",
-                plan.name(head.sender),
-                plan.name(head.receiver)
+                topology.name(head.sender),
+                topology.name(head.receiver)
             )
         };
         let mut chain = vec![hop(head)];
@@ -465,16 +465,16 @@ impl Engine {
         }
         self.parts.note_unfinished(key, class, *head);
         let cause = FaultCause::StepLimit {
-            limit: plan.step_limit,
+            limit: topology.step_limit,
             chain,
         };
         self.parts.fault_at(key, head.receiver, None, cause)
     }
 }
 
-pub(crate) fn hash_if_wanted(plan: &Plan, record: &Record<'_>) -> u128 {
-    if plan.digest {
-        record_hash(plan, record)
+pub(crate) fn hash_if_wanted(topology: &Topology, record: &Record<'_>) -> u128 {
+    if topology.digest {
+        record_hash(topology, record)
     } else {
         0
     }

@@ -15,11 +15,11 @@ use crate::engine::{Sink, hash_if_wanted};
 use crate::fault::{BuildError, Fault};
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::plan::Plan;
 use crate::record::{Observer, RecordClass};
 use crate::report::{End, Report};
 use crate::schedule::Schedule;
 use crate::time::SimTime;
+use crate::topology::Topology;
 
 /// How to execute a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Executor {
 
 /// A run, ready to start.
 pub(crate) struct Ready {
-    pub(crate) plan: Arc<Plan>,
+    pub(crate) topology: Arc<Topology>,
     pub(crate) engines: Vec<Engine>,
     pub(crate) schedule: Schedule,
     pub(crate) observers: Vec<Box<dyn Observer>>,
@@ -54,17 +54,17 @@ pub(crate) struct Ready {
 
 pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError> {
     let Ready {
-        plan,
+        topology,
         engines,
         schedule,
         observers,
         interrupt,
     } = ready;
-    let committer = Committer::new(plan.clone(), observers, interrupt)?;
+    let committer = Committer::new(topology.clone(), observers, interrupt)?;
     match executor {
-        Executor::Inline => Ok(inline::run(plan, engines, schedule, committer)),
+        Executor::Inline => Ok(inline::run(topology, engines, schedule, committer)),
         Executor::Kameo { threads } => {
-            self::kameo::run(plan, engines, schedule, committer, threads)
+            self::kameo::run(topology, engines, schedule, committer, threads)
         }
     }
 }
@@ -96,7 +96,7 @@ impl Ending {
 
     /// Commits a stop and ends the run with it.
     fn stop(
-        plan: &Plan,
+        topology: &Topology,
         committer: &mut Committer,
         key: EventKey,
         by: EntityId,
@@ -104,9 +104,9 @@ impl Ending {
     ) -> Self {
         let mut head = Head::of_entity(EntityId::CONTROL);
         head.sender = by;
-        let record = head.record(plan, RecordClass::Stop, key, reason.as_bytes(), None);
-        committer.commit(&record, hash_if_wanted(plan, &record));
-        let by = plan.name(by).to_owned();
+        let record = head.record(topology, RecordClass::Stop, key, reason.as_bytes(), None);
+        committer.commit(&record, hash_if_wanted(topology, &record));
+        let by = topology.name(by).to_owned();
         Ending {
             end: End::Stopped { by, reason },
             time: key.time,

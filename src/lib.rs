@@ -124,7 +124,6 @@ pub mod fault;
 pub mod ids;
 pub mod key;
 mod payload;
-mod plan;
 mod queue;
 pub mod random;
 pub mod record;
@@ -134,6 +133,7 @@ mod schedule;
 mod simulation;
 pub mod suggest;
 pub mod time;
+mod topology;
 
 pub use actor::{Accepts, Actor, Address, Context, Handler, Recipient};
 pub use carrier::{Carriage, Carrier, FixedDelay, Parcel, Verdicts};
@@ -142,10 +142,10 @@ pub use executor::Executor;
 pub use fault::{BuildError, Fault, FaultCause, HandlerError, LookupError, Outcome};
 pub use ids::{EntityId, HostId, LinkId, MatchKey, TimerId};
 pub use payload::Message;
-pub use plan::{Entity, EntityRole, Kind, RunInfo};
 pub use report::{Counts, End, Report};
 pub use simulation::Simulation;
 pub use time::{SimDuration, SimTime};
+pub use topology::{Entity, EntityRole, Kind, RunInfo};
 
 /// Everything that an actor's author needs.
 pub mod prelude {

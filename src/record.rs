@@ -12,9 +12,9 @@ use crate::digest::Digest;
 pub use crate::fault::ObserverError;
 use crate::ids::{EntityId, MatchKey};
 use crate::key::EventKey;
-use crate::plan::{Kind, Plan, RunInfo};
 use crate::report::Report;
 use crate::time::SimTime;
+use crate::topology::{Kind, RunInfo, Topology};
 
 /// What a [`Record`] is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -192,7 +192,7 @@ const NO_CAUSE: EventKey = EventKey {
 
 /// The hash of one record, to extend a digest with: sixteen words, which is as far as the hash
 /// function's fast path goes. When the message was sent is not among them: it is the cause's time.
-pub(crate) fn record_hash(plan: &Plan, record: &Record<'_>) -> u128 {
+pub(crate) fn record_hash(topology: &Topology, record: &Record<'_>) -> u128 {
     let (key, cause) = (record.key, record.cause.unwrap_or(NO_CAUSE));
     let shape = record.class as u64
         | u64::from(record.match_key.is_some()) << 8
@@ -200,15 +200,15 @@ pub(crate) fn record_hash(plan: &Plan, record: &Record<'_>) -> u128 {
     let words = [
         key.time.as_nanos(),
         u64::from(key.step) << 32 | u64::from(cause.step),
-        plan.name_hash(key.source),
+        topology.name_hash(key.source),
         key.count,
         cause.time.as_nanos(),
-        plan.name_hash(cause.source),
+        topology.name_hash(cause.source),
         cause.count,
         shape,
-        plan.name_hash(record.sender),
-        plan.name_hash(record.receiver),
-        record.link.map_or(0, |link| plan.name_hash(link)),
+        topology.name_hash(record.sender),
+        topology.name_hash(record.receiver),
+        record.link.map_or(0, |link| topology.name_hash(link)),
         record.kind.map_or(0, |kind| kind.hash()),
         record.ordinal,
         record.match_key.map_or(0, |key| key.bits()),

@@ -6,8 +6,8 @@
 
 use std::fmt::Debug;
 
-use crate::plan::RunInfo;
 use crate::record::Record;
+use crate::topology::RunInfo;
 
 /// Draws a run: for each committed record, what changes in the picture.
 ///

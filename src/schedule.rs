@@ -3,8 +3,8 @@
 use crate::engine::Action;
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
-use crate::plan::Plan;
 use crate::time::{SimDuration, SimTime};
+use crate::topology::Topology;
 
 /// A control event.
 pub(crate) struct Control {
@@ -94,7 +94,7 @@ impl Schedule {
 
     /// What is due at [`Schedule::bound`]. A control event goes before a stop asked for at the
     /// same instant, as it would in key order.
-    pub(crate) fn take_due(&mut self, plan: &Plan) -> Option<Due> {
+    pub(crate) fn take_due(&mut self, topology: &Topology) -> Option<Due> {
         let bound = self.bound();
         if self
             .controls
@@ -102,7 +102,7 @@ impl Schedule {
             .is_some_and(|next| Bound::at(next.time) == bound)
         {
             let Control { time, count, what } = self.controls.pop()?;
-            let key = plan.key(time, 0, EntityId::CONTROL, count);
+            let key = topology.key(time, 0, EntityId::CONTROL, count);
             return Some(match what {
                 ControlAction::Entity(entity, action) => Due::Control(key, entity, action),
                 ControlAction::Stop(reason) => Due::Stop {
@@ -113,7 +113,7 @@ impl Schedule {
             });
         }
         let (at, by, reason) = self.stop.take()?;
-        let key = plan.key(at.time, at.step, EntityId::CONTROL, self.next_count);
+        let key = topology.key(at.time, at.step, EntityId::CONTROL, self.next_count);
         Some(Due::Stop { key, by, reason })
     }
 }

@@ -13,10 +13,10 @@ use crate::executor::{self, Executor};
 use crate::fault::{BuildError, LookupError};
 use crate::ids::{HostId, LinkId};
 use crate::payload::Message;
-use crate::plan::{ActorType, KindEntry};
 use crate::record::Observer;
 use crate::report::Report;
 use crate::time::{SimDuration, SimTime};
+use crate::topology::{ActorType, KindEntry};
 
 struct HostDecl {
     name: String,

@@ -8,7 +8,7 @@ mod blame;
 pub mod contacts;
 mod crash;
 mod error;
-mod place;
+mod location;
 mod reference;
 mod seeds;
 mod source;
@@ -37,7 +37,7 @@ use crate::registry::Registry;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
-pub use place::Place;
+pub use location::SourceLocation;
 pub use reference::shared_sections;
 pub(crate) use source::Source;
 

@@ -144,7 +144,7 @@ pub mod summary;
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
 pub(crate) use metrics::KERNEL as KERNEL_METRICS;
-pub use plan::{Plan, Study};
+pub use plan::{Study, StudyPlan};
 pub use runner::{Ended, Progress, RunOptions, run};
 pub use store::Shard;
 

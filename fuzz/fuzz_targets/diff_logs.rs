@@ -1,6 +1,6 @@
-//! Compares two different logs, which are real but for the edits that the input makes in the messages
-//! of either. Whatever they are, there is an error or a report that is the same both ways; and logs
-//! without edits are the same.
+//! Compares two different logs, which are real but for the edits that the input makes in the
+//! messages of either. Whatever they are, there is an error or a report that is the same both ways;
+//! and logs without edits are the same.
 #![no_main]
 
 use farside_fuzz::write_edited;

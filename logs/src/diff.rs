@@ -151,9 +151,9 @@ pub struct DiffReport {
 /// Farside's logs are aligned by the identity of each message: sender, receiver, kind, and the
 /// match key where the protocol gave one, or else the ordinal. The messages of other MCAP files are
 /// aligned on each topic: what is the same, and between these what says the same, what was at the
-/// same time, and last by place. Protobuf and JSON are compared field by field, anything else by its
-/// bytes; so is what cannot be read, and a note says why. Metadata and attachments are compared, and
-/// schemas: a field that is set and that the two do not declare alike differs.
+/// same time, and last by place. Protobuf and JSON are compared field by field, anything else by
+/// its bytes; so is what cannot be read, and a note says why. Metadata and attachments are
+/// compared, and schemas: a field that is set and that the two do not declare alike differs.
 ///
 /// In Farside's logs state samples, what is drawn and what depends on the machine are not compared,
 /// nor in any the topics that one of the logs does not have because they were filtered; the report

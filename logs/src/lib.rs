@@ -30,25 +30,26 @@
 //! | `/scene` | drawn: shapes, and deletions, `foxglove.SceneUpdate` | when | when |
 //! | `/poses/...` | drawn: where something is, `foxglove.PosesInFrame` | when | when |
 //! | `/log` | drawn: text, `foxglove.Log` | when | when |
-//! | `farside/checkpoint` | digest, and a 32-bit hash of each record since the last one | when | when |
+//! | `farside/checkpoint` | digest, and 32-bit hashes of the records since the last | when | when |
 //!
 //! `kind` is the serde name of the message's type in `snake_case`. Each message is an envelope, the
-//! protobuf message `farside.record.{Kind}`: `sender`, `receiver`, `link`, `kind`, `fate`, `reason`,
-//! `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`), `sent_ns`,
-//! `cause`, `match_key`, `body`, and `carriage`: how the link carried the message, its delay in parts
-//! (`queue_ns`, `serialization_ns`, `propagation_ns`, `jitter_ns`, `retries_ns`), the `attempts` it
-//! took, the `energy_j` they cost and the `receive_j` that receiving took; that explains a fate and is
-//! never compared. What has no body is a `farside.log.Event`. State samples are their own type, without
-//! an envelope.
+//! protobuf message `farside.record.{Kind}`: `sender`, `receiver`, `link`, `kind`, `fate`,
+//! `reason`, `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`),
+//! `sent_ns`, `cause`, `match_key`, `body`, and `carriage`: how the link carried the message, its
+//! delay in parts (`queue_ns`, `serialization_ns`, `propagation_ns`, `jitter_ns`, `retries_ns`),
+//! the `attempts` it took, the `energy_j` they cost and the `receive_j` that receiving took; that
+//! explains a fate and is never compared. What has no body is a `farside.log.Event`. State samples
+//! are their own type, without an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
-//! skip the roles that they do not know. What is drawn ([`farside::scene::Scene`]) is derived from the records, in
-//! Foxglove's published schemas, and never compared. Metadata: `farside` (format, code version, seed, scenario),
-//! `farside.run`, `farside.host` (what may differ between machines), and at the end `farside.end`
-//! (digest, counts, why the run ended); a log without it is a prefix. Attachments: the resolved
-//! scenario as `scenario.toml`, and the files that it read.
+//! skip the roles that they do not know. What is drawn ([`farside::scene::Scene`]) is derived from
+//! the records, in Foxglove's published schemas, and never compared. Metadata: `farside` (format,
+//! code version, seed, scenario), `farside.run`, `farside.host` (what may differ between machines),
+//! and at the end `farside.end` (digest, counts, why the run ended); a log without it is a prefix.
+//! Attachments: the resolved scenario as `scenario.toml`, and the files that it read.
 //!
-//! 1.2 added `/event/told` and a carriage's `receive_j`. A minor version adds fields, topics, roles or metadata; a major version changes or removes them.
+//! 1.2 added `/event/told` and a carriage's `receive_j`. A minor version adds fields, topics, roles
+//! or metadata; a major version changes or removes them.
 
 mod descriptors;
 mod diff;

@@ -1,8 +1,8 @@
 //! The content of MCAP records, parsed without trusting a length.
 //!
-//! `mcap::parse_record` reads the same, but of whole files from friends only: in mcap 0.26 it panics
-//! on an attachment without a checksum, and reserves as many bytes as a text says that it has. Its
-//! readers do not say where in a file a record is, nor go on behind a broken one.
+//! `mcap::parse_record` reads the same, but of whole files from friends only: in mcap 0.26 it
+//! panics on an attachment without a checksum, and reserves as many bytes as a text says that it
+//! has. Its readers do not say where in a file a record is, nor go on behind a broken one.
 //! `tests/logs/hostile.rs` shows what can be shown, and fails once it is no longer so.
 
 use std::collections::BTreeMap;

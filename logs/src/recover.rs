@@ -122,7 +122,7 @@ pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recove
     may_be_written(broken, out)?;
     let hints = Hints::read(&mut source)?;
     // First what is declared anywhere in the file: what a message needs may come behind it.
-    let mut known = Known::default();
+    let mut known = FirstDeclared::default();
     Salvage::walk(&mut source, hints.clone(), None, &mut |part| {
         known.add(&part);
         Ok(())
@@ -171,15 +171,15 @@ fn is_same_file(_one: &Path, _other: &std::fs::Metadata) -> bool {
     false
 }
 
-/// What a file declares: for each id, what was declared first under it, preferably where no checksum
-/// says that it may be something else.
+/// What a file declares: for each id, what was declared first under it, preferably where no
+/// checksum says that it may be something else.
 #[derive(Default)]
-struct Known {
+struct FirstDeclared {
     schemas: BTreeMap<u16, (Declaration, bool)>,
     channels: BTreeMap<u16, (Declaration, bool)>,
 }
 
-impl Known {
+impl FirstDeclared {
     fn add(&mut self, part: &Part<'_>) {
         let (of, id, declared, sure) = match part {
             Part::Schema { record, sure, .. } => {

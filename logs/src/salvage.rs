@@ -113,17 +113,17 @@ pub(crate) enum Part<'a> {
 
 /// Where the bytes are that are walked through, for words.
 #[derive(Clone, Copy)]
-enum Place {
+enum WalkedPart {
     File,
     /// In the chunk that starts at this byte of the file.
     Chunk(u64),
 }
 
-impl Place {
+impl WalkedPart {
     fn byte(self, offset: u64) -> String {
         match self {
-            Place::File => format!("at byte {offset}"),
-            Place::Chunk(chunk) => format!("in the chunk at byte {chunk}"),
+            WalkedPart::File => format!("at byte {offset}"),
+            WalkedPart::Chunk(chunk) => format!("in the chunk at byte {chunk}"),
         }
     }
 }
@@ -177,7 +177,7 @@ impl<'e> Salvage<'e> {
             unsure_until: 0,
         };
         let mut at = MAGIC.len() as u64;
-        while let Some(next) = salvage.step(source, at, Place::File)? {
+        while let Some(next) = salvage.step(source, at, WalkedPart::File)? {
             at = next;
         }
         Ok(())
@@ -193,11 +193,11 @@ impl<'e> Salvage<'e> {
         &mut self,
         bytes: &mut impl Bytes,
         at: u64,
-        place: Place,
+        place: WalkedPart,
     ) -> Result<Option<u64>, LogError> {
         let left = bytes.length().saturating_sub(at);
         if left == 0 {
-            if let Place::File = place {
+            if let WalkedPart::File = place {
                 (self.each)(Part::Note("the file ends without a footer".to_owned()))?;
             }
             return Ok(None);
@@ -219,12 +219,12 @@ impl<'e> Salvage<'e> {
             return Ok(Some(end));
         }
         match (opcode, place) {
-            (op::CHUNK, Place::File) => {
+            (op::CHUNK, WalkedPart::File) => {
                 if let Some(next) = self.broken_chunk(bytes, at, length)? {
                     return Ok(Some(next));
                 }
             }
-            (op::ATTACHMENT, Place::File) => {
+            (op::ATTACHMENT, WalkedPart::File) => {
                 if let Some(next) = self.broken_attachment(bytes, at, length)? {
                     return Ok(Some(next));
                 }
@@ -234,10 +234,10 @@ impl<'e> Salvage<'e> {
         self.broken(bytes, at, whole, place).map(Some)
     }
 
-    fn is_sure(&self, at: u64, place: Place) -> bool {
+    fn is_sure(&self, at: u64, place: WalkedPart) -> bool {
         match place {
-            Place::File => at >= self.unsure_until,
-            Place::Chunk(_) => !self.unsure,
+            WalkedPart::File => at >= self.unsure_until,
+            WalkedPart::Chunk(_) => !self.unsure,
         }
     }
 
@@ -247,7 +247,7 @@ impl<'e> Salvage<'e> {
         bytes: &mut impl Bytes,
         at: u64,
         whole: Option<u64>,
-        place: Place,
+        place: WalkedPart,
     ) -> Result<u64, LogError> {
         let found = self.search(bytes, at + 1)?;
         let next = found.unwrap_or(bytes.length());
@@ -366,7 +366,7 @@ impl<'e> Salvage<'e> {
         &mut self,
         bytes: &mut impl Bytes,
         at: u64,
-        place: Place,
+        place: WalkedPart,
         sure: bool,
     ) -> Result<(), LogError> {
         let Some((opcode, length)) = record_head(bytes.at(at, HEAD_BYTES)?) else {

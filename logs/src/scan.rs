@@ -303,9 +303,9 @@ impl Scanner {
         self.frames.offset()
     }
 
-    /// Opens the frame at `position` again, and gives the message there, which is on the channel with
-    /// this serial number. For a scanner that has
-    /// read the file once, and so knows its channels.
+    /// Opens the frame at `position` again, and gives the message there, which is on the channel
+    /// with this serial number. For a scanner that has read the file once, and so knows its
+    /// channels.
     pub(crate) fn message_at(
         &mut self,
         position: Position,

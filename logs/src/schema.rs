@@ -35,7 +35,7 @@ pub(crate) struct MessageType {
 pub(crate) struct Field {
     pub(crate) name: String,
     pub(crate) number: u32,
-    pub(crate) kind: Kind,
+    pub(crate) kind: FieldType,
     pub(crate) repeated: bool,
     /// Absent is something else than zero.
     pub(crate) presence: bool,
@@ -45,26 +45,26 @@ pub(crate) struct Field {
 
 /// The type of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum FieldType {
     /// Anything that is no message.
     Scalar(Type),
     /// A message or group, by its place in the schema; none if the schema does not declare it.
     Message(Option<usize>),
 }
 
-impl Kind {
+impl FieldType {
     /// The type's name in the schema language.
     pub(crate) fn name(self) -> String {
         match self {
-            Kind::Message(_) => "message".to_owned(),
-            Kind::Scalar(kind) => kind.as_str_name()[5..].to_lowercase(),
+            FieldType::Message(_) => "message".to_owned(),
+            FieldType::Scalar(kind) => kind.as_str_name()[5..].to_lowercase(),
         }
     }
 
     /// True if values of the two can be compared as they are.
-    pub(crate) fn is_like(self, other: Kind) -> bool {
+    pub(crate) fn is_like(self, other: FieldType) -> bool {
         match (self, other) {
-            (Kind::Message(_), Kind::Message(_)) => true,
+            (FieldType::Message(_), FieldType::Message(_)) => true,
             (one, other) => one == other,
         }
     }
@@ -135,9 +135,9 @@ impl Types {
                     return Some(format!("field {number} of {} is {x} | {y}", a.name));
                 }
                 match (x.kind, y.kind) {
-                    (Kind::Message(Some(x)), Kind::Message(Some(y))) => next.push((x, y)),
-                    (x, y) if x.is_like(y) && matches!(x, Kind::Scalar(_)) => {}
-                    (Kind::Message(None), Kind::Message(None)) => {}
+                    (FieldType::Message(Some(x)), FieldType::Message(Some(y))) => next.push((x, y)),
+                    (x, y) if x.is_like(y) && matches!(x, FieldType::Scalar(_)) => {}
+                    (FieldType::Message(None), FieldType::Message(None)) => {}
                     _ => {
                         let lacks = "has a type that one of the two does not declare";
                         return Some(format!("field {number} of {} {lacks}", a.name));
@@ -245,10 +245,12 @@ impl Reader {
         let message = || self.resolve(scope, from.type_name());
         let declared = from.r#type.and_then(|kind| Type::try_from(kind).ok());
         let kind = match declared {
-            Some(Type::Message | Type::Group) => Kind::Message(message()),
-            Some(kind) => Kind::Scalar(kind),
+            Some(Type::Message | Type::Group) => FieldType::Message(message()),
+            Some(kind) => FieldType::Scalar(kind),
             // A type name alone is a message or an enumeration.
-            None => message().map_or(Kind::Scalar(Type::Enum), |at| Kind::Message(Some(at))),
+            None => message().map_or(FieldType::Scalar(Type::Enum), |at| {
+                FieldType::Message(Some(at))
+            }),
         };
         let optional = from.proto3_optional();
         Field {
@@ -259,7 +261,7 @@ impl Reader {
             presence: !proto3
                 || optional
                 || from.oneof_index.is_some()
-                || matches!(kind, Kind::Message(_)),
+                || matches!(kind, FieldType::Message(_)),
             oneof: from.oneof_index.filter(|_| !optional),
         }
     }

@@ -15,8 +15,8 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// A text of somebody else's without letters that a terminal would obey: what would move the cursor,
-/// hide letters or turn their order is escaped.
+/// A text of somebody else's without letters that a terminal would obey: what would move the
+/// cursor, hide letters or turn their order is escaped.
 ///
 /// ```
 /// assert_eq!(farside_logs::escaped("/a\u{1b}[2J"), "/a\\u{1b}[2J");

@@ -10,7 +10,7 @@ use crate::encoding::{DecodeError, EncodeError, Schema};
 use crate::engine::{Core, Letter, Sealed};
 use crate::fault::{LookupError, Outcome};
 use crate::payload::{Encode, Message};
-use crate::plan::{ActorType, KindEntry};
+use crate::topology::{ActorType, KindEntry};
 
 /// The address of an actor of type `A`: takes every message that `A` handles, and no other.
 ///

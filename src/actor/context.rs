@@ -41,7 +41,7 @@ impl<'a, A: Actor> Context<'a, A> {
 
     /// This actor's name.
     pub fn name(&self) -> &str {
-        self.parts.plan.name(self.me)
+        self.parts.topology.name(self.me)
     }
 
     /// This actor's own address.
@@ -59,7 +59,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// # Errors
     /// When no actor has that name, or it is not a `B`.
     pub fn lookup<B: Actor>(&self, name: &str) -> Result<Address<B>, LookupError> {
-        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        let (declared, actor_type) = self.parts.topology.actor(name)?;
         if actor_type.type_id != TypeId::of::<B>() {
             return Err(LookupError::WrongType {
                 name: name.to_owned(),
@@ -112,7 +112,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// When no actor has that name, or its `Accepts` does not list `M`; the error names what it
     /// lists.
     pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
-        let (declared, actor_type) = self.parts.plan.actor(name)?;
+        let (declared, actor_type) = self.parts.topology.actor(name)?;
         Recipient::of(declared, actor_type, name)
     }
 
@@ -166,19 +166,22 @@ impl<'a, A: Actor> Context<'a, A> {
     /// The links that carry what this host sends and take changes of type `C`, in name order: those
     /// that [`Context::tell_link`] may be called with.
     pub fn links<C: Message>(&self) -> Vec<LinkId<C>> {
-        let plan = &self.parts.plan;
-        let host = plan.place(self.me).host;
-        let Some(kind) = plan.kind_of_type.get(&TypeId::of::<C>()) else {
+        let topology = &self.parts.topology;
+        let host = topology.place(self.me).host;
+        let Some(kind) = topology.kind_of_type.get(&TypeId::of::<C>()) else {
             return Vec::new();
         };
-        let routes = &plan.routes[host as usize];
+        let routes = &topology.routes[host as usize];
         let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
         links.extend(routes.uplink);
-        links.retain(|link| plan.links[link].change_kind == *kind);
+        links.retain(|link| topology.links[link].change_kind == *kind);
         links.sort_unstable();
         links.dedup();
         let id = |link: EntityId| {
-            let declared = plan.declared_links.iter().position(|known| *known == link);
+            let declared = topology
+                .declared_links
+                .iter()
+                .position(|known| *known == link);
             declared.map(|declared| LinkId::new(declared as u32))
         };
         links.into_iter().filter_map(id).collect()
@@ -187,7 +190,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// Tells a link something: new parameters, or where this host is. The link must be one of this
     /// host's own, or a shared one; it hears of it in the next step of this instant.
     pub fn tell_link<C: Message>(&mut self, link: LinkId<C>, change: C) {
-        let link = self.parts.plan.declared_links[link.declared as usize];
+        let link = self.parts.topology.declared_links[link.declared as usize];
         let letter = seal_change(change);
         self.parts.ask_change(self.state, self.me, link, letter);
     }
@@ -275,7 +278,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// assert_eq!(sim.run(Executor::Inline).unwrap().end.name(), "completed");
     /// ```
     pub fn host_transmit_energy_j(&self) -> f64 {
-        let host = self.parts.plan.place(self.me).host;
+        let host = self.parts.topology.place(self.me).host;
         self.parts.energy_so_far(host).transmit_j
     }
 
@@ -284,7 +287,7 @@ impl<'a, A: Actor> Context<'a, A> {
     ///
     /// [`Carriage::receive_j`]: crate::Carriage::receive_j
     pub fn host_receive_energy_j(&self) -> f64 {
-        let host = self.parts.plan.place(self.me).host;
+        let host = self.parts.topology.place(self.me).host;
         self.parts.energy_so_far(host).receive_j
     }
 
@@ -309,8 +312,8 @@ impl<'a, A: Actor> Context<'a, A> {
     /// The address of draws by `key` (a cycle, a sample's number), the same whatever was drawn
     /// before.
     pub fn random_at(&self, purpose: &str, key: u64) -> RandomKey {
-        RandomKey::new(self.parts.plan.seed)
-            .number(self.parts.plan.name_hash(self.me))
+        RandomKey::new(self.parts.topology.seed)
+            .number(self.parts.topology.name_hash(self.me))
             .text(purpose)
             .number(key)
     }
@@ -332,7 +335,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// True if someone watches state samples; for skipping work that only [`Context::sample`]
     /// needs.
     pub fn samples_wanted(&self) -> bool {
-        self.parts.plan.samples
+        self.parts.topology.samples
     }
 
     /// Records a sample of this actor's state, for logs, monitors and viewers. Samples are no part
@@ -361,7 +364,7 @@ impl<'a, A: Actor> Context<'a, A> {
         match_key: Option<MatchKey>,
         delay: SimDuration,
     ) {
-        let receiver = self.parts.plan.declared[target.declared() as usize];
+        let receiver = self.parts.topology.declared[target.declared() as usize];
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
             self.not_listed::<M>(receiver);
             return;
@@ -378,7 +381,7 @@ impl<'a, A: Actor> Context<'a, A> {
     }
 
     fn not_listed<M>(&mut self, receiver: EntityId) {
-        let receiver = self.parts.plan.name(receiver).to_owned();
+        let receiver = self.parts.topology.name(receiver).to_owned();
         let kind = std::any::type_name::<M>().to_owned();
         self.parts.raise(FaultCause::NotListed { receiver, kind });
     }

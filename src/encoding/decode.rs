@@ -1,4 +1,4 @@
-//! A serde `Deserializer` that reads protobuf by the plan.
+//! A serde `Deserializer` that reads protobuf by the flat schema.
 //!
 //! The bytes may be anyone's: fields in any order, unknown, repeated or absent. Nothing is
 //! allocated for a length that the bytes do not have.
@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use serde::de::{self, DeserializeOwned, Visitor};
 
 use super::error::DecodeError;
-use super::plan::{Card, Field, Kind, MAX_DEPTH, Message, Plan, Shape};
+use super::flat::{Card, Field, FlatSchema, MAX_DEPTH, Message, Shape, ValueType};
 use super::wire::{Payload, Wire};
 
 mod access;
@@ -60,10 +60,13 @@ impl From<DecodeError> for Fault {
 }
 
 /// Reads a value of the root type.
-pub(super) fn decode<T: DeserializeOwned>(plan: &Plan, bytes: &[u8]) -> Result<T, DecodeError> {
-    let message = || plan.messages[0].name.clone();
+pub(super) fn decode<T: DeserializeOwned>(
+    flat: &FlatSchema,
+    bytes: &[u8],
+) -> Result<T, DecodeError> {
+    let message = || flat.messages[0].name.clone();
     // Each new start knows one more required field, and they are remembered from then on.
-    let fields: usize = plan
+    let fields: usize = flat
         .messages
         .iter()
         .map(|message| message.fields.len())
@@ -71,11 +74,11 @@ pub(super) fn decode<T: DeserializeOwned>(plan: &Plan, bytes: &[u8]) -> Result<T
     for _ in 0..=fields {
         let payload = Payload {
             bytes,
-            ..Payload::zero(Kind::Message(0).wire())
+            ..Payload::zero(ValueType::Message(0).wire())
         };
         let root = ValueDe {
-            plan,
-            field: &plan.root,
+            flat,
+            field: &flat.root,
             source: Source::Payload(payload),
             depth: 0,
         };
@@ -114,7 +117,7 @@ enum Source<'r, 'p, 'b> {
 
 /// Reads one value of one field.
 struct ValueDe<'r, 'p, 'b> {
-    plan: &'p Plan,
+    flat: &'p FlatSchema,
     field: &'p Field,
     source: Source<'r, 'p, 'b>,
     depth: u32,
@@ -134,7 +137,7 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
     fn mismatch<T>(&self, actual: &str) -> Result<T, Fault> {
         Err(DecodeError::Mismatch {
             place: self.field.place.clone(),
-            expected: self.plan.describe(self.field, self.expect()),
+            expected: self.flat.describe(self.field, self.expect()),
             actual: actual.to_owned(),
         }
         .into())
@@ -142,7 +145,7 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
 
     /// Takes the one value of a field of the given kind; protobuf lets the last one win.
     #[inline(always)]
-    fn payload(self, kind: Kind) -> Result<Payload<'b>, Fault> {
+    fn payload(self, kind: ValueType) -> Result<Payload<'b>, Fault> {
         if self.field.kind != kind || self.expect() != Card::Single {
             return self.other_kind(kind);
         }
@@ -170,7 +173,7 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
 
     #[cold]
     #[inline(never)]
-    fn other_kind<T>(&self, kind: Kind) -> Result<T, Fault> {
+    fn other_kind<T>(&self, kind: ValueType) -> Result<T, Fault> {
         self.mismatch(&format!("{kind:?}").to_lowercase())
     }
 
@@ -186,11 +189,11 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
         .into())
     }
 
-    fn signed(self, kind: Kind) -> Result<i64, Fault> {
+    fn signed(self, kind: ValueType) -> Result<i64, Fault> {
         Ok(self.payload(kind)?.bits as i64)
     }
 
-    fn text(self, kind: Kind) -> Result<&'b str, Fault> {
+    fn text(self, kind: ValueType) -> Result<&'b str, Fault> {
         let field = self.field;
         let bytes = self.payload(kind)?.bytes;
         match std::str::from_utf8(bytes) {
@@ -199,7 +202,7 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
         }
     }
 
-    fn wide(self, kind: Kind) -> Result<[u8; 16], Fault> {
+    fn wide(self, kind: ValueType) -> Result<[u8; 16], Fault> {
         let field = self.field;
         let bytes = self.payload(kind)?.bytes;
         match (bytes.try_into(), bytes.len()) {
@@ -212,7 +215,9 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
     /// The message that this value is, if one must come now.
     fn message(&self) -> Option<&'p Message> {
         match self.field.kind {
-            Kind::Message(id) if self.expect() == Card::Single => Some(&self.plan.messages[id]),
+            ValueType::Message(id) if self.expect() == Card::Single => {
+                Some(&self.flat.messages[id])
+            }
             _ => None,
         }
     }
@@ -229,10 +234,10 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
         if self.depth >= MAX_DEPTH {
             return Err(DecodeError::TooDeep { limit: MAX_DEPTH }.into());
         }
-        let (plan, depth) = (self.plan, self.depth + 1);
+        let (flat, depth) = (self.flat, self.depth + 1);
         let kind = self.field.kind;
         let payload = self.payload(kind)?;
-        Reader::new(plan, message, payload.bytes, depth)
+        Reader::new(flat, message, payload.bytes, depth)
     }
 
     /// Reads the one field of a wrapper or newtype.
@@ -242,10 +247,10 @@ impl<'r, 'p, 'b> ValueDe<'r, 'p, 'b> {
 
     /// Reads a field of an open message.
     fn member<'s>(reader: &'s mut Reader<'p, 'b>, index: usize) -> ValueDe<'s, 'p, 'b> {
-        let (plan, depth) = (reader.plan, reader.depth);
+        let (flat, depth) = (reader.flat, reader.depth);
         let field = &reader.message.fields[index];
         ValueDe {
-            plan,
+            flat,
             field,
             source: Source::Field(reader, index),
             depth,
@@ -307,28 +312,28 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
 
     // Narrow integers are visited wide: serde checks their range.
     scalars! {
-        deserialize_bool, visit_bool, |this| this.payload(Kind::Bool)?.bits != 0;
-        deserialize_i8, visit_i64, |this| this.signed(Kind::I32)?;
-        deserialize_i16, visit_i64, |this| this.signed(Kind::I32)?;
-        deserialize_i32, visit_i64, |this| this.signed(Kind::I32)?;
-        deserialize_i64, visit_i64, |this| this.signed(Kind::I64)?;
-        deserialize_i128, visit_i128, |this| i128::from_le_bytes(this.wide(Kind::I128)?);
-        deserialize_u8, visit_u64, |this| this.payload(Kind::U32)?.bits;
-        deserialize_u16, visit_u64, |this| this.payload(Kind::U32)?.bits;
-        deserialize_u32, visit_u64, |this| this.payload(Kind::U32)?.bits;
-        deserialize_u64, visit_u64, |this| this.payload(Kind::U64)?.bits;
-        deserialize_u128, visit_u128, |this| u128::from_le_bytes(this.wide(Kind::U128)?);
-        deserialize_f32, visit_f32, |this| f32::from_bits(this.payload(Kind::F32)?.bits as u32);
-        deserialize_f64, visit_f64, |this| f64::from_bits(this.payload(Kind::F64)?.bits);
-        deserialize_str, visit_borrowed_str, |this| this.text(Kind::Str)?;
-        deserialize_string, visit_borrowed_str, |this| this.text(Kind::Str)?;
-        deserialize_bytes, visit_borrowed_bytes, |this| this.payload(Kind::Bytes)?.bytes;
-        deserialize_byte_buf, visit_borrowed_bytes, |this| this.payload(Kind::Bytes)?.bytes;
+        deserialize_bool, visit_bool, |this| this.payload(ValueType::Bool)?.bits != 0;
+        deserialize_i8, visit_i64, |this| this.signed(ValueType::I32)?;
+        deserialize_i16, visit_i64, |this| this.signed(ValueType::I32)?;
+        deserialize_i32, visit_i64, |this| this.signed(ValueType::I32)?;
+        deserialize_i64, visit_i64, |this| this.signed(ValueType::I64)?;
+        deserialize_i128, visit_i128, |this| i128::from_le_bytes(this.wide(ValueType::I128)?);
+        deserialize_u8, visit_u64, |this| this.payload(ValueType::U32)?.bits;
+        deserialize_u16, visit_u64, |this| this.payload(ValueType::U32)?.bits;
+        deserialize_u32, visit_u64, |this| this.payload(ValueType::U32)?.bits;
+        deserialize_u64, visit_u64, |this| this.payload(ValueType::U64)?.bits;
+        deserialize_u128, visit_u128, |this| u128::from_le_bytes(this.wide(ValueType::U128)?);
+        deserialize_f32, visit_f32, |this| f32::from_bits(this.payload(ValueType::F32)?.bits as u32);
+        deserialize_f64, visit_f64, |this| f64::from_bits(this.payload(ValueType::F64)?.bits);
+        deserialize_str, visit_borrowed_str, |this| this.text(ValueType::Str)?;
+        deserialize_string, visit_borrowed_str, |this| this.text(ValueType::Str)?;
+        deserialize_bytes, visit_borrowed_bytes, |this| this.payload(ValueType::Bytes)?.bytes;
+        deserialize_byte_buf, visit_borrowed_bytes, |this| this.payload(ValueType::Bytes)?.bytes;
     }
 
     fn deserialize_char<V: Visitor<'b>>(self, visitor: V) -> Result<V::Value, Fault> {
         let field = self.field;
-        let text = self.text(Kind::Char)?;
+        let text = self.text(ValueType::Char)?;
         let mut chars = text.chars();
         match (chars.next(), chars.next()) {
             (None, _) => visitor.visit_char('\0'),
@@ -350,7 +355,7 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
     }
 
     fn deserialize_option<V: Visitor<'b>>(self, visitor: V) -> Result<V::Value, Fault> {
-        let (plan, field, depth) = (self.plan, self.field, self.depth);
+        let (flat, field, depth) = (self.flat, self.field, self.depth);
         if self.expect() == Card::Optional
             && let Source::Field(reader, index) = self.source
         {
@@ -359,7 +364,7 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
                 Some(payload) => {
                     let source = Source::Payload(payload);
                     visitor.visit_some(ValueDe {
-                        plan,
+                        flat,
                         field,
                         source,
                         depth,
@@ -455,9 +460,9 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
         variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        if let Kind::Enum(id) = self.field.kind {
-            let enumeration = &self.plan.enums[id];
-            let number = self.payload(Kind::Enum(id))?.bits;
+        if let ValueType::Enum(id) = self.field.kind {
+            let enumeration = &self.flat.enums[id];
+            let number = self.payload(ValueType::Enum(id))?.bits;
             let value = usize::try_from(number)
                 .ok()
                 .and_then(|at| enumeration.values.get(at));
@@ -473,7 +478,7 @@ impl<'b> de::Deserializer<'b> for ValueDe<'_, '_, 'b> {
             let mut reader = self.open(Shape::Wrapper)?;
             let inner = ValueDe::inner(&mut reader);
             return match inner.field.kind {
-                Kind::Enum(_) => inner.deserialize_enum(name, variants, visitor),
+                ValueType::Enum(_) => inner.deserialize_enum(name, variants, visitor),
                 _ => inner.mismatch("an enum"),
             };
         }

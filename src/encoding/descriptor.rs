@@ -1,9 +1,9 @@
-//! Writes the plan as a `google.protobuf.FileDescriptorProto`.
+//! Writes the flat schema as a `google.protobuf.FileDescriptorProto`.
 //!
 //! The few messages needed are written by hand, with the field numbers of protobuf's own
 //! `descriptor.proto`: the kernel does without a protobuf library.
 
-use super::plan::{Card, Field, Kind, Plan, Scope, Shape};
+use super::flat::{Card, Field, FlatSchema, Scope, Shape, ValueType};
 use super::wire::{Tag, Wire, put_bytes, put_varint};
 
 /// Protobuf's numbers for field types.
@@ -33,17 +33,17 @@ fn varint(out: &mut Vec<u8>, number: u32, value: u64) {
 }
 
 /// One file that holds the root message, and within it every type that it uses.
-pub(super) fn file(plan: &Plan, file_name: &str, package: &str) -> Vec<u8> {
+pub(super) fn file(flat: &FlatSchema, file_name: &str, package: &str) -> Vec<u8> {
     let mut out = Vec::new();
     bytes(&mut out, 1, file_name.as_bytes());
     bytes(&mut out, 2, package.as_bytes());
-    bytes(&mut out, 4, &message(plan, 0, package));
+    bytes(&mut out, 4, &message(flat, 0, package));
     bytes(&mut out, 12, b"proto3");
     out
 }
 
-fn message(plan: &Plan, id: usize, package: &str) -> Vec<u8> {
-    let this = &plan.messages[id];
+fn message(flat: &FlatSchema, id: usize, package: &str) -> Vec<u8> {
+    let this = &flat.messages[id];
     let mut out = Vec::new();
     bytes(&mut out, 1, this.name.as_bytes());
     let is_oneof = this.shape == Shape::Oneof;
@@ -52,7 +52,7 @@ fn message(plan: &Plan, id: usize, package: &str) -> Vec<u8> {
         oneofs.push("variant".to_owned());
     }
     for (position, one) in this.fields.iter().enumerate() {
-        let optional = one.card == Card::Optional && !matches!(one.kind, Kind::Message(_));
+        let optional = one.card == Card::Optional && !matches!(one.kind, ValueType::Message(_));
         let oneof = if is_oneof {
             Some(0)
         } else if optional {
@@ -64,18 +64,18 @@ fn message(plan: &Plan, id: usize, package: &str) -> Vec<u8> {
         bytes(
             &mut out,
             2,
-            &field(plan, one, position + 1, oneof, optional, package),
+            &field(flat, one, position + 1, oneof, optional, package),
         );
     }
-    for (other, candidate) in plan.messages.iter().enumerate() {
+    for (other, candidate) in flat.messages.iter().enumerate() {
         let here =
             candidate.scope == Scope::MapEntry(id) || (id == 0 && candidate.scope == Scope::Root);
         if here {
-            bytes(&mut out, 3, &message(plan, other, package));
+            bytes(&mut out, 3, &message(flat, other, package));
         }
     }
     if id == 0 {
-        for one in &plan.enums {
+        for one in &flat.enums {
             bytes(&mut out, 4, &enumeration(one));
         }
     }
@@ -102,7 +102,7 @@ fn synthetic_oneof(fields: &[Field], oneofs: &[String], name: &str) -> String {
 }
 
 fn field(
-    plan: &Plan,
+    flat: &FlatSchema,
     field: &Field,
     number: usize,
     oneof: Option<usize>,
@@ -123,26 +123,26 @@ fn field(
         },
     );
     let (code, type_name) = match field.kind {
-        Kind::Bool => (types::BOOL, None),
-        Kind::I32 => (types::INT32, None),
-        Kind::I64 => (types::INT64, None),
-        Kind::U32 => (types::UINT32, None),
-        Kind::U64 => (types::UINT64, None),
-        Kind::F32 => (types::FLOAT, None),
-        Kind::F64 => (types::DOUBLE, None),
-        Kind::Char | Kind::Str => (types::STRING, None),
-        Kind::Pending => unreachable!("no field is of this kind"),
-        Kind::Bytes | Kind::I128 | Kind::U128 => (types::BYTES, None),
-        Kind::Enum(id) => {
-            let root = &plan.messages[0].name;
+        ValueType::Bool => (types::BOOL, None),
+        ValueType::I32 => (types::INT32, None),
+        ValueType::I64 => (types::INT64, None),
+        ValueType::U32 => (types::UINT32, None),
+        ValueType::U64 => (types::UINT64, None),
+        ValueType::F32 => (types::FLOAT, None),
+        ValueType::F64 => (types::DOUBLE, None),
+        ValueType::Char | ValueType::Str => (types::STRING, None),
+        ValueType::Pending => unreachable!("no field is of this kind"),
+        ValueType::Bytes | ValueType::I128 | ValueType::U128 => (types::BYTES, None),
+        ValueType::Enum(id) => {
+            let root = &flat.messages[0].name;
             (
                 types::ENUM,
-                Some(format!(".{package}.{root}.{}", plan.enums[id].name)),
+                Some(format!(".{package}.{root}.{}", flat.enums[id].name)),
             )
         }
-        Kind::Message(id) => (
+        ValueType::Message(id) => (
             types::MESSAGE,
-            Some(format!(".{package}.{}", path(plan, id))),
+            Some(format!(".{package}.{}", path(flat, id))),
         ),
     };
     varint(&mut out, 5, code);
@@ -159,16 +159,16 @@ fn field(
 }
 
 /// A message's name within the package.
-fn path(plan: &Plan, id: usize) -> String {
-    let message = &plan.messages[id];
+fn path(flat: &FlatSchema, id: usize) -> String {
+    let message = &flat.messages[id];
     match message.scope {
         Scope::Top => message.name.clone(),
-        Scope::Root => format!("{}.{}", plan.messages[0].name, message.name),
-        Scope::MapEntry(owner) => format!("{}.{}", path(plan, owner), message.name),
+        Scope::Root => format!("{}.{}", flat.messages[0].name, message.name),
+        Scope::MapEntry(owner) => format!("{}.{}", path(flat, owner), message.name),
     }
 }
 
-fn enumeration(one: &super::plan::Enumeration) -> Vec<u8> {
+fn enumeration(one: &super::flat::Enumeration) -> Vec<u8> {
     let mut out = Vec::new();
     bytes(&mut out, 1, one.name.as_bytes());
     for (number, value) in one.values.iter().enumerate() {

@@ -1,13 +1,13 @@
 //! A serde `Serializer` that writes protobuf in one pass, straight into the caller's buffer.
 //!
-//! The plan is walked beside the value: each call of `Serialize` finds its field by position, so
-//! that nothing is looked up and nothing is allocated. A nested message gets one byte for its
-//! length, which is widened once the length is known to need more.
+//! The flat schema is walked beside the value: each call of `Serialize` finds its field by
+//! position, so that nothing is looked up and nothing is allocated. A nested message gets one byte
+//! for its length, which is widened once the length is known to need more.
 
 use serde::ser::{self, Serialize};
 
 use super::error::EncodeError;
-use super::plan::{Card, Field, Key, Kind, MAX_DEPTH, Message, Plan, Shape};
+use super::flat::{Card, Field, FlatSchema, Key, MAX_DEPTH, Message, Shape, ValueType};
 use super::wire::{self, Tag};
 
 mod compound;
@@ -25,16 +25,16 @@ impl ser::Error for Fault {
 
 /// Appends `value` to `out`; on an error `out` is left as it was.
 pub(super) fn encode<T: Serialize + ?Sized>(
-    plan: &Plan,
+    flat: &FlatSchema,
     value: &T,
     out: &mut Vec<u8>,
 ) -> Result<(), EncodeError> {
     let start = out.len();
     let root = ValueSer {
-        plan,
+        flat,
         out,
-        field: &plan.root,
-        first: plan.root.first,
+        field: &flat.root,
+        first: flat.root.first,
         position: Position::Root,
         depth: 0,
     };
@@ -63,11 +63,11 @@ const NONE: usize = usize::MAX;
 
 /// Writes one value of one field.
 struct ValueSer<'a> {
-    plan: &'a Plan,
+    flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
     /// What may come at once: the field's own `first`, or its kind inside an option or sequence.
-    first: Kind,
+    first: ValueType,
     position: Position,
     depth: u32,
 }
@@ -75,9 +75,14 @@ struct ValueSer<'a> {
 impl<'a> ValueSer<'a> {
     /// A value of the field at `index` in a message that is open in `out`.
     #[inline(always)]
-    fn inside(plan: &'a Plan, out: &'a mut Vec<u8>, field: &'a Field, depth: u32) -> ValueSer<'a> {
+    fn inside(
+        flat: &'a FlatSchema,
+        out: &'a mut Vec<u8>,
+        field: &'a Field,
+        depth: u32,
+    ) -> ValueSer<'a> {
         ValueSer {
-            plan,
+            flat,
             out,
             field,
             first: field.first,
@@ -95,14 +100,14 @@ impl<'a> ValueSer<'a> {
     }
 
     #[inline(always)]
-    fn is(&self, kind: Kind) -> bool {
+    fn is(&self, kind: ValueType) -> bool {
         self.first == kind
     }
 
     /// The cardinality that must come first.
     #[inline(always)]
     fn expect(&self) -> Card {
-        if self.first == Kind::Pending {
+        if self.first == ValueType::Pending {
             self.field.card
         } else {
             Card::Single
@@ -114,13 +119,13 @@ impl<'a> ValueSer<'a> {
     fn mismatch<T>(&self, actual: impl std::fmt::Display) -> Result<T, Fault> {
         Err(Box::new(EncodeError::Mismatch {
             place: self.field.place.clone(),
-            expected: self.plan.describe(self.field, self.expect()),
+            expected: self.flat.describe(self.field, self.expect()),
             actual: actual.to_string(),
         }))
     }
 
     #[inline(always)]
-    fn varint(self, kind: Kind, value: u64) -> Result<(), Fault> {
+    fn varint(self, kind: ValueType, value: u64) -> Result<(), Fault> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
         }
@@ -133,7 +138,7 @@ impl<'a> ValueSer<'a> {
     }
 
     #[inline(always)]
-    fn bytes(self, kind: Kind, bytes: &[u8]) -> Result<(), Fault> {
+    fn bytes(self, kind: ValueType, bytes: &[u8]) -> Result<(), Fault> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
         }
@@ -144,12 +149,12 @@ impl<'a> ValueSer<'a> {
     /// Writes a variant of a plain enum.
     #[inline]
     fn number(self, index: u32, variant: &'static str) -> Result<(), Fault> {
-        let Kind::Enum(id) = self.first else {
+        let ValueType::Enum(id) = self.first else {
             return self.mismatch("a unit variant");
         };
-        let enumeration = &self.plan.enums[id];
+        let enumeration = &self.flat.enums[id];
         match position(&enumeration.values, |value| &value.key, index, variant) {
-            Some(number) => self.varint(Kind::Enum(id), number as u64),
+            Some(number) => self.varint(ValueType::Enum(id), number as u64),
             None => Err(unknown_variant(&enumeration.name, variant)),
         }
     }
@@ -158,7 +163,7 @@ impl<'a> ValueSer<'a> {
     #[inline(always)]
     fn message(&self) -> Option<&'a Message> {
         match self.first {
-            Kind::Message(id) => Some(&self.plan.messages[id]),
+            ValueType::Message(id) => Some(&self.flat.messages[id]),
             _ => None,
         }
     }
@@ -178,7 +183,7 @@ impl<'a> ValueSer<'a> {
             _ => begin(self.out, self.field.tag),
         };
         Ok(Compound {
-            plan: self.plan,
+            flat: self.flat,
             out: self.out,
             message,
             rest: &message.fields,
@@ -222,13 +227,13 @@ impl<'a> ValueSer<'a> {
     ) -> Result<Compound<'a>, Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
         let Compound {
-            plan,
+            flat,
             out,
             start,
             depth,
             ..
         } = oneof;
-        let mut content = ValueSer::inside(plan, out, field, depth).open(shape)?;
+        let mut content = ValueSer::inside(flat, out, field, depth).open(shape)?;
         content.outer = start;
         Ok(content)
     }
@@ -339,60 +344,60 @@ impl<'a> ser::Serializer for ValueSer<'a> {
 
     #[inline(always)]
     fn serialize_bool(self, v: bool) -> Result<(), Fault> {
-        self.varint(Kind::Bool, u64::from(v))
+        self.varint(ValueType::Bool, u64::from(v))
     }
 
     #[inline(always)]
     fn serialize_i8(self, v: i8) -> Result<(), Fault> {
-        self.varint(Kind::I32, i64::from(v) as u64)
+        self.varint(ValueType::I32, i64::from(v) as u64)
     }
 
     #[inline(always)]
     fn serialize_i16(self, v: i16) -> Result<(), Fault> {
-        self.varint(Kind::I32, i64::from(v) as u64)
+        self.varint(ValueType::I32, i64::from(v) as u64)
     }
 
     #[inline(always)]
     fn serialize_i32(self, v: i32) -> Result<(), Fault> {
-        self.varint(Kind::I32, i64::from(v) as u64)
+        self.varint(ValueType::I32, i64::from(v) as u64)
     }
 
     #[inline(always)]
     fn serialize_i64(self, v: i64) -> Result<(), Fault> {
-        self.varint(Kind::I64, v as u64)
+        self.varint(ValueType::I64, v as u64)
     }
 
     fn serialize_i128(self, v: i128) -> Result<(), Fault> {
-        self.bytes(Kind::I128, &v.to_le_bytes())
+        self.bytes(ValueType::I128, &v.to_le_bytes())
     }
 
     #[inline(always)]
     fn serialize_u8(self, v: u8) -> Result<(), Fault> {
-        self.varint(Kind::U32, u64::from(v))
+        self.varint(ValueType::U32, u64::from(v))
     }
 
     #[inline(always)]
     fn serialize_u16(self, v: u16) -> Result<(), Fault> {
-        self.varint(Kind::U32, u64::from(v))
+        self.varint(ValueType::U32, u64::from(v))
     }
 
     #[inline(always)]
     fn serialize_u32(self, v: u32) -> Result<(), Fault> {
-        self.varint(Kind::U32, u64::from(v))
+        self.varint(ValueType::U32, u64::from(v))
     }
 
     #[inline(always)]
     fn serialize_u64(self, v: u64) -> Result<(), Fault> {
-        self.varint(Kind::U64, v)
+        self.varint(ValueType::U64, v)
     }
 
     fn serialize_u128(self, v: u128) -> Result<(), Fault> {
-        self.bytes(Kind::U128, &v.to_le_bytes())
+        self.bytes(ValueType::U128, &v.to_le_bytes())
     }
 
     #[inline(always)]
     fn serialize_f32(self, v: f32) -> Result<(), Fault> {
-        if !self.is(Kind::F32) {
+        if !self.is(ValueType::F32) {
             return self.mismatch("f32");
         }
         wire::put_fixed32(self.out, self.tag(), canonical32(v));
@@ -401,7 +406,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
 
     #[inline(always)]
     fn serialize_f64(self, v: f64) -> Result<(), Fault> {
-        if !self.is(Kind::F64) {
+        if !self.is(ValueType::F64) {
             return self.mismatch("f64");
         }
         wire::put_fixed64(self.out, self.tag(), canonical64(v));
@@ -409,17 +414,17 @@ impl<'a> ser::Serializer for ValueSer<'a> {
     }
 
     fn serialize_char(self, v: char) -> Result<(), Fault> {
-        self.bytes(Kind::Char, v.encode_utf8(&mut [0; 4]).as_bytes())
+        self.bytes(ValueType::Char, v.encode_utf8(&mut [0; 4]).as_bytes())
     }
 
     #[inline(always)]
     fn serialize_str(self, v: &str) -> Result<(), Fault> {
-        self.bytes(Kind::Str, v.as_bytes())
+        self.bytes(ValueType::Str, v.as_bytes())
     }
 
     #[inline(always)]
     fn serialize_bytes(self, v: &[u8]) -> Result<(), Fault> {
-        self.bytes(Kind::Bytes, v)
+        self.bytes(ValueType::Bytes, v)
     }
 
     fn serialize_none(self) -> Result<(), Fault> {
@@ -477,7 +482,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
             wrapper.reborrow_inner().number(index, variant)?;
             return wrapper.close();
         }
-        if let Kind::Enum(_) = self.field.kind {
+        if let ValueType::Enum(_) = self.field.kind {
             return self.number(index, variant);
         }
         self.open_content(index, variant, Shape::Unit)?.close()
@@ -511,7 +516,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
     ) -> Result<(), Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
         value.serialize(ValueSer::inside(
-            oneof.plan,
+            oneof.flat,
             &mut *oneof.out,
             field,
             oneof.depth,

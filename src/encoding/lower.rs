@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use super::flat::{
+    Card, Enumeration, Field, FlatSchema, Key, Message, Scope, Shape, Value, ValueType,
+};
 use super::format::{Body, Container, Fields, Format};
 use super::names::{Names, camel, identifier, snake};
-use super::plan::{Card, Enumeration, Field, Key, Kind, Message, Plan, Scope, Shape, Value};
 use super::wire::{Tag, Wire};
 
-/// Builds the plan for the container at `root`.
-pub(super) fn lower(containers: &[Container], root: usize) -> Plan {
+/// Builds the flat schema for the container at `root`.
+pub(super) fn lower(containers: &[Container], root: usize) -> FlatSchema {
     let mut lowering = Lowering {
         containers,
         newtype_messages: newtype_messages(containers, root),
@@ -28,8 +30,8 @@ pub(super) fn lower(containers: &[Container], root: usize) -> Plan {
     let place = messages[0].name.clone();
     let root = Field {
         tag: Tag::NONE,
-        kind: Kind::Message(0),
-        first: Kind::Message(0),
+        kind: ValueType::Message(0),
+        first: ValueType::Message(0),
         card: Card::Single,
         packed: false,
         key: Key::new(""),
@@ -37,7 +39,7 @@ pub(super) fn lower(containers: &[Container], root: usize) -> Plan {
         name: place.clone(),
         place,
     };
-    Plan {
+    FlatSchema {
         messages,
         enums,
         root,
@@ -110,7 +112,7 @@ struct Lowering<'a> {
     newtype_messages: Vec<bool>,
     messages: Vec<Message>,
     enums: Vec<Enumeration>,
-    by_container: BTreeMap<usize, Kind>,
+    by_container: BTreeMap<usize, ValueType>,
     /// Helper messages, by what they stand for: shared wherever the same is needed.
     by_format: BTreeMap<Format, usize>,
     /// Names within the root, where every helper type lives.
@@ -183,7 +185,7 @@ impl Lowering<'_> {
                 first: if card == Card::Single {
                     kind
                 } else {
-                    Kind::Pending
+                    ValueType::Pending
                 },
                 card,
                 packed,
@@ -235,39 +237,39 @@ impl Lowering<'_> {
     }
 
     /// How a field of this format looks in the message `owner`.
-    fn place(&mut self, format: &Format, owner: usize, name: &str) -> (Card, Kind) {
+    fn place(&mut self, format: &Format, owner: usize, name: &str) -> (Card, ValueType) {
         match self.resolved(format) {
             Format::Option(inner) => (Card::Optional, self.element(&inner)),
             Format::Seq(inner) => (Card::Repeated, self.element(&inner)),
             Format::Tuple(items) if is_alike(&items) => (Card::Repeated, self.element(&items[0])),
             Format::Map(key, value) => {
                 let entry = self.entry(&key, &value, owner, name);
-                (Card::Map, Kind::Message(entry))
+                (Card::Map, ValueType::Message(entry))
             }
             other => (Card::Single, self.element(&other)),
         }
     }
 
     /// How one value of this format looks where neither repetition nor absence can be said.
-    fn element(&mut self, format: &Format) -> Kind {
+    fn element(&mut self, format: &Format) -> ValueType {
         let format = self.resolved(format);
         match &format {
-            Format::Bool => Kind::Bool,
-            Format::I32 => Kind::I32,
-            Format::I64 => Kind::I64,
-            Format::I128 => Kind::I128,
-            Format::U32 => Kind::U32,
-            Format::U64 => Kind::U64,
-            Format::U128 => Kind::U128,
-            Format::F32 => Kind::F32,
-            Format::F64 => Kind::F64,
-            Format::Char => Kind::Char,
-            Format::Str => Kind::Str,
-            Format::Bytes => Kind::Bytes,
+            Format::Bool => ValueType::Bool,
+            Format::I32 => ValueType::I32,
+            Format::I64 => ValueType::I64,
+            Format::I128 => ValueType::I128,
+            Format::U32 => ValueType::U32,
+            Format::U64 => ValueType::U64,
+            Format::U128 => ValueType::U128,
+            Format::F32 => ValueType::F32,
+            Format::F64 => ValueType::F64,
+            Format::Char => ValueType::Char,
+            Format::Str => ValueType::Str,
+            Format::Bytes => ValueType::Bytes,
             Format::Container(id) => self.declare(*id, Scope::Root),
             _ => {
                 if let Some(&id) = self.by_format.get(&format) {
-                    return Kind::Message(id);
+                    return ValueType::Message(id);
                 }
                 let (shape, drafts) = match &format {
                     Format::Tuple(items) if !is_alike(items) => (Shape::Tuple, numbered(items)),
@@ -277,7 +279,7 @@ impl Lowering<'_> {
                 };
                 let id = self.helper(&self.describe(&format), shape, drafts);
                 self.by_format.insert(format, id);
-                Kind::Message(id)
+                ValueType::Message(id)
             }
         }
     }
@@ -303,7 +305,7 @@ impl Lowering<'_> {
             let id = self.push(entry_name, Scope::MapEntry(owner), Shape::Entry);
             // The value of a protobuf map can be neither repeated nor optional.
             let kind = self.element(value);
-            let plain = |key, name: &str, number, kind: Kind| Field {
+            let plain = |key, name: &str, number, kind: ValueType| Field {
                 tag: Tag::new(number, kind.wire()),
                 kind,
                 first: kind,
@@ -323,20 +325,20 @@ impl Lowering<'_> {
         self.helper(&short(wanted, "Entry"), Shape::Entry, drafts)
     }
 
-    fn scalar(&self, format: &Format) -> Kind {
+    fn scalar(&self, format: &Format) -> ValueType {
         match format {
-            Format::Bool => Kind::Bool,
-            Format::I32 => Kind::I32,
-            Format::I64 => Kind::I64,
-            Format::U32 => Kind::U32,
-            Format::U64 => Kind::U64,
-            Format::Char => Kind::Char,
-            _ => Kind::Str,
+            Format::Bool => ValueType::Bool,
+            Format::I32 => ValueType::I32,
+            Format::I64 => ValueType::I64,
+            Format::U32 => ValueType::U32,
+            Format::U64 => ValueType::U64,
+            Format::Char => ValueType::Char,
+            _ => ValueType::Str,
         }
     }
 
     /// The message or enum of a container.
-    fn declare(&mut self, id: usize, scope: Scope) -> Kind {
+    fn declare(&mut self, id: usize, scope: Scope) -> ValueType {
         if let Some(&kind) = self.by_container.get(&id) {
             return kind;
         }
@@ -366,16 +368,16 @@ impl Lowering<'_> {
             Body::Fields(fields) => (shape_of(fields), self.push(name, scope, shape_of(fields))),
             Body::Enum(_) => (Shape::Oneof, self.push(name, scope, Shape::Oneof)),
         };
-        self.by_container.insert(id, Kind::Message(message));
+        self.by_container.insert(id, ValueType::Message(message));
         let drafts = match (&container.body, shape) {
             (Body::Fields(fields), _) => drafts(fields, &container.aliases),
             (Body::Enum(_), _) => self.variants(container, message),
         };
         self.work.push((message, drafts));
-        Kind::Message(message)
+        ValueType::Message(message)
     }
 
-    fn declare_enum(&mut self, container: &Container, wanted: &str) -> Kind {
+    fn declare_enum(&mut self, container: &Container, wanted: &str) -> ValueType {
         let name = self.root_names.take(wanted);
         let prefix = snake(&name).to_uppercase();
         let Body::Enum(variants) = &container.body else {
@@ -394,7 +396,7 @@ impl Lowering<'_> {
             })
             .collect();
         self.enums.push(Enumeration { name, values });
-        Kind::Enum(self.enums.len() - 1)
+        ValueType::Enum(self.enums.len() - 1)
     }
 
     /// The fields of a oneof: what a variant holds, or a message for its fields.
@@ -413,7 +415,8 @@ impl Lowering<'_> {
                     let wanted = format!("{name}{}", camel(&identifier(variant.name)));
                     let content = self.helper(&wanted, shape_of(fields), drafts(fields, &[]));
                     let marker = self.containers.len() + content;
-                    self.by_container.insert(marker, Kind::Message(content));
+                    self.by_container
+                        .insert(marker, ValueType::Message(content));
                     Format::Container(marker)
                 }
             };

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::error::{DecodeError, EncodeError, SchemaError};
-use super::plan::Plan;
+use super::flat::FlatSchema;
 use super::{decode, descriptor, encode, lower, trace, wire};
 
 /// The protobuf package of every message kind.
@@ -40,7 +40,7 @@ pub const PACKAGE: &str = "farside.msg";
 #[derive(Debug)]
 pub struct Schema {
     name: &'static str,
-    plan: Plan,
+    flat: FlatSchema,
 }
 
 impl Schema {
@@ -54,10 +54,10 @@ impl Schema {
     /// ```
     pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
         let traced = trace::trace::<T>()?;
-        let plan = lower::lower(&traced.registry.containers, traced.root);
+        let flat = lower::lower(&traced.registry.containers, traced.root);
         let schema = Schema {
             name: traced.registry.containers[traced.root].name,
-            plan,
+            flat,
         };
         let asymmetric = |reason: String| SchemaError::Asymmetric {
             type_name: type_name::<T>().to_owned(),
@@ -86,7 +86,7 @@ impl Schema {
 
     /// The fully qualified protobuf name of the root message.
     pub fn full_name(&self) -> String {
-        format!("{PACKAGE}.{}", self.plan.messages[0].name)
+        format!("{PACKAGE}.{}", self.flat.messages[0].name)
     }
 
     /// The name of the protobuf file that declares the root message, for another file to import.
@@ -103,7 +103,7 @@ impl Schema {
         format!(
             "{}/{}.proto",
             PACKAGE.replace('.', "/"),
-            self.plan.messages[0].name
+            self.flat.messages[0].name
         )
     }
 
@@ -112,7 +112,7 @@ impl Schema {
     /// Its first and only top-level message is the root; every type that it uses is nested inside
     /// it, so that the helper types of two kinds never collide.
     pub fn file_descriptor(&self) -> Vec<u8> {
-        descriptor::file(&self.plan, &self.file_name(), PACKAGE)
+        descriptor::file(&self.flat, &self.file_name(), PACKAGE)
     }
 
     /// The declaration as an encoded `google.protobuf.FileDescriptorSet` of that one file.
@@ -132,12 +132,12 @@ impl Schema {
         value: &T,
         out: &mut Vec<u8>,
     ) -> Result<(), EncodeError> {
-        encode::encode(&self.plan, value, out)
+        encode::encode(&self.flat, value, out)
     }
 
     /// Reads a value. Unknown fields are skipped; a field that is absent reads as its serde
     /// default, or as protobuf's zero where the type has none.
     pub fn decode<T: DeserializeOwned>(&self, bytes: &[u8]) -> Result<T, DecodeError> {
-        decode::decode(&self.plan, bytes)
+        decode::decode(&self.flat, bytes)
     }
 }

@@ -7,9 +7,9 @@ use super::erased::Sealed;
 use crate::carrier::Carriage;
 use crate::ids::{EntityId, KindIndex, MatchKey};
 use crate::key::EventKey;
-use crate::plan::{Plan, Reason};
 use crate::record::{Record, RecordClass};
 use crate::time::{SimDuration, SimTime};
+use crate::topology::{Reason, Topology};
 
 /// What an event does when its time comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,26 +100,30 @@ impl Head {
     }
 
     /// The message being handled and who sent it, as faults name them.
-    pub(crate) fn message(&self, plan: &Plan) -> Option<String> {
-        let kind = plan.kind(self.kind?).name();
-        Some(format!("{kind} from {}", plan.name(self.sender)))
+    pub(crate) fn message(&self, topology: &Topology) -> Option<String> {
+        let kind = topology.kind(self.kind?).name();
+        Some(format!("{kind} from {}", topology.name(self.sender)))
     }
 
     /// The event that scheduled the next hop: the cause, the hand-over to a shared link, or the
     /// link's last look at a message that it held.
-    pub(crate) fn scheduled_by(&self, plan: &Plan, side: Option<&Side>) -> Option<EventKey> {
+    pub(crate) fn scheduled_by(
+        &self,
+        topology: &Topology,
+        side: Option<&Side>,
+    ) -> Option<EventKey> {
         if let Some(held) = side.and_then(|side| side.scheduled_by) {
             return Some(held);
         }
         let (cause, Some(count)) = (self.cause?, self.handed_over) else {
             return self.cause;
         };
-        Some(plan.key(cause.time, cause.step + 1, self.sender, count.get()))
+        Some(topology.key(cause.time, cause.step + 1, self.sender, count.get()))
     }
 
     pub(crate) fn record<'a>(
         &self,
-        plan: &'a Plan,
+        topology: &'a Topology,
         class: RecordClass,
         key: EventKey,
         body: &'a [u8],
@@ -129,16 +133,16 @@ impl Head {
             class,
             key,
             cause: self.cause,
-            scheduled_by: self.scheduled_by(plan, side),
+            scheduled_by: self.scheduled_by(topology, side),
             sender: self.sender,
             receiver: self.receiver,
             link: self.link,
-            kind: self.kind.map(|kind| plan.kind(kind)),
+            kind: self.kind.map(|kind| topology.kind(kind)),
             ordinal: self.ordinal,
             copy: self.copy,
             match_key: self.match_key,
             sent: self.sent(key),
-            reason: plan.reason(self.reason),
+            reason: topology.reason(self.reason),
             body,
             sends: 0,
             carriage: side.and_then(|side| side.carriage.as_ref()),

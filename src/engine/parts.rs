@@ -16,9 +16,9 @@ use crate::carrier::{SealedChange, Verdicts};
 use crate::fault::{Fault, FaultCause};
 use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
-use crate::plan::{Kind, Plan, Reason};
 use crate::queue::{Entry, Queue};
 use crate::time::{SimDuration, SimTime};
+use crate::topology::{Kind, Reason, Topology};
 
 use sampling::SampleType;
 pub(crate) use sampling::{FirstSample, SampleNames};
@@ -48,7 +48,7 @@ pub(crate) struct HostEnergy {
 
 /// The mutable part of an engine, apart from its actors.
 pub(crate) struct Parts {
-    pub(crate) plan: Arc<Plan>,
+    pub(crate) topology: Arc<Topology>,
     index: u32,
     links: Vec<LinkCell>,
     pub(crate) queue: Queue,
@@ -81,10 +81,10 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    pub(crate) fn new(plan: Arc<Plan>, index: u32, links: Vec<LinkCell>) -> Self {
+    pub(crate) fn new(topology: Arc<Topology>, index: u32, links: Vec<LinkCell>) -> Self {
         Parts {
-            key: plan.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
-            plan,
+            key: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            topology,
             index,
             links,
             queue: Queue::default(),
@@ -143,8 +143,8 @@ impl Parts {
         self.sends = 0;
         self.carrying = None;
         self.body.clear();
-        if let (Some(letter), Some(kind), true) = (letter, kind, self.plan.recording()) {
-            let kind = self.plan.kind(kind);
+        if let (Some(letter), Some(kind), true) = (letter, kind, self.topology.recording()) {
+            let kind = self.topology.kind(kind);
             if let Err(error) = letter.0.encode(kind.schema(), &mut self.body) {
                 let (kind, error) = (kind.name().to_owned(), error.to_string());
                 let cause = FaultCause::Encoding { kind, error };
@@ -159,7 +159,7 @@ impl Parts {
         match self.last_kind {
             Some((last, kind)) if last == type_id => Some(kind),
             _ => {
-                let kind = *self.plan.kind_of_type.get(&type_id)?;
+                let kind = *self.topology.kind_of_type.get(&type_id)?;
                 self.last_kind = Some((type_id, kind));
                 Some(kind)
             }
@@ -178,7 +178,7 @@ impl Parts {
         message: Option<String>,
         cause: FaultCause,
     ) -> Box<Fault> {
-        let actor = self.plan.name(entity).to_owned();
+        let actor = self.topology.name(entity).to_owned();
         Box::new(Fault {
             key,
             time: key.time,
@@ -214,21 +214,26 @@ impl Parts {
             ..Head::of_entity(me)
         };
         self.sends += 1;
-        let (from, to) = (self.plan.place(me), self.plan.place(receiver));
+        let (from, to) = (self.topology.place(me), self.topology.place(receiver));
         if from.host == to.host {
             let key = self.later_key(me, &mut state.count, delay);
             self.schedule(to.engine, key, Class::Message, head, Some(letter));
         } else if !delay.is_zero() {
-            let receiver = self.plan.name(receiver).to_owned();
+            let receiver = self.topology.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
-        } else if let Some(link) = self.plan.link(from.host, to.host) {
+        } else if let Some(link) = self.topology.link(from.host, to.host) {
             let head = Head {
                 link: Some(link),
                 ..head
             };
-            if self.plan.links.get(&link).is_some_and(|link| link.shared) {
+            if self
+                .topology
+                .links
+                .get(&link)
+                .is_some_and(|link| link.shared)
+            {
                 let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
-                let engine = self.plan.place(link).engine;
+                let engine = self.topology.place(link).engine;
                 self.schedule(engine, key, Class::HandOver, head, Some(letter));
             } else {
                 let charge_j = self.carry(link, head, letter, None);
@@ -239,10 +244,10 @@ impl Parts {
             }
         } else {
             self.raise(FaultCause::NoRoute {
-                from: self.plan.host_name(me).to_owned(),
-                to: self.plan.host_name(receiver).to_owned(),
-                receiver: self.plan.name(receiver).to_owned(),
-                kind: self.plan.kind(kind).name().to_owned(),
+                from: self.topology.host_name(me).to_owned(),
+                to: self.topology.host_name(receiver).to_owned(),
+                receiver: self.topology.name(receiver).to_owned(),
+                kind: self.topology.kind(kind).name().to_owned(),
             });
         }
     }
@@ -272,9 +277,10 @@ impl Parts {
         let own = *count;
         *count += 1;
         if delay.is_zero() {
-            self.plan.key(self.key.time, self.key.step + 1, source, own)
+            self.topology
+                .key(self.key.time, self.key.step + 1, source, own)
         } else {
-            self.plan.key(self.key.time + delay, 0, source, own)
+            self.topology.key(self.key.time + delay, 0, source, own)
         }
     }
 
@@ -372,10 +378,10 @@ impl Parts {
         kind: Option<KindIndex>,
         change: SealedChange,
     ) {
-        if let (Some(kind), true) = (kind, self.plan.recording()) {
+        if let (Some(kind), true) = (kind, self.topology.recording()) {
             (change.encode)(
                 &*change.value,
-                self.plan.kind(kind).schema(),
+                self.topology.kind(kind).schema(),
                 &mut self.body,
             );
         }
@@ -387,16 +393,16 @@ impl Parts {
     pub(crate) fn take_in_flight(&mut self, until: Option<EventKey>) -> Vec<InFlight> {
         let mut found = Vec::new();
         if let Some((key, class, head)) = self.unfinished.take()
-            && head.in_flight(&self.plan, class, self.side.as_ref(), until)
+            && head.in_flight(&self.topology, class, self.side.as_ref(), until)
         {
             found.push((key, head, std::mem::take(&mut self.body)));
         }
         for entry in self.queue.drain_sorted() {
             let pending = self.take(entry.slot);
-            found.extend(pending.in_flight(&self.plan, entry.key(), until));
+            found.extend(pending.in_flight(&self.topology, entry.key(), until));
         }
         for Outgoing { key, pending, .. } in std::mem::take(&mut self.outgoing) {
-            found.extend(pending.in_flight(&self.plan, key, until));
+            found.extend(pending.in_flight(&self.topology, key, until));
         }
         found
     }
@@ -406,13 +412,13 @@ impl Head {
     /// True for a message that was sent before `until`, which a fault left of the run.
     fn in_flight(
         &self,
-        plan: &Plan,
+        topology: &Topology,
         class: Class,
         side: Option<&Side>,
         until: Option<EventKey>,
     ) -> bool {
         let side = side.filter(|_| self.has_side);
-        let by = || self.scheduled_by(plan, side);
+        let by = || self.scheduled_by(topology, side);
         let undone = until.is_some_and(|until| by().is_none_or(|by| by >= until));
         let message = matches!(
             class,
@@ -426,20 +432,22 @@ impl Pending {
     /// The message that this event would have delivered, lost or handed over, if there is one.
     pub(crate) fn in_flight(
         self,
-        plan: &Plan,
+        topology: &Topology,
         key: EventKey,
         until: Option<EventKey>,
     ) -> Option<InFlight> {
         if !self
             .head
-            .in_flight(plan, self.class, self.side.as_ref(), until)
+            .in_flight(topology, self.class, self.side.as_ref(), until)
         {
             return None;
         }
         let mut body = Vec::new();
-        if let (Some(letter), Some(kind), true) = (self.letter, self.head.kind, plan.recording()) {
+        if let (Some(letter), Some(kind), true) =
+            (self.letter, self.head.kind, topology.recording())
+        {
             // It will never be handled; what cannot be encoded is recorded empty.
-            let _ = letter.0.encode(plan.kind(kind).schema(), &mut body);
+            let _ = letter.0.encode(topology.kind(kind).schema(), &mut body);
         }
         Some((
             key,

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::Ending;
 use crate::commit::Committer;
 use crate::engine::Engine;
-use crate::plan::Plan;
 use crate::report::{End, Report};
 use crate::schedule::{Due, Schedule};
+use crate::topology::Topology;
 
 /// Runs to the end. Expects one engine: with several, hosts would have to wait for each other.
 pub(super) fn run(
-    plan: Arc<Plan>,
+    topology: Arc<Topology>,
     engines: Vec<Engine>,
     mut schedule: Schedule,
     mut committer: Committer,
@@ -19,13 +19,13 @@ pub(super) fn run(
     let Ok([mut engine]) = <[Engine; 1]>::try_from(engines) else {
         unreachable!("the builder gives this executor a single engine");
     };
-    let ending = run_to_end(&plan, &mut engine, &mut schedule, &mut committer);
+    let ending = run_to_end(&topology, &mut engine, &mut schedule, &mut committer);
     let in_flight = engine.parts.take_in_flight(ending.fault);
     committer.finish(ending.end, ending.time, in_flight)
 }
 
 fn run_to_end(
-    plan: &Plan,
+    topology: &Topology,
     engine: &mut Engine,
     schedule: &mut Schedule,
     committer: &mut Committer,
@@ -47,9 +47,9 @@ fn run_to_end(
         if engine.peek().is_none() && schedule.only_stops_left() {
             return Ending::early(End::Completed, committer.last().time);
         }
-        match schedule.take_due(plan) {
+        match schedule.take_due(topology) {
             Some(Due::Stop { key, by, reason }) => {
-                return Ending::stop(plan, committer, key, by, reason);
+                return Ending::stop(topology, committer, key, by, reason);
             }
             Some(Due::Control(key, entity, action)) => {
                 if let Err(fault) = engine.control(key, entity, action, committer) {

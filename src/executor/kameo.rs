@@ -21,13 +21,13 @@ use super::inline;
 use crate::commit::Committer;
 use crate::engine::Engine;
 use crate::fault::BuildError;
-use crate::plan::Plan;
 use crate::report::Report;
 use crate::schedule::Schedule;
+use crate::topology::Topology;
 
 /// Runs to the end on `threads` threads of a pool of its own.
 pub(super) fn run(
-    plan: Arc<Plan>,
+    topology: Arc<Topology>,
     engines: Vec<Engine>,
     schedule: Schedule,
     committer: Committer,
@@ -40,7 +40,7 @@ pub(super) fn run(
         .build()
         .map_err(|error| BuildError::Threads(error.to_string()))?;
     let run = Run {
-        plan,
+        topology,
         engines,
         schedule,
         committer,
@@ -66,7 +66,7 @@ struct Leader {
 
 /// A whole run.
 struct Run {
-    plan: Arc<Plan>,
+    topology: Arc<Topology>,
     engines: Vec<Engine>,
     schedule: Schedule,
     committer: Committer,
@@ -86,16 +86,16 @@ impl Message<Run> for Leader {
 
     async fn handle(&mut self, run: Run, _: &mut Context<Self, Self::Reply>) -> Self::Reply {
         let Run {
-            plan,
+            topology,
             engines,
             schedule,
             committer,
         } = run;
         if engines.len() == 1 {
-            return Box::new(inline::run(plan, engines, schedule, committer));
+            return Box::new(inline::run(topology, engines, schedule, committer));
         }
         let coordinator =
-            window::Coordinator::new(plan, engines, schedule, committer, self.threads);
+            window::Coordinator::new(topology, engines, schedule, committer, self.threads);
         Box::new(coordinator.run().await)
     }
 }

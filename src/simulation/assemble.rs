@@ -1,4 +1,4 @@
-//! From declarations to a plan and engines: names are checked and ranked, message types traced,
+//! From declarations to a topology and engines: names are checked and ranked, message types traced,
 //! hosts dealt to engines.
 
 use std::any::TypeId;
@@ -9,9 +9,11 @@ use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
 use crate::fault::BuildError;
 use crate::ids::{EntityId, HostId, KindIndex};
-use crate::plan::{Entity, EntityRole, FixedMap, Kind, LinkPlan, Place, Plan, Routes, RunInfo};
 use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
+use crate::topology::{
+    Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, Routes, RunInfo, Topology,
+};
 
 /// Which entity each declaration became.
 struct Ranked {
@@ -37,7 +39,7 @@ impl Simulation {
         let (engine_of_host, engine_of_shared, engine_count) = self.deal(split);
         let places = self.place(&ranked, &engine_of_host, engine_of_shared, engine_count);
         let look_ahead = self.look_ahead();
-        let links = self.link_plans(&ranked, &kinds);
+        let links = self.link_entries(&ranked, &kinds);
         let wants: Vec<_> = self
             .observers
             .iter()
@@ -47,7 +49,7 @@ impl Simulation {
         for (declared, entity) in ranked.actors.iter().enumerate() {
             address_numbers[entity.index()] = Some(declared as u32);
         }
-        let plan = Arc::new(Plan {
+        let topology = Arc::new(Topology {
             seed: self.seed,
             name_hashes: ranked
                 .entities
@@ -82,9 +84,9 @@ impl Simulation {
         let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
         let interrupt = self.interrupt.clone();
-        let engines = self.build_engines(&plan, &ranked, engine_count);
+        let engines = self.build_engines(&topology, &ranked, engine_count);
         Ok(Ready {
-            plan,
+            topology,
             engines,
             schedule,
             observers,
@@ -92,16 +94,16 @@ impl Simulation {
         })
     }
 
-    fn link_plans(&self, ranked: &Ranked, kinds: &Kinds) -> FixedMap<EntityId, LinkPlan> {
-        let plan = |(link, entity): (&LinkDecl, &EntityId)| {
-            let plan = LinkPlan {
+    fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> FixedMap<EntityId, LinkEntry> {
+        let entry = |(link, entity): (&LinkDecl, &EntityId)| {
+            let entry = LinkEntry {
                 min_delay: link.carrier.min_delay(),
                 shared: link.host.is_none(),
                 change_kind: kinds.of_type[&link.change.type_id],
             };
-            (*entity, plan)
+            (*entity, entry)
         };
-        self.links.iter().zip(&ranked.links).map(plan).collect()
+        self.links.iter().zip(&ranked.links).map(entry).collect()
     }
 
     fn check_names(&self) -> Result<(), BuildError> {
@@ -250,8 +252,8 @@ impl Simulation {
         engine_of_host: &[u32],
         engine_of_shared: u32,
         engine_count: u32,
-    ) -> Vec<Place> {
-        let nowhere = Place {
+    ) -> Vec<Location> {
+        let nowhere = Location {
             host: u32::MAX,
             engine: u32::MAX,
             local: u32::MAX,
@@ -261,7 +263,7 @@ impl Simulation {
         let mut links_on = vec![0; engine_count as usize];
         let mut deal = |counts: &mut Vec<u32>, entity: EntityId, host: u32, engine: u32| {
             let local = &mut counts[engine as usize];
-            places[entity.index()] = Place {
+            places[entity.index()] = Location {
                 host,
                 engine,
                 local: *local,
@@ -361,7 +363,7 @@ impl Simulation {
         controls.map(control).collect()
     }
 
-    fn build_engines(self, plan: &Arc<Plan>, ranked: &Ranked, count: u32) -> Vec<Engine> {
+    fn build_engines(self, topology: &Arc<Topology>, ranked: &Ranked, count: u32) -> Vec<Engine> {
         let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
         for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
@@ -373,14 +375,14 @@ impl Simulation {
                 factory: actor.factory,
                 state,
             };
-            actors[plan.place(*entity).engine as usize].push(cell);
+            actors[topology.place(*entity).engine as usize].push(cell);
         }
         for (LinkDecl { carrier, .. }, entity) in self.links.into_iter().zip(&ranked.links) {
-            links[plan.place(*entity).engine as usize].push(LinkCell { carrier, count: 0 });
+            links[topology.place(*entity).engine as usize].push(LinkCell { carrier, count: 0 });
         }
         let lists = actors.into_iter().zip(links).enumerate();
         lists
-            .map(|(at, (a, l))| Engine::new(plan.clone(), at as u32, a, l))
+            .map(|(at, (a, l))| Engine::new(topology.clone(), at as u32, a, l))
             .collect()
     }
 }

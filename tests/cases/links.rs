@@ -29,7 +29,8 @@ fn by_plan(file: &str, keys: &str) -> Result<Assembled, ScenarioError> {
     ))
 }
 
-/// A contact: when it begins and ends \[s\], its light time \[s\], and the bytes that fit through it.
+/// A contact: when it begins and ends \[s\], its light time \[s\], and the bytes that fit through
+/// it.
 type Told = (u64, u64, u64, Option<u64>);
 
 fn contacts(assembled: &Assembled, from: &str, to: &str) -> Vec<Told> {

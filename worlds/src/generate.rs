@@ -17,7 +17,7 @@ use crate::crater::{Crater, CraterSettings};
 use crate::error::WorldError;
 use crate::ids::VertexId;
 use crate::roadmap::Roadmap;
-use ground::Ground;
+use ground::SafeGround;
 use network::Network;
 
 /// What a generated roadmap is to be like. [`RoadmapSettings::builtin`] has those of the built-in
@@ -90,7 +90,7 @@ pub fn generate(crater: &Crater, settings: &RoadmapSettings) -> Result<Roadmap, 
     let key = RandomKey::new(settings.seed)
         .text("roadmap")
         .text(&settings.name);
-    let ground = Ground::survey(crater, settings, key.text("ground").stream());
+    let ground = SafeGround::survey(crater, settings, key.text("ground").stream());
     let mut network = Network::new(&ground, key.text("network").stream());
     let no_room = |reason| WorldError::NoRoom {
         vertices: settings.vertices,

@@ -11,8 +11,8 @@ use super::{
 };
 use crate::figure::Figure;
 
-/// A table of settings that says how its system is assembled: [`Settings`] of a system that reads no
-/// other table.
+/// A table of settings that says how its system is assembled: [`Settings`] of a system that reads
+/// no other table.
 pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
     /// The table's name.
     const NAME: &'static str;

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::study::results::{Claim, Manifest, Results, RunOutcome, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
-use crate::study::summary::values::{Kind, kind_of, value_of};
+use crate::study::summary::values::{ValueKind, kind_of, value_of};
 use crate::study::summary::{
     Difference, ListSummary, MetricSummary, NumberSummary, RateSummary, SHARES, Summary,
 };
@@ -31,7 +31,7 @@ pub fn results_csv(results: &Results) -> String {
         .map(|metric| metric.name.as_str())
         // What is counted has its columns already.
         .filter(|name| !name.starts_with("messages.") && !FIXED.contains(name))
-        .filter(|name| !matches!(kind_of(results, name), Kind::List | Kind::Series))
+        .filter(|name| !matches!(kind_of(results, name), ValueKind::List | ValueKind::Series))
         .collect();
     let counts = COUNTS.iter().map(|count| format!("messages.{count}"));
     let by_reason = reasons

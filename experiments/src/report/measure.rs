@@ -5,7 +5,7 @@ use super::numbers::{Style, with_unit};
 use crate::stats::{Estimate, rates};
 use crate::study::results::{Metric, Results};
 use crate::study::summary::series::SeriesSummary;
-use crate::study::summary::values::{Kind, kind_of};
+use crate::study::summary::values::{ValueKind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
 use farside_actors::figure::numbers::plain;
 
@@ -21,7 +21,7 @@ pub(super) struct Measure<'a> {
     /// Its place in the manifest.
     pub(super) index: usize,
     pub(super) metric: &'a Metric,
-    pub(super) kind: Kind,
+    pub(super) kind: ValueKind,
     pub(super) style: Style,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Study<'a> {
         let metrics = self.results.manifest.metrics.iter().enumerate();
         let measure = |(index, metric): (usize, &'a Metric)| {
             let kind = kind_of(self.results, &metric.name);
-            let style = if kind == Kind::Rate {
+            let style = if kind == ValueKind::Rate {
                 Style::Percent
             } else {
                 Style::Plain
@@ -136,8 +136,8 @@ impl Measure<'_> {
     /// What is estimated, in words.
     pub(super) fn what(&self) -> &'static str {
         match self.kind {
-            Kind::Rate => "rate",
-            Kind::List => "median",
+            ValueKind::Rate => "rate",
+            ValueKind::List => "median",
             _ => "mean",
         }
     }
@@ -159,7 +159,7 @@ impl Measure<'_> {
     /// What a plot's vertical axis says: `mean time ratio`.
     pub(super) fn axis_label(&self) -> String {
         match self.kind {
-            Kind::Rate => self.label(),
+            ValueKind::Rate => self.label(),
             _ => format!("{} {}", self.what(), self.label()),
         }
     }
@@ -207,10 +207,10 @@ impl Measure<'_> {
         let percent = |value: f64| Style::Percent.value(&Estimate { value, ..none });
         let (most, least) = (percent(none.high), percent(1.0 - none.high));
         Some(match self.kind {
-            Kind::Rate if low == 0.0 => {
+            ValueKind::Rate if low == 0.0 => {
                 format!("In none of {runs} runs. A rate above {most} is unlikely (Wilson, 95 %).")
             }
-            Kind::Rate => {
+            ValueKind::Rate => {
                 format!("In all {runs} runs. A rate below {least} is unlikely (Wilson, 95 %).")
             }
             _ if low == 0.0 => format!(

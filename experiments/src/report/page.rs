@@ -12,7 +12,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::measure::{Measure, Study};
 use super::plots::{self, Plots};
-use crate::study::summary::values::Kind;
+use crate::study::summary::values::ValueKind;
 use farside_actors::figure::numbers::plain;
 use farside_actors::figure::svg::Figure;
 
@@ -116,7 +116,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                 p { (sentence) }
             } @else {
                 (tables::overall(study, measure))
-                @if measure.kind == Kind::Series { (series::told(study, measure)) }
+                @if measure.kind == ValueKind::Series { (series::told(study, measure)) }
                 @if !plots.figures.is_empty() {
                     div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
                 }

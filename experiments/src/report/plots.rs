@@ -10,7 +10,7 @@ use self::curves::Shown;
 use super::layout::Shape;
 use super::measure::{Measure, Study};
 use crate::study::results::Claim;
-use crate::study::summary::values::Kind;
+use crate::study::summary::values::ValueKind;
 use farside_actors::figure::svg::{Area, Figure};
 
 /// The width of a figure that stands beside others; on a phone it fills the page.
@@ -34,11 +34,14 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
         figures: Vec::new(),
         notes: Vec::new(),
     };
-    if measure.kind == Kind::Series {
+    if measure.kind == ValueKind::Series {
         series::curves(study, measure, &mut plots);
         return plots;
     }
-    let plotted = matches!(measure.kind, Kind::Number | Kind::Rate | Kind::List);
+    let plotted = matches!(
+        measure.kind,
+        ValueKind::Number | ValueKind::Rate | ValueKind::List
+    );
     if !plotted || measure.constant(study.summary).is_some() {
         return plots;
     }
@@ -68,7 +71,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Plots {
             }
         }
     }
-    if measure.kind == Kind::List {
+    if measure.kind == ValueKind::List {
         steps::distributions(study, measure, &mut plots);
     }
     plots

@@ -4,7 +4,7 @@ use farside::suggest::nearest;
 use farside_actors::system::SetupError;
 
 use super::error::ScenarioError;
-use super::place::one_line;
+use super::location::one_line;
 use super::source::Source;
 
 impl ScenarioError {

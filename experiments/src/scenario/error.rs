@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::place::Place;
+use super::location::SourceLocation;
 use farside::suggest::did_you_mean;
 
 /// A scenario cannot be found, read or built.
@@ -58,7 +58,7 @@ pub enum ScenarioError {
     #[error("{place}: not TOML: {message}{}", quoted(.place))]
     Syntax {
         /// Where.
-        place: Box<Place>,
+        place: Box<SourceLocation>,
         /// What the TOML reader found and expected.
         message: String,
     },
@@ -69,7 +69,7 @@ pub enum ScenarioError {
     )]
     UnknownKey {
         /// Where.
-        place: Box<Place>,
+        place: Box<SourceLocation>,
         /// The key.
         found: String,
         /// The table it is in, as ` in name`.
@@ -86,7 +86,7 @@ pub enum ScenarioError {
     )]
     UnknownValue {
         /// Where.
-        place: Box<Place>,
+        place: Box<SourceLocation>,
         /// The key.
         key: String,
         /// Its value.
@@ -100,7 +100,7 @@ pub enum ScenarioError {
     #[error("{place}: {key}: {message}{}", quoted(.place))]
     Invalid {
         /// Where.
-        place: Box<Place>,
+        place: Box<SourceLocation>,
         /// The key.
         key: String,
         /// What was found and expected.
@@ -115,9 +115,9 @@ pub enum ScenarioError {
 }
 
 /// The line itself, with a mark below the column.
-pub(crate) fn quoted(place: &Place) -> String {
+pub(crate) fn quoted(place: &SourceLocation) -> String {
     match place {
-        Place::File {
+        SourceLocation::File {
             line, column, text, ..
         } if !text.is_empty() => {
             let number = line.to_string();
@@ -133,7 +133,7 @@ pub(crate) fn quoted(place: &Place) -> String {
 
 impl ScenarioError {
     /// Where in the text or among the `--set` arguments it is, if it is there.
-    pub fn place(&self) -> Option<&Place> {
+    pub fn place(&self) -> Option<&SourceLocation> {
         match self {
             ScenarioError::Syntax { place, .. }
             | ScenarioError::UnknownKey { place, .. }

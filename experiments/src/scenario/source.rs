@@ -14,7 +14,7 @@ use toml::de::{DeString, DeTable, DeValue};
 use farside_actors::system::Renamed;
 
 use super::error::ScenarioError;
-use super::place::{MAX_SHOWN, Place, one_line};
+use super::location::{MAX_SHOWN, SourceLocation, one_line};
 
 /// The most keys in a path; scenarios have at most four. Tables are dropped recursively.
 const MAX_DEPTH: usize = 16;
@@ -194,9 +194,9 @@ impl Source {
     }
 
     /// Where the byte `offset` of all positions stands.
-    pub(crate) fn place(&self, offset: usize) -> Box<Place> {
+    pub(crate) fn place(&self, offset: usize) -> Box<SourceLocation> {
         if let Some(set) = self.sets.iter().rev().find(|set| set.base <= offset) {
-            return Box::new(Place::Set {
+            return Box::new(SourceLocation::Set {
                 argument: set.argument.clone(),
             });
         }
@@ -206,7 +206,7 @@ impl Source {
         }
         let before = &self.text[..offset];
         let start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Box::new(Place::File {
+        Box::new(SourceLocation::File {
             name: self.name.clone(),
             line: before.matches('\n').count() + 1,
             column: before[start..].chars().count() + 1,
@@ -216,7 +216,7 @@ impl Source {
 
     /// Where the value of a key stands, given from the top, entries of arrays by number; or the
     /// nearest table above it that is there.
-    pub(crate) fn place_of_key(&self, keys: &[String]) -> Box<Place> {
+    pub(crate) fn place_of_key(&self, keys: &[String]) -> Box<SourceLocation> {
         let Ok(root) = self.document() else {
             return self.place(0);
         };
@@ -464,7 +464,7 @@ mod tests {
     fn places_name_the_line_or_the_argument() {
         let source = source("[team]\n\"röver\" = 5\n", &["seed=7", "a.b=[1, 2]"]);
         let file = |line, column, text: &str| {
-            Box::new(Place::File {
+            Box::new(SourceLocation::File {
                 name: "x.toml".to_owned(),
                 line,
                 column,

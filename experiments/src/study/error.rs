@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use farside::suggest::did_you_mean;
 
-use crate::scenario::{Place, ScenarioError};
+use crate::scenario::{ScenarioError, SourceLocation};
 
 /// A study cannot be read, planned or run.
 #[derive(Debug, Error)]
@@ -28,7 +28,7 @@ pub enum StudyError {
     #[error("{place}: {what}: the scenario refuses it\n  {error}")]
     Refused {
         /// Where the study says it.
-        place: Box<Place>,
+        place: Box<SourceLocation>,
         /// What it sets.
         what: String,
         /// What the scenario says.

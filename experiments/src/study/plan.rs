@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use farside::suggest::nearest;
 
-use crate::scenario::{self, Place, Scenario, ScenarioError, Source};
+use crate::scenario::{self, Scenario, ScenarioError, Source, SourceLocation};
 use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
@@ -44,7 +44,7 @@ pub struct Study {
 }
 
 /// A study that can run.
-pub struct Plan {
+pub struct StudyPlan {
     /// What is run.
     pub manifest: Manifest,
     /// A scenario for each cell.
@@ -142,7 +142,7 @@ impl Study {
         sets: &[String],
         seeds: Option<u64>,
         registry: &Registry,
-    ) -> Result<Plan, StudyError> {
+    ) -> Result<StudyPlan, StudyError> {
         let blame = Blame(&self.source);
         self.check_arguments(sets)?;
         let base = self.scenario(sets, registry)?;
@@ -172,7 +172,7 @@ impl Study {
             stop,
             published,
         };
-        Ok(Plan {
+        Ok(StudyPlan {
             manifest,
             scenarios,
             source: self.source,
@@ -439,7 +439,7 @@ impl Study {
     }
 }
 
-impl Plan {
+impl StudyPlan {
     /// Checks that a run which ended like this has what the study measures.
     pub(super) fn check_metrics(&self, results: &Map<String, Value>) -> Result<(), ScenarioError> {
         let blame = Blame(&self.source);
@@ -498,5 +498,5 @@ pub(super) fn of_cell(
 
 /// Whether the mistake is in this `--set` argument.
 fn is_place_of(error: &ScenarioError, argument: &str) -> bool {
-    matches!(error.place(), Some(Place::Set { argument: blamed }) if blamed == argument)
+    matches!(error.place(), Some(SourceLocation::Set { argument: blamed }) if blamed == argument)
 }

@@ -13,7 +13,7 @@ use super::error::{StoreError, StudyError};
 use super::execute::{Executed, Interrupts, execute};
 use super::lengths::Lengths;
 use super::load;
-use super::plan::Plan;
+use super::plan::StudyPlan;
 use super::pool::{self, Dispatch};
 use super::results::{Manifest, Metric, Results, RunOutcome, RunRecord};
 use super::stop::{self, Sample};
@@ -105,7 +105,7 @@ pub enum Ended {
 /// # Errors
 /// When the folder cannot be used, a metric does not exist, or a cell's first runs all fail.
 pub fn run(
-    plan: Plan,
+    plan: StudyPlan,
     options: &RunOptions,
     interrupts: &Interrupts,
     watch: &mut dyn FnMut(Progress),
@@ -126,7 +126,7 @@ pub fn run(
         done.map_or(Ok(()), |metrics| plan.check_published(metrics))?;
         Vec::new()
     };
-    let Plan {
+    let StudyPlan {
         manifest,
         scenarios,
         ..
@@ -177,7 +177,7 @@ fn unobserved(_: &mut Assembled) -> Result<(), Infallible> {
 /// Runs the first cell's first seed to learn which metrics there are; if it fails, a few more.
 /// `None` if it was interrupted.
 fn try_out(
-    plan: &Plan,
+    plan: &StudyPlan,
     keep_going: bool,
     interrupts: &Interrupts,
 ) -> Result<Option<Vec<Run>>, StudyError> {

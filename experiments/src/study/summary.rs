@@ -23,7 +23,7 @@ use comparisons::ComparisonSummary;
 use figures::{list_summary, number_summary, overall, rate_summary, text_summary};
 use published::{Beside, LineSummary};
 use series::{SeriesSummary, series_summary};
-use values::{Kind, kind_of};
+use values::{ValueKind, kind_of};
 
 /// The shares at which distributions are given.
 pub const SHARES: [f64; 7] = [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95];
@@ -325,7 +325,7 @@ pub struct OverallSummary {
 /// ```
 pub fn summarise(results: &Results) -> Summary {
     let manifest = &results.manifest;
-    let kinds: Vec<(String, Kind)> = manifest
+    let kinds: Vec<(String, ValueKind)> = manifest
         .metrics
         .iter()
         .map(|metric| (metric.name.clone(), kind_of(results, &metric.name)))
@@ -336,7 +336,7 @@ pub fn summarise(results: &Results) -> Summary {
     let lines = published::set_beside(manifest, &mut cells);
     let scalars = kinds
         .iter()
-        .filter(|(_, kind)| matches!(kind, Kind::Number | Kind::Rate));
+        .filter(|(_, kind)| matches!(kind, ValueKind::Number | ValueKind::Rate));
     let overall = scalars.map(|(name, _)| (name.clone(), overall(results, name)));
     Summary {
         study: manifest.study.clone(),
@@ -360,7 +360,7 @@ fn baseline(results: &Results) -> Option<usize> {
     results.manifest.baseline.filter(|cell| *cell < cells)
 }
 
-fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, Kind)]) -> CellSummary {
+fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, ValueKind)]) -> CellSummary {
     let manifest = &results.manifest;
     let runs = results.of_cell(cell);
     let names = manifest.factors.iter().map(|factor| factor.name.clone());
@@ -395,12 +395,12 @@ fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, Kind)]) -> C
     }
     for (name, kind) in kinds {
         let of_metric = match kind {
-            Kind::Number => MetricSummary::Number(number_summary(results, cell, name)),
-            Kind::Rate => MetricSummary::Rate(rate_summary(results, cell, name)),
-            Kind::List => MetricSummary::List(list_summary(results, cell, name)),
-            Kind::Series => MetricSummary::Series(series_summary(results, cell, name)),
-            Kind::Text => text_summary(runs, name),
-            Kind::Absent => MetricSummary::Absent { n: 0 },
+            ValueKind::Number => MetricSummary::Number(number_summary(results, cell, name)),
+            ValueKind::Rate => MetricSummary::Rate(rate_summary(results, cell, name)),
+            ValueKind::List => MetricSummary::List(list_summary(results, cell, name)),
+            ValueKind::Series => MetricSummary::Series(series_summary(results, cell, name)),
+            ValueKind::Text => text_summary(runs, name),
+            ValueKind::Absent => MetricSummary::Absent { n: 0 },
         };
         summary.metrics.push(NamedSummary {
             name: name.clone(),

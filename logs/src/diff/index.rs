@@ -43,8 +43,8 @@ impl Names {
 /// One record, in 88 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// Hash of the identity, without the place in the flow where a match key stands for it; in other
-    /// files than Farside's, of the message without its times.
+    /// Hash of the identity, without the place in the flow where a match key stands for it; in
+    /// other files than Farside's, of the message without its times.
     pub(super) identity: u64,
     /// The place among records of one identity.
     pub(super) ordinal: u64,

@@ -14,7 +14,7 @@ use prost_reflect::prost_types::field_descriptor_proto::Type;
 
 use super::{DEPTH, FieldDiff, Path, near, raw};
 use crate::scan::SchemaInfo;
-use crate::schema::{Field, Kind, MessageType, Types};
+use crate::schema::{Field, FieldType, MessageType, Types};
 use crate::shown::{SHOWN, shorten};
 use crate::wire::{Fields, Value};
 use scalar::{Scalar, WireBits};
@@ -53,7 +53,7 @@ impl<'a> Encoded<'a> {
         let body = |side: Side<'a>| {
             let envelope = side.types.message(side.types.root());
             match envelope.named("body").map(|field| field.kind) {
-                Some(Kind::Message(message)) => Ok(Side { message, ..side }),
+                Some(FieldType::Message(message)) => Ok(Side { message, ..side }),
                 _ => Err("the envelope's schema declares no body"),
             }
         };
@@ -207,7 +207,7 @@ impl Comparison {
             };
             return Some(FieldDiff::new(path.to_string(), text(a), text(b)));
         }
-        let scalar = matches!(a.field.kind, Kind::Scalar(_));
+        let scalar = matches!(a.field.kind, FieldType::Scalar(_));
         if a.values == b.values && (scalar || std::ptr::eq(a.types, b.types)) {
             return None;
         }
@@ -220,7 +220,7 @@ impl Comparison {
         if a.field.presence && a.values.is_empty() != b.values.is_empty() {
             return Some(FieldDiff::new(path.to_string(), a.show(), b.show()));
         }
-        if let (Kind::Message(one), Kind::Message(other)) = (a.field.kind, b.field.kind) {
+        if let (FieldType::Message(one), FieldType::Message(other)) = (a.field.kind, b.field.kind) {
             let (x, y) = (merged(a.values), merged(b.values));
             let a = side(a.types, one);
             let b = side(b.types, other);
@@ -233,7 +233,7 @@ impl Comparison {
     fn scalars(
         &self,
         path: &dyn fmt::Display,
-        kind: Kind,
+        kind: FieldType,
         (a, b): (Option<Value<'_>>, Option<Value<'_>>),
     ) -> Option<FieldDiff> {
         let (a, b) = (Scalar::read(kind, a), Scalar::read(kind, b));
@@ -257,7 +257,7 @@ impl Comparison {
         for (at, (x, y)) in x.iter().zip(&y).enumerate() {
             let path = Path::Entry(path, &at);
             let found = match (a.field.kind, b.field.kind) {
-                (Kind::Message(one), Kind::Message(other)) => {
+                (FieldType::Message(one), FieldType::Message(other)) => {
                     let (x, y) = (content(x), content(y));
                     let (one, other) = (side(a.types, one), side(b.types, other));
                     self.messages(&path, (x, one), (y, other), depth + 1)
@@ -406,7 +406,7 @@ fn entries<'a>(half: Half<'a>, entry: &MessageType) -> Option<BTreeMap<String, V
     for value in half.values {
         let mut held = held(content(value), entry)?;
         let key = held.remove(&1).and_then(|keys| keys.last().copied());
-        let kind = kind.unwrap_or(Kind::Scalar(Type::Bytes));
+        let kind = kind.unwrap_or(FieldType::Scalar(Type::Bytes));
         let key = Scalar::read(kind, key).whole();
         entries.insert(key, held.remove(&2).unwrap_or_default());
     }
@@ -433,7 +433,7 @@ impl<'a> Half<'a> {
     }
 
     fn map_entry(&self) -> Option<&'a MessageType> {
-        let Kind::Message(Some(at)) = self.field.kind else {
+        let FieldType::Message(Some(at)) = self.field.kind else {
             return None;
         };
         Some(self.types.message(at)).filter(|message| message.map_entry && self.field.repeated)
@@ -441,7 +441,7 @@ impl<'a> Half<'a> {
 
     /// The elements of a list, packed or not.
     fn elements(&self) -> Option<Vec<Value<'a>>> {
-        let Kind::Scalar(kind) = self.field.kind else {
+        let FieldType::Scalar(kind) = self.field.kind else {
             return Some(self.values.to_vec());
         };
         if matches!(kind, Type::String | Type::Bytes) {
@@ -465,7 +465,7 @@ impl<'a> Half<'a> {
                 Some(elements) => format!("{} values", elements.len()),
                 None => "a list that is malformed".to_owned(),
             },
-            (Kind::Message(message), values) => {
+            (FieldType::Message(message), values) => {
                 let mut text = String::new();
                 let bytes = merged(values);
                 show_message(&bytes, side(self.types, message), &mut text, 0);
@@ -499,7 +499,7 @@ fn show_message(bytes: &[u8], side: Side<'_>, out: &mut String, depth: usize) {
                 out.push_str(&field.name);
                 out.push_str(": ");
                 match field.kind {
-                    Kind::Message(message) => {
+                    FieldType::Message(message) => {
                         let inner = self::side(side.types, message);
                         show_message(content(&value), inner, out, depth + 1);
                     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use tempfile::NamedTempFile;
 
-use super::{Known, RecoverReport};
+use super::{FirstDeclared, RecoverReport};
 use crate::LogError;
 use crate::parse::{ChannelRecord, SchemaRecord};
 use crate::salvage::Part;
@@ -60,7 +60,7 @@ pub(super) struct Saved<'a> {
     writer: Option<McapWriter>,
     file: Option<NamedTempFile>,
     header: Option<(String, String)>,
-    known: Known,
+    known: FirstDeclared,
     /// What is declared at this point of the broken file, by its ids.
     schemas: BTreeMap<u16, Declaration>,
     channels: BTreeMap<u16, (Declaration, Result<u16, String>)>,
@@ -70,7 +70,11 @@ pub(super) struct Saved<'a> {
 }
 
 impl<'a> Saved<'a> {
-    pub(super) fn create(broken: &Path, path: &'a Path, known: Known) -> Result<Self, LogError> {
+    pub(super) fn create(
+        broken: &Path,
+        path: &'a Path,
+        known: FirstDeclared,
+    ) -> Result<Self, LogError> {
         let folder = path.parent().filter(|folder| *folder != Path::new(""));
         let folder = folder.unwrap_or(Path::new("."));
         let mut builder = tempfile::Builder::new();
@@ -140,7 +144,8 @@ impl<'a> Saved<'a> {
                 sure,
             } => {
                 let declared = Declaration::schema(&record);
-                let declared = Known::surest(&self.known.schemas, record.id, declared, sure);
+                let declared =
+                    FirstDeclared::surest(&self.known.schemas, record.id, declared, sure);
                 if !(in_summary && self.schemas.contains_key(&record.id)) {
                     self.schemas.insert(record.id, declared);
                 }
@@ -151,7 +156,8 @@ impl<'a> Saved<'a> {
                 sure,
             } => {
                 let declared = Declaration::channel(&record);
-                let declared = Known::surest(&self.known.channels, record.id, declared, sure);
+                let declared =
+                    FirstDeclared::surest(&self.known.channels, record.id, declared, sure);
                 self.channel(record.id, declared, in_summary)?;
             }
             Part::Message { head, data, sure } => self.message(head, data, sure)?,

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use super::{Bytes, Opened, Part, Place, Salvage};
+use super::{Bytes, Opened, Part, Salvage, WalkedPart};
 use crate::LogError;
 use crate::frames::{HEAD_BYTES, LIMIT_BYTES};
 use crate::parse::{ChunkRecord, Parser, most};
@@ -146,7 +146,7 @@ impl Salvage<'_> {
         let mut opened = Opened(&records);
         let mut next = Some(0);
         while let Some(at_record) = next {
-            next = self.step(&mut opened, at_record, Place::Chunk(at))?;
+            next = self.step(&mut opened, at_record, WalkedPart::Chunk(at))?;
         }
         self.unsure = false;
         Ok(())

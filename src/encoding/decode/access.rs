@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use serde::de::{self, DeserializeSeed, IntoDeserializer, Visitor};
 
-use super::super::plan::{Card, Shape};
+use super::super::flat::{Card, Shape};
 use super::super::wire::{Payload, Wire, take_payload};
 use super::reader::Reader;
 use super::{DecodeError, Fault, Source, ValueDe, read_struct};
@@ -122,10 +122,10 @@ impl<'b> de::SeqAccess<'b> for Elements<'_, '_, 'b> {
         let Some(payload) = self.next()? else {
             return Ok(None);
         };
-        let (plan, depth) = (self.reader.plan, self.reader.depth);
+        let (flat, depth) = (self.reader.flat, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
         seed.deserialize(ValueDe {
-            plan,
+            flat,
             field,
             source: Source::Payload(payload),
             depth,
@@ -158,10 +158,10 @@ impl<'r, 'p, 'b> Entries<'r, 'p, 'b> {
     }
 
     fn open(&mut self, payload: Payload<'b>) -> Result<&mut Reader<'p, 'b>, Fault> {
-        let (plan, depth) = (self.reader.plan, self.reader.depth);
+        let (flat, depth) = (self.reader.flat, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
         let value = ValueDe {
-            plan,
+            flat,
             field,
             source: Source::Payload(payload),
             depth,
@@ -254,10 +254,10 @@ pub(super) struct OneVariant<'p, 'b> {
 
 impl<'p, 'b> OneVariant<'p, 'b> {
     fn value(&self) -> ValueDe<'_, 'p, 'b> {
-        let (plan, depth) = (self.reader.plan, self.reader.depth);
+        let (flat, depth) = (self.reader.flat, self.reader.depth);
         let field = &self.reader.message.fields[self.index];
         ValueDe {
-            plan,
+            flat,
             field,
             source: Source::Payload(self.payload),
             depth,

@@ -1,17 +1,17 @@
-//! The fields of one message on the wire, in the order of the plan.
+//! The fields of one message on the wire, in the order of the flat schema.
 
 use super::super::error::DecodeError;
-use super::super::plan::{Message, Plan};
+use super::super::flat::{FlatSchema, Message};
 use super::super::wire::{Malformed, Payload, take_field};
 use super::Fault;
 
 /// An open message: hands out the occurrences of each field, fields in ascending order.
 pub(super) struct Reader<'p, 'b> {
-    pub(super) plan: &'p Plan,
+    pub(super) flat: &'p FlatSchema,
     pub(super) message: &'p Message,
     pub(super) depth: u32,
     bytes: &'b [u8],
-    /// The offset of the next occurrence, while the bytes are in the plan's order.
+    /// The offset of the next occurrence, while the bytes are in the flat schema's order.
     pos: usize,
     /// Otherwise: all occurrences as (field, offset), sorted, and how many were taken.
     sorted: Option<(Vec<(usize, usize)>, usize)>,
@@ -20,13 +20,13 @@ pub(super) struct Reader<'p, 'b> {
 impl<'p, 'b> Reader<'p, 'b> {
     /// Checks that the bytes are fields, and whether they are in order.
     pub(super) fn new(
-        plan: &'p Plan,
+        flat: &'p FlatSchema,
         message: &'p Message,
         bytes: &'b [u8],
         depth: u32,
     ) -> Result<Reader<'p, 'b>, Fault> {
         let mut reader = Reader {
-            plan,
+            flat,
             message,
             depth,
             bytes,

@@ -3,13 +3,13 @@
 use serde::ser::{self, Serialize};
 
 use super::super::error::EncodeError;
-use super::super::plan::{Card, Field, Kind, Message, Plan};
+use super::super::flat::{Card, Field, FlatSchema, Message, ValueType};
 use super::super::wire;
 use super::{Fault, NONE, Position, ValueSer, begin, finish, widen};
 
 /// A message whose fields are being written.
 pub(super) struct Compound<'a> {
-    pub(super) plan: &'a Plan,
+    pub(super) flat: &'a FlatSchema,
     pub(super) out: &'a mut Vec<u8>,
     pub(super) message: &'a Message,
     /// The fields that are still to come.
@@ -31,18 +31,18 @@ impl<'a> Compound<'a> {
 
     /// The one field of a wrapper or newtype.
     pub(super) fn inner(self) -> ValueSer<'a> {
-        ValueSer::inside(self.plan, self.out, &self.message.fields[0], self.depth)
+        ValueSer::inside(self.flat, self.out, &self.message.fields[0], self.depth)
     }
 
     /// The one field of a wrapper or newtype that is closed later.
     #[inline(always)]
     pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_> {
-        ValueSer::inside(self.plan, self.out, &self.message.fields[0], self.depth)
+        ValueSer::inside(self.flat, self.out, &self.message.fields[0], self.depth)
     }
 
     #[inline(always)]
     fn put<T: ?Sized + Serialize>(&mut self, field: &'a Field, value: &T) -> Result<(), Fault> {
-        value.serialize(ValueSer::inside(self.plan, self.out, field, self.depth))
+        value.serialize(ValueSer::inside(self.flat, self.out, field, self.depth))
     }
 
     #[inline(always)]
@@ -162,10 +162,10 @@ impl ser::SerializeTupleVariant for Compound<'_> {
 
 /// A repeated field whose elements are being written.
 pub(super) struct SeqSer<'a> {
-    plan: &'a Plan,
+    flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
-    kind: Kind,
+    kind: ValueType,
     position: Position,
     /// Where the packed elements begin, and how many bytes are kept for their length.
     packed: usize,
@@ -195,7 +195,7 @@ impl<'a> SeqSer<'a> {
     #[inline(always)]
     fn begin(value: ValueSer<'a>, len: Option<usize>, wrapper: usize) -> SeqSer<'a> {
         let ValueSer {
-            plan,
+            flat,
             out,
             field,
             depth,
@@ -221,7 +221,7 @@ impl<'a> SeqSer<'a> {
         };
         let kind = field.kind;
         SeqSer {
-            plan,
+            flat,
             out,
             field,
             kind,
@@ -237,7 +237,7 @@ impl<'a> SeqSer<'a> {
     #[inline(always)]
     fn element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         value.serialize(ValueSer {
-            plan: self.plan,
+            flat: self.flat,
             out: self.out,
             field: self.field,
             first: self.kind,
@@ -317,7 +317,7 @@ struct EntrySpan {
 
 /// A map whose entries are being written.
 pub(super) struct MapSer<'a> {
-    plan: &'a Plan,
+    flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
     entry: &'a Message,
@@ -341,23 +341,23 @@ impl<'a> MapSer<'a> {
             let start = wrapper.start;
             (wrapper.inner(), start)
         };
-        let Kind::Message(entry) = value.field.kind else {
+        let ValueType::Message(entry) = value.field.kind else {
             return value.mismatch("a map");
         };
         if value.expect() != Card::Map {
             return value.mismatch("a map");
         }
         let ValueSer {
-            plan,
+            flat,
             out,
             field,
             depth,
             ..
         } = value;
-        let entry = &plan.messages[entry];
+        let entry = &flat.messages[entry];
         let (spans, tag, key, key_end) = (Vec::new(), NONE, NONE, NONE);
         Ok(MapSer {
-            plan,
+            flat,
             out,
             field,
             entry,
@@ -395,7 +395,7 @@ impl ser::SerializeMap for MapSer<'_> {
         self.tag = self.out.len();
         self.key = begin(self.out, self.field.tag);
         let field = &self.entry.fields[0];
-        key.serialize(ValueSer::inside(self.plan, self.out, field, self.depth + 1))?;
+        key.serialize(ValueSer::inside(self.flat, self.out, field, self.depth + 1))?;
         self.key_end = self.out.len();
         Ok(())
     }
@@ -403,7 +403,7 @@ impl ser::SerializeMap for MapSer<'_> {
     #[inline(always)]
     fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         let field = &self.entry.fields[1];
-        value.serialize(ValueSer::inside(self.plan, self.out, field, self.depth + 1))?;
+        value.serialize(ValueSer::inside(self.flat, self.out, field, self.depth + 1))?;
         let before = self.out.len();
         finish(self.out, self.key);
         let moved = self.out.len() - before;

@@ -11,8 +11,8 @@ use crate::engine::{CellState, Class, Head, Pending, Sealed, Side};
 use crate::fault::FaultCause;
 use crate::ids::{EntityId, KindIndex};
 use crate::key::EventKey;
-use crate::plan::Kind;
 use crate::time::{SimDuration, SimTime};
+use crate::topology::Kind;
 
 impl Parts {
     /// Lets `link` decide the fate of a message, now; `held` if it held it before. Returns what the
@@ -25,12 +25,12 @@ impl Parts {
         held: Option<Side>,
     ) -> f64 {
         self.carrying = Some(link);
-        let plan = self.plan.clone();
-        let Some(kind) = head.kind.map(|kind| plan.kind(kind)) else {
+        let topology = self.topology.clone();
+        let Some(kind) = head.kind.map(|kind| topology.kind(kind)) else {
             return 0.0;
         };
         let parcel = Parcel {
-            plan: &plan,
+            topology: &topology,
             now: self.key.time,
             sent: head.sent(self.key),
             link,
@@ -46,11 +46,11 @@ impl Parts {
             size: Cell::new(None),
         };
         let mut verdicts = std::mem::take(&mut self.verdicts);
-        let cell = &mut self.links[plan.place(link).local as usize];
+        let cell = &mut self.links[topology.place(link).local as usize];
         cell.carrier.carry(&parcel, &mut verdicts);
         let mut count = cell.count;
         self.execute(link, &mut count, head, letter, kind, &verdicts);
-        self.links[plan.place(link).local as usize].count = count;
+        self.links[topology.place(link).local as usize].count = count;
         let charge_j = std::mem::take(&mut verdicts.charge_j);
         verdicts.list.clear();
         self.verdicts = verdicts;
@@ -67,16 +67,19 @@ impl Parts {
     }
 
     fn is_shared(&self, link: EntityId) -> bool {
-        self.plan.links.get(&link).is_some_and(|link| link.shared)
+        self.topology
+            .links
+            .get(&link)
+            .is_some_and(|link| link.shared)
     }
 
     fn charge_later(&mut self, link: EntityId, sender: EntityId, energy_j: f64) {
-        let plan = self.plan.clone();
-        let min_delay = plan.links.get(&link).map(|link| link.min_delay);
-        let cell = &mut self.links[plan.place(link).local as usize];
+        let topology = self.topology.clone();
+        let min_delay = topology.links.get(&link).map(|link| link.min_delay);
+        let cell = &mut self.links[topology.place(link).local as usize];
         let mut count = cell.count;
         let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
-        self.links[plan.place(link).local as usize].count = count;
+        self.links[topology.place(link).local as usize].count = count;
         let carriage = Carriage {
             energy_j,
             ..Carriage::default()
@@ -90,7 +93,7 @@ impl Parts {
                 ..Side::default()
             }),
         };
-        self.schedule_with(plan.place(sender).engine, key, pending);
+        self.schedule_with(topology.place(sender).engine, key, pending);
     }
 
     /// Asks for a change of a link on behalf of an actor.
@@ -101,19 +104,19 @@ impl Parts {
         link: EntityId,
         letter: Sealed,
     ) {
-        let (mine, its) = (self.plan.place(me), self.plan.place(link));
+        let (mine, its) = (self.topology.place(me), self.topology.place(link));
         if self.fault.is_some() {
             return;
         }
         if mine.host != its.host && !self.is_shared(link) {
             return self.raise(FaultCause::NoRoute {
-                from: self.plan.host_name(me).to_owned(),
-                to: self.plan.host_name(link).to_owned(),
-                receiver: self.plan.name(link).to_owned(),
+                from: self.topology.host_name(me).to_owned(),
+                to: self.topology.host_name(link).to_owned(),
+                receiver: self.topology.name(link).to_owned(),
                 kind: "a change".to_owned(),
             });
         }
-        let kind = self.plan.links.get(&link).map(|link| link.change_kind);
+        let kind = self.topology.links.get(&link).map(|link| link.change_kind);
         let flow = state.next_in_flow(link.0, kind.unwrap_or(KindIndex::MAX), None);
         let head = Head {
             receiver: link,
@@ -128,7 +131,7 @@ impl Parts {
 
     /// Gives a link a change.
     pub(crate) fn tell(&mut self, link: EntityId, change: Box<dyn Any + Send>, now: SimTime) {
-        let local = self.plan.place(link).local as usize;
+        let local = self.topology.place(link).local as usize;
         self.links[local].carrier.change(change, now);
     }
 
@@ -169,9 +172,9 @@ impl Parts {
         }
         if verdicts.list.is_empty() {
             self.raise(FaultCause::NoFate {
-                link: self.plan.name(link).to_owned(),
+                link: self.topology.name(link).to_owned(),
                 kind: kind.name().to_owned(),
-                sender: self.plan.name(head.sender).to_owned(),
+                sender: self.topology.name(head.sender).to_owned(),
             });
         }
     }
@@ -196,7 +199,7 @@ impl Parts {
         let (class, engine, after, side) = match verdict {
             Verdict::Deliver { after, carriage } => {
                 self.check_delay(link, after)?;
-                let engine = self.plan.place(head.receiver).engine;
+                let engine = self.topology.place(head.receiver).engine;
                 (Class::Message, engine, after, side(carriage))
             }
             Verdict::Hold { after, token } => {
@@ -212,7 +215,7 @@ impl Parts {
                 reason,
                 carriage,
             } => {
-                head.reason = self.plan.intern(reason);
+                head.reason = self.topology.intern(reason);
                 if after.is_zero() {
                     self.lose(head, &letter, kind, side(carriage));
                     return Ok(());
@@ -259,14 +262,14 @@ impl Parts {
 
     fn check_delay(&self, link: EntityId, actual: SimDuration) -> Result<(), FaultCause> {
         let declared = self
-            .plan
+            .topology
             .links
             .get(&link)
             .map_or(SimDuration::ZERO, |link| link.min_delay);
-        if actual >= declared || !self.plan.check_min_delay {
+        if actual >= declared || !self.topology.check_min_delay {
             return Ok(());
         }
-        let link = self.plan.name(link).to_owned();
+        let link = self.topology.name(link).to_owned();
         Err(FaultCause::UndercutsMinDelay {
             link,
             declared,
@@ -276,7 +279,7 @@ impl Parts {
 
     fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind, side: Option<Side>) {
         let start = self.effect_bytes.len();
-        if self.plan.recording()
+        if self.topology.recording()
             && let Err(error) = letter.0.encode(kind.schema(), &mut self.effect_bytes)
         {
             let (kind, error) = (kind.name().to_owned(), error.to_string());

@@ -14,8 +14,8 @@ use crate::fault::{Fault, FaultCause};
 use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::payload::Message;
-use crate::plan::Kind;
 use crate::record::RecordClass;
+use crate::topology::Kind;
 
 /// A type of samples that was met.
 pub(crate) struct SampleType {
@@ -96,7 +96,7 @@ impl Parts {
     #[cold]
     fn meet_sample_type<S: Message>(&mut self, actor: EntityId) -> usize {
         let (type_id, type_name) = (TypeId::of::<S>(), std::any::type_name::<S>());
-        let kind = self.plan.sample_kind::<S>();
+        let kind = self.topology.sample_kind::<S>();
         if let Ok(kind) = &kind {
             let named =
                 |known: &&SampleType| known.kind.as_ref().is_ok_and(|k| k.name() == kind.name());
@@ -143,7 +143,7 @@ impl Parts {
             // is no fault.
             Err(error) => {
                 self.effect_bytes.truncate(start);
-                tracing::warn!(actor = self.plan.name(entity), %error, "state sample dropped");
+                tracing::warn!(actor = self.topology.name(entity), %error, "state sample dropped");
             }
         }
     }
@@ -155,8 +155,9 @@ impl Parts {
                 Effect::Lost { head, body, side } => {
                     let body = &self.effect_bytes[body];
                     let side = side.as_deref();
-                    let record = head.record(&self.plan, RecordClass::Lost, self.key, body, side);
-                    sink.commit(&record, hash_if_wanted(&self.plan, &record));
+                    let record =
+                        head.record(&self.topology, RecordClass::Lost, self.key, body, side);
+                    sink.commit(&record, hash_if_wanted(&self.topology, &record));
                 }
                 Effect::Sample { entity, kind, body } => {
                     let head = Head {
@@ -165,12 +166,12 @@ impl Parts {
                     };
                     let body = &self.effect_bytes[body];
                     let class = RecordClass::Sample;
-                    let mut record = head.record(&self.plan, class, self.key, body, None);
+                    let mut record = head.record(&self.topology, class, self.key, body, None);
                     record.kind = Some(&kind);
                     sink.commit(&record, 0);
                 }
                 Effect::FirstSample(mut sample) => {
-                    sample.message = event.message(&self.plan);
+                    sample.message = event.message(&self.topology);
                     sink.first_sample(*sample);
                 }
             }

@@ -12,14 +12,14 @@ use crate::executor::Ending;
 use crate::fault::Fault;
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
-use crate::plan::Plan;
 use crate::report::{End, Report};
 use crate::schedule::{Due, Schedule};
 use crate::time::SimDuration;
+use crate::topology::Topology;
 
 /// Leads the engines of one run from window to window.
 pub(super) struct Coordinator {
-    plan: Arc<Plan>,
+    topology: Arc<Topology>,
     seats: Seats,
     helpers: Vec<ActorRef<Helper>>,
     /// The engine of shared links, which runs after the others in each window.
@@ -34,18 +34,18 @@ pub(super) struct Coordinator {
 
 impl Coordinator {
     pub(super) fn new(
-        plan: Arc<Plan>,
+        topology: Arc<Topology>,
         engines: Vec<Engine>,
         schedule: Schedule,
         committer: Committer,
         threads: usize,
     ) -> Self {
-        let shared = plan.links.iter().find(|(_, link)| link.shared);
-        let shared = shared.map(|(link, _)| plan.place(*link).engine as usize);
-        let look_ahead = plan.info.look_ahead;
+        let shared = topology.links.iter().find(|(_, link)| link.shared);
+        let shared = shared.map(|(link, _)| topology.place(*link).engine as usize);
+        let look_ahead = topology.info.look_ahead;
         let helpers = (0..threads).map(|_| Helper::spawn(Helper)).collect();
         Coordinator {
-            plan,
+            topology,
             seats: Seats::new(engines),
             helpers,
             shared,
@@ -68,7 +68,7 @@ impl Coordinator {
         for at in 0..self.seats.len() {
             let mut seat = self.seats.take(at);
             for Outgoing { key, pending, .. } in std::mem::take(&mut seat.inbox) {
-                let found = pending.in_flight(&self.plan, key, ending.fault);
+                let found = pending.in_flight(&self.topology, key, ending.fault);
                 in_flight.extend(found);
             }
             in_flight.extend(seat.engine.parts.take_in_flight(ending.fault));
@@ -99,9 +99,9 @@ impl Coordinator {
             None if self.schedule.only_stops_left() => {
                 Some(Ending::early(End::Completed, self.committer.last().time))
             }
-            _ => match self.schedule.take_due(&self.plan) {
+            _ => match self.schedule.take_due(&self.topology) {
                 Some(Due::Stop { key, by, reason }) => Some(Ending::stop(
-                    &self.plan,
+                    &self.topology,
                     &mut self.committer,
                     key,
                     by,
@@ -158,7 +158,7 @@ impl Coordinator {
         action: Action,
         undone: &mut Vec<InFlight>,
     ) -> Option<Ending> {
-        let at = self.plan.place(entity).engine as usize;
+        let at = self.topology.place(entity).engine as usize;
         self.seats.take(at).control(key, entity, action);
         self.seats.hand_out(at);
         self.settle(&[at], undone)
@@ -171,7 +171,7 @@ impl Coordinator {
             .iter_mut()
             .map(|seat| std::mem::take(&mut seat.batch.first_samples));
         let samples: Vec<_> = samples.flatten().collect();
-        let name = |actor| self.plan.name(actor).to_owned();
+        let name = |actor| self.topology.name(actor).to_owned();
         let clash = self.sample_names.take(samples, name);
         let fault = done.iter().filter_map(|seat| seat.fault.as_ref());
         let fault = fault.chain(&clash).min_by_key(|fault| fault.key);
@@ -193,7 +193,7 @@ impl Coordinator {
         if let Some(fault) = fault {
             for (seat, at) in done.iter().zip(&uncommitted) {
                 if let Some(at) = at {
-                    undone.extend(seat.batch.undone(*at, fault.key, &self.plan));
+                    undone.extend(seat.batch.undone(*at, fault.key, &self.topology));
                 }
             }
             return Some(Ending::fault(fault));

@@ -23,7 +23,7 @@ const CHANCE_COST: f64 = 2.5;
 const STRAIGHTENINGS: usize = 4;
 
 /// A dense planar graph of safe ground.
-pub(super) struct Ground {
+pub(super) struct SafeGround {
     /// Places on safe ground; the gates come first.
     pub(super) positions_m: Vec<Point2<f64>>,
     /// How many gates there are.
@@ -34,7 +34,7 @@ pub(super) struct Ground {
     pub(super) spacing_m: f64,
 }
 
-impl Ground {
+impl SafeGround {
     pub(super) fn survey(crater: &Crater, settings: &RoadmapSettings, mut stream: Stream) -> Self {
         let mut positions_m = Vec::new();
         throw_places(crater, settings, &mut positions_m, &mut stream);
@@ -57,7 +57,7 @@ impl Ground {
         };
         let links = order.iter().map(renumbered).collect();
         positions_m = order.iter().map(|&v| positions_m[v]).collect();
-        Ground {
+        SafeGround {
             positions_m,
             gates,
             links,

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 use farside::random::Stream;
 use nalgebra::Point2;
 
-use super::ground::Ground;
+use super::ground::SafeGround;
 
 /// Pairs of vertices tried for one loop.
 const LOOP_TRIES: usize = 240;
@@ -30,7 +30,7 @@ const MOST_JOINED: usize = 4;
 
 /// The vertices and edges chosen so far.
 pub(super) struct Network<'a> {
-    ground: &'a Ground,
+    ground: &'a SafeGround,
     stream: Stream,
     chosen: Vec<bool>,
     joined: Vec<Vec<usize>>,
@@ -39,7 +39,7 @@ pub(super) struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    pub(super) fn new(ground: &'a Ground, stream: Stream) -> Self {
+    pub(super) fn new(ground: &'a SafeGround, stream: Stream) -> Self {
         let n = ground.positions_m.len();
         let (chosen, joined) = (vec![false; n], vec![Vec::new(); n]);
         Network {

@@ -6,7 +6,7 @@ use super::anchor;
 use crate::report::measure::{Measure, Study};
 use crate::report::numbers::Style;
 use crate::stats::Estimate;
-use crate::study::summary::values::Kind;
+use crate::study::summary::values::ValueKind;
 use crate::study::summary::{
     CellSummary, ListSummary, MetricSummary, NumberSummary, OverallSummary, RateSummary, SURE_FROM,
 };
@@ -16,7 +16,7 @@ use farside_actors::figure::numbers::plain;
 pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
     let shown: Vec<&Measure<'_>> = measures
         .iter()
-        .filter(|measure| measure.kind != Kind::Absent)
+        .filter(|measure| measure.kind != ValueKind::Absent)
         .collect();
     html! {
         p class="note" {
@@ -26,7 +26,7 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                         ", and the difference to the baseline over the same seeds. ▲ and ▼ mark \
                          differences whose interval leaves out 0: of twenty that are none, about \
                          one is marked. Differences of rates are in percentage points (pp)."
-                        @if shown.iter().any(|measure| measure.kind == Kind::Series) {
+                        @if shown.iter().any(|measure| measure.kind == ValueKind::Series) {
                             " Of curves it is said from which index on they differ, if they do at \
                              the last."
                         }
@@ -138,7 +138,7 @@ pub(super) fn overall(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
     html! {
         p {
             "Over all cells, each counted the same: " (measure.told(&mean))
-            @if measure.kind == Kind::Number {
+            @if measure.kind == ValueKind::Number {
                 "; interquartile mean " (measure.told(&middle))
             }
             "."
@@ -164,7 +164,7 @@ fn overall_estimates(overall: &OverallSummary) -> (Estimate, Estimate) {
 /// Everything that is known of a metric, cell by cell.
 pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
     let columns: &[&str] = match measure.kind {
-        Kind::Number => &[
+        ValueKind::Number => &[
             "mean",
             "95 % interval",
             "interquartile mean",
@@ -174,7 +174,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
             "difference",
             "95 % interval",
         ],
-        Kind::Rate => &[
+        ValueKind::Rate => &[
             "true in",
             "rate",
             "95 % interval",
@@ -183,7 +183,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
             "only here / only baseline",
             "McNemar p",
         ],
-        Kind::List => &[
+        ValueKind::List => &[
             "values",
             "happened",
             "censored",
@@ -195,7 +195,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
             "75 %",
             "95 %",
         ],
-        Kind::Series => &[
+        ValueKind::Series => &[
             "last index",
             "mean there",
             "95 % interval",
@@ -203,7 +203,7 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
             "95 % interval",
             "differs from",
         ],
-        Kind::Text | Kind::Absent => &["says"],
+        ValueKind::Text | ValueKind::Absent => &["says"],
     };
     html! {
         div class="scroll" tabindex="0" {

@@ -30,7 +30,7 @@ struct Step {
 }
 
 /// What the curves of all panels share.
-struct Kind {
+struct CurveStyle {
     /// What the file's name ends with.
     file: &'static str,
     y_label: String,
@@ -82,7 +82,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
         let starts = all()
             .filter_map(|curve| curve.steps.first())
             .map(|step| step.x);
-        Kind {
+        CurveStyle {
             file: "ecdf",
             y_label: "share of all values, at or below".to_owned(),
             title: "distribution",
@@ -92,7 +92,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
         let ends = all()
             .filter_map(|curve| curve.steps.last())
             .map(|step| step.x);
-        Kind {
+        CurveStyle {
             file: "survival",
             y_label: "still outstanding".to_owned(),
             title: "survival",
@@ -218,7 +218,7 @@ fn steps(study: &Study<'_>, metric: &str, cell: usize, name: &str, all_happened:
 fn figure(
     study: &Study<'_>,
     measure: &Measure<'_>,
-    kind: &Kind,
+    kind: &CurveStyle,
     panel: &str,
     series: Option<usize>,
     curves: Vec<Steps>,
@@ -276,7 +276,13 @@ fn figure(
     )
 }
 
-fn named(measure: &Measure<'_>, kind: &Kind, panel: &str, heading: &str, body: Markup) -> Figure {
+fn named(
+    measure: &Measure<'_>,
+    kind: &CurveStyle,
+    panel: &str,
+    heading: &str,
+    body: Markup,
+) -> Figure {
     let (metric, title) = (&measure.metric.label, kind.title);
     let within = if panel.is_empty() {
         String::new()

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::figures::{number_difference, rate_test};
 use super::series::{self, ALPHA, DifferencePoint};
-use super::values::Kind;
+use super::values::ValueKind;
 use super::{Difference, Estimate};
 use crate::stats::{bootstrap, paired};
 use crate::study::results::{Claim, Comparison, Published, Results};
@@ -140,12 +140,12 @@ impl Bounds {
 }
 
 /// All comparisons that were published, in the order of tables.
-pub(super) fn compare(results: &Results, kinds: &[(String, Kind)]) -> Vec<ComparisonSummary> {
+pub(super) fn compare(results: &Results, kinds: &[(String, ValueKind)]) -> Vec<ComparisonSummary> {
     let mut all = Vec::new();
     let cells = results.manifest.cells.len();
     for (index, table) in results.manifest.published.iter().enumerate() {
         let kind = kinds.iter().find(|(name, _)| *name == table.metric);
-        let kind = kind.map_or(Kind::Absent, |(_, kind)| *kind);
+        let kind = kind.map_or(ValueKind::Absent, |(_, kind)| *kind);
         for figure in &table.figures {
             let Claim::Exceeds(claim) = &figure.claim else {
                 continue;
@@ -208,18 +208,18 @@ fn summary(
 fn judge(
     results: &Results,
     table: &Published,
-    kind: Kind,
+    kind: ValueKind,
     cells: (usize, usize),
     claim: &Comparison,
 ) -> Judged {
     let bounds = Bounds::new(claim, table.scale);
     let name = &table.metric;
     let difference = match kind {
-        Kind::Series => return judge_curve(results, name, cells, claim, bounds),
-        Kind::Rate => rate_test(results, cells, name).1,
-        Kind::Number => number_difference(results, cells, name),
+        ValueKind::Series => return judge_curve(results, name, cells, claim, bounds),
+        ValueKind::Rate => rate_test(results, cells, name).1,
+        ValueKind::Number => number_difference(results, cells, name),
         // Refused when the study is planned; a folder of other making has no verdict.
-        Kind::List | Kind::Text | Kind::Absent => {
+        ValueKind::List | ValueKind::Text | ValueKind::Absent => {
             Difference::new(0, 0, Estimate::unknown(f64::NAN))
         }
     };

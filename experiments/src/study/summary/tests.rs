@@ -195,8 +195,8 @@ fn the_kernel_counts_too() {
         assert_eq!(number_of(&run, name), Some(count as f64), "{name}");
     }
     assert_eq!(number_of(&run, "messages.nonsense"), None);
-    assert_eq!(kind_of(&results, "deadlock"), Kind::Text);
-    assert_eq!(kind_of(&results, "completed"), Kind::Rate);
+    assert_eq!(kind_of(&results, "deadlock"), ValueKind::Text);
+    assert_eq!(kind_of(&results, "completed"), ValueKind::Rate);
 }
 
 #[test]

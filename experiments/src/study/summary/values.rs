@@ -11,7 +11,7 @@ use farside_actors::system::Series;
 
 /// What a metric's values are, in all cells alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ValueKind {
     /// Numbers, summed up by their mean.
     Number,
     /// True or false, summed up as a rate.
@@ -26,14 +26,14 @@ pub enum Kind {
     Absent,
 }
 
-impl From<DeclaredKind> for Kind {
-    fn from(declared: DeclaredKind) -> Kind {
+impl From<DeclaredKind> for ValueKind {
+    fn from(declared: DeclaredKind) -> ValueKind {
         match declared {
-            DeclaredKind::Number => Kind::Number,
-            DeclaredKind::Rate => Kind::Rate,
-            DeclaredKind::List => Kind::List,
-            DeclaredKind::Series => Kind::Series,
-            DeclaredKind::Word => Kind::Text,
+            DeclaredKind::Number => ValueKind::Number,
+            DeclaredKind::Rate => ValueKind::Rate,
+            DeclaredKind::List => ValueKind::List,
+            DeclaredKind::Series => ValueKind::Series,
+            DeclaredKind::Word => ValueKind::Text,
         }
     }
 }
@@ -95,7 +95,7 @@ pub fn number_of(run: &RunRecord, name: &str) -> Option<f64> {
 
 /// The kind of a metric: what its system declares; of others, what all runs say. One list makes it
 /// lists, one curve curves, one word makes it words; numbers and truth values together are numbers.
-pub fn kind_of(results: &Results, name: &str) -> Kind {
+pub fn kind_of(results: &Results, name: &str) -> ValueKind {
     let metrics = &results.manifest.metrics;
     let declared = metrics.iter().find(|metric| metric.name == name);
     let declared = declared.and_then(|metric| metric.kind);
@@ -105,20 +105,20 @@ pub fn kind_of(results: &Results, name: &str) -> Kind {
         return if reported {
             declared.into()
         } else {
-            Kind::Absent
+            ValueKind::Absent
         };
     }
-    let mut kind = Kind::Absent;
+    let mut kind = ValueKind::Absent;
     for run in &results.runs {
         let Some(value) = value_of(&run.outcome, name) else {
             continue;
         };
         match (value.as_ref(), kind) {
-            (Value::Array(_), _) => return Kind::List,
-            (Value::Object(_), _) if Series::from_json(&value).is_ok() => return Kind::Series,
-            (Value::String(_) | Value::Object(_), _) => kind = Kind::Text,
-            (Value::Number(_), Kind::Absent | Kind::Rate) => kind = Kind::Number,
-            (Value::Bool(_), Kind::Absent) => kind = Kind::Rate,
+            (Value::Array(_), _) => return ValueKind::List,
+            (Value::Object(_), _) if Series::from_json(&value).is_ok() => return ValueKind::Series,
+            (Value::String(_) | Value::Object(_), _) => kind = ValueKind::Text,
+            (Value::Number(_), ValueKind::Absent | ValueKind::Rate) => kind = ValueKind::Number,
+            (Value::Bool(_), ValueKind::Absent) => kind = ValueKind::Rate,
             _ => {}
         }
     }

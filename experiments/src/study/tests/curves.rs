@@ -12,7 +12,7 @@ use farside_logs::{LogOptions, LogWriter, Verifier, VerifyOutcome};
 use super::super::results::{Manifest, Results, RunOutcome, RunRecord};
 use super::super::summary::comparisons::Verdict;
 use super::super::summary::{MetricSummary, summarise};
-use super::super::{Ended, Interrupts, Plan, RunOptions, Study, StudyError, reproduce, run};
+use super::super::{Ended, Interrupts, RunOptions, Study, StudyError, StudyPlan, reproduce, run};
 use crate::report;
 use crate::scenario::Scenario;
 use farside_actors::system::{Files, Series};
@@ -35,16 +35,16 @@ const CLAIMS: &str = "[[published]]\nmetric = 'reward'\ntitle = 'Figure 3'\nsour
     { planner = 'search', exceeds = { planner = 'greedy' }, by_at_least = 2, by_at_most = 6 },\n\
     { planner = 'greedy', exceeds = { planner = 'search' }, equal_within = 0.5 },\n]\n";
 
-struct Place(tempfile::TempDir);
+struct StudyFolder(tempfile::TempDir);
 
-impl Place {
+impl StudyFolder {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("learner.toml"), "system = 'learner'\n").unwrap();
-        Place(folder)
+        StudyFolder(folder)
     }
 
-    fn plan(&self, text: &str, seeds: Option<u64>) -> Result<Plan, StudyError> {
+    fn plan(&self, text: &str, seeds: Option<u64>) -> Result<StudyPlan, StudyError> {
         let study = Study::parse("x.toml", text.to_owned(), self.0.path().to_owned())?;
         study.plan(&[], seeds, &registry())
     }
@@ -75,7 +75,7 @@ fn metrics(record: &RunRecord) -> &serde_json::Map<String, serde_json::Value> {
 
 #[test]
 fn the_page_names_the_index_from_which_a_difference_holds() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let results = place.run(&format!("{STUDY}{CLAIMS}"), "whole").unwrap();
     let summary = summarise(&results);
     let MetricSummary::Series(series) = &summary.cells[1].metrics[0].summary else {
@@ -168,7 +168,7 @@ fn the_page_names_the_index_from_which_a_difference_holds() {
 
 #[test]
 fn a_block_of_seeds_shares_a_problem() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let results = place.run(STUDY, "blocks").unwrap();
     let manifest = &results.manifest;
     assert_eq!((manifest.block, manifest.problem_seed(7)), (5, Some(6)));
@@ -216,7 +216,7 @@ fn a_block_of_seeds_shares_a_problem() {
 
 #[test]
 fn any_point_of_a_curve_comes_back_and_its_log_can_be_verified() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let text = STUDY.replace("seeds = 30", "seeds = 10");
     let results = place.run(&text, "whole").unwrap();
     let log = place.0.path().join("run.mcap");
@@ -270,7 +270,7 @@ fn any_point_of_a_curve_comes_back_and_its_log_can_be_verified() {
 
 #[test]
 fn curves_of_one_cell_have_the_same_indices() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let uneven = STUDY.replace("[[factor]]", "[set]\nlearner.uneven = true\n[[factor]]");
     let error = place.run(&uneven, "uneven").unwrap_err().to_string();
     for said in [
@@ -321,7 +321,7 @@ fn curves_of_one_cell_have_the_same_indices() {
 
 #[test]
 fn blocks_must_divide_the_seeds() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let said = |from: &str, to: &str| place.refused(&STUDY.replace(from, to));
     for (from, to, starts) in [
         (
@@ -382,7 +382,7 @@ fn blocks_must_divide_the_seeds() {
 
 #[test]
 fn a_mistake_in_a_claim_is_said_where_it_stands() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let greedy = "exceeds = { planner = 'greedy' }";
     for (values, starts, holds) in [
         (
@@ -474,7 +474,7 @@ fn claim(metric: &str, values: &str) -> String {
 /// Before the other runs are made, and in a folder that has them already.
 #[test]
 fn what_only_a_run_can_tell_of_a_claim_is_said_where_it_stands() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let greedy = "exceeds = { planner = 'greedy' }";
     place
         .run(&STUDY.replace("seeds = 30", "seeds = 5"), "there")
@@ -511,7 +511,7 @@ fn what_only_a_run_can_tell_of_a_claim_is_said_where_it_stands() {
 
 #[test]
 fn a_problem_or_the_ties_may_be_a_factor() {
-    let place = Place::new();
+    let place = StudyFolder::new();
     let text = "question = 'x?'\nscenario = 'learner.toml'\nseeds = 2\n\
         metrics = ['problem', 'last']\n[[factor]]\nname = 'p'\nkey = 'problem_seed'\n\
         values = [7, 9]\n[[factor]]\nname = 'ties'\nkey = 'tie_seed'\nvalues = [1, 2]\n";

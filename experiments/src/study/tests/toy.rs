@@ -10,7 +10,7 @@ use farside_actors::units;
 use serde::{Deserialize, Serialize};
 
 use crate::registry::Registry;
-use crate::study::{Plan, Study, StudyError};
+use crate::study::{Study, StudyError, StudyPlan};
 
 /// A folder with the toy's scenario in it.
 pub(super) struct Toy(tempfile::TempDir);
@@ -32,11 +32,15 @@ pub(super) fn study(more: &str) -> String {
     format!("question = 'x?'\nscenario = 'toy.toml'\nmetrics = ['value', 'list']\n{more}")
 }
 
-pub(super) fn plan(toy: &Toy, text: &str) -> Plan {
+pub(super) fn plan(toy: &Toy, text: &str) -> StudyPlan {
     plan_with(toy, text, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
-pub(super) fn plan_with(toy: &Toy, text: &str, seeds: Option<u64>) -> Result<Plan, StudyError> {
+pub(super) fn plan_with(
+    toy: &Toy,
+    text: &str,
+    seeds: Option<u64>,
+) -> Result<StudyPlan, StudyError> {
     let folder = toy.0.path().to_owned();
     Study::parse("x.toml", text.to_owned(), folder)?.plan(&[], seeds, &registry())
 }

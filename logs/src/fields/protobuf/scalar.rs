@@ -6,7 +6,7 @@ use prost_reflect::prost_types::field_descriptor_proto::Type;
 
 use super::content;
 use crate::fields::{FieldDiff, raw};
-use crate::schema::Kind;
+use crate::schema::FieldType;
 use crate::shown::hex;
 use crate::shown::{SHOWN, apart, shorten};
 use crate::wire::{Value, signed};
@@ -30,8 +30,8 @@ pub(super) struct WireBits<'a>(pub(super) Value<'a>);
 
 impl<'a> Scalar<'a> {
     /// Reads a value, or what stands for it where there is none.
-    pub(super) fn read(kind: Kind, value: Option<Value<'a>>) -> Scalar<'a> {
-        let Kind::Scalar(kind) = kind else {
+    pub(super) fn read(kind: FieldType, value: Option<Value<'a>>) -> Scalar<'a> {
+        let FieldType::Scalar(kind) = kind else {
             return value.map_or(Scalar::Absent, |value| Scalar::Wire(WireBits(value)));
         };
         let zero = match kind {

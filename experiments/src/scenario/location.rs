@@ -5,7 +5,7 @@ pub(super) const MAX_SHOWN: usize = 80;
 
 /// Where something stands: in a file, or in a `--set` argument.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum SourceLocation {
     /// In the scenario's text.
     File {
         /// The file, or the name of a built-in scenario.
@@ -24,13 +24,13 @@ pub enum Place {
     },
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for SourceLocation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Place::File {
+            SourceLocation::File {
                 name, line, column, ..
             } => write!(f, "{name}:{line}:{column}"),
-            Place::Set { argument } => {
+            SourceLocation::Set { argument } => {
                 let shown: String = argument.chars().take(MAX_SHOWN).collect();
                 let dots = if shown.len() < argument.len() {
                     "..."

@@ -162,13 +162,14 @@ impl RunInfo {
     }
 }
 
-/// The number of a loss reason in [`Plan::reason`]: messages in flight carry two bytes, not a text.
+/// The number of a loss reason in [`Topology::reason`]: messages in flight carry two bytes, not a
+/// text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Reason(u16);
 
 /// Where an entity's state lives.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct Location {
     pub(crate) host: HostIndex,
     /// Which engine runs the host.
     pub(crate) engine: u32,
@@ -185,16 +186,16 @@ pub(crate) struct Routes {
     pub(crate) by_host: Vec<Option<EntityId>>,
 }
 
-/// A link as the plan knows it.
+/// A link as the topology knows it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LinkPlan {
+pub(crate) struct LinkEntry {
     pub(crate) min_delay: SimDuration,
     pub(crate) shared: bool,
     pub(crate) change_kind: KindIndex,
 }
 
 /// Everything fixed about a run.
-pub(crate) struct Plan {
+pub(crate) struct Topology {
     pub(crate) seed: u64,
     pub(crate) info: Arc<RunInfo>,
     pub(crate) name_hashes: Vec<u64>,
@@ -208,10 +209,10 @@ pub(crate) struct Plan {
     pub(crate) actor_types: Vec<ActorType>,
     /// From the number in an address to the type of the actor.
     pub(crate) type_of_actor: Vec<u32>,
-    pub(crate) places: Vec<Place>,
+    pub(crate) places: Vec<Location>,
     pub(crate) host_names: Vec<String>,
     pub(crate) routes: Vec<Routes>,
-    pub(crate) links: FixedMap<EntityId, LinkPlan>,
+    pub(crate) links: FixedMap<EntityId, LinkEntry>,
     pub(crate) kind_of_type: FixedMap<TypeId, KindIndex>,
     /// Reasons met so far. Their numbers differ from run to run, and leave the kernel as texts.
     pub(crate) reasons: Mutex<Vec<&'static str>>,
@@ -225,7 +226,7 @@ pub(crate) struct Plan {
     pub(crate) check_min_delay: bool,
 }
 
-impl Plan {
+impl Topology {
     pub(crate) fn name(&self, entity: EntityId) -> &str {
         self.info.name(entity)
     }
@@ -238,7 +239,7 @@ impl Plan {
         &self.host_names[self.places[entity.index()].host as usize]
     }
 
-    pub(crate) fn place(&self, entity: EntityId) -> Place {
+    pub(crate) fn place(&self, entity: EntityId) -> Location {
         self.places[entity.index()]
     }
 

@@ -1,4 +1,4 @@
-//! The schema as encoder, decoder and descriptor read it: flat tables of messages and enums.
+//! The flat schema, as encoder, decoder and descriptor read it: tables of messages and enums.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -10,7 +10,7 @@ pub(super) const MAX_DEPTH: u32 = 96;
 
 /// Everything about one root message type; the root is message 0.
 #[derive(Debug)]
-pub(super) struct Plan {
+pub(super) struct FlatSchema {
     pub(super) messages: Vec<Message>,
     pub(super) enums: Vec<Enumeration>,
     /// A field that holds the root message and writes neither tag nor length.
@@ -75,12 +75,12 @@ impl fmt::Display for Shape {
 #[derive(Debug)]
 pub(super) struct Field {
     pub(super) tag: Tag,
-    pub(super) kind: Kind,
+    pub(super) kind: ValueType,
     pub(super) card: Card,
     pub(super) packed: bool,
     /// What an encoder may write at once: the kind, or `Pending` where the cardinality comes
     /// first. One comparison of it checks both.
-    pub(super) first: Kind,
+    pub(super) first: ValueType,
     /// The serde name.
     pub(super) key: Key,
     /// Set when a reader was seen to reject the field's absence. Such a field reads as zero where
@@ -107,7 +107,7 @@ pub(super) enum Card {
 
 /// The type of one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ValueType {
     Bool,
     I32,
     I64,
@@ -126,24 +126,31 @@ pub(super) enum Kind {
     Pending,
 }
 
-impl Kind {
+impl ValueType {
     pub(super) fn wire(self) -> Wire {
         match self {
-            Kind::Bool | Kind::I32 | Kind::I64 | Kind::U32 | Kind::U64 | Kind::Enum(_) => {
-                Wire::Varint
-            }
-            Kind::F32 => Wire::Fixed32,
-            Kind::F64 => Wire::Fixed64,
-            Kind::Char | Kind::Str | Kind::Bytes | Kind::I128 | Kind::U128 => Wire::Bytes,
-            Kind::Message(_) | Kind::Pending => Wire::Bytes,
+            ValueType::Bool
+            | ValueType::I32
+            | ValueType::I64
+            | ValueType::U32
+            | ValueType::U64
+            | ValueType::Enum(_) => Wire::Varint,
+            ValueType::F32 => Wire::Fixed32,
+            ValueType::F64 => Wire::Fixed64,
+            ValueType::Char
+            | ValueType::Str
+            | ValueType::Bytes
+            | ValueType::I128
+            | ValueType::U128 => Wire::Bytes,
+            ValueType::Message(_) | ValueType::Pending => Wire::Bytes,
         }
     }
 
     /// The bytes of each value, where all values take the same.
     pub(super) fn width(self) -> Option<usize> {
         match self {
-            Kind::F32 => Some(4),
-            Kind::F64 => Some(8),
+            ValueType::F32 => Some(4),
+            ValueType::F64 => Some(8),
             _ => None,
         }
     }
@@ -203,12 +210,12 @@ impl Key {
     }
 }
 
-impl Plan {
+impl FlatSchema {
     /// Says what a field expects, for error messages.
     pub(super) fn describe(&self, field: &Field, card: Card) -> String {
         let kind = match field.kind {
-            Kind::Enum(id) => format!("the enum `{}`", self.enums[id].name),
-            Kind::Message(id) => {
+            ValueType::Enum(id) => format!("the enum `{}`", self.enums[id].name),
+            ValueType::Message(id) => {
                 format!("{} (`{}`)", self.messages[id].shape, self.messages[id].name)
             }
             scalar => format!("{scalar:?}").to_lowercase(),
