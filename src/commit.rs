@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::carrier::Carriage;
 use crate::digest::Digest;
-use crate::engine::{FirstSample, Head, InFlight, Sink, hash_if_wanted};
+use crate::engine::{FirstSample, Head, InFlight, Sink, dropped, guarded, hash_if_wanted};
 use crate::fault::ObserverError;
 use crate::ids::EntityId;
 use crate::key::EventKey;
@@ -17,6 +17,14 @@ use crate::topology::{Kind, Topology};
 
 /// Hashed records from one checkpoint to the next.
 const CHECKPOINT_RECORDS: usize = 8192;
+
+/// Runs an observer. Whether it returns an error or panics, it can watch no longer.
+fn watched<T>(observe: impl FnOnce() -> Result<T, ObserverError>) -> Result<T, String> {
+    match guarded(observe) {
+        Ok(observed) => observed.map_err(|error| error.to_string()),
+        Err(cause) => Err(format!("an observer {cause}")),
+    }
+}
 
 /// Takes records in key order, and is told nothing else.
 pub(crate) struct Committer {
@@ -42,7 +50,7 @@ impl Committer {
     ) -> Result<Self, ObserverError> {
         let mut observers: Vec<_> = observers.into_iter().map(|o| (o.wants(), o)).collect();
         for (_, observer) in &mut observers {
-            observer.begin(&topology.info)?;
+            watched(|| observer.begin(&topology.info)).map_err(ObserverError)?;
         }
         Ok(Committer {
             last: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
@@ -103,8 +111,13 @@ impl Committer {
             report.end = End::ObserverFailed(failure);
         }
         for (_, observer) in &mut self.observers {
-            if let Err(error) = observer.end(&report) {
-                report.end = End::ObserverFailed(error.to_string());
+            if let Err(failure) = watched(|| observer.end(&report)) {
+                report.end = End::ObserverFailed(failure);
+            }
+        }
+        for (_, observer) in self.observers {
+            if let Err(cause) = dropped(observer) {
+                report.end = End::ObserverFailed(format!("an observer {cause}"));
             }
         }
         report
@@ -147,9 +160,9 @@ impl Committer {
         };
         for (wants, observer) in &mut self.observers {
             if wants.checkpoints
-                && let Err(error) = observer.checkpoint(&checkpoint)
+                && let Err(failure) = watched(|| observer.checkpoint(&checkpoint))
             {
-                self.failure.get_or_insert(error.to_string());
+                self.failure.get_or_insert(failure);
             }
         }
         self.hashes.clear();
@@ -164,14 +177,17 @@ impl Sink for Committer {
             if record.class == RecordClass::Sample && !wants.samples {
                 continue;
             }
-            match observer.record(record) {
-                Ok(Flow::Continue) => {}
-                Ok(Flow::Stop(reason)) => {
+            match guarded(|| observer.record(record)) {
+                Ok(Ok(Flow::Continue)) => {}
+                Ok(Ok(Flow::Stop(reason))) => {
                     self.stop
                         .get_or_insert((record.key, EntityId::CONTROL, reason));
                 }
-                Err(error) => {
+                Ok(Err(error)) => {
                     self.failure.get_or_insert(error.to_string());
+                }
+                Err(cause) => {
+                    self.failure.get_or_insert(format!("an observer {cause}"));
                 }
             }
         }

@@ -5,11 +5,12 @@
 
 mod erased;
 mod event;
+mod guard;
 mod parts;
+mod remains;
 mod store;
 
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use crate::carrier::{AnyCarrier, SealedChange};
@@ -24,7 +25,9 @@ use crate::topology::{FixedMap, Topology};
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
+pub(crate) use guard::{dropped, guarded};
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
+pub(crate) use remains::Remains;
 
 /// Where an engine commits what happened, in key order.
 pub(crate) trait Sink {
@@ -184,8 +187,11 @@ impl Engine {
         } = self.parts.take(entry.slot);
         let key = entry.key();
         self.parts.side = side;
-        if class == Class::Void || self.died_with_its_incarnation(class, &head) {
+        if class == Class::Void {
             return Ok(());
+        }
+        if self.died_with_its_incarnation(class, &head) {
+            return self.discard(key, class, head, letter);
         }
         if let Err(fault) = self.parts.begin(key, letter.as_ref(), head.kind) {
             self.parts.note_unfinished(key, class, head);
@@ -202,6 +208,7 @@ impl Engine {
             Class::Start => RecordClass::Start,
             Class::Timer => RecordClass::Timer,
             Class::Message if self.is_crashed(head.receiver) => {
+                self.discard(key, class, head, letter)?;
                 let reason = self.parts.topology.intern("crashed");
                 self.commit(RecordClass::Lost, key, &Head { reason, ..head }, sink);
                 return Ok(());
@@ -221,11 +228,27 @@ impl Engine {
                 return Ok(());
             }
             Class::LateLoss => {
+                self.discard(key, class, head, letter)?;
                 self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
             }
         };
         self.run_handler(class, record, key, &head, letter, sink)
+    }
+
+    /// Drops a message or timer that nobody handles.
+    fn discard(
+        &mut self,
+        key: EventKey,
+        class: Class,
+        head: Head,
+        letter: Option<Sealed>,
+    ) -> Result<(), Box<Fault>> {
+        dropped(letter).map_err(|cause| {
+            self.parts.note_unfinished(key, class, head);
+            let message = head.message(&self.parts.topology);
+            self.parts.fault_at(key, head.receiver, message, *cause)
+        })
     }
 
     /// Charges a host for receiving a message, which its radio does whether or not the actor is
@@ -308,9 +331,8 @@ impl Engine {
         };
         let held = self.parts.side.filter(|_| class == Class::Held);
         let parts = &mut self.parts;
-        let carried = catch_unwind(AssertUnwindSafe(|| parts.carry(link, head, letter, held)));
-        let result = carried.map_err(|payload| Box::new(FaultCause::Panic(panic_text(&*payload))));
-        let result = result.and_then(|charge_j| match self.parts.fault.take() {
+        let carried = guarded(|| parts.carry(link, head, letter, held));
+        let result = carried.and_then(|charge_j| match self.parts.fault.take() {
             Some(cause) => Err(cause),
             None => Ok(charge_j),
         });
@@ -334,11 +356,8 @@ impl Engine {
         let change = letter.and_then(|mut letter| letter.0.take_change());
         let (link, parts) = (head.receiver, &mut self.parts);
         if let Some(change) = change {
-            let told = catch_unwind(AssertUnwindSafe(|| parts.tell(link, change, key.time)));
-            if let Err(payload) = told {
-                let cause = FaultCause::Panic(panic_text(&*payload));
-                return Err(self.parts.fault_at(key, link, None, cause));
-            }
+            guarded(|| parts.tell(link, change, key.time))
+                .map_err(|cause| self.parts.fault_at(key, link, None, *cause))?;
         }
         self.commit(RecordClass::Change, key, head, sink);
         Ok(())
@@ -358,7 +377,8 @@ impl Engine {
         self.parts.begin(key, None, None)?;
         match action {
             Action::Crash => {
-                self.actors[local].actor = None;
+                dropped(self.actors[local].actor.take())
+                    .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
                 self.commit(RecordClass::Crash, key, &head, sink);
                 Ok(())
             }
@@ -366,16 +386,11 @@ impl Engine {
                 let cell = &mut self.actors[local];
                 cell.state.incarnation += 1;
                 cell.state.streams.clear();
-                cell.actor = None;
                 let (topology, factory) = (&self.parts.topology, &cell.factory);
-                let built = catch_unwind(AssertUnwindSafe(|| factory(topology.name(entity))));
-                match built {
-                    Ok(actor) => cell.actor = Some(actor),
-                    Err(payload) => {
-                        let cause = FaultCause::Panic(panic_text(&*payload));
-                        return Err(self.parts.fault_at(key, entity, None, cause));
-                    }
-                }
+                let old = dropped(cell.actor.take());
+                let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
+                cell.actor =
+                    Some(built.map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?);
                 self.run_handler(Class::Start, RecordClass::Restart, key, &head, None, sink)
             }
             Action::Change(change) => {
@@ -385,7 +400,9 @@ impl Engine {
                     .links
                     .get(&entity)
                     .map(|link| link.change_kind);
-                self.parts.apply_change(local, key, head.kind, change);
+                let parts = &mut self.parts;
+                guarded(|| parts.apply_change(local, key, head.kind, change))
+                    .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
             }
@@ -413,6 +430,7 @@ impl Engine {
         };
         self.parts.begin(key, Some(&letter), head.kind)?;
         if self.is_crashed(head.receiver) {
+            self.discard(key, Class::Tell, head, Some(letter))?;
             self.commit(RecordClass::Told, key, &head, sink);
             return Ok(());
         }
@@ -442,6 +460,19 @@ impl Engine {
         if !parts.effects.is_empty() {
             parts.commit_effects(head, sink);
         }
+    }
+
+    /// Takes apart what is left once the run is over; see [`Remains`].
+    pub(crate) fn dissolve(&mut self, until: Option<EventKey>, remains: &mut Remains) {
+        self.parts.take_in_flight(until, remains);
+        for cell in std::mem::take(&mut self.actors) {
+            remains.drop_of(&self.parts.topology, cell.entity, cell.actor);
+            for kept in cell.state.durable {
+                remains.drop_of(&self.parts.topology, cell.entity, kept);
+            }
+            remains.drop_of(&self.parts.topology, cell.entity, cell.factory);
+        }
+        self.parts.drop_carriers(remains);
     }
 
     fn step_limit_fault(&mut self, key: EventKey, class: Class, head: &Head) -> Box<Fault> {
@@ -496,21 +527,9 @@ fn invoke(
         me: cell.entity,
         key,
     };
-    let outcome: Result<Outcome, _> = catch_unwind(AssertUnwindSafe(|| match letter {
+    let outcome: Result<Outcome, _> = guarded(|| match letter {
         Some(mut letter) => letter.0.deliver(actor.as_any(), &mut core),
         None => actor.started(&mut core),
-    }));
-    match outcome {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(Box::new(FaultCause::Error(error.to_string()))),
-        Err(payload) => Err(Box::new(FaultCause::Panic(panic_text(&*payload)))),
-    }
-}
-
-pub(crate) fn panic_text(payload: &(dyn Any + Send)) -> String {
-    let text = payload
-        .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned());
-    text.or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a value that is no text".to_owned())
+    });
+    outcome?.map_err(|error| Box::new(FaultCause::Error(error.to_string())))
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::commit::Committer;
-use crate::engine::{Engine, Head};
+use crate::engine::{Engine, Head, Remains};
 use crate::engine::{Sink, hash_if_wanted};
 use crate::fault::{BuildError, Fault};
 use crate::ids::EntityId;
@@ -50,6 +50,8 @@ pub(crate) struct Ready {
     pub(crate) schedule: Schedule,
     pub(crate) observers: Vec<Box<dyn Observer>>,
     pub(crate) interrupt: Arc<AtomicBool>,
+    /// A constructor panicked before the first event.
+    pub(crate) fault: Option<Box<Fault>>,
 }
 
 pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError> {
@@ -59,8 +61,17 @@ pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError
         schedule,
         observers,
         interrupt,
+        fault,
     } = ready;
     let committer = Committer::new(topology.clone(), observers, interrupt)?;
+    if let Some(fault) = fault {
+        let ending = Ending::fault(fault);
+        let mut remains = Remains::default();
+        for mut engine in engines {
+            engine.dissolve(ending.fault, &mut remains);
+        }
+        return Ok(ending.finish(&topology, schedule, committer, remains));
+    }
     match executor {
         Executor::Inline => Ok(inline::run(topology, engines, schedule, committer)),
         Executor::Kameo { threads } => {
@@ -92,6 +103,24 @@ impl Ending {
             time,
             fault: None,
         }
+    }
+
+    /// Drops what is left, then commits what is still on its way and reports. A panic meanwhile is a
+    /// fault, unless the run ends with another: nothing that was committed is undone by it.
+    fn finish(
+        self,
+        topology: &Topology,
+        schedule: Schedule,
+        committer: Committer,
+        mut remains: Remains,
+    ) -> Report {
+        schedule.dissolve(topology, &mut remains);
+        let fault = remains.fault(topology, self.time);
+        let end = match (self.end, fault) {
+            (End::Fault(fault), _) | (_, Some(fault)) => End::Fault(fault),
+            (end, None) => end,
+        };
+        committer.finish(end, self.time, remains.in_flight)
     }
 
     /// Commits a stop and ends the run with it.

@@ -71,9 +71,13 @@ pub enum FaultCause {
     /// The handler returned an error.
     #[error("{0}")]
     Error(String),
-    /// The handler panicked.
+    /// A handler, a constructor, a link or the encoding of a message panicked.
     #[error("panicked: {0}")]
     Panic(String),
+    /// Something of the actor or link panicked while it was dropped: its state at a crash, a
+    /// restart or the end of the run, or a message that could not reach it.
+    #[error("panicked while it was dropped: {0}")]
+    PanicInDrop(String),
     /// A link delivered sooner than it declared it ever would.
     #[error("link {link} declares a min_delay of {declared} but delivers after {actual}")]
     UndercutsMinDelay {

@@ -52,6 +52,7 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
+    #[cfg(test)]
     pub(crate) const NEVER: Bound = Bound {
         time: SimTime::MAX,
         step: u32::MAX,

@@ -1,6 +1,6 @@
 //! When a run must pause: control events fixed beforehand, and requests to stop.
 
-use crate::engine::Action;
+use crate::engine::{Action, Remains};
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
 use crate::time::{SimDuration, SimTime};
@@ -74,12 +74,13 @@ impl Schedule {
         }
     }
 
-    /// Nothing at or after this may be handled before [`Schedule::take_due`].
+    /// Nothing at or after this may be handled before [`Schedule::take_due`]. The last instant of
+    /// the clock is never reached: what would be later has its time too, and must not happen early.
     pub(crate) fn bound(&self) -> Bound {
         let control = self
             .controls
             .last()
-            .map_or(Bound::NEVER, |next| Bound::at(next.time));
+            .map_or(Bound::at(SimTime::MAX), |next| Bound::at(next.time));
         self.stop
             .as_ref()
             .map_or(control, |(stop, ..)| control.min(*stop))
@@ -96,6 +97,9 @@ impl Schedule {
     /// same instant, as it would in key order.
     pub(crate) fn take_due(&mut self, topology: &Topology) -> Option<Due> {
         let bound = self.bound();
+        if bound >= Bound::at(SimTime::MAX) {
+            return None;
+        }
         if self
             .controls
             .last()
@@ -115,5 +119,14 @@ impl Schedule {
         let (at, by, reason) = self.stop.take()?;
         let key = topology.key(at.time, at.step, EntityId::CONTROL, self.next_count);
         Some(Due::Stop { key, by, reason })
+    }
+
+    /// Drops what was never due.
+    pub(crate) fn dissolve(self, topology: &Topology, remains: &mut Remains) {
+        for control in self.controls {
+            if let ControlAction::Entity(entity, action) = control.what {
+                remains.drop_of(topology, entity, action);
+            }
+        }
     }
 }

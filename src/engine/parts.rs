@@ -10,15 +10,17 @@ use std::sync::Arc;
 
 use super::store::Store;
 use super::{
-    CellState, Class, Head, InFlight, LinkCell, Outbound, Outgoing, Pending, Sealed, Side, Sink,
+    CellState, Class, Head, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side, Sink,
+    guarded,
 };
 use crate::carrier::{SealedChange, Verdicts};
+use crate::encoding::EncodeError;
 use crate::fault::{Fault, FaultCause};
 use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
 use crate::queue::{Entry, Queue};
 use crate::time::{SimDuration, SimTime};
-use crate::topology::{Kind, Reason, Topology};
+use crate::topology::{Kind, Topology};
 
 use sampling::SampleType;
 pub(crate) use sampling::{FirstSample, SampleNames};
@@ -145,13 +147,30 @@ impl Parts {
         self.body.clear();
         if let (Some(letter), Some(kind), true) = (letter, kind, self.topology.recording()) {
             let kind = self.topology.kind(kind);
-            if let Err(error) = letter.0.encode(kind.schema(), &mut self.body) {
-                let (kind, error) = (kind.name().to_owned(), error.to_string());
-                let cause = FaultCause::Encoding { kind, error };
-                return Err(self.fault_at(key, key.source, None, cause));
+            let body = &mut self.body;
+            let encoded = guarded(|| letter.0.encode(kind.schema(), body));
+            if !matches!(encoded, Ok(Ok(()))) {
+                return Err(self.encoding_fault(key, kind.name().to_owned(), encoded));
             }
         }
         Ok(())
+    }
+
+    #[cold]
+    fn encoding_fault(
+        &self,
+        key: EventKey,
+        kind: String,
+        encoded: Result<Result<(), EncodeError>, Box<FaultCause>>,
+    ) -> Box<Fault> {
+        let (message, cause) = match encoded {
+            Err(cause) => (Some(kind), *cause),
+            Ok(encoded) => {
+                let error = encoded.err().map_or_else(String::new, |e| e.to_string());
+                (None, FaultCause::Encoding { kind, error })
+            }
+        };
+        self.fault_at(key, key.source, message, cause)
     }
 
     #[inline]
@@ -388,75 +407,31 @@ impl Parts {
         self.links[local].carrier.change(change.value, key.time);
     }
 
-    /// Takes every message still on its way, with the key its next event would have had. `until`
-    /// leaves out what events at or after that key sent: a fault undid them.
-    pub(crate) fn take_in_flight(&mut self, until: Option<EventKey>) -> Vec<InFlight> {
-        let mut found = Vec::new();
+    /// Takes every message still on its way, with the key its next event would have had.
+    pub(super) fn take_in_flight(&mut self, until: Option<EventKey>, remains: &mut Remains) {
+        let topology = self.topology.clone();
         if let Some((key, class, head)) = self.unfinished.take()
-            && head.in_flight(&self.topology, class, self.side.as_ref(), until)
+            && head.in_flight(&topology, class, self.side.as_ref(), until)
         {
-            found.push((key, head, std::mem::take(&mut self.body)));
+            let body = std::mem::take(&mut self.body);
+            remains.in_flight.push((key, head, body));
         }
         for entry in self.queue.drain_sorted() {
             let pending = self.take(entry.slot);
-            found.extend(pending.in_flight(&self.topology, entry.key(), until));
+            remains.take(&topology, entry.key(), pending, until);
         }
         for Outgoing { key, pending, .. } in std::mem::take(&mut self.outgoing) {
-            found.extend(pending.in_flight(&self.topology, key, until));
+            remains.take(&topology, key, pending, until);
         }
-        found
     }
-}
 
-impl Head {
-    /// True for a message that was sent before `until`, which a fault left of the run.
-    fn in_flight(
-        &self,
-        topology: &Topology,
-        class: Class,
-        side: Option<&Side>,
-        until: Option<EventKey>,
-    ) -> bool {
-        let side = side.filter(|_| self.has_side);
-        let by = || self.scheduled_by(topology, side);
-        let undone = until.is_some_and(|until| by().is_none_or(|by| by >= until));
-        let message = matches!(
-            class,
-            Class::Message | Class::HandOver | Class::Held | Class::LateLoss
-        );
-        message && !undone
-    }
-}
-
-impl Pending {
-    /// The message that this event would have delivered, lost or handed over, if there is one.
-    pub(crate) fn in_flight(
-        self,
-        topology: &Topology,
-        key: EventKey,
-        until: Option<EventKey>,
-    ) -> Option<InFlight> {
-        if !self
-            .head
-            .in_flight(topology, self.class, self.side.as_ref(), until)
-        {
-            return None;
+    /// Drops the links, once the run is over.
+    pub(super) fn drop_carriers(&mut self, remains: &mut Remains) {
+        let mut entities: Vec<_> = self.topology.links.keys().copied().collect();
+        entities.retain(|link| self.topology.place(*link).engine == self.index);
+        entities.sort_unstable_by_key(|link| self.topology.place(*link).local);
+        for (link, cell) in entities.into_iter().zip(std::mem::take(&mut self.links)) {
+            remains.drop_of(&self.topology, link, cell.carrier);
         }
-        let mut body = Vec::new();
-        if let (Some(letter), Some(kind), true) =
-            (self.letter, self.head.kind, topology.recording())
-        {
-            // It will never be handled; what cannot be encoded is recorded empty.
-            let _ = letter.0.encode(topology.kind(kind).schema(), &mut body);
-        }
-        Some((
-            key,
-            Head {
-                reason: Reason::default(),
-                has_side: false,
-                ..self.head
-            },
-            body,
-        ))
     }
 }

@@ -65,8 +65,9 @@ impl Store {
             return false;
         }
         *class = Class::Void;
-        self.letters[slot as usize] = None;
         self.voids += 1;
+        // Last, since dropping a message may panic.
+        self.letters[slot as usize] = None;
         true
     }
 

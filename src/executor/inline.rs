@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Ending;
 use crate::commit::Committer;
-use crate::engine::Engine;
+use crate::engine::{Engine, Remains};
 use crate::report::{End, Report};
 use crate::schedule::{Due, Schedule};
 use crate::topology::Topology;
@@ -20,8 +20,9 @@ pub(super) fn run(
         unreachable!("the builder gives this executor a single engine");
     };
     let ending = run_to_end(&topology, &mut engine, &mut schedule, &mut committer);
-    let in_flight = engine.parts.take_in_flight(ending.fault);
-    committer.finish(ending.end, ending.time, in_flight)
+    let mut remains = Remains::default();
+    engine.dissolve(ending.fault, &mut remains);
+    ending.finish(&topology, schedule, committer, remains)
 }
 
 fn run_to_end(

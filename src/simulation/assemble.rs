@@ -5,12 +5,13 @@ use std::any::TypeId;
 use std::sync::{Arc, Mutex};
 
 use super::{LinkDecl, Planned, Simulation, Target};
-use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
+use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell, guarded};
 use crate::executor::Ready;
-use crate::fault::BuildError;
+use crate::fault::{BuildError, Fault};
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
+use crate::time::SimTime;
 use crate::topology::{
     Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, Routes, RunInfo, Topology,
 };
@@ -84,13 +85,14 @@ impl Simulation {
         let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
         let interrupt = self.interrupt.clone();
-        let engines = self.build_engines(&topology, &ranked, engine_count);
+        let (engines, fault) = self.build_engines(&topology, &ranked, engine_count);
         Ok(Ready {
             topology,
             engines,
             schedule,
             observers,
             interrupt,
+            fault,
         })
     }
 
@@ -363,15 +365,35 @@ impl Simulation {
         controls.map(control).collect()
     }
 
-    fn build_engines(self, topology: &Arc<Topology>, ranked: &Ranked, count: u32) -> Vec<Engine> {
+    /// Builds the actors, in order of declaration, up to the first whose constructor panics.
+    fn build_engines(
+        self,
+        topology: &Arc<Topology>,
+        ranked: &Ranked,
+        count: u32,
+    ) -> (Vec<Engine>, Option<Box<Fault>>) {
+        let mut fault = None;
         let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
         for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
             let state = CellState::new(declared as u32);
-            let built = (actor.factory)(&actor.name);
+            let built = match fault {
+                None => guarded(|| (actor.factory)(&actor.name)).map_err(|cause| {
+                    let key = topology.key(SimTime::ZERO, 0, *entity, 0);
+                    let (time, actor) = (SimTime::ZERO, actor.name.clone());
+                    fault = Some(Box::new(Fault {
+                        key,
+                        time,
+                        actor,
+                        message: None,
+                        cause: *cause,
+                    }));
+                }),
+                Some(_) => Err(()),
+            };
             let cell = ActorCell {
                 entity: *entity,
-                actor: Some(built),
+                actor: built.ok(),
                 factory: actor.factory,
                 state,
             };
@@ -381,9 +403,8 @@ impl Simulation {
             links[topology.place(*entity).engine as usize].push(LinkCell { carrier, count: 0 });
         }
         let lists = actors.into_iter().zip(links).enumerate();
-        lists
-            .map(|(at, (a, l))| Engine::new(topology.clone(), at as u32, a, l))
-            .collect()
+        let engines = lists.map(|(at, (a, l))| Engine::new(topology.clone(), at as u32, a, l));
+        (engines.collect(), fault)
     }
 }
 

@@ -7,7 +7,7 @@ use kameo::actor::{ActorRef, Spawn};
 use super::seat::{Round, Seats};
 use super::{Helper, Share, lost_worker};
 use crate::commit::Committer;
-use crate::engine::{Action, Engine, InFlight, Outgoing, SampleNames};
+use crate::engine::{Action, Engine, InFlight, Outgoing, Remains, SampleNames};
 use crate::executor::Ending;
 use crate::fault::Fault;
 use crate::ids::EntityId;
@@ -64,16 +64,16 @@ impl Coordinator {
                 break ending;
             }
         };
-        let mut in_flight = undone;
+        let mut remains = Remains::default();
+        remains.in_flight = undone;
         for at in 0..self.seats.len() {
             let mut seat = self.seats.take(at);
             for Outgoing { key, pending, .. } in std::mem::take(&mut seat.inbox) {
-                let found = pending.in_flight(&self.topology, key, ending.fault);
-                in_flight.extend(found);
+                remains.take(&self.topology, key, pending, ending.fault);
             }
-            in_flight.extend(seat.engine.parts.take_in_flight(ending.fault));
+            seat.engine.dissolve(ending.fault, &mut remains);
         }
-        self.committer.finish(ending.end, ending.time, in_flight)
+        ending.finish(&self.topology, self.schedule, self.committer, remains)
     }
 
     /// Runs one window or applies one control event; tells if that was the last.
