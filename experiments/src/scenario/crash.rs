@@ -101,6 +101,22 @@ impl Crash {
         if self.restart_after.is_some_and(SimDuration::is_zero) {
             return Err(mistake("restart_after", "0s: expected a time over zero"));
         }
+        let (mut last, limit) = (self.from().as_nanos(), SimDuration::MAX);
+        for (key, wait) in [
+            ("within", self.within),
+            ("restart_after", self.restart_after),
+        ] {
+            let wait = wait.unwrap_or(SimDuration::ZERO);
+            let sum = last.checked_add(wait.as_nanos());
+            last = sum.ok_or_else(|| {
+                let since = SimDuration::from_nanos(last);
+                let message = format!(
+                    "{wait}: expected a time on the clock, which ends at {limit}, and counted \
+                     from {since} it is none"
+                );
+                mistake(key, message)
+            })?;
+        }
         let Some(mtbf) = self.mtbf else {
             return match self.mttr {
                 Some(_) => Err(mistake("mttr", "expected `mtbf` beside it")),

@@ -122,6 +122,14 @@ fn wrong_units_types_and_ranges_are_refused_where_they_stand() {
         "x.toml:5:9: crash.0.restart: ",
         &["after the crash at 5s"],
     );
+    let never = "system = 'network'\n[[crash]]\nactor='node_01'\nat='10000000000s'\n";
+    for key in ["restart_after", "within"] {
+        check(
+            &format!("{never}{key}='10000000000s'"),
+            &format!("x.toml:5:{}: crash.0.{key}: ", key.len() + 2),
+            &["expected a time on the clock, which ends at 18446744073.709551615s"],
+        );
+    }
 }
 
 #[test]
