@@ -7,6 +7,7 @@ pub(crate) mod draw;
 pub(crate) mod explain;
 pub(crate) mod info;
 mod interrupt;
+mod output;
 mod progress;
 pub(crate) mod recover;
 pub(crate) mod report;
@@ -71,6 +72,9 @@ pub(crate) enum CommandError {
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
+    /// A file that is there already, and is something else than what would be written.
+    #[error("{}: is there already and is no {what}: it is not replaced", .path.display())]
+    InTheWay { path: PathBuf, what: &'static str },
     /// A file that cannot be written.
     #[error("{}: cannot write it: {source}", .path.display())]
     Write {
@@ -98,6 +102,7 @@ impl CommandError {
             | CommandError::Log(_)
             | CommandError::NotRepeatable { .. }
             | CommandError::NotDrawn { .. }
+            | CommandError::InTheWay { .. }
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

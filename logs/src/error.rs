@@ -116,7 +116,7 @@ pub enum LogError {
         path: PathBuf,
     },
     /// The file to write is the file to read.
-    #[error("{path}: would be written over the file that is being read")]
+    #[error("{path}: is read by this command, which does not write over what it reads")]
     SameFile {
         /// The file.
         path: PathBuf,

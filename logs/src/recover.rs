@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::output::may_hold_log;
 use crate::salvage::{Hints, Part, Salvage};
 use crate::shown::Shown;
 use crate::source::Source;
@@ -136,39 +137,14 @@ pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recove
 
 /// Refuses to write over the file that is read, by whatever name, and over what is no log.
 fn may_be_written(broken: &Path, out: &Path) -> Result<(), LogError> {
-    let Ok(found) = std::fs::metadata(out) else {
-        return Ok(());
-    };
-    let same_path = match (broken.canonicalize(), out.canonicalize()) {
-        (Ok(from), Ok(to)) => from == to,
-        _ => false,
-    };
-    if same_path || is_same_file(broken, &found) {
-        return Err(LogError::SameFile {
+    may_hold_log(out, &[broken.to_owned()])?;
+    match std::fs::metadata(out) {
+        // What is saved is renamed to its place, which a device or folder cannot be.
+        Ok(found) if !found.is_file() => Err(LogError::NotAFile {
             path: out.to_owned(),
-        });
+        }),
+        _ => Ok(()),
     }
-    let path = || out.to_owned();
-    if !found.is_file() {
-        return Err(LogError::NotAFile { path: path() });
-    }
-    if found.len() > 0 && Source::open(out).is_err() {
-        return Err(LogError::InTheWay { path: path() });
-    }
-    Ok(())
-}
-
-/// True if the two are one file by two names, as with hard links.
-#[cfg(unix)]
-fn is_same_file(one: &Path, other: &std::fs::Metadata) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let one = std::fs::metadata(one);
-    one.is_ok_and(|one| (one.dev(), one.ino()) == (other.dev(), other.ino()))
-}
-
-#[cfg(not(unix))]
-fn is_same_file(_one: &Path, _other: &std::fs::Metadata) -> bool {
-    false
 }
 
 /// What a file declares: for each id, what was declared first under it, preferably where no

@@ -66,6 +66,15 @@ impl Files {
         Ok(bytes)
     }
 
+    /// Where what was read lies on disk; nothing if it came out of a log.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        let names = self.read.keys();
+        let folder = self.folder.iter();
+        folder
+            .flat_map(|folder| names.clone().map(|name| folder.join(name)))
+            .collect()
+    }
+
     /// What was read, by name.
     pub fn all(&self) -> &BTreeMap<String, Vec<u8>> {
         &self.read

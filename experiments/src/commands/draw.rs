@@ -16,6 +16,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::Exit;
+use super::output::{self, Format};
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
@@ -85,14 +86,11 @@ fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
         let name = format!("{}-{}", stem.unwrap_or_default(), figure.file);
         args.log.with_file_name(name)
     });
-    std::fs::write(&out, figure.standalone()).map_err(|source| CommandError::Write {
-        path: out.clone(),
-        source,
-    })?;
-    let out = out.display();
+    let inputs = std::slice::from_ref(&args.log);
+    let out = output::write(out, &figure.standalone(), Format::Svg, inputs)?;
     if args.json {
         print_json(&Document {
-            out: out.to_string(),
+            out,
             title: &figure.title,
             description: &figure.description,
         })?;

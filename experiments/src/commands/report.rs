@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::output::{self, Format};
 use super::{CommandError, print, print_json};
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
@@ -76,7 +77,12 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
     let report = report::build(&results, &first.display().to_string());
-    let document = write(&report, out, &results)?;
+    let inputs: Vec<PathBuf> = args
+        .folders
+        .iter()
+        .flat_map(|folder| Results::files(folder))
+        .collect();
+    let document = write(&report, out, &inputs, &results)?;
     if args.json {
         print_json(&document)?;
     } else {
@@ -85,20 +91,23 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, CommandError> {
+fn write(
+    report: &Report,
+    out: &Path,
+    inputs: &[PathBuf],
+    results: &Results,
+) -> Result<Document, CommandError> {
     let plots = out.join("plots");
     std::fs::create_dir_all(&plots).map_err(|source| CommandError::Write {
         path: plots.clone(),
         source,
     })?;
-    let write = |path: PathBuf, text: &str| match std::fs::write(&path, text) {
-        Ok(()) => Ok(path.display().to_string()),
-        Err(source) => Err(CommandError::Write { path, source }),
-    };
-    let results_csv = write(out.join("results.csv"), &report.results_csv)?;
-    let summary_csv = write(out.join("summary.csv"), &report.summary_csv)?;
+    let write = |path, text: &str, format| output::write(path, text, format, inputs);
+    let table = |name: &str, text: &str| write(out.join(name), text, Format::Table);
+    let results_csv = table("results.csv", &report.results_csv)?;
+    let summary_csv = table("summary.csv", &report.summary_csv)?;
     let if_any = |name: &str, text: &Option<String>| match text {
-        Some(text) => write(out.join(name), text).map(Some),
+        Some(text) => table(name, text).map(Some),
         None => Ok(None),
     };
     let series_csv = if_any("series.csv", &report.series_csv)?;
@@ -113,7 +122,7 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
     });
     let figures = report.figures.iter();
     let plots: Result<Vec<String>, CommandError> = figures
-        .map(|figure| write(plots.join(&figure.file), &figure.standalone()))
+        .map(|figure| write(plots.join(&figure.file), &figure.standalone(), Format::Svg))
         .collect();
     let failed = |run: &&RunRecord| {
         matches!(
@@ -131,7 +140,7 @@ fn write(report: &Report, out: &Path, results: &Results) -> Result<Document, Com
         lines: report.summary.lines.clone(),
         comparisons: report.summary.comparisons.clone(),
         // The page comes last: where it is, the rest is too.
-        page: write(out.join("report.html"), &report.page)?,
+        page: write(out.join("report.html"), &report.page, Format::Page)?,
         runs: results.runs.len(),
         missing: results.missing(),
         failed: results.runs.iter().filter(failed).count(),

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use farside::Executor;
-use farside_logs::LogWriter;
+use farside_logs::{LogWriter, may_hold_log};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -66,6 +66,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let interrupts = Interrupts::default();
     let raised = interrupts.clone();
     interrupt::on_interrupt(move || raised.raise());
+    may_hold_log(&args.out, &Results::files(&args.folder))?;
     let mut trouble = None;
     let again = reproduce(
         manifest,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use farside::{Counts, End, Executor, Report, SimDuration};
 use farside_actors::units;
-use farside_logs::{Attachment, LogOptions, LogWriter};
+use farside_logs::{Attachment, LogOptions, LogWriter, may_hold_log};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -149,6 +149,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     }
     let log = (!args.no_log).then_some(&args.out);
     if let Some(path) = log {
+        let mut inputs = assembled.files.paths();
+        inputs.push(PathBuf::from(&args.scenario));
+        may_hold_log(path, &inputs)?;
         let mut options = log_options(&scenario, &assembled, executor)?;
         let draws = scenario.shared().log.viewer;
         options.scene = assembled.system.scene.take().filter(|_| draws);

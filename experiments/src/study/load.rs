@@ -1,12 +1,12 @@
 //! Reading results folders, and joining those of several machines.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::error::{StoreError, io};
 use super::lengths::Lengths;
-use super::results::{FORMAT, Manifest, Results, RunOutcome, RunRecord};
+use super::results::{Claim, FORMAT, Manifest, Results, RunOutcome, RunRecord};
 
 /// The file that says what is run.
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -23,6 +23,13 @@ impl Results {
         let runs = runs(folder, &manifest)?;
         check_series(folder, &manifest, &runs)?;
         Ok(Results { manifest, runs })
+    }
+
+    /// The files that [`Results::load`] reads of a folder.
+    pub(crate) fn files(folder: &Path) -> Vec<PathBuf> {
+        let mut files = shards(folder).unwrap_or_default();
+        files.push(folder.join(MANIFEST));
+        files
     }
 
     /// Joins the results of one study from several folders; their order does not matter.
@@ -101,30 +108,94 @@ pub(super) fn manifest(folder: &Path) -> Result<Manifest, StoreError> {
             found: format.to_string(),
             expected: FORMAT,
         }),
-        _ => serde_json::from_value(value).map_err(corrupt),
+        _ => {
+            let manifest = serde_json::from_value(value).map_err(corrupt)?;
+            check(&manifest).map_err(|message| StoreError::Corrupt {
+                path: path.clone(),
+                line: None,
+                message,
+            })?;
+            Ok(manifest)
+        }
+    }
+}
+
+/// Holds a manifest to what everything that reads one takes for granted: somebody may have edited
+/// it.
+fn check(manifest: &Manifest) -> Result<(), String> {
+    let cells = manifest.cells.len();
+    if cells == 0 || manifest.seeds.is_empty() {
+        return Err("a study has at least one cell and one seed".to_owned());
+    }
+    let factors = manifest.factors.len();
+    for (number, cell) in manifest.cells.iter().enumerate() {
+        let (values, texts) = (cell.values.len(), cell.texts.len());
+        if (values, texts) != (factors, factors) {
+            return Err(format!(
+                "cell {number} has {values} values and {texts} texts for {factors} factors"
+            ));
+        }
+    }
+    let mut seeds = manifest.seeds.clone();
+    seeds.sort_unstable();
+    if seeds.windows(2).any(|pair| pair[0] == pair[1]) {
+        return Err("a seed is there twice".to_owned());
+    }
+    let block = manifest.block;
+    if block == 0 || manifest.seeds.len() % block != 0 {
+        let seeds = manifest.seeds.len();
+        return Err(format!("blocks of {block} do not divide {seeds} seeds"));
+    }
+    for published in &manifest.published {
+        let title = &published.title;
+        let metrics = &mut manifest.metrics.iter();
+        if !metrics.any(|metric| metric.name == published.metric) {
+            let metric = &published.metric;
+            return Err(format!("{title}: the study has no metric {metric:?}"));
+        }
+        for figure in &published.figures {
+            let others = match &figure.claim {
+                Claim::Exceeds(comparison) => &comparison.others,
+                _ => &figure.cells,
+            };
+            let named = figure.cells.iter().chain(others);
+            if others.len() != figure.cells.len() || named.clone().any(|cell| *cell >= cells) {
+                return Err(format!("{title}: a figure names cells that there are not"));
+            }
+        }
+    }
+    match manifest.baseline {
+        Some(baseline) if baseline >= cells => Err(format!(
+            "the baseline is cell {baseline}, the last one is {}",
+            cells - 1
+        )),
+        _ => Ok(()),
     }
 }
 
 /// All records in a folder, in order.
 pub(super) fn runs(folder: &Path, manifest: &Manifest) -> Result<Vec<RunRecord>, StoreError> {
-    let mut names = Vec::new();
-    let entries = std::fs::read_dir(folder).map_err(io(folder, "cannot read it"))?;
-    for entry in entries {
-        let entry = entry.map_err(io(folder, "cannot read it"))?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let ours = name == "runs.jsonl" || name.starts_with("runs-") && name.ends_with(".jsonl");
-        if ours {
-            names.push(name);
-        }
-    }
-    names.sort();
     let mut runs = Vec::new();
-    for name in names {
-        let path = folder.join(name);
+    for path in shards(folder)? {
         let bytes = std::fs::read(&path).map_err(io(&path, "cannot read it"))?;
         records(&path, &bytes, manifest, &mut runs)?;
     }
     in_order(runs)
+}
+
+/// The files of a results folder that hold records.
+fn shards(folder: &Path) -> Result<Vec<PathBuf>, StoreError> {
+    let mut paths = Vec::new();
+    let entries = std::fs::read_dir(folder).map_err(io(folder, "cannot read it"))?;
+    for entry in entries {
+        let entry = entry.map_err(io(folder, "cannot read it"))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name == "runs.jsonl" || name.starts_with("runs-") && name.ends_with(".jsonl") {
+            paths.push(entry.path());
+        }
+    }
+    paths.sort();
+    Ok(paths)
 }
 
 /// The records of one file; a last line that is cut is none.

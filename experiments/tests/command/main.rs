@@ -3,6 +3,7 @@
 mod common;
 mod contacts;
 mod logs;
+mod outputs;
 mod pictures;
 mod report;
 mod running;

@@ -209,6 +209,47 @@ fn published_figures_are_in_every_form() {
 }
 
 #[test]
+fn edited_manifests_are_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    type Edit = fn(&mut Manifest);
+    let edits: [(Edit, &str); 9] = [
+        (|m| m.cells.clear(), "at least one cell and one seed"),
+        (|m| m.seeds.clear(), "at least one cell and one seed"),
+        (
+            |m| m.cells[1].values.clear(),
+            "cell 1 has 0 values and 1 texts for 1 factors",
+        ),
+        (
+            |m| m.factors.clear(),
+            "cell 0 has 1 values and 1 texts for 0 factors",
+        ),
+        (|m| m.seeds[1] = 1, "a seed is there twice"),
+        (|m| m.block = 0, "blocks of 0 do not divide 4 seeds"),
+        (|m| m.block = 3, "blocks of 3 do not divide 4 seeds"),
+        (
+            |m| m.baseline = Some(2),
+            "the baseline is cell 2, the last one is 1",
+        ),
+        (|m| m.cells.truncate(1), "the last one is 0"),
+    ];
+    for (edit, said) in edits {
+        let mut edited = manifest();
+        edit(&mut edited);
+        fill(&out, &edited, &all());
+        for arguments in [
+            &["report", "out"][..],
+            &["reproduce", "out", "--cell", "1", "--seed", "2"],
+        ] {
+            let output = farside(folder.path(), arguments);
+            let error = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{said}: {error}");
+            assert!(error.contains(said), "{said}: {error}");
+        }
+    }
+}
+
+#[test]
 fn other_folders_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let output = farside(folder.path(), &["report", "nowhere"]);

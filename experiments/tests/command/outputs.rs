@@ -1,0 +1,187 @@
+//! Nobody's file is overwritten by accident: not what a command reads, by whatever name, and not what
+//! is there and of another kind.
+
+use std::path::Path;
+use std::process::Output;
+
+use crate::common::{SMALL, farside, text};
+
+const SCENARIO: &str = "system = 'network'\nuntil = '5s'\n[team]\nrovers = 2\n";
+
+/// The command fails as one that was called wrongly, says why, and leaves the file as it was.
+fn refused(folder: &Path, arguments: &[&str], kept: &str, why: &str) -> Output {
+    let before = std::fs::read(folder.join(kept)).unwrap();
+    let output = farside(folder, arguments);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    assert!(said.contains(why), "{arguments:?}: {said}");
+    assert_eq!(
+        std::fs::read(folder.join(kept)).unwrap(),
+        before,
+        "{arguments:?} changed {kept}"
+    );
+    output
+}
+
+const READ: &str = "is read by this command, which does not write over what it reads";
+
+#[test]
+fn a_run_spares_what_it_reads_and_what_is_no_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    refused(at, &["run", "s.toml", "--out", "s.toml"], "s.toml", READ);
+    std::fs::hard_link(at.join("s.toml"), at.join("hard.mcap")).unwrap();
+    refused(at, &["run", "s.toml", "--out", "hard.mcap"], "s.toml", READ);
+    refused(at, &["run", "s.toml", "--out", "./s.toml"], "s.toml", READ);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("s.toml", at.join("soft.mcap")).unwrap();
+        refused(at, &["run", "s.toml", "--out", "soft.mcap"], "s.toml", READ);
+    }
+    std::fs::write(at.join("thesis.txt"), "all my work").unwrap();
+    let no_log = "is there already and is no log: it is not replaced";
+    refused(
+        at,
+        &["run", "s.toml", "--out", "thesis.txt"],
+        "thesis.txt",
+        no_log,
+    );
+    // The default name is as any other.
+    std::fs::write(at.join("run.mcap"), "not a log").unwrap();
+    refused(at, &["run", "s.toml"], "run.mcap", no_log);
+
+    // A log gives way to a log, and so does an empty file; a device has nothing to lose.
+    std::fs::write(at.join("run.mcap"), "").unwrap();
+    for out in ["run.mcap", "run.mcap", "/dev/null"] {
+        if out == "/dev/null" && !Path::new(out).exists() {
+            continue;
+        }
+        let output = farside(at, &["run", "s.toml", "--out", out]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn a_run_spares_the_files_that_its_scenario_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plan = "a contact +0 +3600 1 2 1000\na range +0 +3600 1 2 1\n";
+    std::fs::write(at.join("plan.txt"), plan).unwrap();
+    let scenario = "system = 'traffic'\nuntil = '5s'\n[traffic]\nhosts = ['a', 'b']\n\
+        flow = [{ from = 'a', to = 'b', size = '100B', period = '1s' }]\n\
+        [contacts]\nfile = 'plan.txt'\nnodes = { 1 = 'a', 2 = 'b' }\n";
+    std::fs::write(at.join("s.toml"), scenario).unwrap();
+    let fine = farside(at, &["run", "s.toml"]);
+    assert!(fine.status.success(), "{}", text(&fine.stderr));
+    refused(
+        at,
+        &["run", "s.toml", "--out", "plan.txt"],
+        "plan.txt",
+        READ,
+    );
+}
+
+#[test]
+fn pictures_and_recovered_logs_spare_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert!(farside(at, &SMALL).status.success());
+    refused(
+        at,
+        &["draw", "run.mcap", "--out", "run.mcap"],
+        "run.mcap",
+        READ,
+    );
+    std::fs::hard_link(at.join("run.mcap"), at.join("other.svg")).unwrap();
+    refused(
+        at,
+        &["draw", "run.mcap", "--out", "other.svg"],
+        "run.mcap",
+        READ,
+    );
+    refused(
+        at,
+        &["recover", "run.mcap", "--out", "other.svg"],
+        "run.mcap",
+        READ,
+    );
+    let no_figure = "is there already and is no figure: it is not replaced";
+    let inkscape = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n<svg/>";
+    for mine in ["all my work", inkscape] {
+        std::fs::write(at.join("map.svg"), mine).unwrap();
+        refused(
+            at,
+            &["draw", "run.mcap", "--out", "map.svg"],
+            "map.svg",
+            no_figure,
+        );
+    }
+    std::fs::write(at.join("map.svg"), "").unwrap();
+    for _ in 0..2 {
+        let output = farside(at, &["draw", "run.mcap", "--out", "map.svg"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn reports_and_runs_again_spare_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let study = "question = 'How late?'\nscenario = 's.toml'\nseeds = 1\nmetrics = ['time_ratio']\n\
+        [[factor]]\nname = 'loss'\nkey = 'links.default.loss'\nvalues = ['0%', '10%']\n";
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let made = farside(at, &["study", "study.toml", "--out", "results"]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let again = [
+        "reproduce",
+        "results",
+        "--cell",
+        "0",
+        "--seed",
+        "1",
+        "--out",
+    ];
+    let out = |name| [&again[..], &[name]].concat();
+    refused(
+        at,
+        &out("results/manifest.json"),
+        "results/manifest.json",
+        READ,
+    );
+    refused(
+        at,
+        &out("s.toml"),
+        "s.toml",
+        "is no log: it is not replaced",
+    );
+
+    for _ in 0..2 {
+        let report = farside(at, &["report", "results"]);
+        assert!(report.status.success(), "{}", text(&report.stderr));
+    }
+    let report = ["report", "results", "--out", "mine"];
+    std::fs::create_dir(at.join("mine")).unwrap();
+    for (name, mine, what) in [
+        (
+            "results.csv",
+            "name,mark\nme,1.0\n",
+            "is no table of this kind",
+        ),
+        ("summary.csv", "all my work", "is no table of this kind"),
+        (
+            "report.html",
+            "<!DOCTYPE html><html><title>My report</title></html>",
+            "is no report",
+        ),
+    ] {
+        std::fs::write(at.join("mine").join(name), mine).unwrap();
+        refused(at, &report, &format!("mine/{name}"), what);
+        std::fs::remove_file(at.join("mine").join(name)).unwrap();
+    }
+    // An output that is an input by another name.
+    let page = at.join("mine/report.html");
+    std::fs::hard_link(at.join("results/manifest.json"), page).unwrap();
+    refused(at, &report, "results/manifest.json", READ);
+}
