@@ -142,7 +142,7 @@ fn check(manifest: &Manifest) -> Result<(), String> {
         return Err("a seed is there twice".to_owned());
     }
     let block = manifest.block;
-    if block == 0 || manifest.seeds.len() % block != 0 {
+    if block == 0 || !manifest.seeds.len().is_multiple_of(block) {
         let seeds = manifest.seeds.len();
         return Err(format!("blocks of {block} do not divide {seeds} seeds"));
     }

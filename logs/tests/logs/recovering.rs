@@ -100,6 +100,6 @@ fn behind_a_hole_reading_goes_on() {
 fn a_file_is_not_written_over_itself() {
     let (_folder, path, _) = logged(&Plan::default());
     let error = recover(&path, &path).unwrap_err();
-    assert!(error.to_string().contains("being read"), "{error}");
+    assert!(error.to_string().contains("is read by"), "{error}");
     assert!(info(&path).unwrap().missing.is_empty());
 }
