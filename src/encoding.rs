@@ -47,7 +47,8 @@
 //!
 //! # What is refused
 //!
-//! Types whose shape depends on the data (`flatten`, `untagged`, internally and adjacently tagged
+//! Types with fields that would not come back (`skip`, `skip_serializing`, `skip_serializing_if` for
+//! other values than the default). Types whose shape depends on the data (`flatten`, `untagged`, internally and adjacently tagged
 //! enums), hash maps and hash sets, roots that are no struct or enum, and types whose `Serialize`
 //! writes what their `Deserialize` does not read. [`Schema::of`] names the type and the reason.
 //!
@@ -67,6 +68,7 @@ mod names;
 mod registry;
 mod samples;
 mod schema;
+mod symmetry;
 mod trace;
 mod wire;
 

@@ -25,6 +25,9 @@ pub(super) struct Message {
     pub(super) scope: Scope,
     pub(super) shape: Shape,
     pub(super) fields: Vec<Field>,
+    /// Set while a type is traced, to see its defaults: fields that `Deserialize` can do without
+    /// are kept from it.
+    pub(super) withheld: AtomicBool,
 }
 
 /// Where a message type is declared.
@@ -86,6 +89,8 @@ pub(super) struct Field {
     /// Set when a reader was seen to reject the field's absence. Such a field reads as zero where
     /// it is absent; the others are left to `#[serde(default)]`.
     pub(super) required: AtomicBool,
+    /// Set when `Serialize` was seen to leave the field out.
+    pub(super) left_out: AtomicBool,
     /// The protobuf name.
     pub(super) name: String,
     /// For error messages, as in `Ping.count`.

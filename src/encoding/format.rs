@@ -140,6 +140,17 @@ impl Container {
         }
     }
 
+    /// How many variants hold something.
+    pub(super) fn variants(&self) -> usize {
+        match &self.body {
+            Body::Fields(_) => 0,
+            Body::Enum(variants) => {
+                let hold = |v: &&Variant| !matches!(v.fields, Some(Fields::Unit));
+                variants.iter().filter(hold).count()
+            }
+        }
+    }
+
     /// Is it an enum whose variants all hold nothing?
     pub(super) fn is_plain_enum(&self) -> bool {
         match &self.body {

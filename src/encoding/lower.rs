@@ -36,6 +36,7 @@ pub(super) fn lower(containers: &[Container], root: usize) -> FlatSchema {
         packed: false,
         key: Key::new(""),
         required: AtomicBool::new(true),
+        left_out: AtomicBool::new(false),
         name: place.clone(),
         place,
     };
@@ -144,6 +145,7 @@ impl Lowering<'_> {
 
     fn push(&mut self, name: String, scope: Scope, shape: Shape) -> usize {
         self.messages.push(Message {
+            withheld: AtomicBool::new(false),
             name,
             scope,
             shape,
@@ -191,6 +193,7 @@ impl Lowering<'_> {
                 packed,
                 key: Key::new(key),
                 required: AtomicBool::new(false),
+                left_out: AtomicBool::new(false),
                 place: format!("{}.{name}", self.messages[id].name),
                 name,
             };
@@ -313,6 +316,7 @@ impl Lowering<'_> {
                 packed: false,
                 key: Key::new(key),
                 required: AtomicBool::new(false),
+                left_out: AtomicBool::new(false),
                 name: name.to_owned(),
                 place: format!("{}.{name}", self.messages[id].name),
             };

@@ -45,6 +45,9 @@ pub(super) struct Registry {
     /// Counts what was learned, to notice when nothing is.
     pub(super) progress: u64,
     pub(super) fatal: Option<SchemaError>,
+    /// How many options, collections and variants may still be filled, where values are wanted in
+    /// which everything is there.
+    pub(super) fills: Option<u32>,
     /// The fields that are being read, outermost first.
     pub(super) trail: Vec<Slot>,
     /// For each container at the start of the pass: the least depth of a value.
@@ -175,6 +178,31 @@ impl Registry {
         }
     }
 
+    /// Takes note that one more is filled.
+    pub(super) fn fill(&mut self) {
+        self.fills = self.fills.map(|left| left.saturating_sub(1));
+    }
+
+    /// May an option or collection of this be filled? A type inside itself is entered once.
+    pub(super) fn may_fill(&self, format: &Format) -> bool {
+        match format {
+            Format::Unknown => false,
+            Format::Option(inner) | Format::Seq(inner) => self.may_fill(inner),
+            Format::Map(key, value) => self.may_fill(key) && self.may_fill(value),
+            Format::Tuple(items) => items.iter().all(|item| self.may_fill(item)),
+            Format::Container(id) => self.may_enter(*id),
+            _ => true,
+        }
+    }
+
+    fn may_enter(&self, id: usize) -> bool {
+        if self.fills == Some(0) {
+            return false;
+        }
+        let open = self.trail.iter().filter(|slot| slot.container == id);
+        open.count() < 2
+    }
+
     /// Is the container being read further out?
     pub(super) fn is_open(&self, id: usize) -> bool {
         self.trail.iter().any(|slot| slot.container == id)
@@ -256,6 +284,7 @@ impl Registry {
         finite.sort_unstable();
         let chosen = match (unknown, finite.is_empty()) {
             (Some((at, _)), _) => at,
+            (None, false) if self.fills.is_some() && !self.may_enter(id) => finite[0].1,
             (None, false) => finite[tries as usize % finite.len()].1,
             (None, true) => return Err(Halt::Again),
         };

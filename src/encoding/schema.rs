@@ -1,13 +1,15 @@
 //! The schema of one message kind, as the rest of the world uses it.
 
-use std::any::type_name;
+use std::any::TypeId;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::error::{DecodeError, EncodeError, SchemaError};
 use super::flat::FlatSchema;
-use super::{decode, descriptor, encode, lower, trace, wire};
+use super::{decode, descriptor, encode, lower, symmetry, trace, wire};
 
 /// The protobuf package of every message kind.
 pub const PACKAGE: &str = "farside.msg";
@@ -53,28 +55,20 @@ impl Schema {
     /// assert!(matches!(error, SchemaError::NotAContainer { .. }));
     /// ```
     pub fn of<T: Serialize + DeserializeOwned + 'static>() -> Result<Schema, SchemaError> {
-        let traced = trace::trace::<T>()?;
+        let mut traced = trace::trace::<T>()?;
         let flat = lower::lower(&traced.registry.containers, traced.root);
         let schema = Schema {
             name: traced.registry.containers[traced.root].name,
             flat,
         };
-        let asymmetric = |reason: String| SchemaError::Asymmetric {
-            type_name: type_name::<T>().to_owned(),
-            reason,
-        };
-        let mut bytes = Vec::new();
-        for value in &traced.values {
-            bytes.clear();
-            match schema.encode(value, &mut bytes) {
-                Ok(()) => {}
-                // A sample may be a value that the type itself refuses to write.
-                Err(EncodeError::Custom(_)) => continue,
-                Err(error) => return Err(asymmetric(error.to_string())),
-            }
-            if let Err(error) = schema.decode::<T>(&bytes) {
-                return Err(asymmetric(error.to_string()));
-            }
+        // A study builds the same simulation a thousand times.
+        static CHECKED: Mutex<BTreeSet<TypeId>> = Mutex::new(BTreeSet::new());
+        let checked = || CHECKED.lock().unwrap_or_else(PoisonError::into_inner);
+        let id = TypeId::of::<T>();
+        if !checked().contains(&id) {
+            let filled = traced.filled();
+            symmetry::check(&schema, &schema.flat, &traced.values, &filled)?;
+            checked().insert(id);
         }
         Ok(schema)
     }

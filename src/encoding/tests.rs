@@ -97,7 +97,6 @@ fn serde_attributes_are_followed() {
     check(Attributes {
         kebab_name: 1,
         kind: 2,
-        skipped: 0,
         shown: None,
         seven: 7,
         aliased: 5,
@@ -105,7 +104,6 @@ fn serde_attributes_are_followed() {
     check(Attributes {
         kebab_name: 0,
         kind: 0,
-        skipped: 0,
         shown: Some(0),
         seven: 0,
         aliased: 0,
@@ -118,6 +116,164 @@ fn serde_attributes_are_followed() {
         low: Low(1),
         count: std::num::NonZeroU32::new(5).unwrap(),
     });
+}
+
+mod left_out {
+    //! Types whose fields would not come back, and their like that do.
+
+    use serde::{Deserialize, Serialize};
+    use std::collections::BTreeMap;
+
+    pub(super) fn seven() -> u32 {
+        7
+    }
+
+    fn is_seven(value: &u32) -> bool {
+        *value == 7
+    }
+
+    fn some_seven() -> Option<u32> {
+        Some(7)
+    }
+
+    fn is_some_seven(value: &Option<u32>) -> bool {
+        *value == some_seven()
+    }
+
+    fn ones() -> Vec<u32> {
+        vec![1]
+    }
+
+    fn are_ones(values: &[u32]) -> bool {
+        values == ones()
+    }
+
+    fn is_zero(value: &u32) -> bool {
+        *value == 0
+    }
+
+    macro_rules! types {
+        ($($name:ident { $($(#[$of:meta])* $field:ident: $ty:ty),* })*) => {$(
+            #[derive(Serialize, Deserialize, PartialEq, Debug)]
+            pub(super) struct $name { $($(#[$of])* pub(super) $field: $ty),* }
+        )*};
+    }
+
+    types! {
+        Skip { kept: u32, #[serde(skip)] gone: u32 }
+        SkipWithDefault { kept: u32, #[serde(skip, default = "seven")] gone: u32 }
+        SkipText { kept: Vec<u8>, #[serde(skip)] gone: String }
+        SkipSerializing { kept: u32, #[serde(skip_serializing, default)] gone: u32 }
+        SkipSerializingOption { #[serde(skip_serializing)] gone: Option<u32>, kept: u32 }
+        SkipSome { #[serde(skip_serializing_if = "Option::is_some")] gone: Option<u32>, kept: u32 }
+        SkipOfNoDefault { #[serde(skip_serializing_if = "is_seven")] gone: u32 }
+        SkipOfOtherDefault { #[serde(default, skip_serializing_if = "is_seven")] gone: u32 }
+        SkipOfSome {
+            #[serde(default = "some_seven", skip_serializing_if = "is_some_seven")]
+            gone: Option<u32>
+        }
+        SkipOfList { #[serde(default = "ones", skip_serializing_if = "are_ones")] gone: Vec<u32> }
+        Inside { kept: u32, inner: Vec<SkipOfList> }
+        InMap { inner: BTreeMap<u32, Option<SkipSome>> }
+        Good {
+            #[serde(default = "seven", skip_serializing_if = "is_seven")] seven: u32,
+            #[serde(default, skip_serializing_if = "is_zero")] zero: u32,
+            #[serde(skip_serializing_if = "Option::is_none")] none: Option<u32>,
+            #[serde(default, skip_serializing_if = "Vec::is_empty")] empty: Vec<u32>,
+            #[serde(default)] nothing: bool,
+            #[serde(default = "ones")] ones: Vec<u32>,
+            #[serde(default = "some_seven")] some: Option<u32>,
+            #[serde(skip)] marker: std::marker::PhantomData<u64>,
+            wide: u128, narrow: u8, middle: u16
+        }
+    }
+
+    #[derive(Serialize, Deserialize)]
+    pub(super) struct Pair(
+        u64,
+        #[serde(skip)]
+        #[expect(dead_code)]
+        u64,
+    );
+
+    #[derive(Serialize, Deserialize)]
+    #[repr(C)]
+    pub(super) struct AsInC {
+        a: u8,
+        b: u64,
+        c: u8,
+    }
+
+    #[derive(Serialize, Deserialize)]
+    #[repr(align(64))]
+    pub(super) struct Aligned {
+        a: u8,
+    }
+
+    #[derive(Serialize, Deserialize)]
+    pub(super) struct Tree {
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        children: Vec<Tree>,
+    }
+
+    #[derive(Serialize, Deserialize)]
+    pub(super) enum Variants {
+        One {
+            kept: u32,
+        },
+        Two {
+            #[serde(skip_serializing, default)]
+            gone: u32,
+        },
+    }
+}
+
+#[test]
+fn fields_that_would_not_come_back_are_refused_by_name() {
+    use left_out::*;
+    fn refused<T: Serialize + DeserializeOwned + 'static>(said: &str) {
+        let error = Schema::of::<T>().expect_err(said).to_string();
+        let name = std::any::type_name::<T>();
+        assert!(error.contains(said) && error.contains(name), "{error}");
+    }
+    refused::<Skip>("#[serde(skip)]");
+    refused::<SkipWithDefault>("#[serde(skip)]");
+    refused::<SkipText>("#[serde(skip)]");
+    refused::<Pair>("#[serde(skip)]");
+    refused::<SkipSerializing>("`SkipSerializing.gone`");
+    refused::<SkipSerializingOption>("`SkipSerializingOption.gone`");
+    refused::<SkipSome>("`SkipSome.gone`");
+    refused::<SkipOfNoDefault>("`SkipOfNoDefault.gone`");
+    refused::<SkipOfOtherDefault>("`SkipOfOtherDefault.gone`");
+    refused::<SkipOfSome>("`SkipOfSome.gone`");
+    refused::<SkipOfList>("`SkipOfList.gone`");
+    refused::<Inside>("`SkipOfList.gone`");
+    refused::<InMap>("`SkipSome.gone`");
+    refused::<Variants>("gone`");
+}
+
+#[test]
+fn fields_that_come_back_may_be_left_out() {
+    use left_out::*;
+    let good = |seven, zero, none, empty: Vec<u32>, some| Good {
+        seven,
+        zero,
+        none,
+        empty,
+        nothing: false,
+        ones: vec![],
+        some,
+        marker: std::marker::PhantomData,
+        wide: 0,
+        narrow: 1,
+        middle: 2,
+    };
+    check(good(7, 0, None, vec![], None));
+    check(good(0, 7, Some(7), vec![1], Some(7)));
+    check(good(seven(), 1, Some(0), vec![0], Some(0)));
+    schema::<AsInC>();
+    schema::<Aligned>();
+    schema::<Tree>();
 }
 
 #[test]

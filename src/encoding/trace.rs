@@ -11,7 +11,7 @@ use std::fmt;
 use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visitor};
 
 use super::error::SchemaError;
-use super::format::{Body, Fields, Format, Variant, merge};
+use super::format::{Body, Container, Fields, Format, Variant, merge};
 use super::registry::{Halt, INFINITE, Registry, Slot};
 use super::samples::{Sample, mix};
 
@@ -83,6 +83,40 @@ pub(super) fn trace<T: DeserializeOwned>() -> Result<Traced<T>, SchemaError> {
     Err(SchemaError::Infinite {
         type_name: type_name::<T>().to_owned(),
     })
+}
+
+impl<T: DeserializeOwned> Traced<T> {
+    /// Values in which every option and collection that can hold something holds something, made of
+    /// other samples each. Types that validate may refuse some.
+    pub(super) fn filled(&mut self) -> Vec<T> {
+        /// So many and two for each variant of the largest enum, and so many attempts for each.
+        const VALUES: u32 = 6;
+        const ATTEMPTS: u32 = 16;
+        /// So much is filled in one value: types within types would fill without end.
+        const FILLS: u32 = 64;
+        let mut values = Vec::new();
+        let variants = self.registry.containers.iter().map(Container::variants);
+        let variants = variants.max().unwrap_or(0) as u32;
+        for sample in 0..VALUES.max(2 * variants) {
+            let read = (0..ATTEMPTS).find_map(|_| {
+                let mut root = Format::Container(self.root);
+                self.registry.trail.clear();
+                self.registry.fatal = None;
+                self.registry.fills = Some(FILLS);
+                let tries = sample + self.registry.tries(0);
+                T::deserialize(Tracer {
+                    registry: &mut self.registry,
+                    slot: &mut root,
+                    site: 0,
+                    tries,
+                    cheap: false,
+                })
+                .ok()
+            });
+            values.extend(read);
+        }
+        values
+    }
 }
 
 impl fmt::Display for Halt {
@@ -180,6 +214,10 @@ impl<'a> Tracer<'a> {
         let buildable = inner
             .iter()
             .all(|format| self.registry.depth(format) < INFINITE);
+        if self.registry.fills.is_some() {
+            let fill = inner.iter().all(|format| self.registry.may_fill(format));
+            return usize::from(fill && buildable);
+        }
         if self.tries > 0 && buildable {
             return [0, 1, 2, 3][self.tries as usize % 4];
         }
@@ -225,6 +263,10 @@ impl<'a> Tracer<'a> {
         let mut access = self.fields(id, variant, cheap);
         match visitor.visit_map(&mut access) {
             Err(Halt::Duplicate(primary)) => Err(access.duplicate(primary)),
+            Ok(value) if variant.is_none() => {
+                access.refuse_hidden::<V::Value, V>()?;
+                Ok(value)
+            }
             other => other,
         }
     }
@@ -337,6 +379,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
         let Format::Option(inner) = self.slot else {
             return Err(Halt::Again);
         };
+        self.registry.fill();
         visitor.visit_some(Tracer::part(self.registry, inner, context, 1))
     }
 
@@ -352,6 +395,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
             return Err(Halt::Again);
         };
         let slots = std::slice::from_mut(&mut **inner);
+        self.registry.fill();
         visitor.visit_seq(CollectionAccess::new(self.registry, slots, context, left))
     }
 
@@ -367,6 +411,7 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
             return Err(Halt::Again);
         };
         let mut slots = [std::mem::take(&mut **key), std::mem::take(&mut **value)];
+        self.registry.fill();
         let access = CollectionAccess::new(self.registry, &mut slots, context, left);
         let flattened = type_name::<V::Value>();
         let read = visitor.visit_map(access.naming(flattened));
@@ -431,7 +476,10 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
     ) -> Result<V::Value, Halt> {
         let body = Body::Fields(Fields::Tuple(unknown(len)));
         let (id, cheap) = self.enter::<V::Value>(name, body)?;
-        visitor.visit_seq(self.fields(id, None, cheap))
+        let mut access = self.fields(id, None, cheap);
+        let value = visitor.visit_seq(&mut access)?;
+        access.refuse_hidden::<V::Value, V>()?;
+        Ok(value)
     }
 
     fn deserialize_struct<V: Visitor<'static>>(

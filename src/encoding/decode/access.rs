@@ -36,9 +36,9 @@ impl<'b> de::MapAccess<'b> for Members<'_, '_, 'b> {
         while let Some(field) = message.fields.get(self.next) {
             // Absence of one value is left to serde's default until the type turns out to have
             // none. Absence of an option or collection says that it is empty.
-            let given = field.card != Card::Single
-                || field.required.load(Ordering::Relaxed)
-                || self.reader.has(self.next)?;
+            let given = field.required.load(Ordering::Relaxed)
+                || !message.withheld.load(Ordering::Relaxed)
+                    && (field.card != Card::Single || self.reader.has(self.next)?);
             if given {
                 return read_name(field.key.name, seed).map(Some);
             }

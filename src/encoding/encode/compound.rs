@@ -1,5 +1,7 @@
 //! The open ends of a value being encoded: messages, sequences and maps.
 
+use std::sync::atomic::Ordering;
+
 use serde::ser::{self, Serialize};
 
 use super::super::error::EncodeError;
@@ -74,6 +76,16 @@ impl<'a> Compound<'a> {
         }
     }
 
+    /// Notes that `Serialize` leaves a field out.
+    fn left_out(&self, key: &'static str) {
+        let field = self.message.fields.iter().find(|field| field.key.is(key));
+        if let Some(field) = field
+            && !field.left_out.load(Ordering::Relaxed)
+        {
+            field.left_out.store(true, Ordering::Relaxed);
+        }
+    }
+
     #[cold]
     fn unknown(&self, field: String) -> Fault {
         Box::new(EncodeError::UnknownField {
@@ -96,6 +108,11 @@ impl ser::SerializeStruct for Compound<'_> {
     type Ok = ();
     type Error = Fault;
 
+    fn skip_field(&mut self, key: &'static str) -> Result<(), Fault> {
+        self.left_out(key);
+        Ok(())
+    }
+
     #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(
         &mut self,
@@ -114,6 +131,11 @@ impl ser::SerializeStruct for Compound<'_> {
 impl ser::SerializeStructVariant for Compound<'_> {
     type Ok = ();
     type Error = Fault;
+
+    fn skip_field(&mut self, key: &'static str) -> Result<(), Fault> {
+        self.left_out(key);
+        Ok(())
+    }
 
     #[inline(always)]
     fn serialize_field<T: ?Sized + Serialize>(

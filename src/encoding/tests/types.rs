@@ -116,8 +116,6 @@ pub(super) struct Attributes {
     pub(super) kebab_name: u32,
     #[serde(rename = "type")]
     pub(super) kind: u32,
-    #[serde(skip)]
-    pub(super) skipped: u32,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) shown: Option<u32>,
     #[serde(default = "seven", skip_serializing_if = "is_seven")]

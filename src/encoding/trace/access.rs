@@ -1,5 +1,7 @@
 //! What the tracer hands to visitors: fields, elements, entries and variants.
 
+use std::any::type_name;
+
 use serde::de::{self, DeserializeSeed, Visitor};
 
 use super::super::format::{Body, Fields, Format};
@@ -15,6 +17,36 @@ pub(super) struct FieldAccess<'a> {
     /// Positions of the fields, in the order to read them.
     order: Vec<usize>,
     next: usize,
+    layout: Layout,
+}
+
+/// The room that the fields read so far take, in bytes.
+#[derive(Default)]
+struct Layout {
+    /// Without padding.
+    sum: usize,
+    /// In the order of declaration, as C lays them out.
+    in_order: usize,
+    align: usize,
+}
+
+impl Layout {
+    fn add<T>(&mut self) {
+        let (size, align) = (size_of::<T>(), align_of::<T>());
+        self.sum += size;
+        self.in_order = self.in_order.next_multiple_of(align) + size;
+        self.align = self.align.max(align);
+    }
+
+    /// True if a `T` of these fields and no others would be smaller than it is. A field that lies
+    /// in what would be padding without it is not found out.
+    fn is_less_than<T>(&self) -> bool {
+        let (size, align) = (size_of::<T>(), align_of::<T>());
+        // Fields sorted by alignment need no padding but at the end.
+        let found = self.sum.next_multiple_of(align);
+        // A type that asks for a larger alignment itself says nothing by its size.
+        align <= self.align.max(1) && found < size && self.in_order.next_multiple_of(align) < size
+    }
 }
 
 impl<'a> FieldAccess<'a> {
@@ -38,7 +70,23 @@ impl<'a> FieldAccess<'a> {
             context,
             order,
             next: 0,
+            layout: Layout::default(),
         }
+    }
+
+    /// Refuses a struct that has more than the fields that were read: `#[serde(skip)]` leaves no
+    /// trace in what serde says of a type but its size. Derived `Deserialize` alone is held to it,
+    /// which the name of its visitor tells: others may make anything of what they read.
+    pub(super) fn refuse_hidden<T, V>(&mut self) -> Result<(), Halt> {
+        let derived = type_name::<V>().contains("::__Visitor");
+        let all_read = self.next == self.order.len();
+        if derived && all_read && self.layout.is_less_than::<T>() {
+            let reason = "it has a field that `#[serde(skip)]` leaves out, which would not come \
+                          back where a message is copied or read from a log; write it, or keep it \
+                          out of the message";
+            return Err(self.registry.unsupported(type_name::<T>(), reason));
+        }
+        Ok(())
     }
 
     /// Learns from a field that was refused because it came before.
@@ -55,6 +103,7 @@ impl<'a> FieldAccess<'a> {
     fn read<S: DeserializeSeed<'static>>(&mut self, seed: S) -> Result<S::Value, Halt> {
         let field = self.order[self.next];
         self.next += 1;
+        self.layout.add::<S::Value>();
         let slot = Slot {
             container: self.id,
             variant: self.variant,
@@ -220,7 +269,7 @@ impl de::MapAccess<'static> for CollectionAccess<'_> {
         // A flattened struct is read as a map, but its keys are names of fields. This is looked
         // at even where no entry is to be read, since such a struct would otherwise be mistaken
         // for an empty map.
-        if std::any::type_name::<K::Value>().contains("::__Field") {
+        if type_name::<K::Value>().contains("::__Field") {
             let type_name = self.type_name;
             let reason = "`#[serde(flatten)]` gives it no fixed shape; name the fields instead";
             return Err(self.registry.unsupported(type_name, reason));
