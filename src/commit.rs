@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::carrier::Carriage;
 use crate::digest::Digest;
-use crate::engine::{FirstSample, Head, InFlight, Sink, dropped, guarded, hash_if_wanted};
+use crate::engine::{FirstSample, Head, InFlight, Sink, hash_if_wanted};
 use crate::fault::ObserverError;
+use crate::guard::{dropped, guarded};
 use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::record::{Checkpoint, Flow, Observer, Record, RecordClass, Wants};

@@ -5,7 +5,6 @@
 
 mod erased;
 mod event;
-mod guard;
 mod parts;
 mod remains;
 mod store;
@@ -15,6 +14,7 @@ use std::sync::Arc;
 
 use crate::carrier::{AnyCarrier, SealedChange};
 use crate::fault::{Fault, FaultCause, Outcome};
+use crate::guard::{dropped, guarded};
 use crate::ids::{EntityId, KindIndex, MatchKey};
 use crate::key::{Bound, EventKey};
 use crate::queue::Entry;
@@ -25,7 +25,7 @@ use crate::topology::{FixedMap, Topology};
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
-pub(crate) use guard::{dropped, guarded};
+
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
 pub(crate) use remains::Remains;
 

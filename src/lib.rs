@@ -121,6 +121,7 @@ pub mod encoding;
 mod engine;
 mod executor;
 pub mod fault;
+mod guard;
 pub mod ids;
 pub mod key;
 mod payload;

@@ -9,6 +9,8 @@ use serde::de::DeserializeOwned;
 
 use super::error::{DecodeError, EncodeError, SchemaError};
 use super::flat::FlatSchema;
+use crate::guard::dropped;
+
 use super::{decode, descriptor, encode, lower, symmetry, trace, wire};
 
 /// The protobuf package of every message kind.
@@ -67,7 +69,12 @@ impl Schema {
         let id = TypeId::of::<T>();
         if !checked().contains(&id) {
             let filled = traced.filled();
-            symmetry::check(&schema, &schema.flat, &traced.values, &filled)?;
+            let symmetric = symmetry::check(&schema.flat, &traced.values, &filled);
+            for sample in traced.values.into_iter().chain(filled) {
+                // What panics with a sample need not with what a run has.
+                let _ = dropped(sample);
+            }
+            symmetric?;
             checked().insert(id);
         }
         Ok(schema)

@@ -14,6 +14,7 @@ use super::error::SchemaError;
 use super::format::{Body, Container, Fields, Format, Variant, merge};
 use super::registry::{Halt, INFINITE, Registry, Slot};
 use super::samples::{Sample, mix};
+use crate::guard::guarded;
 
 mod access;
 
@@ -104,14 +105,17 @@ impl<T: DeserializeOwned> Traced<T> {
                 self.registry.fatal = None;
                 self.registry.fills = Some(FILLS);
                 let tries = sample + self.registry.tries(0);
-                T::deserialize(Tracer {
-                    registry: &mut self.registry,
-                    slot: &mut root,
-                    site: 0,
-                    tries,
-                    cheap: false,
-                })
-                .ok()
+                let registry = &mut self.registry;
+                let read = guarded(|| {
+                    T::deserialize(Tracer {
+                        registry,
+                        slot: &mut root,
+                        site: 0,
+                        tries,
+                        cheap: false,
+                    })
+                });
+                read.ok()?.ok()
             });
             values.extend(read);
         }

@@ -11,11 +11,11 @@ use std::sync::Arc;
 use super::store::Store;
 use super::{
     CellState, Class, Head, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side, Sink,
-    guarded,
 };
 use crate::carrier::{SealedChange, Verdicts};
 use crate::encoding::EncodeError;
 use crate::fault::{Fault, FaultCause};
+use crate::guard::guarded;
 use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
 use crate::queue::{Entry, Queue};

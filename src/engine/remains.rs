@@ -1,9 +1,9 @@
 //! What is left of a run when it is over: messages still on their way, and what users brought in.
 //! All of it is dropped before the end is reported, so that a panic meanwhile is a fault as well.
 
-use super::guard::{dropped, guarded};
 use super::{Class, Head, InFlight, Pending, Side};
 use crate::fault::{Fault, FaultCause};
+use crate::guard::{dropped, guarded};
 use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::time::SimTime;

@@ -5,9 +5,10 @@ use std::any::TypeId;
 use std::sync::{Arc, Mutex};
 
 use super::{LinkDecl, Planned, Simulation, Target};
-use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell, guarded};
+use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
 use crate::fault::{BuildError, Fault};
+use crate::guard::guarded;
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
