@@ -287,6 +287,7 @@ pub(crate) enum Verdict {
     Park {
         latest: Option<SimDuration>,
         token: u64,
+        copy: Option<u32>,
     },
 }
 
@@ -333,7 +334,23 @@ impl Verdicts {
     /// A copy that is never woken is in flight when the run ends. Two copies that are parked at one
     /// time have different tokens: a link that mixes them up is at fault.
     pub fn park(&mut self, latest: Option<SimDuration>, token: u64) {
-        self.list.push(Verdict::Park { latest, token });
+        let copy = None;
+        self.list.push(Verdict::Park {
+            latest,
+            token,
+            copy,
+        });
+    }
+
+    /// The same for one copy more, which has the number `copy` from now on: what a sender keeps of a
+    /// message that has arrived, until it knows.
+    pub fn park_another(&mut self, latest: Option<SimDuration>, token: u64, copy: u32) {
+        let copy = Some(copy);
+        self.list.push(Verdict::Park {
+            latest,
+            token,
+            copy,
+        });
     }
 
     /// Shows the link a copy that it parked, `delay` from now, unless that comes sooner anyway.

@@ -84,6 +84,7 @@ mod contacts;
 mod form;
 mod jitter;
 mod params;
+mod pipeline;
 mod preset;
 mod queue;
 mod stage;
@@ -96,6 +97,7 @@ use std::sync::Arc;
 use farside::carrier::{Carriage, Carrier, Parcel, Verdicts};
 use farside::{SimDuration, SimTime};
 
+use pipeline::Pipeline;
 use stage::{Draws, Purpose};
 
 pub use burst::Burst;
@@ -124,6 +126,8 @@ pub const NO_CONTACT: &str = "no_contact";
 pub const QUEUE_FULL: &str = "queue_full";
 /// Why a link drops a message that waited for longer than its lifetime.
 pub const EXPIRED: &str = "expired";
+/// Why a message is dropped that has arrived before: its acknowledgement was lost.
+pub const DUPLICATE: &str = "duplicate";
 /// Why a message is dropped where it arrives.
 pub const CORRUPT: &str = "corrupt";
 
@@ -187,6 +191,10 @@ pub struct Link {
     /// Which parameters held when last asked, and until when.
     index: usize,
     until: SimTime,
+    /// The link that answers come back over, if it is known.
+    back: Option<Arc<Timeline>>,
+    /// Messages that are followed, if ever any were.
+    pipeline: Option<Box<Pipeline>>,
 }
 
 impl Link {
@@ -197,7 +205,17 @@ impl Link {
             until: transmitter.timeline().end_of(0).unwrap_or(SimTime::MAX),
             index: 0,
             transmitter,
+            back: None,
+            pipeline: None,
         }
+    }
+
+    /// Says what the link has over which acknowledgements come back. Unless it is said, that is a
+    /// link like this one.
+    #[must_use]
+    pub fn answered_over(mut self, back: impl Into<Arc<Timeline>>) -> Self {
+        self.back = Some(back.into());
+        self
     }
 
     /// Declares that the link may be given these parameters during the run: [`Carrier::min_delay`]
@@ -259,6 +277,12 @@ impl Carrier for Link {
         let now = parcel.now();
         if now >= self.until {
             self.turn_to(now);
+        }
+        if parcel.token().is_some() || self.transmitter.timeline().is_followed() {
+            let back = &self.back;
+            let new = || Box::new(Pipeline::new(back.clone()));
+            let pipeline = self.pipeline.get_or_insert_with(new);
+            return pipeline.carry(&mut self.transmitter, parcel, verdicts);
         }
         let span = &self.transmitter.timeline().spans[self.index];
         if span.plain && self.transmitter.free_at() <= now {

@@ -14,6 +14,7 @@ use super::*;
 use crate::wiring::{LinkBuilder, Wiring};
 
 mod air;
+mod arq;
 mod loss;
 mod random;
 

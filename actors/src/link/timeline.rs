@@ -72,6 +72,7 @@ fn is_plain(params: &LinkParams) -> bool {
         && params.contacts.is_none()
         && !params.store_and_forward
         && params.retries == 0
+        && !params.is_followed()
 }
 
 impl Timeline {
@@ -111,6 +112,11 @@ impl Timeline {
                 span.plain = false;
             }
         }
+    }
+
+    /// Whether messages have to be followed, whatever holds when they are sent.
+    pub(super) fn is_followed(&self) -> bool {
+        self.spans.iter().any(|span| span.params.is_followed())
     }
 
     /// The parameters at `at`.

@@ -265,8 +265,16 @@ impl LinkBuilder {
         }
         self.hosts = wiring.hosts.iter().cloned().collect();
         let mut links = Links::default();
+        let mut known = BTreeMap::new();
+        for ((_, from), (_, to)) in wiring.links() {
+            let resolved = self.resolve(from, to);
+            let resolved = (resolved.timeline.clone(), resolved.base.clone());
+            known.insert((from, to), resolved);
+        }
         for (from, to) in wiring.links() {
-            let nominal = self.connect(sim, from, to);
+            let (timeline, nominal) = known[&(from.1, to.1)].clone();
+            let back = known.get(&(to.1, from.1)).map(|(back, _)| back);
+            self.connect(sim, (from, to), timeline, back);
             links.add(from.1, to.1, nominal);
         }
         links.processors = self.slowdowns.apply(&wiring.processors)?;
@@ -277,34 +285,37 @@ impl LinkBuilder {
         Ok(links)
     }
 
-    /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations.
-    /// A link through a radio is declared with it, by [`LinkBuilder::finish`].
+    /// Declares the link `{from}-{to}`, and its changes; `back` is what the link back has, if there
+    /// is one. A link through a radio is declared with it, by [`LinkBuilder::finish`].
     fn connect(
         &mut self,
         sim: &mut Simulation,
-        (from_host, from): (HostId, &str),
-        (to_host, to): (HostId, &str),
-    ) -> Arc<LinkParams> {
+        ((from_host, from), (to_host, to)): ((HostId, &str), (HostId, &str)),
+        timeline: Arc<Timeline>,
+        back: Option<&Arc<Timeline>>,
+    ) {
         let name = format!("{from}-{to}");
-        let known = self.resolve(from, to);
-        let (timeline, nominal) = (known.timeline.clone(), known.base.clone());
         let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
             changes.push((at, LinkChange::planned(before.1, params)));
         }
         changes.extend(timeline.contact_changes(self.until));
         let Some(wanted) = timeline.at(SimTime::ZERO).radio.clone() else {
-            let id = sim.link(from_host, to_host, &name, Link::new(timeline));
+            let link = Link::new(timeline);
+            let link = match back {
+                Some(back) => link.answered_over(back.clone()),
+                None => link,
+            };
+            let id = sim.link(from_host, to_host, &name, link);
             for (at, change) in changes {
                 sim.change_at(at, id, change);
             }
-            return nominal;
+            return;
         };
         match self.radios.iter_mut().find(|radio| radio.name() == wanted) {
             Some(radio) => radio.join(&name, (from_host, to_host), timeline, changes),
             None => self.no_such_radio(&name, &wanted),
         }
-        nominal
     }
 
     /// What the links declared so far are told that has no effect.

@@ -287,7 +287,12 @@ impl Parts {
                 };
                 (Class::Held, self.index, after, Some(side))
             }
-            Verdict::Park { latest, token } => {
+            Verdict::Park {
+                latest,
+                token,
+                copy,
+            } => {
+                head.copy = copy.unwrap_or(head.copy);
                 let side = Side {
                     scheduled_by,
                     token,

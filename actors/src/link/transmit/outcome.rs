@@ -59,6 +59,11 @@ pub struct Attempt {
 }
 
 impl Attempt {
+    /// How long the message is on its way if nothing else happens, and an answer too.
+    pub(in crate::link) fn way(&self) -> SimDuration {
+        self.answer
+    }
+
     /// When the sender has an answer, if it waits for one: the answer takes the propagation back,
     /// has no jitter, and is never lost.
     pub fn answered(&self) -> SimTime {

@@ -1,0 +1,602 @@
+//! Messages that are followed while they are under way: in fragments, several at a time, each
+//! acknowledged or sent again.
+//!
+//! A link without these keys decides all of a message when it is sent. Where a later message may be
+//! transmitted before an earlier one is repeated, that cannot be: each transmission is then decided
+//! when it begins, and in between the messages are parked ([`Verdicts::park`]). A message costs as
+//! many events as it has transmissions, and two more, however many wait.
+//!
+//! The sender transmits, as soon as the transmitter is free: what is due to be sent again, first due
+//! first; else the next fragment of the message that it has begun; else the next message of the line.
+//! New ones need room in the window: less than `window` sequence numbers from the first on that is
+//! neither acknowledged nor given up. Nobody's timer ends while the answer is on its way.
+
+mod ack;
+mod table;
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::sync::Arc;
+
+use farside::carrier::{Carriage, Parcel, Verdicts};
+use farside::{SimDuration, SimTime};
+
+use super::stage::Draws;
+use super::transmit::{Attempt, Path, Transmitter};
+use super::{DUPLICATE, EXPIRED, QUEUE_FULL, Timeline};
+use ack::{Acks, Answer};
+use table::{Message, Table};
+
+/// A message, or a fragment of one, that may have to be sent again.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    message: u32,
+    fragment: u32,
+    attempts: u32,
+    /// Whether the receiver has it.
+    arrived: bool,
+    /// When the sender is done with it, once that is known.
+    closed: Option<SimTime>,
+}
+
+/// A message's place in the order in which messages were begun.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    message: u32,
+    /// When it need not be waited for any more, once that is known.
+    ready: Option<SimTime>,
+    /// Whether nothing arrives.
+    lost: bool,
+}
+
+/// Both ends of a link whose messages are followed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pipeline {
+    messages: Table,
+    /// Messages that are not begun, as they came; those that have gone meanwhile too.
+    line: VecDeque<u32>,
+    /// What waits in it.
+    waiting: u64,
+    waiting_bytes: u64,
+    /// The message that is begun and has fragments that are not.
+    current: Option<u32>,
+    /// Frames by sequence number, from `base` on.
+    frames: VecDeque<Frame>,
+    base: u64,
+    /// When which frames are sent again, unless they are closed by then.
+    due: BinaryHeap<Reverse<(SimTime, u64)>>,
+    /// Frames that are due and wait for the transmitter.
+    urgent: VecDeque<u64>,
+    /// Messages that were begun and have not been let out, in order.
+    order: VecDeque<Place>,
+    order_base: u64,
+    /// The latest arrival that was let out in order.
+    let_out: SimTime,
+    acks: Acks,
+}
+
+/// What is to be transmitted next.
+#[derive(Clone, Copy, Debug)]
+enum Turn {
+    Again(u64),
+    New(u32),
+}
+
+/// One look at one message.
+struct Look<'a, 'p> {
+    parcel: &'a Parcel<'p>,
+    at: u32,
+    now: SimTime,
+    /// Nothing arrives sooner from now.
+    least: SimDuration,
+    verdicts: &'a mut Verdicts,
+}
+
+impl Pipeline {
+    /// What follows the messages of a link whose answers come back over a link with this timeline.
+    pub(super) fn new(back: Option<Arc<Timeline>>) -> Self {
+        Pipeline {
+            acks: Acks::new(back),
+            ..Pipeline::default()
+        }
+    }
+
+    /// Decides what becomes of a message now.
+    pub(super) fn carry(&mut self, tx: &mut Transmitter, parcel: &Parcel<'_>, out: &mut Verdicts) {
+        let now = parcel.now();
+        let least = tx.min_delay();
+        let look = |at, verdicts| Look {
+            parcel,
+            at,
+            now,
+            least,
+            verdicts,
+        };
+        self.slide(now);
+        if let Some(token) = parcel.token() {
+            return self.look(tx, look(token as u32, out));
+        }
+        let copies = tx.copies(parcel);
+        for copy in 0..copies {
+            let Some(at) = self.accept(tx, parcel, (copy, copies)) else {
+                let carriage = Carriage {
+                    queue: now.since(parcel.sent()),
+                    ..Carriage::default()
+                };
+                out.lose_as(SimDuration::ZERO, QUEUE_FULL, carriage);
+                continue;
+            };
+            if copies > 1 {
+                // Each in a look of its own: one copy may get several verdicts.
+                out.park(None, u64::from(at));
+                continue;
+            }
+            return self.look(tx, look(at, out));
+        }
+        for at in self.line.iter().rev().take(copies as usize) {
+            out.wake(SimDuration::ZERO, u64::from(*at));
+        }
+    }
+
+    /// Takes one copy of a message into the line, if there is room.
+    fn accept(
+        &mut self,
+        tx: &Transmitter,
+        parcel: &Parcel<'_>,
+        (copy, copies): (u32, u32),
+    ) -> Option<u32> {
+        let now = parcel.now();
+        let params = tx.timeline().at(now);
+        let mut message = Message::new(params, parcel, (copy, copies));
+        message.expires = tx.expires(parcel);
+        let bytes = message.bytes.saturating_add(params.overhead);
+        let idle = self.waiting == 0 && tx.free_at() <= now && self.next().is_none();
+        let begins = || {
+            let piece = message.piece(0);
+            let opening = tx.opening_for(parcel, piece, now, &Path::default());
+            self.frames.len() < params.window as usize && opening.is_ok_and(|at| at <= now)
+        };
+        if !(idle && begins())
+            && let Some(limit) = params.queue
+            && !limit.allows(self.waiting + 1, self.waiting_bytes.saturating_add(bytes))
+        {
+            return None;
+        }
+        message.waiting_bytes = bytes;
+        self.waiting += 1;
+        self.waiting_bytes = self.waiting_bytes.saturating_add(bytes);
+        let at = self.messages.put(message);
+        self.line.push_back(at);
+        Some(at)
+    }
+
+    /// Forgets frames that the sender is done with, from the first on, and finds those that are due.
+    fn slide(&mut self, now: SimTime) {
+        while let Some(frame) = self.frames.front()
+            && frame.closed.is_some_and(|closed| closed <= now)
+        {
+            self.frames.pop_front();
+            self.base += 1;
+        }
+        while let Some(Reverse((at, number))) = self.due.peek().copied()
+            && (at <= now || self.is_closed(number))
+        {
+            self.due.pop();
+            if !self.is_closed(number) {
+                self.urgent.push_back(number);
+            }
+        }
+        while let Some(number) = self.urgent.front()
+            && self.is_closed(*number)
+        {
+            self.urgent.pop_front();
+        }
+    }
+
+    fn frame(&mut self, number: u64) -> &mut Frame {
+        &mut self.frames[(number - self.base) as usize]
+    }
+
+    fn is_closed(&self, number: u64) -> bool {
+        let at = number.checked_sub(self.base);
+        let frame = at.and_then(|at| self.frames.get(at as usize));
+        frame.is_none_or(|frame| frame.closed.is_some())
+    }
+
+    /// What comes next, and when there is room for it in the window, if that is known.
+    fn next(&self) -> Option<Turn> {
+        if let Some(number) = self.urgent.iter().find(|number| !self.is_closed(**number)) {
+            return Some(Turn::Again(*number));
+        }
+        let new = self.current.or_else(|| {
+            let mut line = self.line.iter().copied();
+            line.find(|at| !self.messages[*at].gone)
+        });
+        new.map(Turn::New)
+    }
+
+    /// Whose turn is next, and from when on, as far as is known.
+    fn turn(&self, tx: &Transmitter, now: SimTime) -> Option<(u32, SimTime)> {
+        let (at, room) = match self.next()? {
+            Turn::Again(number) => (self.frames[(number - self.base) as usize].message, now),
+            Turn::New(at) => (at, self.room(tx, now)?),
+        };
+        let from = room.max(tx.free_at()).max(self.messages[at].not_before);
+        Some((at, from))
+    }
+
+    /// From when on there is room in the window, if that is known.
+    fn room(&self, tx: &Transmitter, now: SimTime) -> Option<SimTime> {
+        let window = tx.timeline().at(now).window as usize;
+        match self.frames.front() {
+            Some(first) if self.frames.len() >= window => first.closed,
+            _ => Some(now),
+        }
+    }
+
+    /// Does what there is to do for one message, and says what becomes of it.
+    fn look(&mut self, tx: &mut Transmitter, mut look: Look<'_, '_>) {
+        let mut stays = !self.let_out_if_ready(&mut look) && !self.expire(&mut look);
+        // What is kept of a message that was let out is looked at for itself.
+        while stays && tx.free_at() <= look.now && !self.messages[look.at].is_another() {
+            match self.turn(tx, look.now) {
+                Some((at, from)) if at == look.at && from <= look.now => {}
+                _ => break,
+            }
+            stays = self.transmit(tx, &mut look);
+            self.slide(look.now);
+        }
+        let own = self.arrange(tx, &mut look, stays);
+        if stays {
+            let message = &self.messages[look.at];
+            let expires = message.expires.filter(|_| !message.is_settled());
+            let latest = own.into_iter().chain(expires).min();
+            let latest = latest.map(|at| at.since(look.now));
+            match self.messages[look.at].take_another() {
+                Some(copy) => look.verdicts.park_another(latest, u64::from(look.at), copy),
+                None => look.verdicts.park(latest, u64::from(look.at)),
+            }
+        }
+    }
+
+    /// Sees to it that whoever is next, and whoever is due next, is looked at then. When that is the
+    /// message in hand, says when.
+    fn arrange(
+        &mut self,
+        tx: &Transmitter,
+        look: &mut Look<'_, '_>,
+        stays: bool,
+    ) -> Option<SimTime> {
+        self.slide(look.now);
+        while let Some(first) = self.line.front().copied()
+            && self.messages[first].gone
+        {
+            self.line.pop_front();
+            self.messages.free(first);
+        }
+        let turn = self.turn(tx, look.now);
+        let due = self.due.peek().map(|Reverse((at, number))| {
+            let frame = &self.frames[(number - self.base) as usize];
+            (frame.message, *at)
+        });
+        let mut own = None;
+        for (at, when) in [turn, due].into_iter().flatten() {
+            let when = when.max(look.now);
+            if at == look.at && stays {
+                own = Some(own.map_or(when, |own: SimTime| own.min(when)));
+            } else {
+                look.verdicts.wake(when.since(look.now), u64::from(at));
+            }
+        }
+        own
+    }
+
+    /// Drops the message in hand if it has waited for too long; true if it is done with.
+    fn expire(&mut self, look: &mut Look<'_, '_>) -> bool {
+        let message = &self.messages[look.at];
+        let expired = message.expires.is_some_and(|at| at <= look.now);
+        if !expired || message.is_settled() {
+            return false;
+        }
+        self.drop_frames(look.at, look.now);
+        let message = &mut self.messages[look.at];
+        if message.missing == 0 && !message.told {
+            // It has arrived, and waits for its turn there.
+            return false;
+        }
+        let reason = if message.told { DUPLICATE } else { EXPIRED };
+        let carriage = message.carriage_until(look.now);
+        let known = look.now + message.propagation;
+        self.lose(look, reason, look.now, known, carriage);
+        true
+    }
+
+    /// Closes all frames of a message that are still to be sent again.
+    fn drop_frames(&mut self, at: u32, now: SimTime) {
+        let message = &mut self.messages[at];
+        message.open = 0;
+        let (first, begun) = (message.first_frame, u64::from(message.begun));
+        if self.current == Some(at) {
+            self.current = None;
+        }
+        for number in first.max(self.base)..(first + begun).max(self.base) {
+            let index = (number - self.base) as usize;
+            if let Some(frame) = self.frames.get_mut(index)
+                && frame.message == at
+            {
+                frame.closed.get_or_insert(now);
+            }
+        }
+    }
+
+    /// Ends a message: lost at `at`, and not waited for any more after `known`.
+    fn lose(
+        &mut self,
+        look: &mut Look<'_, '_>,
+        reason: &'static str,
+        at: SimTime,
+        known: SimTime,
+        carriage: Carriage,
+    ) {
+        look.verdicts.lose_as(at.since(look.now), reason, carriage);
+        let message = self.messages[look.at];
+        if !message.told {
+            // What of it arrived was received in vain.
+            look.verdicts.charge_receiver(message.receive_j);
+        }
+        if self.current == Some(look.at) {
+            self.current = None;
+        }
+        if message.begun == 0 {
+            self.leave_line(look.at);
+            self.messages[look.at].gone = true;
+            return;
+        }
+        if let Some(place) = message.place {
+            self.settle(place, known, true, look);
+        }
+        self.messages.free(look.at);
+    }
+
+    fn leave_line(&mut self, at: u32) {
+        self.waiting -= 1;
+        self.waiting_bytes -= self.messages[at].waiting_bytes;
+    }
+}
+
+impl Pipeline {
+    /// Transmits the next piece of the message in hand; false if the message is done with.
+    fn transmit(&mut self, tx: &mut Transmitter, look: &mut Look<'_, '_>) -> bool {
+        let Some(turn) = self.next() else {
+            return true;
+        };
+        let message = &self.messages[look.at];
+        let (fragment, attempts) = match turn {
+            Turn::Again(number) => {
+                let frame = &self.frames[(number - self.base) as usize];
+                (frame.fragment, frame.attempts)
+            }
+            Turn::New(_) => (message.begun, 0),
+        };
+        let piece = message.piece(fragment);
+        let path = Path::default();
+        match tx.opening_for(look.parcel, piece, look.now, &path) {
+            Ok(open) if open > look.now => {
+                self.messages[look.at].not_before = open;
+                return true;
+            }
+            Ok(_) => {}
+            Err(reason) => {
+                self.drop_frames(look.at, look.now);
+                let message = &self.messages[look.at];
+                let carriage = message.carriage_until(look.now);
+                if message.missing == 0 && !message.told {
+                    return true;
+                }
+                let reason = if message.told { DUPLICATE } else { reason };
+                let known = look.now + message.propagation;
+                self.lose(look, reason, look.now, known, carriage);
+                return false;
+            }
+        }
+        let draws = Draws {
+            attempt: attempts,
+            copy: message.copy,
+            fragment,
+        };
+        let attempt = tx.attempt_piece(look.parcel, draws, piece, look.now, &path);
+        tx.busy_until(attempt.end);
+        self.messages[look.at].transmitted(&attempt);
+        look.verdicts.charge(attempt.energy_j);
+        let params = tx.timeline().at(look.now);
+        let ordered = params.fifo;
+        if params.retries == 0 {
+            self.begin(look.at, ordered);
+            return self.sent_once(look, &attempt);
+        }
+        let last = attempts >= params.retries;
+        let answer = self.acks.answer(tx, look.parcel, draws, &attempt);
+        let number = match turn {
+            Turn::Again(number) => {
+                while self.urgent.pop_front().is_some_and(|first| first != number) {}
+                number
+            }
+            Turn::New(at) => {
+                self.begin(at, ordered);
+                self.frames.push_back(Frame {
+                    message: at,
+                    fragment,
+                    attempts: 0,
+                    arrived: false,
+                    closed: None,
+                });
+                self.messages[at].open += 1;
+                self.base + self.frames.len() as u64 - 1
+            }
+        };
+        self.answered(look, number, &attempt, &answer, last)
+    }
+
+    /// Takes note that one more piece of a message is begun.
+    fn begin(&mut self, at: u32, ordered: bool) {
+        if self.messages[at].begun == 0 {
+            self.leave_line(at);
+            let first = self.line.pop_front();
+            debug_assert_eq!(first, Some(at), "those that went are forgotten before");
+            let place = self.order_base + self.order.len() as u64;
+            let message = &mut self.messages[at];
+            message.first_frame = self.base + self.frames.len() as u64;
+            if ordered {
+                message.place = Some(place);
+                self.order.push_back(Place {
+                    message: at,
+                    ready: None,
+                    lost: false,
+                });
+            }
+        }
+        let message = &mut self.messages[at];
+        message.begun += 1;
+        let more = message.begun < message.fragments;
+        self.current = more.then_some(at);
+    }
+
+    /// What becomes of a message whose pieces nobody acknowledges.
+    fn sent_once(&mut self, look: &mut Look<'_, '_>, attempt: &Attempt) -> bool {
+        let message = &mut self.messages[look.at];
+        match attempt.failed {
+            None => message.arrived(attempt),
+            Some(reason) => {
+                message.failed.get_or_insert(reason);
+            }
+        }
+        message.arrival = message.arrival.max(attempt.at);
+        if message.begun < message.fragments {
+            return true;
+        }
+        let Some(reason) = message.failed else {
+            return self.complete(look);
+        };
+        // Before the last is there, nobody knows.
+        let at = message.arrival;
+        let carriage = message.carriage(at);
+        self.lose(look, reason, at, at.max(attempt.at), carriage);
+        false
+    }
+
+    /// What becomes of a message when one of its pieces was transmitted and perhaps acknowledged.
+    fn answered(
+        &mut self,
+        look: &mut Look<'_, '_>,
+        number: u64,
+        attempt: &Attempt,
+        answer: &Answer,
+        last: bool,
+    ) -> bool {
+        let frame = self.frame(number);
+        frame.attempts += 1;
+        let is_new = attempt.failed.is_none() && !frame.arrived;
+        frame.arrived |= is_new;
+        let arrived = frame.arrived;
+        frame.closed = match answer.at {
+            Some(at) => Some(at),
+            None => last.then_some(answer.given_up),
+        };
+        let closed = frame.closed.is_some();
+        if !closed {
+            self.due.push(Reverse((answer.given_up, number)));
+        }
+        let message = &mut self.messages[look.at];
+        message.open -= u32::from(closed);
+        message.energy_j += answer.energy_j;
+        look.verdicts.charge(answer.energy_j);
+        if attempt.failed.is_none() {
+            let receive_j = attempt.receive_j + answer.receive_j;
+            match message.told {
+                true => look.verdicts.charge_receiver(receive_j),
+                false => message.receive_j += receive_j,
+            }
+        }
+        if is_new {
+            message.arrived(attempt);
+            message.arrival = message.arrival.max(attempt.at);
+        }
+        if closed && !arrived {
+            let reason = attempt.failed.unwrap_or(DUPLICATE);
+            self.drop_frames(look.at, look.now);
+            let carriage = self.messages[look.at].carriage(attempt.at);
+            // The receiver learns it as it would learn anything.
+            let known = answer.given_up + answer.way;
+            self.lose(look, reason, attempt.at, known, carriage);
+            return false;
+        }
+        let message = &self.messages[look.at];
+        if is_new && message.missing == 0 {
+            return self.complete(look);
+        }
+        if message.told && message.open == 0 {
+            let carriage = message.carriage(attempt.at);
+            self.lose(look, DUPLICATE, attempt.at, attempt.at, carriage);
+            return false;
+        }
+        true
+    }
+
+    /// All of the message in hand has arrived, or will have: it is let out, now or in its turn.
+    /// False if it is done with.
+    fn complete(&mut self, look: &mut Look<'_, '_>) -> bool {
+        let message = &self.messages[look.at];
+        let arrival = message.arrival;
+        match message.place {
+            None => self.messages[look.at].let_out = Some(arrival),
+            Some(place) => self.settle(place, arrival, false, look),
+        }
+        !self.let_out_if_ready(look)
+    }
+
+    /// Nobody waits for the message at this place any more after `ready`: lets out all that can be.
+    fn settle(&mut self, place: u64, ready: SimTime, lost: bool, look: &mut Look<'_, '_>) {
+        let Some(index) = place.checked_sub(self.order_base) else {
+            return;
+        };
+        let Some(entry) = self.order.get_mut(index as usize) else {
+            return;
+        };
+        (entry.ready, entry.lost) = (Some(ready), lost);
+        while let Some(first) = self.order.front().copied()
+            && let Some(ready) = first.ready
+        {
+            self.order.pop_front();
+            self.order_base += 1;
+            self.let_out = self.let_out.max(ready);
+            if first.lost {
+                continue;
+            }
+            self.messages[first.message].let_out = Some(self.let_out);
+            self.messages[first.message].place = None;
+            if first.message != look.at {
+                look.verdicts
+                    .wake(SimDuration::ZERO, u64::from(first.message));
+            }
+        }
+    }
+
+    /// Delivers the message in hand if it may be; true if it is done with.
+    fn let_out_if_ready(&mut self, look: &mut Look<'_, '_>) -> bool {
+        let message = &mut self.messages[look.at];
+        let Some(at) = message.let_out.filter(|_| !message.told) else {
+            return false;
+        };
+        // That nothing is waited for any more, the receiver learns as it would learn anything.
+        let at = at.max(look.now + look.least);
+        let mut carriage = message.carriage(at);
+        carriage.receive_j = message.receive_j;
+        look.verdicts.deliver_as(at.since(look.now), carriage);
+        if message.open == 0 {
+            self.messages.free(look.at);
+            return true;
+        }
+        message.keep();
+        false
+    }
+}
