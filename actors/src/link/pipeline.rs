@@ -23,7 +23,7 @@ use farside::{SimDuration, SimTime};
 
 use super::stage::Draws;
 use super::transmit::{Attempt, Path, Transmitter};
-use super::{DUPLICATE, EXPIRED, QUEUE_FULL, Timeline};
+use super::{DUPLICATE, EXPIRED, LinkParams, QUEUE_FULL, Timeline};
 use ack::{Acks, Answer};
 use table::{Message, Table};
 
@@ -72,6 +72,8 @@ pub(super) struct Pipeline {
     order_base: u64,
     /// The latest arrival that was let out in order.
     let_out: SimTime,
+    /// Messages that are let out in this instant, in order, until they have been looked at.
+    leaving: VecDeque<u32>,
     acks: Acks,
 }
 
@@ -250,7 +252,8 @@ impl Pipeline {
         if stays {
             let message = &self.messages[look.at];
             let expires = message.expires.filter(|_| !message.is_settled());
-            let latest = own.into_iter().chain(expires).min();
+            let leaves = message.let_out.filter(|_| !message.told).map(|_| look.now);
+            let latest = own.into_iter().chain(expires).chain(leaves).min();
             let latest = latest.map(|at| at.since(look.now));
             match self.messages[look.at].take_another() {
                 Some(copy) => look.verdicts.park_another(latest, u64::from(look.at), copy),
@@ -408,13 +411,14 @@ impl Pipeline {
         tx.busy_until(attempt.end);
         self.messages[look.at].transmitted(&attempt);
         look.verdicts.charge(attempt.energy_j);
-        let params = tx.timeline().at(look.now);
-        let ordered = params.fifo;
-        if params.retries == 0 {
-            self.begin(look.at, ordered);
+        if let Turn::New(at) = turn {
+            self.begin(at, tx.timeline().at(look.now));
+        }
+        let retries = self.messages[look.at].retries;
+        if retries == 0 {
             return self.sent_once(look, &attempt);
         }
-        let last = attempts >= params.retries;
+        let last = attempts >= retries;
         let answer = self.acks.answer(tx, look.parcel, draws, &attempt);
         let number = match turn {
             Turn::Again(number) => {
@@ -422,7 +426,6 @@ impl Pipeline {
                 number
             }
             Turn::New(at) => {
-                self.begin(at, ordered);
                 self.frames.push_back(Frame {
                     message: at,
                     fragment,
@@ -438,7 +441,7 @@ impl Pipeline {
     }
 
     /// Takes note that one more piece of a message is begun.
-    fn begin(&mut self, at: u32, ordered: bool) {
+    fn begin(&mut self, at: u32, params: &LinkParams) {
         if self.messages[at].begun == 0 {
             self.leave_line(at);
             let first = self.line.pop_front();
@@ -446,7 +449,8 @@ impl Pipeline {
             let place = self.order_base + self.order.len() as u64;
             let message = &mut self.messages[at];
             message.first_frame = self.base + self.frames.len() as u64;
-            if ordered {
+            message.retries = params.retries;
+            if params.fifo {
                 message.place = Some(place);
                 self.order.push_back(Place {
                     message: at,
@@ -548,7 +552,10 @@ impl Pipeline {
         let message = &self.messages[look.at];
         let arrival = message.arrival;
         match message.place {
-            None => self.messages[look.at].let_out = Some(arrival),
+            None => {
+                self.messages[look.at].let_out = Some(arrival);
+                self.leaving.push_front(look.at);
+            }
             Some(place) => self.settle(place, arrival, false, look),
         }
         !self.let_out_if_ready(look)
@@ -574,6 +581,7 @@ impl Pipeline {
             }
             self.messages[first.message].let_out = Some(self.let_out);
             self.messages[first.message].place = None;
+            self.leaving.push_back(first.message);
             if first.message != look.at {
                 look.verdicts
                     .wake(SimDuration::ZERO, u64::from(first.message));
@@ -587,6 +595,14 @@ impl Pipeline {
         let Some(at) = message.let_out.filter(|_| !message.told) else {
             return false;
         };
+        if self
+            .leaving
+            .pop_front_if(|first| *first == look.at)
+            .is_none()
+        {
+            // Those before it are looked at in this same instant.
+            return false;
+        }
         // That nothing is waited for any more, the receiver learns as it would learn anything.
         let at = at.max(look.now + look.least);
         let mut carriage = message.carriage(at);

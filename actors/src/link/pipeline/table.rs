@@ -28,6 +28,8 @@ pub(super) struct Message {
     pub(super) missing: u32,
     /// How many were begun and may still be transmitted again.
     pub(super) open: u32,
+    /// How often each is sent again, by what held when the first was transmitted.
+    pub(super) retries: u32,
     /// The sequence number of the first of them.
     pub(super) first_frame: u64,
     pub(super) expires: Option<SimTime>,
@@ -87,6 +89,7 @@ impl Message {
             begun: 0,
             missing: fragments,
             open: 0,
+            retries: 0,
             first_frame: 0,
             expires: None,
             not_before: SimTime::ZERO,

@@ -52,3 +52,209 @@ fn answers_wait_for_each_other() {
     let start = ms(55 + 30 + 45) + ms(30) * (count as u64 - 51);
     assert_eq!(last_arrival(&seen), start + ms(55));
 }
+
+/// What the brute-force oracle is given: all times in slots of 10 ms, one transmission each.
+#[derive(Clone, Debug)]
+struct Slotted {
+    window: usize,
+    latency: usize,
+    retries: usize,
+    in_order: bool,
+    /// When each message is sent.
+    sent: Vec<usize>,
+    /// In which slots transmissions are lost, and from which on answers.
+    bad: Vec<bool>,
+    bad_back: Vec<bool>,
+}
+
+/// What becomes of a message in it: the slot of its arrival or none, and its transmissions.
+#[derive(Clone, Debug, PartialEq)]
+struct Became {
+    arrives: Option<usize>,
+    attempts: usize,
+}
+
+fn slotted() -> impl Strategy<Value = Slotted> {
+    let luck = || proptest::collection::vec(proptest::bool::weighted(0.3), 200);
+    let sent = proptest::collection::vec(0..4usize, 1..40);
+    (
+        1..9usize,
+        0..6usize,
+        1..6usize,
+        any::<bool>(),
+        sent,
+        luck(),
+        luck(),
+    )
+        .prop_map(
+            |(window, latency, retries, in_order, gaps, bad, bad_back)| {
+                let mut at = 0;
+                let sent = gaps.into_iter().map(|gap| {
+                    at += gap;
+                    at
+                });
+                let sent = sent.collect();
+                Slotted {
+                    window,
+                    latency,
+                    retries,
+                    in_order,
+                    sent,
+                    bad,
+                    bad_back,
+                }
+            },
+        )
+}
+
+impl Slotted {
+    /// Goes through all slots, one by one.
+    fn oracle(&self) -> Vec<Became> {
+        struct Sent {
+            attempts: usize,
+            arrived: Option<usize>,
+            done: Option<usize>,
+            due: Option<usize>,
+            lost: bool,
+        }
+        let count = self.sent.len();
+        let is_bad = |luck: &[bool], slot: usize| luck.get(slot).copied().unwrap_or(false);
+        let mut frames: Vec<Sent> = Vec::new();
+        for slot in 0..10_000 {
+            let next = frames.len();
+            let again = (0..next).filter(|&i| frames[i].due.is_some_and(|due| due <= slot));
+            // First due first; of those due at once, the one begun first.
+            let again = again.min_by_key(|&i| (frames[i].due, i));
+            let base = frames
+                .iter()
+                .position(|frame| frame.done.is_none_or(|done| done > slot));
+            let is_open = next - base.unwrap_or(next) < self.window;
+            let at = match again {
+                Some(at) => at,
+                None if next < count && self.sent[next] <= slot && is_open => {
+                    let (attempts, arrived, done, due) = (0, None, None, None);
+                    frames.push(Sent {
+                        attempts,
+                        arrived,
+                        done,
+                        due,
+                        lost: false,
+                    });
+                    next
+                }
+                None => continue,
+            };
+            let frame = &mut frames[at];
+            frame.attempts += 1;
+            frame.due = None;
+            let (arrival, answer) = (slot + 1 + self.latency, slot + 1 + 2 * self.latency);
+            let got_through = !is_bad(&self.bad, slot);
+            if got_through {
+                frame.arrived.get_or_insert(arrival);
+            }
+            if got_through && !is_bad(&self.bad_back, arrival) {
+                frame.done = Some(answer);
+            } else if frame.attempts > self.retries {
+                frame.done = Some(answer);
+                frame.lost = frame.arrived.is_none();
+            } else {
+                frame.due = Some(answer);
+            }
+        }
+        assert_eq!(frames.len(), count);
+        let mut out = 0;
+        let became = frames.iter().map(|frame| {
+            let Some(arrived) = frame.arrived else {
+                out = out.max(frame.done.expect("it is over") + self.latency);
+                return Became {
+                    arrives: None,
+                    attempts: frame.attempts,
+                };
+            };
+            out = out.max(arrived);
+            let arrives = if self.in_order { out } else { arrived };
+            Became {
+                arrives: Some(arrives),
+                attempts: frame.attempts,
+            }
+        });
+        became.collect()
+    }
+
+    fn luck(&self, base: &LinkParams, bad: &[bool]) -> Timeline {
+        let lossy = |is_bad: bool| LinkParams {
+            loss: if is_bad { 1.0 } else { 0.0 },
+            ..base.clone()
+        };
+        let mut timeline = Timeline::new(lossy(bad[0]));
+        for (slot, pair) in bad.windows(2).enumerate() {
+            if pair[0] != pair[1] {
+                let from = SimTime::ZERO + ms(10) * (slot as u64 + 1);
+                timeline = timeline.then(from, lossy(pair[1]));
+            }
+        }
+        timeline.then(SimTime::ZERO + ms(10) * bad.len() as u64, lossy(false))
+    }
+
+    fn link(&self) -> Link {
+        let base = LinkParams {
+            latency: ms(10) * self.latency as u64,
+            rate: Some(80_000),
+            retries: self.retries as u32,
+            window: self.window as u32,
+            // A window of one would be stop and wait, whose answers are never lost.
+            mtu: Some(1 << 20),
+            fifo: self.in_order,
+            tx_power_w: 2.0,
+            ..LinkParams::default()
+        };
+        Link::new(self.luck(&base, &self.bad)).answered_over(self.luck(&base, &self.bad_back))
+    }
+
+    fn sends(&self) -> Vec<Send> {
+        let at = |slot: &usize| SimTime::ZERO + ms(10) * *slot as u64;
+        self.sent
+            .iter()
+            .map(|slot| Send {
+                at: at(slot),
+                pad: 98,
+            })
+            .collect()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn selective_repeat_is_what_an_oracle_says_slot_by_slot(case in slotted()) {
+        let expected = case.oracle();
+        let seen = over(7, &case.sends(), case.link());
+        for (ordinal, expected) in expected.iter().enumerate() {
+            let own: Vec<&Fate> = seen.iter().filter(|f| f.ordinal == ordinal as u64).collect();
+            let arrived: Vec<usize> = own
+                .iter()
+                .filter(|fate| fate.reason.is_empty())
+                .map(|f| ((f.sent + f.delay).as_nanos() / 10_000_000) as usize)
+                .collect();
+            let attempts = own.iter().map(|fate| fate.parts().attempts as usize).sum();
+            // Never twice, whatever becomes of answers.
+            prop_assert!(arrived.len() <= 1, "{:?}", own);
+            let became = Became { arrives: arrived.first().copied(), attempts };
+            prop_assert_eq!(&became, expected, "message {}: {:?}", ordinal, own);
+            let lost = own.iter().filter(|fate| fate.reason == LOSS).count();
+            prop_assert_eq!(lost, usize::from(expected.arrives.is_none()));
+            let kept = own.iter().filter(|fate| fate.reason == DUPLICATE).count();
+            prop_assert_eq!(own.len(), 1 + kept);
+            for fate in own {
+                prop_assert_eq!(fate.parts().total(), fate.delay);
+                // 2 W for 10 ms.
+                let energy_j = 0.02 * f64::from(fate.parts().attempts);
+                prop_assert!((fate.parts().energy_j - energy_j).abs() < 1e-12);
+            }
+        }
+        if case.in_order {
+            prop_assert!(self::arrived(&seen).is_sorted_by_key(|fate| fate.ordinal));
+        }
+    }
+}
