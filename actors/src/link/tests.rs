@@ -16,6 +16,7 @@ use crate::wiring::{LinkBuilder, Wiring};
 mod air;
 mod arq;
 mod loss;
+mod presets;
 mod random;
 
 /// A message of a size to choose.
