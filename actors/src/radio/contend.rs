@@ -8,6 +8,10 @@ use super::channel::Transmission;
 use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
 use crate::link::{Attempt, EXPIRED, QUEUE_FULL, difference};
 
+/// How often a frame asks when its turn may be, before it waits to be woken instead. The first
+/// answers are right where nothing is sent again and nobody else has to be waited for.
+const MAX_LOOKS: u8 = 4;
+
 impl Radio {
     /// Takes the copies of a message into its link's line.
     pub(super) fn accept(&mut self, parcel: &Parcel<'_>, directed: u32, verdicts: &mut Verdicts) {
@@ -74,6 +78,8 @@ impl Radio {
 
     /// Looks at a frame again.
     pub(super) fn resume(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
+        #[cfg(test)]
+        super::LOOKS.with(|looks| looks.set(looks.get() + 1));
         let frame = self.frames[at as usize];
         match frame.phase {
             Phase::InLine => {
@@ -81,9 +87,12 @@ impl Radio {
                 if first == at {
                     self.frames[at as usize].phase = Phase::Contending;
                     self.contend(parcel, at, verdicts);
-                } else {
+                } else if frame.looks < MAX_LOOKS {
                     let next = self.turn_of(at, first, parcel.now());
+                    self.frames[at as usize].looks += 1;
                     self.hold_until(parcel.now(), next, at, verdicts);
+                } else {
+                    verdicts.park(None, u64::from(at));
                 }
             }
             Phase::Contending => self.contend(parcel, at, verdicts),
@@ -128,7 +137,7 @@ impl Radio {
             Err(reason) if reason == EXPIRED || free <= now => {
                 let carriage = self.carriage(parcel, at, now);
                 verdicts.lose_as(SimDuration::ZERO, reason, carriage);
-                return self.done(at);
+                return self.done(at, verdicts);
             }
             Err(_) => Some(free),
             Ok(open) if open > now => Some(open),
@@ -235,7 +244,7 @@ impl Radio {
                 link.free = attempt.answered();
             }
             self.arrive(parcel, at, &attempt, arrival, verdicts);
-            return self.done(at);
+            return self.done(at, verdicts);
         };
         let params = link.transmitter.timeline().at(frame.start);
         if frame.attempts <= params.retries {
@@ -253,7 +262,7 @@ impl Radio {
             attempt.at.since(now)
         };
         verdicts.lose_as(after, reason, carriage);
-        self.done(at);
+        self.done(at, verdicts);
     }
 
     /// What the frame's delay is made of so far.
@@ -298,13 +307,16 @@ impl Radio {
         verdicts.deliver_as(way, carriage);
     }
 
-    /// Forgets a frame that came first in its line.
-    fn done(&mut self, at: u32) {
+    /// Forgets a frame that came first in its line, and wakes the next if it is parked.
+    fn done(&mut self, at: u32, verdicts: &mut Verdicts) {
         let directed = self.frames[at as usize].directed;
         let link = &mut self.directed[directed as usize];
         let first = link.line.pop_front();
         link.line_bytes -= self.frames[at as usize].bytes;
         debug_assert_eq!(first, Some(at), "only the first of a line is sent");
+        if let Some(next) = link.line.front() {
+            verdicts.wake(SimDuration::ZERO, u64::from(*next));
+        }
         self.free.push(at);
     }
 

@@ -512,3 +512,61 @@ proptest! {
         prop_assert!(fates.len() as u64 + inline.counts.in_flight == inline.counts.sent);
     }
 }
+
+/// Before a contact begins so many messages come together, and after it, on a channel that ten
+/// others want too. A message is looked at a number of times that does not hang on how many wait.
+#[test]
+fn a_message_costs_the_same_however_many_wait_for_the_radio() {
+    let contacts = "contacts = [{ start = '1000s', end = '9000s' }]\nstore_and_forward = true";
+    let contacts: LinkOverrides = toml::from_str(contacts).unwrap();
+    let cases = [
+        ("access = 'scheduled'", true),
+        ("access = 'csma'\nslot = '5ms'", true),
+        ("access = 'csma'\nslot = '5ms'", false),
+    ];
+    for (radio, waits_for_contact) in cases {
+        for count in [500u32, 4_000] {
+            let mut team = Team::new(radio, ring(10));
+            team.link = LinkParams {
+                queue: Some(QueueLimit::Messages(1 << 40)),
+                retries: 3,
+                ..team.link
+            };
+            if waits_for_contact {
+                team.link = team.link.with(&contacts);
+            }
+            team.mean_s = match waits_for_contact {
+                true => 1000.0 * 10.0 / f64::from(count),
+                // Twice as many as the channel carries.
+                false => 10.0 * 0.010 / 2.0,
+            };
+            team.until_s = match waits_for_contact {
+                true => 1000 + u64::from(count) / 10,
+                false => u64::from(count) / 200,
+            };
+            LOOKS.with(|looks| looks.set(0));
+            let (report, fates, _) = team.run(Executor::Inline);
+            let looks = LOOKS.with(std::cell::Cell::get) as f64;
+            let arrived = fates.iter().filter(|fate| fate.reason.is_empty()).count();
+            assert!(arrived > count as usize / 4, "{radio}: {arrived}");
+            let each = looks / report.counts.sent as f64;
+            assert!(
+                each < 16.0,
+                "{radio}, {count}: {each} looks for each message"
+            );
+        }
+    }
+}
+
+#[test]
+fn who_is_parked_is_woken_in_every_executor() {
+    let mut team = Team::new("access = 'csma'\nslot = '5ms'", ring(5));
+    team.link.queue = Some(QueueLimit::Messages(1000));
+    team.mean_s = 0.030;
+    team.until_s = 20;
+    let (report, ..) = team.run(Executor::Inline);
+    assert!(report.counts.in_flight > 100, "many wait at the end");
+    let (same, ..) = team.run(Executor::Kameo { threads: 2 });
+    assert_eq!(report.digest, same.digest);
+    assert_eq!(report.counts, same.counts);
+}
