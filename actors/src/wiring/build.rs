@@ -13,9 +13,10 @@ use super::processors::Slowdowns;
 use super::{Links, Wiring};
 use crate::link::{
     Contacts, Degrade, Degraded, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams,
-    LinksConfig, Timeline, Trace,
+    LinksConfig, Timeline, Trace, remarks_of_links,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
+use crate::system::settings::Table;
 use farside::suggest::{closest, did_you_mean};
 
 /// Builds links by name from [`LinksConfig`] and [`Degrade`]s, and checks that every pattern
@@ -64,17 +65,19 @@ pub struct LinkBuilder {
 }
 
 /// A degradation of links.
-struct Worse {
+pub(super) struct Worse {
+    /// Its place among `[[degrade]]`.
+    pub(super) number: usize,
     pattern: Pattern,
-    when: Degrade,
-    over: LinkOverrides,
+    pub(super) when: Degrade,
+    pub(super) over: LinkOverrides,
 }
 
 /// The timeline of all links with one base and one set of degradations.
-struct SharedTimeline {
-    base: Arc<LinkParams>,
+pub(super) struct SharedTimeline {
+    pub(super) base: Arc<LinkParams>,
     /// Indices into the degradations.
-    degrades: Vec<usize>,
+    pub(super) degrades: Vec<usize>,
     timeline: Arc<Timeline>,
 }
 
@@ -134,6 +137,7 @@ impl LinkBuilder {
                 return Err(LinkConfigError::ChangesNothing { key });
             }
             builder.degrades.push(Worse {
+                number: index,
                 pattern: Pattern::new(key("links"), pattern)?,
                 when: degrade.clone(),
                 over,
@@ -192,16 +196,20 @@ impl LinkBuilder {
         radios: &BTreeMap<String, RadioConfig>,
     ) -> Result<(), LinkConfigError> {
         for (name, config) in radios {
-            config.check().map_err(|(key, message)| {
-                let keys = key.split('.').map(str::to_owned);
-                LinkConfigError::Value {
-                    key: ["radios".to_owned(), name.clone()]
-                        .into_iter()
-                        .chain(keys)
-                        .collect(),
-                    message,
-                }
+            let wrong = |keys: Vec<String>, message| LinkConfigError::Value {
+                key: ["radios".to_owned(), name.clone()]
+                    .into_iter()
+                    .chain(keys)
+                    .collect(),
+                message,
+            };
+            config.check("").map_err(|error| {
+                let (key, message) = error.into_parts();
+                let (_, below) = key.split_at(1.min(key.len()));
+                wrong(below.to_vec(), message)
             })?;
+            let together = config.check_together();
+            together.map_err(|(key, message)| wrong(vec![key.to_owned()], message))?;
             self.radios.push(RadioBuilder::new(name, config.clone()));
         }
         Ok(())
@@ -278,10 +286,13 @@ impl LinkBuilder {
             links.add(from.1, to.1, nominal);
         }
         links.processors = self.slowdowns.apply(&wiring.processors)?;
+        let back = |(from, to)| known.get(&(to, from)).map(|(back, _)| back);
+        let met = known
+            .iter()
+            .map(|(ends, (timeline, _))| (timeline, back(*ends)));
+        links.remarks = self.remarks(met);
         self.finish(sim, wiring.terrain.as_ref())?;
-        let remarks = self.remarks().into_iter();
-        let remarks = remarks.map(|remark| format!("links: {remark}"));
-        links.remarks = remarks.chain(links.processors.remarks()).collect();
+        links.remarks.extend(links.processors.remarks());
         Ok(links)
     }
 
@@ -318,10 +329,23 @@ impl LinkBuilder {
         }
     }
 
-    /// What the links declared so far are told that has no effect.
-    fn remarks(&self) -> BTreeSet<&'static str> {
-        let params = self.known.iter().flat_map(|known| known.timeline.iter());
-        params.flat_map(|(_, params)| params.remarks()).collect()
+    /// What links, radios and degradations are told that has no effect. Of each link: what it has,
+    /// and what the link back has.
+    fn remarks<'a>(
+        &self,
+        links: impl Iterator<Item = (&'a Arc<Timeline>, Option<&'a Arc<Timeline>>)>,
+    ) -> Vec<String> {
+        // Most links are alike.
+        let mut seen = BTreeSet::new();
+        let links = links
+            .filter(|(timeline, back)| seen.insert((Arc::as_ptr(timeline), back.map(Arc::as_ptr))));
+        let links = links.map(|(timeline, back)| (timeline.as_ref(), back.map(Arc::as_ref)));
+        let mut remarks = remarks_of_links(links);
+        remarks.sort_unstable();
+        let remarks = remarks.into_iter().map(|remark| format!("links: {remark}"));
+        let radios = self.radios.iter().flat_map(RadioBuilder::remarks);
+        let degrades = super::idle::of_degrades(&self.degrades, &self.known);
+        remarks.chain(radios).chain(degrades).collect()
     }
 
     fn no_such_radio(&mut self, link: &str, wanted: &str) {

@@ -43,6 +43,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let Some(name) = &args.name else {
         return list(&sections, registry, &all, args.json);
     };
+    let name = &of_any(name);
     let section = sections.iter().find(|section| section.name == *name);
     let found: Vec<&Entry<'_>> = match section {
         Some(section) => all.iter().filter(|entry| entry.is_in(section)).collect(),
@@ -69,6 +70,35 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     texts.extend(found.iter().map(|entry| entry.text()));
     print(texts.join("\n\n"))?;
     Ok(Exit::Done)
+}
+
+/// The name under which the keys of a table stand that scenarios name themselves, or number: those
+/// of `radios.uhf` are those of `radios.NAME`, those of `links.rover_*` those of `links.default`.
+fn of_any(name: &str) -> String {
+    let stands = |table: &str| match table {
+        "links" => Some("links.default"),
+        "radios" => Some("radios.NAME"),
+        _ => None,
+    };
+    let Some((table, rest)) = name.split_once('.') else {
+        return name.to_owned();
+    };
+    // Patterns and names have no dots, or stand in quotes.
+    let (own, key) = match rest.strip_prefix(['"', '\'']) {
+        Some(quoted) => quoted.split_once(['"', '\'']).unwrap_or((quoted, "")),
+        None => rest.split_once('.').unwrap_or((rest, "")),
+    };
+    let key = key.trim_start_matches('.');
+    let is_number = !own.is_empty() && own.bytes().all(|byte| byte.is_ascii_digit());
+    let table = match stands(table) {
+        Some(stands) => stands,
+        None if is_number => table,
+        None => return name.to_owned(),
+    };
+    match key {
+        "" => table.to_owned(),
+        key => format!("{table}.{key}"),
+    }
 }
 
 fn entries<'a>(sections: &[&'a Section], registry: &'a Registry) -> Vec<Entry<'a>> {
