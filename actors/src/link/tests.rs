@@ -15,6 +15,7 @@ use crate::wiring::{LinkBuilder, Wiring};
 
 mod air;
 mod arq;
+mod fragments;
 mod loss;
 mod presets;
 mod random;

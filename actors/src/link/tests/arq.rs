@@ -258,3 +258,188 @@ proptest! {
         }
     }
 }
+
+/// Sends a number of messages at once, and reads its bill at the end.
+struct Payer {
+    sink: Address<Receiver>,
+    count: usize,
+    bill: Arc<Mutex<[f64; 2]>>,
+}
+
+impl Actor for Payer {
+    type Accepts = (Tick,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for _ in 0..self.count {
+            ctx.send(self.sink, Probe { pad: vec![0; 98] });
+        }
+        ctx.timer(SimDuration::from_secs(10_000), Tick);
+        Ok(())
+    }
+}
+
+impl Handler<Tick> for Payer {
+    fn handle(&mut self, _tick: Tick, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.bill.lock().unwrap()[0] = ctx.transmit_energy_j();
+        Ok(())
+    }
+}
+
+/// Reads its host's bill at the end.
+struct Receiver(Arc<Mutex<[f64; 2]>>);
+
+impl Actor for Receiver {
+    type Accepts = (Probe, Tick);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.timer(SimDuration::from_secs(10_000), Tick);
+        Ok(())
+    }
+}
+
+impl Handler<Probe> for Receiver {
+    fn handle(&mut self, _probe: Probe, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+impl Handler<Tick> for Receiver {
+    fn handle(&mut self, _tick: Tick, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.0.lock().unwrap()[1] = ctx.host_receive_energy_j();
+        Ok(())
+    }
+}
+
+/// What both ends pay for so many messages, and what the run came to.
+fn bill(count: usize, link: Link, executor: Executor) -> ([f64; 2], Vec<Fate>, farside::Report) {
+    let mut sim = Simulation::new(3);
+    let (a, b) = (sim.host("a"), sim.host("b"));
+    sim.heavy(a);
+    sim.heavy(b);
+    let bill = Arc::new(Mutex::new([0.0; 2]));
+    let (payer, receiver) = (bill.clone(), bill.clone());
+    let sink = sim.actor(b, "sink", move |_| Receiver(receiver.clone()));
+    sim.actor(a, "source", move |_| Payer {
+        sink,
+        count,
+        bill: payer.clone(),
+    });
+    sim.link(a, b, "a-b", link);
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    sim.observe(Fates(seen.clone()));
+    let report = sim.run(executor).unwrap();
+    assert_eq!(report.end.name(), "completed", "{}", report.end.detail());
+    let bill = *bill.lock().unwrap();
+    (
+        bill,
+        Arc::into_inner(seen).unwrap().into_inner().unwrap(),
+        report,
+    )
+}
+
+#[test]
+fn energy_is_that_of_all_attempts_and_all_answers() {
+    // 10 ms for a message and 4 ms for an answer; every message arrives, three answers in ten do not.
+    let text = format!(
+        "{LINK}\nwindow = 20\nack = '40B'\nack_loss = 0.3\ntx_power = '2W'\nrx_power = '0.5W'"
+    );
+    let count = 2_000;
+    let (paid, seen, _) = bill(count, Link::new(params(&text)), Executor::Inline);
+    assert_eq!(arrived(&seen).len(), count);
+    let attempts: u32 = seen.iter().map(|fate| fate.parts().attempts).sum();
+    let attempts = f64::from(attempts);
+    let expected = count as f64 / 0.7;
+    assert!(
+        (attempts / expected - 1.0).abs() < 0.03,
+        "{attempts} {expected}"
+    );
+    let told: f64 = seen.iter().map(|fate| fate.parts().energy_j).sum();
+    let sender_j = attempts * 2.0 * 0.010 + count as f64 * 0.5 * 0.004;
+    let receiver_j = attempts * (0.5 * 0.010 + 2.0 * 0.004);
+    assert!((paid[0] - sender_j).abs() < 1e-6, "{paid:?} {sender_j}");
+    assert!((told - sender_j).abs() < 1e-6, "{told} {sender_j}");
+    assert!((paid[1] - receiver_j).abs() < 1e-6, "{paid:?} {receiver_j}");
+}
+
+#[test]
+fn the_kernel_counts_every_copy_once_in_every_executor() {
+    let text = format!(
+        "{LINK}\nwindow = 20\nack = '40B'\nloss = 0.2\nduplicate = 0.1\nin_order = true\nmtu = '30B'"
+    );
+    let run = |executor| bill(500, Link::new(params(&text)), executor);
+    let (paid, seen, report) = run(Executor::Inline);
+    let counts = &report.counts;
+    assert_eq!(counts.sent, 500);
+    assert_eq!(
+        counts.sent + counts.duplicated,
+        counts.delivered + counts.lost + counts.in_flight
+    );
+    assert_eq!(
+        (counts.in_flight, counts.lost),
+        (0, counts.lost_by_reason[DUPLICATE])
+    );
+    assert_eq!(seen.len() as u64, counts.sent + counts.duplicated);
+    let (same_paid, same_seen, same) = run(Executor::Kameo { threads: 2 });
+    assert_eq!(
+        (report.digest, paid, seen),
+        (same.digest, same_paid, same_seen)
+    );
+}
+
+/// Counts hand-overs: the looks at messages that are followed.
+struct HandOvers(Arc<Mutex<u64>>);
+
+impl Observer for HandOvers {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        *self.0.lock().unwrap() += u64::from(record.class == RecordClass::HandOver);
+        Ok(Flow::Continue)
+    }
+}
+
+#[test]
+fn a_message_costs_the_same_however_many_wait() {
+    let texts = [
+        "window = 7",
+        "window = 1\nmtu = '30B'",
+        "window = 7\nmtu = '30B'\nloss = 0.3\nin_order = true",
+        "window = 7\nstore_and_forward = true\n\
+         contacts = { every = '10s', windows = [{ start = '5s', end = '6s' }] }",
+    ];
+    for text in texts {
+        for count in [200, 8_000] {
+            let looks = Arc::new(Mutex::new(0));
+            let seen = run(1, &at_once(count), &["b"], |sim, a, hosts| {
+                sim.link(
+                    a,
+                    hosts[0],
+                    "a-b",
+                    Link::new(params(&format!("{LINK}\n{text}"))),
+                );
+                sim.observe(HandOvers(looks.clone()));
+            });
+            assert_eq!(arrived(&seen).len(), count);
+            let attempts: u32 = seen.iter().map(|fate| fate.parts().attempts).sum();
+            let looks = *looks.lock().unwrap();
+            let most = 3 * u64::from(attempts) + 2 * count as u64;
+            assert!(
+                looks <= most,
+                "{text}, {count}: {looks} looks, {attempts} attempts"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    for (text, expected) in [
+        (
+            "window = 0",
+            "0: expected 1 to 16777216; 1 is stop and wait",
+        ),
+        ("mtu = '0B'", "0B: expected more than that"),
+        ("fifo = true\nin_order = true", "duplicate field"),
+    ] {
+        let error = toml::from_str::<LinkParams>(text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
+}
