@@ -259,3 +259,45 @@ fn list(
     print(lines.join("\n\n"))?;
     Ok(Exit::Done)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_tables_that_scenarios_name_are_found() {
+        let shared = shared_sections();
+        let sections: Vec<&Section> = shared.iter().collect();
+        let registry = Registry::builtin();
+        let all = entries(&sections, &registry);
+        for (asked, found) in [
+            ("radios.uhf.sense_delay", "radios.NAME.sense_delay"),
+            (
+                "radios.uhf.path_loss.exponent",
+                "radios.NAME.path_loss.exponent",
+            ),
+            ("contacts.range", "contacts.range"),
+            ("contacts.file", "contacts.file"),
+            ("links.rover_*-node_*.window", "links.default.window"),
+            ("links.\"a.b-c\".mtu", "links.default.mtu"),
+            ("degrade.3.at", "degrade.at"),
+            ("links.default.ack", "links.default.ack"),
+        ] {
+            let name = of_any(asked);
+            let found_all: Vec<String> = all
+                .iter()
+                .filter(|entry| entry.is_called(&name))
+                .map(Entry::name)
+                .collect();
+            assert_eq!(found_all, [found], "{asked}");
+        }
+        for table in ["radios.uhf", "radios", "contacts", "links.\"a.b\"", "links"] {
+            let name = of_any(table);
+            let is_known = sections.iter().any(|section| section.name == name);
+            assert!(
+                is_known || ["radios", "links"].contains(&table),
+                "{table}: {name}"
+            );
+        }
+    }
+}
