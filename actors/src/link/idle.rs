@@ -264,7 +264,8 @@ fn remarks<'a>(all: &[Told<'a>]) -> Vec<&'static str> {
     rules.map(|rule| rule.says).collect()
 }
 
-/// What several links are told that has no effect: each with what the link back has, if there is one.
+/// What several links are told that has no effect: each with what the link back has, if there is
+/// one.
 pub(crate) fn remarks_of_links<'a>(
     links: impl Iterator<Item = (&'a Timeline, Option<&'a Timeline>)>,
 ) -> Vec<&'static str> {

@@ -31,7 +31,8 @@ macro_rules! parameters {
         ///
         /// ```
         /// use farside_actors::link::LinkParams;
-        /// let params: LinkParams = toml::from_str("latency = '5ms'\njitter = '1ms'\nloss = '2%'")?;
+        /// let text = "latency = '5ms'\njitter = '1ms'\nloss = '2%'";
+        /// let params: LinkParams = toml::from_str(text)?;
         /// assert_eq!(params.loss, 0.02);
         /// assert_eq!(params.min_delay().to_string(), "4ms");
         /// # Ok::<(), toml::de::Error>(())
@@ -214,8 +215,9 @@ parameters! {
     jitter_correlation: f64 = 0.0, key "jitter_correlation", as Fraction, IfOn;
     /// No delay is below this, whatever the jitter. Unless given, it is where the jitter ends.
     least_delay: Option<SimDuration> = None, key "min_delay", as OrOff<Duration>, IfOn;
-    /// Later messages never arrive before earlier ones. It wins over `reorder`. With a `window`, what
-    /// arrives waits at the receiver for what was sent before it, until that is there or given up.
+    /// Later messages never arrive before earlier ones. It wins over `reorder`. With a `window`,
+    /// what arrives waits at the receiver for what was sent before it, until that is there or given
+    /// up.
     fifo: bool = false, key "fifo" or "in_order", as Plain<bool>, IfOn;
     /// The fraction of messages that are lost, each by itself.
     loss: f64 = 0.0, key "loss", as Fraction, Always;
@@ -263,13 +265,14 @@ parameters! {
     /// With `retries`, how many messages or fragments may be under way at once, from the first that
     /// is not acknowledged on: selective repeat. 1 is stop and wait.
     window: u32 = 1, key "window", as WindowSize, IfOn;
-    /// The size of an acknowledgement with its headers: it takes `8 ack / ack_rate` on the way back.
+    /// The size of an acknowledgement with its headers: it takes `8 ack / ack_rate` on the way
+    /// back.
     ack: u64 = 0, key "ack", as DataSize, IfOn;
     /// The bit rate of acknowledgements; that of the link back unless given.
     ack_rate: Option<u64> = None, key "ack_rate", as OrOff<DataRate>, IfOn;
     /// The fraction of acknowledgements that are lost. Unless given, and where there is a `window`,
-    /// an `ack` or an `mtu`, they meet the loss, bursts, bit errors, outages and contacts of the link
-    /// back; else none is lost.
+    /// an `ack` or an `mtu`, they meet the loss, bursts, bit errors, outages and contacts of the
+    /// link back; else none is lost.
     ack_loss: Option<f64> = None, key "ack_loss", as OrOff<Fraction>, IfOn;
     /// How long after a transmission began it is given up. Never below what an answer takes:
     /// the transmission, twice the latency, and the acknowledgement.
@@ -298,8 +301,8 @@ impl LinkParams {
         self.least_way_of_all() + sending
     }
 
-    /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace says
-    /// when to transmit.
+    /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace
+    /// says when to transmit.
     pub(crate) fn fastest_bit_per_s(&self) -> Option<u64> {
         let windows = self.contacts.iter().flat_map(Contacts::windows);
         let fastest = windows
@@ -312,8 +315,8 @@ impl LinkParams {
         rate.filter(|_| self.trace.is_none())
     }
 
-    /// Whether messages have to be followed while they are under way: in fragments, side by side, or
-    /// with answers of their own. Without, all of a message is decided when it is sent.
+    /// Whether messages have to be followed while they are under way: in fragments, side by side,
+    /// or with answers of their own. Without, all of a message is decided when it is sent.
     pub(super) fn is_followed(&self) -> bool {
         self.window > 1 || self.ack > 0 || self.ack_loss.is_some() || self.mtu.is_some()
     }

@@ -6,10 +6,10 @@
 //! when it begins, and in between the messages are parked ([`Verdicts::park`]). A message costs as
 //! many events as it has transmissions, and two more, however many wait.
 //!
-//! The sender transmits, as soon as the transmitter is free: what is due to be sent again, first due
-//! first; else the next fragment of the message that it has begun; else the next message of the line.
-//! New ones need room in the window: less than `window` sequence numbers from the first on that is
-//! neither acknowledged nor given up. Nobody's timer ends while the answer is on its way.
+//! The sender transmits, as soon as the transmitter is free: what is due to be sent again, first
+//! due first; else the next fragment of the message that it has begun; else the next message of the
+//! line. New ones need room in the window: less than `window` sequence numbers from the first on
+//! that is neither acknowledged nor given up. Nobody's timer ends while the answer is on its way.
 
 mod ack;
 mod steps;
@@ -172,7 +172,8 @@ impl Pipeline {
         Some(at)
     }
 
-    /// Forgets frames that the sender is done with, from the first on, and finds those that are due.
+    /// Forgets frames that the sender is done with, from the first on, and finds those that are
+    /// due.
     fn slide(&mut self, now: SimTime) {
         while let Some(frame) = self.frames.front()
             && frame.closed.is_some_and(|closed| closed <= now)
@@ -262,8 +263,8 @@ impl Pipeline {
         }
     }
 
-    /// Sees to it that whoever is next, and whoever is due next, is looked at then. When that is the
-    /// message in hand, says when.
+    /// Sees to it that whoever is next, and whoever is due next, is looked at then. When that is
+    /// the message in hand, says when.
     fn arrange(
         &mut self,
         tx: &Transmitter,

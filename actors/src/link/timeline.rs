@@ -170,8 +170,8 @@ impl Timeline {
         delays(false).or(delays(true)).unwrap_or_default()
     }
 
-    /// The highest bit rate over all parameters \[bit/s\], outages left out as above; none if there is
-    /// no bound.
+    /// The highest bit rate over all parameters \[bit/s\], outages left out as above; none if there
+    /// is no bound.
     pub(super) fn fastest_bit_per_s(&self) -> Option<u64> {
         let rates = self.spans.iter().filter(|span| !span.params.outage);
         let rates = rates.map(|span| span.params.fastest_bit_per_s());

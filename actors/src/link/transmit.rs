@@ -1,8 +1,9 @@
 //! The core of a link: one transmitter, one way, and what becomes of what it sends.
 //!
-//! A [`Transmitter`] knows a [`Timeline`] of parameters and what it was asked to send so far. Ask it
-//! for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something else
-//! decides when the channel is free, for one transmission at a time ([`Transmitter::attempt`]).
+//! A [`Transmitter`] knows a [`Timeline`] of parameters and what it was asked to send so far. Ask
+//! it for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something
+//! else decides when the channel is free, for one transmission at a time
+//! ([`Transmitter::attempt`]).
 
 mod outcome;
 
@@ -28,8 +29,8 @@ pub use outcome::{Attempt, Path, Sent};
 ///
 /// Ask it for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something
 /// else decides when the channel is free and who collides, for one transmission at a time
-/// ([`Transmitter::opening`], [`Transmitter::attempt`], [`Transmitter::in_order`]). What the geometry
-/// adds comes in a [`Path`].
+/// ([`Transmitter::opening`], [`Transmitter::attempt`], [`Transmitter::in_order`]). What the
+/// geometry adds comes in a [`Path`].
 ///
 /// ```
 /// use std::collections::BTreeMap;

@@ -51,8 +51,8 @@ settings! {
     /// A link goes through a radio by `radio = "NAME"` among its own parameters, which go on to
     /// apply: its rate decides how long it is on the air, its retries what happens after a
     /// collision, its queue what waits. A station transmits one message at a time, whatever link it
-    /// is for; a link with retries stops and waits for each answer, and the station's other links go
-    /// on meanwhile.
+    /// is for; a link with retries stops and waits for each answer, and the station's other links
+    /// go on meanwhile.
     ///
     /// ```
     /// use farside_actors::radio::{Access, RadioConfig};
@@ -205,7 +205,7 @@ const RULES: &[Rule] = &[
         idle: |radio, _| !radio.sense_delay.is_zero() && radio.access != Access::Csma,
     },
     Rule {
-        says: "antenna where nothing asks for places: no light_time, range, line_of_sight, path_loss",
+        says: "antenna without light_time, range, line_of_sight or path_loss: no place matters",
         idle: |radio, default| radio.antenna_m != default.antenna_m && !radio.needs_places(),
     },
     Rule {

@@ -8,9 +8,10 @@ use super::channel::Transmission;
 use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
 use crate::link::{Attempt, EXPIRED, QUEUE_FULL, difference};
 
-/// How often a frame asks when its turn may be, before it waits to be woken instead. The first
-/// answers are right where nothing is sent again and nobody else has to be waited for.
-const MAX_LOOKS: u8 = 4;
+/// How often a frame looks whether it is its turn, before it waits to be woken instead. Fewer would
+/// do; what a frame looks at is part of a run's digest, and built-in runs have lines in which one
+/// looks a hundred times.
+const MAX_LOOKS: u8 = u8::MAX;
 
 impl Radio {
     /// Takes the copies of a message into its link's line.
@@ -87,8 +88,7 @@ impl Radio {
                 if first == at {
                     self.frames[at as usize].phase = Phase::Contending;
                     self.contend(parcel, at, verdicts);
-                } else if frame.looks < MAX_LOOKS {
-                    let next = self.turn_of(at, first, parcel.now());
+                } else if let Some(next) = self.turn_of(at, first, parcel.now()) {
                     self.frames[at as usize].looks += 1;
                     self.hold_until(parcel.now(), next, at, verdicts);
                 } else {
@@ -101,9 +101,9 @@ impl Radio {
     }
 
     /// The soonest that a frame can have its turn behind the `first` of its line: when all ahead of
-    /// it have been on the air, as long as nothing changes airtimes; else, when something happens
-    /// to the first.
-    fn turn_of(&self, at: u32, first: u32, now: SimTime) -> SimTime {
+    /// it have been on the air, or airtimes change. Nothing where that tells too little, because
+    /// contacts or a trace decide, or told too little often enough: who is first wakes the next.
+    fn turn_of(&self, at: u32, first: u32, now: SimTime) -> Option<SimTime> {
         let (frame, first) = (&self.frames[at as usize], &self.frames[first as usize]);
         let ahead = match first.phase {
             // It is off the air at `next`.
@@ -112,7 +112,10 @@ impl Radio {
         };
         let transmitter = &self.directed[frame.directed as usize].transmitter;
         let steady_until = transmitter.steady_until(now);
-        (first.next + ahead).min(steady_until.max(first.next))
+        if steady_until <= now || frame.looks >= MAX_LOOKS {
+            return None;
+        }
+        Some((first.next + ahead).min(steady_until.max(first.next)))
     }
 
     fn hold_until(&mut self, now: SimTime, next: SimTime, at: u32, verdicts: &mut Verdicts) {

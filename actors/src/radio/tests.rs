@@ -525,7 +525,7 @@ fn a_message_costs_the_same_however_many_wait_for_the_radio() {
         ("access = 'csma'\nslot = '5ms'", false),
     ];
     for (radio, waits_for_contact) in cases {
-        for count in [500u32, 4_000] {
+        let looks_each = [4_000u32, 16_000].map(|count| {
             let mut team = Team::new(radio, ring(10));
             team.link = LinkParams {
                 queue: Some(QueueLimit::Messages(1 << 40)),
@@ -549,12 +549,15 @@ fn a_message_costs_the_same_however_many_wait_for_the_radio() {
             let looks = LOOKS.with(std::cell::Cell::get) as f64;
             let arrived = fates.iter().filter(|fate| fate.reason.is_empty()).count();
             assert!(arrived > count as usize / 4, "{radio}: {arrived}");
-            let each = looks / report.counts.sent as f64;
-            assert!(
-                each < 16.0,
-                "{radio}, {count}: {each} looks for each message"
-            );
-        }
+            looks / report.counts.sent as f64
+        });
+        // Who comes first in its line may have to ask several times, among ten; who waits behind it
+        // does not.
+        let [few, many] = looks_each;
+        assert!(
+            many < 32.0 && many < 1.5 * few,
+            "{radio}: {few} looks for each message of few, {many} of many"
+        );
     }
 }
 

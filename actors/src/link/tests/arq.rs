@@ -339,7 +339,8 @@ fn bill(count: usize, link: Link, executor: Executor) -> ([f64; 2], Vec<Fate>, f
 
 #[test]
 fn energy_is_that_of_all_attempts_and_all_answers() {
-    // 10 ms for a message and 4 ms for an answer; every message arrives, three answers in ten do not.
+    // 10 ms for a message and 4 ms for an answer; every message arrives, three answers in ten do
+    // not.
     let text = format!(
         "{LINK}\nwindow = 20\nack = '40B'\nack_loss = 0.3\ntx_power = '2W'\nrx_power = '0.5W'"
     );
@@ -364,7 +365,8 @@ fn energy_is_that_of_all_attempts_and_all_answers() {
 #[test]
 fn the_kernel_counts_every_copy_once_in_every_executor() {
     let text = format!(
-        "{LINK}\nwindow = 20\nack = '40B'\nloss = 0.2\nduplicate = 0.1\nin_order = true\nmtu = '30B'"
+        "{LINK}\nwindow = 20\nack = '40B'\nloss = 0.2\nduplicate = 0.1\n\
+         in_order = true\nmtu = '30B'"
     );
     let run = |executor| bill(500, Link::new(params(&text)), executor);
     let (paid, seen, report) = run(Executor::Inline);

@@ -179,7 +179,7 @@ fn who_is_not_answered_sends_all_fragments_and_who_is_stops() {
     // In the second of ten everything is lost.
     let text = |retries| {
         format!(
-            "links.default = {{ rate = '8kbit/s', latency = '1s', mtu = '1kB', retries = {retries} }}\n\
+            "[links.default]\nrate = '8kbit/s'\nlatency = '1s'\nmtu = '1kB'\nretries = {retries}\n\
              [[degrade]]\nat = '1s'\nuntil = '2s'\nlinks = '*'\nloss = 1.0"
         )
     };

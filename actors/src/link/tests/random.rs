@@ -252,7 +252,8 @@ proptest! {
             let own = || seen.iter().filter(|fate| fate.ordinal == ordinal);
             let copies = own().filter(|fate| fate.reason != DUPLICATE).count();
             prop_assert!((1..=2).contains(&copies) && own().count() <= 2 * copies);
-            prop_assert!(own().map(|fate| fate.copy).collect::<BTreeSet<_>>().len() == own().count());
+            let numbers: BTreeSet<u32> = own().map(|fate| fate.copy).collect();
+            prop_assert!(numbers.len() == own().count());
             let kept = own().count() - copies;
             prop_assert!(kept <= own().filter(|fate| fate.reason.is_empty()).count());
         }

@@ -1,4 +1,5 @@
-//! What becomes of a transmission and of a message, and what the world between two antennas adds to it.
+//! What becomes of a transmission and of a message, and what the world between two antennas adds to
+//! it.
 
 use farside::carrier::{Carriage, Verdicts};
 use farside::{SimDuration, SimTime};
