@@ -563,12 +563,16 @@ fn a_message_costs_the_same_however_many_wait_for_the_radio() {
 
 #[test]
 fn who_is_parked_is_woken_in_every_executor() {
+    let contacts = "contacts = [{ start = '5s', end = '900s' }]\nstore_and_forward = true";
     let mut team = Team::new("access = 'csma'\nslot = '5ms'", ring(5));
     team.link.queue = Some(QueueLimit::Messages(1000));
+    team.link = team.link.with(&toml::from_str(contacts).unwrap());
     team.mean_s = 0.030;
     team.until_s = 20;
-    let (report, ..) = team.run(Executor::Inline);
-    assert!(report.counts.in_flight > 100, "many wait at the end");
+    let (report, fates, _) = team.run(Executor::Inline);
+    let counts = &report.counts;
+    assert!(counts.in_flight > 100, "many wait at the end");
+    assert_eq!(counts.sent, fates.len() as u64 + counts.in_flight);
     let (same, ..) = team.run(Executor::Kameo { threads: 2 });
     assert_eq!(report.digest, same.digest);
     assert_eq!(report.counts, same.counts);
