@@ -34,7 +34,8 @@ pub trait Carrier: Send + 'static {
     }
 
     /// Decides the fate of `parcel`: at least one verdict, one for each copy. A copy that was held
-    /// ([`Verdicts::hold`]) is shown again, with its token, and gets one verdict more.
+    /// ([`Verdicts::hold`], [`Verdicts::park`]) is shown again, with its token, and gets at least one
+    /// verdict more.
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
 
     /// Takes a change from a control event.
@@ -107,7 +108,8 @@ impl Parcel<'_> {
         self.sent
     }
 
-    /// What [`Verdicts::hold`] was given, if the link held this copy and now sees it again.
+    /// What [`Verdicts::hold`] or [`Verdicts::park`] was given, if the link held this copy and now
+    /// sees it again.
     pub fn token(&self) -> Option<u64> {
         self.token
     }
@@ -200,8 +202,10 @@ pub struct Carriage {
     /// From the first transmission to the one that got through: failed ones, and the waits for
     /// answers that never came.
     pub retries: SimDuration,
-    /// How often it was transmitted; 0 if it never left.
+    /// How often it was transmitted, or its fragments were, all together; 0 if it never left.
     pub attempts: u32,
+    /// How many fragments it was sent in; 0 if it went as a whole.
+    pub fragments: u32,
     /// What the transmissions took from the sender, in joules. It is charged by
     /// [`Verdicts::charge`]; this says so in the log.
     pub energy_j: f64,
@@ -240,6 +244,9 @@ impl fmt::Display for Carriage {
             let size = SimDuration::from_nanos(self.jitter_ns.unsigned_abs());
             write!(f, "jitter {sign}{size}, ")?;
         }
+        if self.fragments != 0 {
+            write!(f, "{} fragments, ", self.fragments)?;
+        }
         let plural = if self.attempts == 1 { "" } else { "s" };
         write!(f, "{} attempt{plural}", self.attempts)?;
         if self.energy_j != 0.0 {
@@ -256,7 +263,10 @@ impl fmt::Display for Carriage {
 #[derive(Debug, Default)]
 pub struct Verdicts {
     pub(crate) list: Vec<Verdict>,
+    /// Copies that are parked, by token, and how far from now they are shown at the latest.
+    pub(crate) wakes: Vec<(u64, SimDuration)>,
     pub(crate) charge_j: f64,
+    pub(crate) charge_receiver_j: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -273,6 +283,11 @@ pub(crate) enum Verdict {
     Hold {
         after: SimDuration,
         token: u64,
+    },
+    Park {
+        latest: Option<SimDuration>,
+        token: u64,
+        copy: Option<u32>,
     },
 }
 
@@ -309,6 +324,45 @@ impl Verdicts {
             after: delay,
             token,
         });
+    }
+
+    /// One copy waits at the link until [`Verdicts::wake`] is called with `token`, which may happen
+    /// while the link decides about any other message, or until `latest` from now. Then the link is
+    /// shown it again, with `token`. For lines: who is first wakes the next, and nobody has to look
+    /// again and again whether it is their turn.
+    ///
+    /// A copy that is never woken is in flight when the run ends. Two copies that are parked at one
+    /// time have different tokens: a link that mixes them up is at fault.
+    pub fn park(&mut self, latest: Option<SimDuration>, token: u64) {
+        let copy = None;
+        self.list.push(Verdict::Park {
+            latest,
+            token,
+            copy,
+        });
+    }
+
+    /// The same for one copy more, which has the number `copy` from now on: what a sender keeps of a
+    /// message that has arrived, until it knows.
+    pub fn park_another(&mut self, latest: Option<SimDuration>, token: u64, copy: u32) {
+        let copy = Some(copy);
+        self.list.push(Verdict::Park {
+            latest,
+            token,
+            copy,
+        });
+    }
+
+    /// Shows the link a copy that it parked, `delay` from now, unless that comes sooner anyway.
+    /// Without a copy parked under `token` nothing happens.
+    pub fn wake(&mut self, delay: SimDuration, token: u64) {
+        self.wakes.push((token, delay));
+    }
+
+    /// Charges the receiver's host, in joules, one [`Carrier::min_delay`] from now: for what it
+    /// receives and sends besides the delivery of a message, which [`Carriage::receive_j`] charges.
+    pub fn charge_receiver(&mut self, energy_j: f64) {
+        self.charge_receiver_j += energy_j;
     }
 
     /// Charges the sending actor for the transmission, in joules. A shared link's charges reach it

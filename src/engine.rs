@@ -10,6 +10,7 @@ mod remains;
 mod store;
 
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::carrier::{AnyCarrier, SealedChange};
@@ -123,6 +124,25 @@ pub(crate) struct ActorCell {
 pub(crate) struct LinkCell {
     pub(crate) carrier: Box<dyn AnyCarrier>,
     pub(crate) count: u64,
+    /// The messages that it may wake, by token.
+    pub(crate) parked: BTreeMap<u64, Parked>,
+}
+
+/// Where a message waits that its link may wake, and when it is shown at the latest.
+#[derive(Clone, Copy)]
+pub(crate) struct Parked {
+    pub(crate) slot: u32,
+    pub(crate) latest: Option<SimTime>,
+}
+
+impl LinkCell {
+    pub(crate) fn new(carrier: Box<dyn AnyCarrier>) -> Self {
+        LinkCell {
+            carrier,
+            count: 0,
+            parked: BTreeMap::new(),
+        }
+    }
 }
 
 /// What a control event does to one entity.
@@ -221,10 +241,12 @@ impl Engine {
             Class::Charge => {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.topology.place(head.receiver).local as usize;
-                let charge_j = charge.map_or(0.0, |charge| charge.energy_j);
-                self.actors[local].state.charged_j += charge_j;
+                let charge = charge.unwrap_or_default();
+                self.actors[local].state.charged_j += charge.energy_j;
                 let host = self.parts.topology.place(head.receiver).host;
-                self.parts.energy(host).transmit_j += charge_j;
+                let energy = self.parts.energy(host);
+                energy.transmit_j += charge.energy_j;
+                energy.receive_j += charge.receive_j;
                 return Ok(());
             }
             Class::LateLoss => {

@@ -1,62 +1,100 @@
 //! Links: when a message arrives, how often, or why it does not.
 //!
 //! A [`Link`] joins two hosts, one way. What it does with a message is decided by a [`Transmitter`]
-//! from a [`Timeline`] of [`LinkParams`]; which link has which is the affair of [`LinksConfig`], and
-//! when they change, of [`Degrade`]; both are what scenario files hold, and [`LinkBuilder`](crate::wiring::LinkBuilder) turns
-//! them into links.
+//! from a [`Timeline`] of [`LinkParams`]; which link has which is the affair of [`LinksConfig`],
+//! and when they change, of [`Degrade`]; both are what scenario files hold, and
+//! [`LinkBuilder`](crate::wiring::LinkBuilder) turns them into links.
 //!
 //! # What happens to a message
 //!
 //! 1. It arrives at the link. By `duplicate` it is one copy or two, each on its own from here.
 //! 2. It waits until those before it are done with, and, with `store_and_forward`, until the link
-//!    can transmit it as a whole. If more than `queue` would wait, it is lost: `queue_full`.
+//!    can transmit it as a whole. If more than `queue` would wait, it is lost: `queue_full`. If it
+//!    would wait for longer than its `lifetime`: `expired`.
 //! 3. It is transmitted: `8 (L + overhead) / rate`, or at a `trace`'s opportunities. In an `outage`
-//!    or without a contact it is lost before or cut short (`outage`, `no_contact`).
+//!    or without a contact it is lost before or cut short (`outage`, `no_contact`). With an `mtu`,
+//!    a longer one goes in fragments, and all that is said here of a message from here on is true
+//!    of each of them: it waits for a contact by itself, and is lost and repeated by itself. The
+//!    message is there when all are, and lost when one is.
 //! 4. It may be lost when its last bit has left, by `loss` or by a `burst`.
 //! 5. It is on its way for the latency and the jitter, or held back by `reorder`. It may arrive
 //!    `corrupt`.
-//! 6. With `retries`, a sender that has no answer after `timeout` goes back to 3, with new luck;
-//!    those behind it wait. An answer takes the latency and is never lost.
+//! 6. With `retries`, a sender that has no answer after `timeout` goes back to 3, with new luck.
 //!
-//! All this is decided when the message is sent, by what holds at the instant of each step: a message
-//! that is sent now and transmitted in six minutes meets the outage that begins in five.
+//! Without the keys of the next section, all this is decided when the message is sent, by what
+//! holds at the instant of each step: a message that is sent now and transmitted in six minutes
+//! meets the outage that begins in five.
+//!
+//! # Who waits for whom
+//!
+//! By default `retries` are stop and wait: those behind a message wait until it is answered or
+//! given up. An answer takes the latency, no airtime, and is never lost. A link carries one message
+//! each `T + 2 latency`, where T is what a transmission takes.
+//!
+//! With a `window` of W, W messages or fragments may be under way, counted from the first on that
+//! is neither answered nor given up: selective repeat, which carries `min(1 / T, W / (T + 2
+//! latency))` where nothing is lost. What is due again goes before what is new. `in_order`, which
+//! is `fifo`, lets nothing out at the receiver before what was sent earlier.
+//!
+//! Where there is a `window`, an `ack` or an `mtu`, answers are messages of `ack` bytes over the
+//! link back, by what that link is told (degradations included, changes of a fork not): its rate,
+//! its loss, bursts and bit errors, its outages and contacts, its powers. They wait for each other
+//! in the order of transmission, not for that link's messages, nor those for them, because the link
+//! back is another host's. `ack_rate` and `ack_loss` replace its rate and all that loses. Whose
+//! answer is lost sends again; the receiver drops what it has, so that a message arrives once. What
+//! the sender keeps of it until then is a copy of its own in the log, and ends as lost with the
+//! reason `duplicate`.
+//!
+//! Nobody's timer ends while the answer is on its way: a `timeout` only lengthens the wait.
 //!
 //! # The keys of `[links.default]`, `[links.PATTERN]` and `[[degrade]]`
 //!
-//! Everything is off by default. What is on is turned off with `"off"`, 0 or false.
+//! Everything is off by default. What is on is turned off with `"off"`, 0 or false. What each key
+//! is, the fields of [`LinkParams`] say, and `farside explain links.default`.
 //!
-//! | key | alias | unit | default | what it is |
-//! |---|---|---|---|---|
-//! | `preset` | | name | none | all parameters, from [`Preset`]; other keys override it |
-//! | `latency` | `delay` | duration | 5 ms | one way |
-//! | `jitter` | | duration | 0 | scale of `jitter_shape` |
-//! | `jitter_shape` | `distribution` | [`JitterShape`] | `"uniform"` | `"normal"`, `"pareto"`, `{ table = [...] }` |
-//! | `jitter_correlation` | | fraction | 0 | AR(1), mapped to the shape; netem's own recipe shrinks the variance |
-//! | `min_delay` | | duration | where the jitter ends | floor under latency and jitter |
-//! | `fifo` | | bool | false | later messages never arrive before earlier ones |
-//! | `loss` | | fraction | 0 | each message by itself; reason `loss` |
-//! | `burst` | `gemodel`, `loss_gemodel`, `loss_state` | [`Burst`] | off | Gilbert-Elliott or four states, in time; reason `burst` |
-//! | `duplicate` | | fraction | 0 | messages that set out twice |
-//! | `reorder` | | fraction | 0 | messages that are held back by `reorder_by` |
-//! | `reorder_by` | | duration | the latency | netem sends those at once and delays the others: the same gap, but no least delay |
-//! | `corrupt` | | fraction | 0 | messages that arrive corrupt; reason `corrupt` |
-//! | `ber` | | fraction | 0 | bit error rate: `1 - (1 - ber)^(8 (L + overhead))` |
-//! | `rate` | | data rate | unlimited | bits on the air |
-//! | `overhead` | | data size | 0 | bytes beside the message |
-//! | `queue` | `limit` | messages or data size | unlimited | drop-tail, behind the one being sent; netem counts that one too |
-//! | `trace` | | [`Trace`] | off | mahimahi's delivery opportunities, in place of `rate`: a file, a built-in name, milliseconds |
-//! | `contacts` | | [`Contacts`] | the scenario's plan | windows with rate and light time; reason `no_contact` |
-//! | `store_and_forward` | | bool | false | wait for the end of an outage, for a contact |
-//! | `lifetime` | | duration | unlimited | how long a message may wait until its transmission begins, retries too; reason `expired` |
-//! | `retries` | | number | 0 | stop-and-wait repetitions |
-//! | `timeout` | | duration | `2 latency + 8 (L + overhead) / rate` | never below its default |
-//! | `tx_power` | | power | 0 | `tx_power 8 (L + overhead) / rate` of the sender's energy each attempt |
-//! | `rx_power` | | power | 0 | `rx_power 8 (L + overhead) / rate` of the receiving host's energy for what arrives; listening, and what does not arrive, costs nothing |
-//! | `radio` | | name | none | what the link goes through, see [`crate::radio`] |
-//! | `outage` | | bool | false | the link is out; reason `outage` |
+//! | key | alias | unit | default |
+//! |---|---|---|---|
+//! | `preset` | | [`Preset`] | none |
+//! | `latency` | `delay` | duration | 5 ms |
+//! | `jitter` | | duration | 0 |
+//! | `jitter_shape` | `distribution` | [`JitterShape`] | `"uniform"` |
+//! | `jitter_correlation` | | fraction | 0 |
+//! | `min_delay` | | duration | where the jitter ends |
+//! | `fifo` | `in_order` | bool | false |
+//! | `loss` | | fraction | 0 |
+//! | `burst` | `gemodel`, `loss_gemodel`, `loss_state` | [`Burst`] | off |
+//! | `duplicate` | | fraction | 0 |
+//! | `reorder` | | fraction | 0 |
+//! | `reorder_by` | | duration | the latency |
+//! | `corrupt` | | fraction | 0 |
+//! | `ber` | | fraction | 0 |
+//! | `rate` | | data rate | unlimited |
+//! | `overhead` | | data size | 0 |
+//! | `queue` | `limit` | messages or data size | unlimited |
+//! | `trace` | | [`Trace`]: a file, a built-in name, milliseconds | off |
+//! | `contacts` | | [`Contacts`] | the scenario's plan |
+//! | `store_and_forward` | | bool | false |
+//! | `lifetime` | | duration | unlimited |
+//! | `mtu` | | data size | unlimited |
+//! | `fragment_header` | | data size | 0 |
+//! | `retries` | | number | 0 |
+//! | `window` | | number | 1 |
+//! | `ack` | | data size | 0 |
+//! | `ack_rate` | | data rate | that of the link back |
+//! | `ack_loss` | | fraction | that of the link back |
+//! | `timeout` | | duration | what an answer takes, and never below |
+//! | `radio` | | name of one of [`crate::radio`] | none |
+//! | `tx_power` | | power | 0 |
+//! | `rx_power` | | power | 0 |
+//! | `outage` | | bool | false |
 //!
-//! Sources: tc-netem(8) for names and for what users expect of them; the pages of each type for the
-//! rest. Rates that change during a transmission do not change it; outages and contacts cut it.
+//! Sources: tc-netem(8) for names and for what users expect of them, with these differences: its
+//! `reorder` sends those at once and delays the others, which is the same gap without a least
+//! delay; its `limit` counts the message that is being sent too; its recipe for correlated jitter
+//! shrinks the variance. CCSDS 211.0-B (Proximity-1), whose COP-P is go-back-n with a window of up
+//! to 127 and acknowledges by 16 bits in a frame, and RFC 5326 (LTP), for windows and answers; RFC
+//! 791 for fragments. The pages of each type for the rest. Rates that change during a transmission
+//! do not change it; outages and contacts cut it.
 //!
 //! # Randomness
 //!
@@ -82,8 +120,10 @@ mod change;
 mod config;
 mod contacts;
 mod form;
+mod idle;
 mod jitter;
 mod params;
+mod pipeline;
 mod preset;
 mod queue;
 mod stage;
@@ -96,12 +136,14 @@ use std::sync::Arc;
 use farside::carrier::{Carriage, Carrier, Parcel, Verdicts};
 use farside::{SimDuration, SimTime};
 
+use pipeline::Pipeline;
 use stage::{Draws, Purpose};
 
 pub use burst::Burst;
 pub use change::LinkChange;
 pub use config::{Degrade, Degraded, LinkConfigError, LinksConfig};
 pub use contacts::{Contact, Contacts, Window};
+pub(crate) use idle::remarks_of_links;
 pub use jitter::JitterShape;
 pub use params::{LinkOverrides, LinkParams};
 pub use preset::Preset;
@@ -124,6 +166,8 @@ pub const NO_CONTACT: &str = "no_contact";
 pub const QUEUE_FULL: &str = "queue_full";
 /// Why a link drops a message that waited for longer than its lifetime.
 pub const EXPIRED: &str = "expired";
+/// Why a message is dropped that has arrived before: its acknowledgement was lost.
+pub const DUPLICATE: &str = "duplicate";
 /// Why a message is dropped where it arrives.
 pub const CORRUPT: &str = "corrupt";
 
@@ -187,6 +231,10 @@ pub struct Link {
     /// Which parameters held when last asked, and until when.
     index: usize,
     until: SimTime,
+    /// The link that answers come back over, if it is known.
+    back: Option<Arc<Timeline>>,
+    /// Messages that are followed, if ever any were.
+    pipeline: Option<Box<Pipeline>>,
 }
 
 impl Link {
@@ -197,7 +245,17 @@ impl Link {
             until: transmitter.timeline().end_of(0).unwrap_or(SimTime::MAX),
             index: 0,
             transmitter,
+            back: None,
+            pipeline: None,
         }
+    }
+
+    /// Says what the link has over which acknowledgements come back. Unless it is said, that is a
+    /// link like this one.
+    #[must_use]
+    pub fn answered_over(mut self, back: impl Into<Arc<Timeline>>) -> Self {
+        self.back = Some(back.into());
+        self
     }
 
     /// Declares that the link may be given these parameters during the run: [`Carrier::min_delay`]
@@ -259,6 +317,12 @@ impl Carrier for Link {
         let now = parcel.now();
         if now >= self.until {
             self.turn_to(now);
+        }
+        if parcel.token().is_some() || self.transmitter.timeline().is_followed() {
+            let back = &self.back;
+            let new = || Box::new(Pipeline::new(back.clone()));
+            let pipeline = self.pipeline.get_or_insert_with(new);
+            return pipeline.carry(&mut self.transmitter, parcel, verdicts);
         }
         let span = &self.transmitter.timeline().spans[self.index];
         if span.plain && self.transmitter.free_at() <= now {

@@ -90,6 +90,8 @@ struct Frame {
     phase: Phase,
     /// Transmissions so far.
     attempts: u32,
+    /// How often it asked whose turn it is.
+    looks: u8,
     /// Random waits so far.
     waits: u32,
     /// When the radio will look at it again.
@@ -330,6 +332,12 @@ impl Carrier for Radio {
             }
         }
     }
+}
+
+#[cfg(test)]
+thread_local! {
+    /// How often a frame was looked at.
+    static LOOKS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 
 #[cfg(test)]

@@ -116,6 +116,7 @@ fn carriage() -> DescriptorProto {
             field("attempts", 6, Type::Uint32),
             field("energy_j", 7, Type::Double),
             field("receive_j", 8, Type::Double),
+            field("fragments", 9, Type::Uint32),
         ],
         ..Default::default()
     }

@@ -192,7 +192,7 @@ pub(crate) fn put_key(out: &mut Vec<u8>, number: u32, key: &EventKey, source: &s
 
 /// Appends how a link carried a message, as a message field.
 fn put_carriage(out: &mut Vec<u8>, carriage: &Carriage) {
-    // Eight fields of at most eleven bytes: the length always fits one byte.
+    // Nine fields of at most eleven bytes: the length always fits one byte.
     let at = out.len();
     put_varint(out, u64::from(field::CARRIAGE) << 3 | 2);
     let length_at = out.len();
@@ -205,6 +205,7 @@ fn put_carriage(out: &mut Vec<u8>, carriage: &Carriage) {
     put_number(out, 6, u64::from(carriage.attempts));
     put_double(out, 7, carriage.energy_j);
     put_double(out, 8, carriage.receive_j);
+    put_number(out, 9, u64::from(carriage.fragments));
     let length = out.len() - length_at - 1;
     debug_assert!(length < 0x80 && at < length_at);
     out[length_at] = length as u8;
@@ -224,6 +225,7 @@ fn read_carriage(message: &[u8]) -> Option<Carriage> {
             6 => carriage.attempts = u32::try_from(value.number()?).ok()?,
             7 => carriage.energy_j = value.double()?,
             8 => carriage.receive_j = value.double()?,
+            9 => carriage.fragments = u32::try_from(value.number()?).ok()?,
             _ => {}
         }
     }

@@ -37,8 +37,8 @@
 //! `reason`, `ordinal`, `copy`, the event's key (`time_ns`, `step`, `source`, `count`, `tie`),
 //! `sent_ns`, `cause`, `match_key`, `body`, and `carriage`: how the link carried the message, its
 //! delay in parts (`queue_ns`, `serialization_ns`, `propagation_ns`, `jitter_ns`, `retries_ns`),
-//! the `attempts` it took, the `energy_j` they cost and the `receive_j` that receiving took; that
-//! explains a fate and is never compared. What has no body is a `farside.log.Event`. State samples
+//! the `attempts` it took, the `energy_j` they cost, the `receive_j` that receiving took and the
+//! number of `fragments` if it did not go as a whole; that explains a fate and is never compared. What has no body is a `farside.log.Event`. State samples
 //! are their own type, without an envelope.
 //!
 //! `role` in a channel's metadata is `message`, `event`, `state`, `viewer` or `checkpoint`; readers
@@ -48,8 +48,8 @@
 //! and at the end `farside.end` (digest, counts, why the run ended); a log without it is a prefix.
 //! Attachments: the resolved scenario as `scenario.toml`, and the files that it read.
 //!
-//! 1.2 added `/event/told` and a carriage's `receive_j`. A minor version adds fields, topics, roles
-//! or metadata; a major version changes or removes them.
+//! 1.2 added `/event/told` and a carriage's `receive_j` and `fragments`. A minor version adds fields,
+//! topics, roles or metadata; a major version changes or removes them.
 
 mod descriptors;
 mod diff;

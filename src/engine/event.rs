@@ -25,7 +25,7 @@ pub(crate) enum Class {
     LateLoss,
     /// An actor changes a link; in a control event, an actor is told something.
     Tell,
-    /// A shared link charges an actor for what it transmitted.
+    /// A link charges an actor for what it transmitted, or its host for what it received.
     Charge,
     /// A cancelled timer.
     Void,
@@ -47,6 +47,8 @@ pub(crate) struct Side {
     pub(crate) scheduled_by: Option<EventKey>,
     /// What a link that holds the message knows it by.
     pub(crate) token: u64,
+    /// Whether the link may wake it.
+    pub(crate) parked: bool,
 }
 
 /// A message still on its way: the key its next event would have had, what is known of it, and its

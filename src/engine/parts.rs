@@ -373,13 +373,17 @@ impl Parts {
         let cancelled = self.store.cancel(timer.slot, |head| {
             head.receiver == me && head.kind == Some(timer.kind) && head.ordinal == timer.ordinal
         });
-        if cancelled && self.store.is_mostly_void() {
+        if cancelled {
             self.shed_voids();
         }
         cancelled
     }
 
+    /// Forgets what is in the queue without effect, once it is worth it.
     fn shed_voids(&mut self) {
+        if !self.store.is_mostly_void() {
+            return;
+        }
         let store = &mut self.store;
         self.queue.retain(|entry| {
             let void = store.is_void(entry.slot);
@@ -419,6 +423,14 @@ impl Parts {
         for entry in self.queue.drain_sorted() {
             let pending = self.take(entry.slot);
             remains.take(&topology, entry.key(), pending, until);
+        }
+        for cell in &mut self.links {
+            // Those with a latest instant were in the queue.
+            let parked = std::mem::take(&mut cell.parked).into_values();
+            for parked in parked.filter(|parked| parked.latest.is_none()) {
+                let pending = self.store.take(parked.slot);
+                remains.take(&topology, self.key, pending, until);
+            }
         }
         for Outgoing { key, pending, .. } in std::mem::take(&mut self.outgoing) {
             remains.take(&topology, key, pending, until);

@@ -52,6 +52,12 @@ impl Remains {
     ) {
         let (class, head) = (pending.class, pending.head);
         let letter = pending.letter.take();
+        // Until when a link would have left it parked may hang on what a fault undid.
+        let parked = pending.side.filter(|side| head.has_side && side.parked);
+        let key = match (parked, head.link) {
+            (Some(side), Some(link)) => topology.key(SimTime::MAX, 0, link, side.token),
+            _ => key,
+        };
         if head.in_flight(topology, class, pending.side.as_ref(), until) {
             let mut body = Vec::new();
             if let (Some(letter), Some(kind), true) = (&letter, head.kind, topology.recording()) {

@@ -11,7 +11,7 @@ pub(crate) struct Store {
     /// What few events have besides, by slot; shorter than the others if no late slot has any.
     sides: Vec<Side>,
     free: Vec<u32>,
-    /// How many of the events that wait are cancelled timers.
+    /// How many of the events that wait have no effect any more.
     voids: usize,
 }
 
@@ -71,14 +71,23 @@ impl Store {
         true
     }
 
-    /// True once cancelled timers are worth shedding: many, and most of what waits.
+    /// Takes an event out of a slot whose place in the queue stays behind, without effect.
+    pub(crate) fn take_ahead(&mut self, slot: u32) -> Pending {
+        let pending = self.take(slot);
+        self.free.pop();
+        self.heads[slot as usize].0 = Class::Void;
+        self.voids += 1;
+        pending
+    }
+
+    /// True once events without effect are worth shedding: many, and most of what waits.
     pub(crate) fn is_mostly_void(&self) -> bool {
         const WORTH_IT: usize = 1024;
         let waiting = self.heads.len() - self.free.len();
         self.voids >= WORTH_IT && self.voids * 2 > waiting
     }
 
-    /// True for a cancelled timer.
+    /// True for an event without effect: a cancelled timer, or what came sooner.
     pub(crate) fn is_void(&self, slot: u32) -> bool {
         self.heads[slot as usize].0 == Class::Void
     }

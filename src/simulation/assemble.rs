@@ -401,7 +401,7 @@ impl Simulation {
             actors[topology.place(*entity).engine as usize].push(cell);
         }
         for (LinkDecl { carrier, .. }, entity) in self.links.into_iter().zip(&ranked.links) {
-            links[topology.place(*entity).engine as usize].push(LinkCell { carrier, count: 0 });
+            links[topology.place(*entity).engine as usize].push(LinkCell::new(carrier));
         }
         let lists = actors.into_iter().zip(links).enumerate();
         let engines = lists.map(|(at, (a, l))| Engine::new(topology.clone(), at as u32, a, l));

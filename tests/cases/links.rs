@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
-use farside::{Executor, SimDuration};
+use farside::{Executor, Report, SimDuration};
 use farside_actors::system::Files;
 use farside_experiments::registry::Registry;
 use farside_experiments::scenario::{Assembled, Scenario, ScenarioError};
@@ -151,15 +151,78 @@ fn what_a_contact_has_its_own_of_is_said_to_have_no_effect() {
 
 #[test]
 fn a_packet_that_comes_in_the_millisecond_of_an_opportunity_misses_it() {
-    let text = std::fs::read_to_string(folder().join("mahimahi-tie.toml")).expect("it is there");
-    let mut assembled = assembled(text).expect("it is a scenario");
-    let delays = Arc::new(Mutex::new(Vec::new()));
-    assembled.sim.observe(Delays(delays.clone()));
-    assembled.sim.run(Executor::Inline).expect("it runs");
-    let delays = delays.lock().expect("nobody panicked");
+    let (delays, _) = delays("mahimahi-tie.toml");
     assert!(delays.len() >= 200);
     let wrong = delays.iter().find(|delay| delay.as_nanos() != 21_000_000);
     assert_eq!(wrong, None);
+}
+
+/// The delays of all messages that arrive in one of the scenarios, and what the run comes to.
+fn delays(file: &str) -> (Vec<SimDuration>, Report) {
+    let text = std::fs::read_to_string(folder().join(file)).expect("the file is there");
+    let mut assembled = assembled(text).expect("it is a scenario");
+    let delays = Arc::new(Mutex::new(Vec::new()));
+    assembled.sim.observe(Delays(delays.clone()));
+    let report = assembled.sim.run(Executor::Inline).expect("it runs");
+    let delays = delays.lock().expect("nobody panicked").clone();
+    (delays, report)
+}
+
+#[test]
+fn a_relay_carries_a_quarter_of_its_rate() {
+    let (delays, report) = delays("lunar-relay.toml");
+    let counts = &report.counts;
+    assert_eq!((counts.sent, counts.delivered), (12_000, 12_000));
+    // What is kept of messages whose acknowledgement is lost is no loss.
+    let kept = counts.lost_by_reason.get("duplicate").copied();
+    assert_eq!(counts.lost, kept.unwrap_or(0));
+    // 13.25 ms on the air and 60 ms on the way, and waits for what is sent again.
+    let mean_s = delays.iter().map(|d| d.as_secs_f64()).sum::<f64>() / delays.len() as f64;
+    assert!((0.073..0.085).contains(&mean_s), "{mean_s}");
+}
+
+#[test]
+fn what_waits_for_a_contact_costs_a_few_events_each() {
+    let (delays, report) = delays("waiting-160000.toml");
+    assert_eq!(delays.len(), 160_000);
+    assert!(report.counts.events < 2 * 160_000);
+}
+
+/// What is said of a second of traffic over these links, radios and degradations.
+fn remarks_on(keys: &str) -> Vec<String> {
+    let told = assembled(format!(
+        "system = 'traffic'\nuntil = '400s'\n[traffic]\nhosts = ['a', 'b']\n\
+         flow = [{{ from = 'a', to = 'b', size = '1kB', period = '1s' }}]\n{keys}\n"
+    ));
+    told.expect("it is a scenario").remarks
+}
+
+#[test]
+fn what_a_degradation_sets_and_links_have_anyway_is_said_to_have_no_effect() {
+    let worse = "[links.default]\nlatency = '2s'\n\
+                 [[degrade]]\nat = '1s'\nuntil = '9s'\nlinks = '*'\nlatency = '2s'\nloss = 0.5";
+    let what = "degrade.0.latency has no effect: its links have that value anyway";
+    assert_eq!(remarks_on(worse), [what]);
+    // It ends what another one began.
+    let ends = format!("{worse}\n[[degrade]]\nat = '3s'\nlinks = '*'\nlatency = '9s'");
+    assert_eq!(remarks_on(&ends), [""; 0]);
+    let later = ends.replace("at = '3s'", "at = '9s'");
+    assert_eq!(remarks_on(&later), [what]);
+}
+
+#[test]
+fn what_radios_are_told_without_effect_is_said() {
+    let radio = "[radios.uhf]\naccess = 'scheduled'\nslot = '2ms'";
+    let unused = format!("[links.default]\nrate = '1Mbit/s'\n{radio}");
+    assert_eq!(remarks_on(&unused), ["radios.uhf: no link goes through it"]);
+    let used = format!("[links.default]\nradio = 'uhf'\nrate = '1Mbit/s'\nmtu = '1kB'\n{radio}");
+    assert_eq!(
+        remarks_on(&used),
+        [
+            "links: mtu and fragment_header have no effect through a radio: messages go as a whole",
+            "radios.uhf.slot without aloha or csma: nobody waits at random"
+        ]
+    );
 }
 
 /// The delays of all messages over links.

@@ -121,7 +121,8 @@ pub struct Contact<'a> {
 /// ```
 /// use farside_worlds::contacts::{ContactFormat, ContactPlan};
 /// let hdtn = br#"{ "contacts": [
-///     { "source": 10, "dest": 2, "startTime": 0, "endTime": 60, "rateBitsPerSec": 8000, "owlt": 1 }
+///     { "source": 10, "dest": 2, "startTime": 0, "endTime": 60,
+///       "rateBitsPerSec": 8000, "owlt": 1 }
 /// ] }"#;
 /// let ion = b"a range +0 +60 2 10 1\na contact +0 +60 10 2 1000";
 /// let plan = ContactPlan::from_bytes(hdtn, ContactFormat::Hdtn)?;

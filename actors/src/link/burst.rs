@@ -21,10 +21,14 @@ use crate::units;
 ///
 /// | written as | means | defaults |
 /// |---|---|---|
-/// | `{ loss, length }` | a mean loss, and the mean length of a burst as a duration: `r = slot / length`, `p = r loss / (1 - loss)` | `slot`: a tenth of `length` |
-/// | `{ loss, messages, interval }` | the same with a mean burst of so many messages, one sent each `interval` | `slot`: the interval |
-/// | `{ p, r, bad_loss, good_loss }` | the chain itself; `1-h` and `1-k` are other names | `r = 1 - p`, `bad_loss = 1`, `good_loss = 0`, `slot = "10ms"` |
-/// | `{ p13, p31, p32, p23, p14 }` | netem's four states: 1 good, 2 good within a burst, 3 lost within a burst, 4 lost by itself | `p31 = 1 - p13`, `p32 = 0`, `p23 = 1`, `p14 = 0`, `slot = "10ms"` |
+/// | `{ loss, length }` | mean loss, and mean burst as a duration | `slot`: a tenth of `length` |
+/// | `{ loss, messages, interval }` | mean burst in messages, each `interval` | `slot`: that |
+/// | `{ p, r, bad_loss, good_loss }` | the chain itself | `1 - p`, 1 and 0 for the last three |
+/// | `{ p13, p31, p32, p23, p14 }` | netem's four states | `p31 = 1 - p13`, `p23 = 1`, else 0 |
+///
+/// The first two stand for `r = slot / length` and `p = r loss / (1 - loss)`. Of the last two,
+/// `slot` is 10 ms unless given; `1-h` and `1-k` are other names of `bad_loss` and `good_loss`. The
+/// four states are good (1), good within a burst (2), lost within a burst (3), lost by itself (4).
 ///
 /// Of two mean losses with one burst length the higher loses the same messages and more, as long
 /// as `p <= 1 - r`; the first two forms refuse anything else.

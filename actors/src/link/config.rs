@@ -131,6 +131,12 @@ impl Degrade {
             .collect()
     }
 
+    /// Whether there is an instant at which both hold.
+    pub(crate) fn overlaps(&self, other: &Degrade) -> bool {
+        self.until.is_none_or(|until| other.at < until)
+            && other.until.is_none_or(|until| self.at < until)
+    }
+
     pub(crate) fn is_active(&self, at: SimDuration) -> bool {
         self.at <= at && self.until.is_none_or(|until| at < until)
     }

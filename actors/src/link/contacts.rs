@@ -42,8 +42,8 @@ pub struct Contact {
     pub owlt: Option<SimDuration>,
 }
 
-/// The contacts of a link, in order and apart, perhaps repeated: `[{ start, end, rate, owlt }, ...]`
-/// or `{ every = "12h", windows = [...] }`.
+/// The contacts of a link, in order and apart, perhaps repeated: `[{ start, end, rate, owlt },
+/// ...]` or `{ every = "12h", windows = [...] }`.
 ///
 /// ```
 /// use farside::SimTime;
@@ -197,8 +197,8 @@ impl Contacts {
     /// assert_eq!(contacts.windows()[0].rate, Some(128_000));
     /// ```
     pub fn of_plan(windows: &[ContactWindow]) -> Self {
-        // Plans keep the contacts of a pair in order and apart, and know no rate of zero. Where they
-        // set no limit, the link's own holds.
+        // Plans keep the contacts of a pair in order and apart, and know no rate of zero. Where
+        // they set no limit, the link's own holds.
         let windows = windows.iter().map(|window| Contact {
             start: window.start.since(SimTime::ZERO),
             end: window.end.since(SimTime::ZERO),
@@ -289,7 +289,8 @@ mod tests {
 
     #[test]
     fn contacts_begin_end_and_repeat() {
-        let text = "every = '1s'\nwindows = [{ start = '600ms', end = '700ms' }, { start = '100ms', end = '200ms' }]";
+        let text = "every = '1s'\nwindows = [{ start = '600ms', end = '700ms' }, \
+                    { start = '100ms', end = '200ms' }]";
         let contacts: Contacts = toml::from_str(text).unwrap();
         assert_eq!(contacts.at(at(99)), None);
         assert_eq!(contacts.at(at(100)).unwrap().end, at(200));

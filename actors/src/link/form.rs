@@ -124,6 +124,48 @@ impl Form for Retries {
     }
 }
 
+/// A number of messages under way at once.
+pub(super) struct WindowSize;
+
+/// The largest window: more sequence numbers than any protocol has.
+const MAX_WINDOW: u32 = 1 << 24;
+
+impl Form for WindowSize {
+    type Value = u32;
+
+    fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+        let window = u32::deserialize(from)?;
+        match window {
+            1..=MAX_WINDOW => Ok(window),
+            _ => Err(D::Error::custom(format!(
+                "{window}: expected 1 to {MAX_WINDOW}; 1 is stop and wait"
+            ))),
+        }
+    }
+
+    fn write<S: Serializer>(value: &u32, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u32(*value)
+    }
+}
+
+/// A number of bytes that cannot be zero.
+pub(super) struct SomeBytes;
+
+impl Form for SomeBytes {
+    type Value = u64;
+
+    fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+        match DataSize::read(from)? {
+            0 => Err(D::Error::custom("0B: expected more than that")),
+            bytes => Ok(bytes),
+        }
+    }
+
+    fn write<S: Serializer>(value: &u64, to: S) -> Result<S::Ok, S::Error> {
+        DataSize::write(value, to)
+    }
+}
+
 /// How one turns off what a default or a preset turned on.
 const OFF: &str = "off";
 

@@ -18,11 +18,13 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// |---|---|---|
 /// | `"uniform"` | evenly from -1 to 1 | -1 |
 /// | `"normal"` | normal, standard deviation 1, cut at 3 to either side | -3 |
-/// | `"pareto"` | `(X - 3/2) 2/sqrt(3)` with `P(X > x) = x^-3`: mean 0, standard deviation 1, a long tail | -0.577 |
-/// | `{ table = [...] }` | the inverse cumulative distribution at evenly spaced probabilities from 0 to 1, linear between | the first entry |
+/// | `"pareto"` | `(X - 3/2) 2/sqrt(3)`, `P(X > x) = x^-3`: a long tail | -0.577 |
+/// | `{ table = [...] }` | see below | the first entry |
 ///
-/// The pareto shape is that of netem's `pareto.c` (iproute2: a = 3, less the mean 3/2), scaled so
-/// that the jitter is the standard deviation; netem scales by 4/3 and cuts at 4.
+/// A table is the inverse cumulative distribution at evenly spaced probabilities from 0 to 1,
+/// linear between. The pareto shape, of mean 0 and standard deviation 1, is that of netem's
+/// `pareto.c` (iproute2: a = 3, less the mean 3/2), scaled so that the jitter is the standard
+/// deviation; netem scales by 4/3 and cuts at 4.
 ///
 /// ```
 /// use farside_actors::link::JitterShape;

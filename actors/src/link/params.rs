@@ -10,7 +10,8 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::form::{
-    DataRate, DataSize, Duration, Form, Fraction, OrOff, Plain, Power, Retries, Span,
+    DataRate, DataSize, Duration, Form, Fraction, OrOff, Plain, Power, Retries, SomeBytes, Span,
+    WindowSize,
 };
 use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace, preset};
 
@@ -30,7 +31,8 @@ macro_rules! parameters {
         ///
         /// ```
         /// use farside_actors::link::LinkParams;
-        /// let params: LinkParams = toml::from_str("latency = '5ms'\njitter = '1ms'\nloss = '2%'")?;
+        /// let text = "latency = '5ms'\njitter = '1ms'\nloss = '2%'";
+        /// let params: LinkParams = toml::from_str(text)?;
         /// assert_eq!(params.loss, 0.02);
         /// assert_eq!(params.min_delay().to_string(), "4ms");
         /// # Ok::<(), toml::de::Error>(())
@@ -213,8 +215,10 @@ parameters! {
     jitter_correlation: f64 = 0.0, key "jitter_correlation", as Fraction, IfOn;
     /// No delay is below this, whatever the jitter. Unless given, it is where the jitter ends.
     least_delay: Option<SimDuration> = None, key "min_delay", as OrOff<Duration>, IfOn;
-    /// Later messages never arrive before earlier ones. It wins over `reorder`.
-    fifo: bool = false, key "fifo", as Plain<bool>, IfOn;
+    /// Later messages never arrive before earlier ones. It wins over `reorder`. With a `window`,
+    /// what arrives waits at the receiver for what was sent before it, until that is there or given
+    /// up.
+    fifo: bool = false, key "fifo" or "in_order", as Plain<bool>, IfOn;
     /// The fraction of messages that are lost, each by itself.
     loss: f64 = 0.0, key "loss", as Fraction, Always;
     /// Loss in bursts, beside that.
@@ -250,10 +254,28 @@ parameters! {
     store_and_forward: bool = false, key "store_and_forward", as Plain<bool>, IfOn;
     /// A message whose transmission has not begun so long after it was sent is dropped.
     lifetime: Option<SimDuration> = None, key "lifetime", as OrOff<Span>, IfOn;
-    /// How often a lost message is sent again: stop and wait, so that those behind it wait.
+    /// The most bytes of a message that go in one transmission, headers apart: a longer one goes in
+    /// fragments, each with an `overhead` of its own, each lost and repeated by itself, each in
+    /// whatever is left of a contact. The message is there when all are, and lost when one is.
+    mtu: Option<u64> = None, key "mtu", as OrOff<SomeBytes>, IfOn;
+    /// The bytes that each fragment has beside that, and a message in one piece does not.
+    fragment_header: u64 = 0, key "fragment_header", as DataSize, IfOn;
+    /// How often a lost message, or fragment, is sent again.
     retries: u32 = 0, key "retries", as Retries, IfOn;
+    /// With `retries`, how many messages or fragments may be under way at once, from the first that
+    /// is not acknowledged on: selective repeat. 1 is stop and wait.
+    window: u32 = 1, key "window", as WindowSize, IfOn;
+    /// The size of an acknowledgement with its headers: it takes `8 ack / ack_rate` on the way
+    /// back.
+    ack: u64 = 0, key "ack", as DataSize, IfOn;
+    /// The bit rate of acknowledgements; that of the link back unless given.
+    ack_rate: Option<u64> = None, key "ack_rate", as OrOff<DataRate>, IfOn;
+    /// The fraction of acknowledgements that are lost. Unless given, and where there is a `window`,
+    /// an `ack` or an `mtu`, they meet the loss, bursts, bit errors, outages and contacts of the
+    /// link back; else none is lost.
+    ack_loss: Option<f64> = None, key "ack_loss", as OrOff<Fraction>, IfOn;
     /// How long after a transmission began it is given up. Never below what an answer takes:
-    /// the transmission and twice the latency.
+    /// the transmission, twice the latency, and the acknowledgement.
     timeout: Option<SimDuration> = None, key "timeout", as OrOff<Span>, IfOn;
     /// The name of the radio that the link goes through, one of the scenario's `[radios]`.
     radio: Option<String> = None, key "radio", as OrOff<Plain<String>>, IfOn;
@@ -279,8 +301,8 @@ impl LinkParams {
         self.least_way_of_all() + sending
     }
 
-    /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace says
-    /// when to transmit.
+    /// The highest bit rate \[bit/s\], in contacts too; none if there is no bound, or if a trace
+    /// says when to transmit.
     pub(crate) fn fastest_bit_per_s(&self) -> Option<u64> {
         let windows = self.contacts.iter().flat_map(Contacts::windows);
         let fastest = windows
@@ -293,86 +315,10 @@ impl LinkParams {
         rate.filter(|_| self.trace.is_none())
     }
 
-    /// What is said here and has no effect without something else that is not said.
-    ///
-    /// ```
-    /// use farside_actors::link::LinkParams;
-    /// let params: LinkParams = toml::from_str("tx_power = '5W'")?;
-    /// assert_eq!(params.remarks(), ["tx_power without a rate: a transmission takes no time, so no energy"]);
-    /// # Ok::<(), toml::de::Error>(())
-    /// ```
-    pub fn remarks(&self) -> Vec<&'static str> {
-        let windows = || self.contacts.iter().flat_map(Contacts::windows);
-        let own_rate = windows().any(|window| window.rate.is_some());
-        let own_light_time = windows().any(|window| window.owlt.is_some());
-        let timed = self.rate.is_some() || self.trace.is_some() || own_rate;
-        let default = LinkParams::default();
-        let all = [
-            (
-                self.rate.is_some() && own_rate,
-                "rate has no effect in contacts that have their own",
-            ),
-            (
-                self.trace.is_some() && own_rate,
-                "trace has no effect in contacts that have a rate of their own",
-            ),
-            (
-                self.latency != default.latency && own_light_time,
-                "latency has no effect in contacts that have their own",
-            ),
-            (
-                self.rate.is_some() && self.trace.is_some(),
-                "rate beside a trace: the trace says when to transmit",
-            ),
-            (
-                self.overhead > 0
-                    && !timed
-                    && self.ber == 0.0
-                    && !matches!(self.queue, Some(QueueLimit::Bytes(_))),
-                "overhead without a rate: a transmission takes no time",
-            ),
-            (
-                self.jitter_shape != default.jitter_shape && self.jitter.is_zero(),
-                "jitter_shape without jitter: nothing scatters",
-            ),
-            (
-                self.retries > 0
-                    && self
-                        .timeout
-                        .is_some_and(|timeout| timeout < self.latency * 2),
-                "timeout below twice the latency: an answer takes longer",
-            ),
-            (
-                self.tx_power_w > 0.0 && !timed,
-                "tx_power without a rate: a transmission takes no time, so no energy",
-            ),
-            (
-                self.rx_power_w > 0.0 && !timed,
-                "rx_power without a rate: a transmission takes no time, so no energy",
-            ),
-            (
-                self.queue.is_some() && !timed && !self.store_and_forward && self.retries == 0,
-                "queue without a rate: nothing ever waits",
-            ),
-            (
-                self.lifetime.is_some() && !timed && !self.store_and_forward && self.retries == 0,
-                "lifetime without a rate: nothing ever waits",
-            ),
-            (
-                self.timeout.is_some() && self.retries == 0,
-                "timeout without retries: nobody waits for an answer",
-            ),
-            (
-                self.reorder_by.is_some() && self.reorder == 0.0,
-                "reorder_by without reorder: nothing is held back",
-            ),
-            (
-                self.jitter_correlation > 0.0 && self.jitter.is_zero(),
-                "jitter_correlation without jitter: there is nothing to correlate",
-            ),
-        ];
-        let said = all.into_iter().filter(|(holds, _)| *holds);
-        said.map(|(_, remark)| remark).collect()
+    /// Whether messages have to be followed while they are under way: in fragments, side by side,
+    /// or with answers of their own. Without, all of a message is decided when it is sent.
+    pub(super) fn is_followed(&self) -> bool {
+        self.window > 1 || self.ack > 0 || self.ack_loss.is_some() || self.mtu.is_some()
     }
 
     /// The least time on the way, over all contacts.

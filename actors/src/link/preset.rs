@@ -14,6 +14,40 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// assert!(relay.store_and_forward);
 /// # Ok::<(), toml::de::Error>(())
 /// ```
+///
+/// # What they carry
+///
+/// A thousand messages of 500 bytes, at random times (exponential gaps), that take a quarter, half
+/// and nine tenths of the rate, from the start on, in the first contact where there are contacts;
+/// how many arrive, and after how long on average and for 99 of 100. A test counts this table anew.
+///
+/// | preset | share of the rate | arrive | mean delay | 99 of 100 |
+/// |---|---|---|---|---|
+/// | `perfect` | 1/4 | 1000 | 1 us | 1 us |
+/// | `perfect` | 1/2 | 1000 | 1 us | 1 us |
+/// | `perfect` | 9/10 | 1000 | 1 us | 1 us |
+/// | `lunar-surface-wifi` | 1/4 | 981 | 3 ms | 6 ms |
+/// | `lunar-surface-wifi` | 1/2 | 981 | 3 ms | 6 ms |
+/// | `lunar-surface-wifi` | 9/10 | 981 | 5 ms | 11 ms |
+/// | `lunar-relay` | 1/4 | 1000 | 98 ms | 150 ms |
+/// | `lunar-relay` | 1/2 | 1000 | 108 ms | 201 ms |
+/// | `lunar-relay` | 9/10 | 1000 | 186 ms | 412 ms |
+/// | `earth-moon-teleop` | 1/4 | 1000 | 1.3 s | 1.3 s |
+/// | `earth-moon-teleop` | 1/2 | 1000 | 1.3 s | 1.3 s |
+/// | `earth-moon-teleop` | 9/10 | 1000 | 1.3 s | 1.4 s |
+/// | `mars-relay` | 1/4 | 1000 | 41 ms | 91 ms |
+/// | `mars-relay` | 1/2 | 1000 | 51 ms | 138 ms |
+/// | `mars-relay` | 9/10 | 1000 | 129 ms | 358 ms |
+/// | `mars-direct` | 1/4 | 1000 | 752.4 s | 755.5 s |
+/// | `mars-direct` | 1/2 | 1000 | 753.0 s | 758.8 s |
+/// | `mars-direct` | 9/10 | 1000 | 758.0 s | 772.9 s |
+/// | `subsurface-mesh` | 1/4 | 936 | 32 ms | 60 ms |
+/// | `subsurface-mesh` | 1/2 | 904 | 33 ms | 62 ms |
+/// | `subsurface-mesh` | 9/10 | 900 | 39 ms | 68 ms |
+///
+/// So each carries nine tenths of its rate. Those that do not repeat (`lunar-surface-wifi`,
+/// `earth-moon-teleop`, `subsurface-mesh`) lose at any load what their `loss` and `burst` say, and
+/// `perfect` has no rate: it is taken to be 1 Mbit/s here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Preset(pub(super) usize);
 

@@ -20,23 +20,38 @@ pub(super) enum Purpose {
     BitErrors = 7,
     Reorder = 8,
     Path = 9,
+    Ack = 10,
+    AckBitErrors = 11,
+    AckBurst = 12,
+    /// By slot, not by message.
+    AckBurstSlot = 13,
 }
 
-/// One transmission of one copy of a message.
+/// One transmission of one copy of a message, or of a fragment of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Draws {
     pub(super) attempt: u32,
     pub(super) copy: u32,
+    /// 0 for the first fragment, and for a message as a whole.
+    pub(super) fragment: u32,
 }
 
 impl Draws {
     /// The first transmission of this copy.
     pub(super) fn first(copy: u32) -> Self {
-        Draws { attempt: 0, copy }
+        Draws {
+            attempt: 0,
+            copy,
+            fragment: 0,
+        }
     }
 
     pub(super) fn key(self, parcel: &Parcel<'_>, purpose: Purpose) -> RandomKey {
-        parcel.random(purpose as u64, self.attempt, self.copy)
+        let key = parcel.random(purpose as u64, self.attempt, self.copy);
+        match self.fragment {
+            0 => key,
+            fragment => key.number(u64::from(fragment)),
+        }
     }
 
     /// Whether something of this probability happens. Below one draw lie all smaller

@@ -14,7 +14,10 @@ use super::*;
 use crate::wiring::{LinkBuilder, Wiring};
 
 mod air;
+mod arq;
+mod fragments;
 mod loss;
+mod presets;
 mod random;
 
 /// A message of a size to choose.

@@ -72,6 +72,7 @@ fn is_plain(params: &LinkParams) -> bool {
         && params.contacts.is_none()
         && !params.store_and_forward
         && params.retries == 0
+        && !params.is_followed()
 }
 
 impl Timeline {
@@ -111,6 +112,11 @@ impl Timeline {
                 span.plain = false;
             }
         }
+    }
+
+    /// Whether messages have to be followed, whatever holds when they are sent.
+    pub(super) fn is_followed(&self) -> bool {
+        self.spans.iter().any(|span| span.params.is_followed())
     }
 
     /// The parameters at `at`.
@@ -164,8 +170,8 @@ impl Timeline {
         delays(false).or(delays(true)).unwrap_or_default()
     }
 
-    /// The highest bit rate over all parameters \[bit/s\], outages left out as above; none if there is
-    /// no bound.
+    /// The highest bit rate over all parameters \[bit/s\], outages left out as above; none if there
+    /// is no bound.
     pub(super) fn fastest_bit_per_s(&self) -> Option<u64> {
         let rates = self.spans.iter().filter(|span| !span.params.outage);
         let rates = rates.map(|span| span.params.fastest_bit_per_s());

@@ -1,8 +1,9 @@
 //! The core of a link: one transmitter, one way, and what becomes of what it sends.
 //!
-//! A [`Transmitter`] knows a [`Timeline`] of parameters and what it was asked to send so far. Ask it
-//! for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something else
-//! decides when the channel is free, for one transmission at a time ([`Transmitter::attempt`]).
+//! A [`Transmitter`] knows a [`Timeline`] of parameters and what it was asked to send so far. Ask
+//! it for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something
+//! else decides when the channel is free, for one transmission at a time
+//! ([`Transmitter::attempt`]).
 
 mod outcome;
 
@@ -28,8 +29,8 @@ pub use outcome::{Attempt, Path, Sent};
 ///
 /// Ask it for a whole message ([`Transmitter::send`]: queue, attempts, answers) or, where something
 /// else decides when the channel is free and who collides, for one transmission at a time
-/// ([`Transmitter::opening`], [`Transmitter::attempt`], [`Transmitter::in_order`]). What the geometry
-/// adds comes in a [`Path`].
+/// ([`Transmitter::opening`], [`Transmitter::attempt`], [`Transmitter::in_order`]). What the
+/// geometry adds comes in a [`Path`].
 ///
 /// ```
 /// use std::collections::BTreeMap;
@@ -158,6 +159,11 @@ impl Transmitter {
         self.opportunity = None;
     }
 
+    /// It transmits something until then.
+    pub(super) fn busy_until(&mut self, end: SimTime) {
+        self.free = self.free.max(end);
+    }
+
     /// When it has sent all it was given.
     pub fn free_at(&self) -> SimTime {
         self.free
@@ -165,7 +171,7 @@ impl Transmitter {
 
     /// The bytes of the message with the link's overhead.
     pub fn bytes(&self, parcel: &Parcel<'_>) -> u64 {
-        bytes(self.timeline.at(parcel.now()), parcel)
+        Piece::Whole.bytes(self.timeline.at(parcel.now()), parcel)
     }
 
     /// Until when messages of one size have one airtime, as far as is known at `now`: `now` itself
@@ -191,12 +197,13 @@ impl Transmitter {
 
     /// How long the message is on the air if it begins at `start`.
     pub fn airtime(&self, parcel: &Parcel<'_>, start: SimTime, path: &Path) -> SimDuration {
-        self.air(parcel, start, path).0
+        self.air(parcel, Piece::Whole, start, path).0
     }
 
     fn air(
         &self,
         parcel: &Parcel<'_>,
+        piece: Piece,
         start: SimTime,
         path: &Path,
     ) -> (SimDuration, Option<Opportunity>) {
@@ -206,14 +213,14 @@ impl Transmitter {
         let trace = params.trace.as_ref().and_then(Trace::capacity);
         if let (None, Some(trace)) = (own, trace) {
             let used = self.opportunity.filter(|(span, _)| *span == index);
-            let bytes = bytes(params, parcel);
+            let bytes = piece.bytes(params, parcel);
             let used = used.map(|(_, used)| used);
             let (end, rest) = trace::delivered(trace, (parcel.sent(), start), bytes, used);
             return (end.since(start), Some(rest));
         }
         let link = own.or(params.rate);
         let airtime = match link.into_iter().chain(path.rate).min() {
-            Some(rate) => super::transmission_time(bytes(params, parcel), rate),
+            Some(rate) => super::transmission_time(piece.bytes(params, parcel), rate),
             None => SimDuration::ZERO,
         };
         (airtime, None)
@@ -228,7 +235,7 @@ impl Transmitter {
     /// Sends one copy of a message, no sooner than `from`, behind those it sends already.
     pub fn send(&mut self, parcel: &Parcel<'_>, copy: u32, from: SimTime, path: &Path) -> Sent {
         let now = parcel.now();
-        let deviate = self.step_jitter(parcel, copy);
+        let deviate = self.step_jitter(parcel, Draws::first(copy));
         let ready = now.max(from).max(self.free);
         let start = self.opening(parcel, ready, path);
         let first = start.unwrap_or(ready);
@@ -280,9 +287,9 @@ impl Transmitter {
         loop {
             let draws = Draws {
                 attempt: number,
-                copy,
+                ..Draws::first(copy)
             };
-            let mut attempt = self.transmit(parcel, draws, start, path, deviate);
+            let mut attempt = self.transmit(parcel, draws, Piece::Whole, start, path, deviate);
             carriage.attempts += u32::from(attempt.sent);
             carriage.energy_j += attempt.energy_j;
             let timeout = self.timeline.at(start).timeout.unwrap_or_default();
@@ -333,17 +340,34 @@ impl Transmitter {
         start: SimTime,
         path: &Path,
     ) -> Attempt {
-        let deviate = match attempt {
-            0 => self.step_jitter(parcel, copy),
+        let draws = Draws {
+            attempt,
+            ..Draws::first(copy)
+        };
+        self.attempt_piece(parcel, draws, Piece::Whole, start, path)
+    }
+
+    /// The same for a piece of a message.
+    pub(super) fn attempt_piece(
+        &mut self,
+        parcel: &Parcel<'_>,
+        draws: Draws,
+        piece: Piece,
+        start: SimTime,
+        path: &Path,
+    ) -> Attempt {
+        let deviate = match draws.attempt {
+            0 => self.step_jitter(parcel, draws),
             _ => self.deviate,
         };
-        self.transmit(parcel, Draws { attempt, copy }, start, path, deviate)
+        self.transmit(parcel, draws, piece, start, path, deviate)
     }
 
     fn transmit(
         &mut self,
         parcel: &Parcel<'_>,
         draws: Draws,
+        piece: Piece,
         start: SimTime,
         path: &Path,
         deviate: Option<f64>,
@@ -370,7 +394,7 @@ impl Transmitter {
             attempt.failed = Some(closed.reason);
             return attempt;
         }
-        let (airtime, rest) = self.air(parcel, start, path);
+        let (airtime, rest) = self.air(parcel, piece, start, path);
         self.opportunity = rest.map(|rest| (index, rest));
         let cut = timeline.cut(start, start + airtime);
         attempt.sent = true;
@@ -392,7 +416,7 @@ impl Transmitter {
         attempt.propagation = propagation;
         // Only a change that nobody declared can be faster than what the run counts on.
         attempt.at = (attempt.end + way).max(parcel.now() + self.floor);
-        if is_corrupt(params, parcel, draws) {
+        if is_corrupt(params, parcel, draws, piece) {
             attempt.failed = Some(CORRUPT);
         } else {
             attempt.receive_j = params.rx_power_w * airtime.as_secs_f64();
@@ -453,6 +477,17 @@ impl Transmitter {
         ready: SimTime,
         path: &Path,
     ) -> Result<SimTime, &'static str> {
+        self.opening_for(parcel, Piece::Whole, ready, path)
+    }
+
+    /// The same for a piece of a message.
+    pub(super) fn opening_for(
+        &self,
+        parcel: &Parcel<'_>,
+        piece: Piece,
+        ready: SimTime,
+        path: &Path,
+    ) -> Result<SimTime, &'static str> {
         let timeline = &self.timeline;
         let mut at = ready;
         let mut tries = 0;
@@ -466,7 +501,7 @@ impl Transmitter {
             looked = index;
             let (next, reason) = match timeline.closed(at) {
                 Some(closed) => (closed.until, closed.reason),
-                None => match timeline.cut(at, at + self.airtime(parcel, at, path)) {
+                None => match timeline.cut(at, at + self.air(parcel, piece, at, path).0) {
                     None => return Ok(at),
                     Some((cut, reason)) => (Some(cut), reason),
                 },
@@ -488,7 +523,7 @@ impl Transmitter {
         if waits.1 <= now {
             return None;
         }
-        let own = bytes(params, parcel);
+        let own = Piece::Whole.bytes(params, parcel);
         if !self.waiting.push(waits, own, params.queue) {
             let queue = now.since(parcel.sent());
             return Some(Sent {
@@ -505,10 +540,10 @@ impl Transmitter {
 
     /// The next state of the correlated jitter: one step for each copy, whatever becomes of it, so
     /// that losses leave the jitter of other messages alone.
-    fn step_jitter(&mut self, parcel: &Parcel<'_>, copy: u32) -> Option<f64> {
+    fn step_jitter(&mut self, parcel: &Parcel<'_>, draws: Draws) -> Option<f64> {
         let correlation = self.timeline.at(parcel.now()).jitter_correlation;
         if correlation > 0.0 {
-            let key = Draws::first(copy).key(parcel, Purpose::Jitter);
+            let key = draws.key(parcel, Purpose::Jitter);
             let fresh = key.stream().normal(0.0, 1.0);
             self.deviate = Some(jitter::next_normal(self.deviate, correlation, fresh));
         }
@@ -539,16 +574,29 @@ fn way(
 }
 
 /// Whether a copy arrives with wrong bits.
-fn is_corrupt(params: &LinkParams, parcel: &Parcel<'_>, draws: Draws) -> bool {
+fn is_corrupt(params: &LinkParams, parcel: &Parcel<'_>, draws: Draws, piece: Piece) -> bool {
     let wrong = match params.ber {
         0.0 => 0.0,
-        ber => packet_error_rate(ber, bytes(params, parcel)),
+        ber => packet_error_rate(ber, piece.bytes(params, parcel)),
     };
     draws.happens(parcel, Purpose::Corrupt, params.corrupt)
         || draws.happens(parcel, Purpose::BitErrors, wrong)
 }
 
-/// The bytes on the air.
-fn bytes(params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
-    parcel.size_bytes().saturating_add(params.overhead)
+/// What is transmitted at once: a message, or so many bytes of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Piece {
+    Whole,
+    Part(u64),
+}
+
+impl Piece {
+    /// The bytes on the air. To ask for a whole message's costs an encoding.
+    fn bytes(self, params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
+        let own = match self {
+            Piece::Whole => parcel.size_bytes(),
+            Piece::Part(bytes) => bytes,
+        };
+        own.saturating_add(params.overhead)
+    }
 }

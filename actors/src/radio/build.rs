@@ -39,6 +39,18 @@ impl RadioBuilder {
         &self.name
     }
 
+    /// What it is told that has no effect.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        let name = &self.name;
+        if self.links.is_empty() {
+            return vec![format!("radios.{name}: no link goes through it")];
+        }
+        let remarks = self.config.remarks().into_iter();
+        remarks
+            .map(|remark| format!("radios.{name}.{remark}"))
+            .collect()
+    }
+
     pub(crate) fn join(
         &mut self,
         name: &str,

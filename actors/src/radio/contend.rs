@@ -8,6 +8,11 @@ use super::channel::Transmission;
 use super::{Access, BACKOFF, COLLISION, Frame, Phase, Radio};
 use crate::link::{Attempt, EXPIRED, QUEUE_FULL, difference};
 
+/// How often a frame looks whether it is its turn, before it waits to be woken instead. Fewer would
+/// do; what a frame looks at is part of a run's digest, and built-in runs have lines in which one
+/// looks a hundred times.
+const MAX_LOOKS: u8 = u8::MAX;
+
 impl Radio {
     /// Takes the copies of a message into its link's line.
     pub(super) fn accept(&mut self, parcel: &Parcel<'_>, directed: u32, verdicts: &mut Verdicts) {
@@ -74,6 +79,8 @@ impl Radio {
 
     /// Looks at a frame again.
     pub(super) fn resume(&mut self, parcel: &Parcel<'_>, at: u32, verdicts: &mut Verdicts) {
+        #[cfg(test)]
+        super::LOOKS.with(|looks| looks.set(looks.get() + 1));
         let frame = self.frames[at as usize];
         match frame.phase {
             Phase::InLine => {
@@ -81,9 +88,11 @@ impl Radio {
                 if first == at {
                     self.frames[at as usize].phase = Phase::Contending;
                     self.contend(parcel, at, verdicts);
-                } else {
-                    let next = self.turn_of(at, first, parcel.now());
+                } else if let Some(next) = self.turn_of(at, first, parcel.now()) {
+                    self.frames[at as usize].looks += 1;
                     self.hold_until(parcel.now(), next, at, verdicts);
+                } else {
+                    verdicts.park(None, u64::from(at));
                 }
             }
             Phase::Contending => self.contend(parcel, at, verdicts),
@@ -92,9 +101,9 @@ impl Radio {
     }
 
     /// The soonest that a frame can have its turn behind the `first` of its line: when all ahead of
-    /// it have been on the air, as long as nothing changes airtimes; else, when something happens
-    /// to the first.
-    fn turn_of(&self, at: u32, first: u32, now: SimTime) -> SimTime {
+    /// it have been on the air, or airtimes change. Nothing where that tells too little, because
+    /// contacts or a trace decide, or told too little often enough: who is first wakes the next.
+    fn turn_of(&self, at: u32, first: u32, now: SimTime) -> Option<SimTime> {
         let (frame, first) = (&self.frames[at as usize], &self.frames[first as usize]);
         let ahead = match first.phase {
             // It is off the air at `next`.
@@ -103,7 +112,10 @@ impl Radio {
         };
         let transmitter = &self.directed[frame.directed as usize].transmitter;
         let steady_until = transmitter.steady_until(now);
-        (first.next + ahead).min(steady_until.max(first.next))
+        if steady_until <= now || frame.looks >= MAX_LOOKS {
+            return None;
+        }
+        Some((first.next + ahead).min(steady_until.max(first.next)))
     }
 
     fn hold_until(&mut self, now: SimTime, next: SimTime, at: u32, verdicts: &mut Verdicts) {
@@ -128,7 +140,7 @@ impl Radio {
             Err(reason) if reason == EXPIRED || free <= now => {
                 let carriage = self.carriage(parcel, at, now);
                 verdicts.lose_as(SimDuration::ZERO, reason, carriage);
-                return self.done(at);
+                return self.done(at, verdicts);
             }
             Err(_) => Some(free),
             Ok(open) if open > now => Some(open),
@@ -235,7 +247,7 @@ impl Radio {
                 link.free = attempt.answered();
             }
             self.arrive(parcel, at, &attempt, arrival, verdicts);
-            return self.done(at);
+            return self.done(at, verdicts);
         };
         let params = link.transmitter.timeline().at(frame.start);
         if frame.attempts <= params.retries {
@@ -253,7 +265,7 @@ impl Radio {
             attempt.at.since(now)
         };
         verdicts.lose_as(after, reason, carriage);
-        self.done(at);
+        self.done(at, verdicts);
     }
 
     /// What the frame's delay is made of so far.
@@ -298,13 +310,16 @@ impl Radio {
         verdicts.deliver_as(way, carriage);
     }
 
-    /// Forgets a frame that came first in its line.
-    fn done(&mut self, at: u32) {
+    /// Forgets a frame that came first in its line, and wakes the next if it is parked.
+    fn done(&mut self, at: u32, verdicts: &mut Verdicts) {
         let directed = self.frames[at as usize].directed;
         let link = &mut self.directed[directed as usize];
         let first = link.line.pop_front();
         link.line_bytes -= self.frames[at as usize].bytes;
         debug_assert_eq!(first, Some(at), "only the first of a line is sent");
+        if let Some(next) = link.line.front() {
+            verdicts.wake(SimDuration::ZERO, u64::from(*next));
+        }
         self.free.push(at);
     }
 

@@ -2,10 +2,14 @@
 //!
 //! | quantity | formula | source |
 //! |---|---|---|
-//! | received power | `P_tx - (L0 + 10 n log10(d / 1 m)) - S - O` in dBm | log-distance model, Rappaport, *Wireless Communications*, 2nd ed., section 4.9; defaults of Gazebo's RF model |
-//! | shadowing `S` | normal, mean 0, one draw for each pair of stations and stretch of time | same, section 4.9.2 |
-//! | bit error rate | `erfc(sqrt(snr)) / 2`, QPSK with the noise in the bit's bandwidth | Proakis, *Digital Communications*, 4th ed., section 5.2.7 |
+//! | received power | `P_tx - (L0 + 10 n log10(d / 1 m)) - S - O` in dBm | Rappaport, 4.9 |
+//! | shadowing `S` | normal, one draw for each pair and stretch of time | Rappaport, 4.9.2 |
+//! | bit error rate | `erfc(sqrt(snr)) / 2`, QPSK | Proakis, 5.2.7 |
 //! | message error rate | `1 - (1 - BER)^bits` | independent bit errors |
+//!
+//! Sources: Rappaport, *Wireless Communications*, 2nd ed. (the log-distance model); Proakis,
+//! *Digital Communications*, 4th ed., with the noise in the bit's bandwidth; the defaults are those
+//! of Gazebo's RF model.
 
 use std::sync::Arc;
 

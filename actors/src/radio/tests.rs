@@ -512,3 +512,68 @@ proptest! {
         prop_assert!(fates.len() as u64 + inline.counts.in_flight == inline.counts.sent);
     }
 }
+
+/// Before a contact begins so many messages come together, and after it, on a channel that ten
+/// others want too. A message is looked at a number of times that does not hang on how many wait.
+#[test]
+fn a_message_costs_the_same_however_many_wait_for_the_radio() {
+    let contacts = "contacts = [{ start = '1000s', end = '9000s' }]\nstore_and_forward = true";
+    let contacts: LinkOverrides = toml::from_str(contacts).unwrap();
+    let cases = [
+        ("access = 'scheduled'", true),
+        ("access = 'csma'\nslot = '5ms'", true),
+        ("access = 'csma'\nslot = '5ms'", false),
+    ];
+    for (radio, waits_for_contact) in cases {
+        let looks_each = [4_000u32, 16_000].map(|count| {
+            let mut team = Team::new(radio, ring(10));
+            team.link = LinkParams {
+                queue: Some(QueueLimit::Messages(1 << 40)),
+                retries: 3,
+                ..team.link
+            };
+            if waits_for_contact {
+                team.link = team.link.with(&contacts);
+            }
+            team.mean_s = match waits_for_contact {
+                true => 1000.0 * 10.0 / f64::from(count),
+                // Twice as many as the channel carries.
+                false => 10.0 * 0.010 / 2.0,
+            };
+            team.until_s = match waits_for_contact {
+                true => 1000 + u64::from(count) / 10,
+                false => u64::from(count) / 200,
+            };
+            LOOKS.with(|looks| looks.set(0));
+            let (report, fates, _) = team.run(Executor::Inline);
+            let looks = LOOKS.with(std::cell::Cell::get) as f64;
+            let arrived = fates.iter().filter(|fate| fate.reason.is_empty()).count();
+            assert!(arrived > count as usize / 4, "{radio}: {arrived}");
+            looks / report.counts.sent as f64
+        });
+        // Who comes first in its line may have to ask several times, among ten; who waits behind it
+        // does not.
+        let [few, many] = looks_each;
+        assert!(
+            many < 32.0 && many < 1.5 * few,
+            "{radio}: {few} looks for each message of few, {many} of many"
+        );
+    }
+}
+
+#[test]
+fn who_is_parked_is_woken_in_every_executor() {
+    let contacts = "contacts = [{ start = '5s', end = '900s' }]\nstore_and_forward = true";
+    let mut team = Team::new("access = 'csma'\nslot = '5ms'", ring(5));
+    team.link.queue = Some(QueueLimit::Messages(1000));
+    team.link = team.link.with(&toml::from_str(contacts).unwrap());
+    team.mean_s = 0.030;
+    team.until_s = 20;
+    let (report, fates, _) = team.run(Executor::Inline);
+    let counts = &report.counts;
+    assert!(counts.in_flight > 100, "many wait at the end");
+    assert_eq!(counts.sent, fates.len() as u64 + counts.in_flight);
+    let (same, ..) = team.run(Executor::Kameo { threads: 2 });
+    assert_eq!(report.digest, same.digest);
+    assert_eq!(report.counts, same.counts);
+}

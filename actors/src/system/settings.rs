@@ -168,6 +168,10 @@ impl<T, R: Rule<T>> Rule<Option<T>> for IfSet<R> {
             .as_ref()
             .map_or(Ok(()), |value| self.0.check(key, value))
     }
+
+    fn sections(&self, key: &str) -> Vec<Section> {
+        self.0.sections(key)
+    }
 }
 
 /// A rule that no range says.
@@ -179,7 +183,7 @@ pub struct Where<T> {
 }
 
 /// What `holds` is true of; `shown` writes a value that it is not.
-pub fn such_that<T>(
+pub const fn such_that<T>(
     expected: &'static str,
     shown: fn(&T) -> String,
     holds: fn(&T) -> bool,

@@ -13,9 +13,10 @@ use super::processors::Slowdowns;
 use super::{Links, Wiring};
 use crate::link::{
     Contacts, Degrade, Degraded, Link, LinkChange, LinkConfigError, LinkOverrides, LinkParams,
-    LinksConfig, Timeline, Trace,
+    LinksConfig, Timeline, Trace, remarks_of_links,
 };
 use crate::radio::{RadioBuilder, RadioConfig};
+use crate::system::settings::Table;
 use farside::suggest::{closest, did_you_mean};
 
 /// Builds links by name from [`LinksConfig`] and [`Degrade`]s, and checks that every pattern
@@ -64,17 +65,19 @@ pub struct LinkBuilder {
 }
 
 /// A degradation of links.
-struct Worse {
+pub(super) struct Worse {
+    /// Its place among `[[degrade]]`.
+    pub(super) number: usize,
     pattern: Pattern,
-    when: Degrade,
-    over: LinkOverrides,
+    pub(super) when: Degrade,
+    pub(super) over: LinkOverrides,
 }
 
 /// The timeline of all links with one base and one set of degradations.
-struct SharedTimeline {
-    base: Arc<LinkParams>,
+pub(super) struct SharedTimeline {
+    pub(super) base: Arc<LinkParams>,
     /// Indices into the degradations.
-    degrades: Vec<usize>,
+    pub(super) degrades: Vec<usize>,
     timeline: Arc<Timeline>,
 }
 
@@ -134,6 +137,7 @@ impl LinkBuilder {
                 return Err(LinkConfigError::ChangesNothing { key });
             }
             builder.degrades.push(Worse {
+                number: index,
                 pattern: Pattern::new(key("links"), pattern)?,
                 when: degrade.clone(),
                 over,
@@ -192,16 +196,20 @@ impl LinkBuilder {
         radios: &BTreeMap<String, RadioConfig>,
     ) -> Result<(), LinkConfigError> {
         for (name, config) in radios {
-            config.check().map_err(|(key, message)| {
-                let keys = key.split('.').map(str::to_owned);
-                LinkConfigError::Value {
-                    key: ["radios".to_owned(), name.clone()]
-                        .into_iter()
-                        .chain(keys)
-                        .collect(),
-                    message,
-                }
+            let wrong = |keys: Vec<String>, message| LinkConfigError::Value {
+                key: ["radios".to_owned(), name.clone()]
+                    .into_iter()
+                    .chain(keys)
+                    .collect(),
+                message,
+            };
+            config.check("").map_err(|error| {
+                let (key, message) = error.into_parts();
+                let (_, below) = key.split_at(1.min(key.len()));
+                wrong(below.to_vec(), message)
             })?;
+            let together = config.check_together();
+            together.map_err(|(key, message)| wrong(vec![key.to_owned()], message))?;
             self.radios.push(RadioBuilder::new(name, config.clone()));
         }
         Ok(())
@@ -265,52 +273,79 @@ impl LinkBuilder {
         }
         self.hosts = wiring.hosts.iter().cloned().collect();
         let mut links = Links::default();
+        let mut known = BTreeMap::new();
+        for ((_, from), (_, to)) in wiring.links() {
+            let resolved = self.resolve(from, to);
+            let resolved = (resolved.timeline.clone(), resolved.base.clone());
+            known.insert((from, to), resolved);
+        }
         for (from, to) in wiring.links() {
-            let nominal = self.connect(sim, from, to);
+            let (timeline, nominal) = known[&(from.1, to.1)].clone();
+            let back = known.get(&(to.1, from.1)).map(|(back, _)| back);
+            self.connect(sim, (from, to), timeline, back);
             links.add(from.1, to.1, nominal);
         }
         links.processors = self.slowdowns.apply(&wiring.processors)?;
+        let back = |(from, to)| known.get(&(to, from)).map(|(back, _)| back);
+        let met = known
+            .iter()
+            .map(|(ends, (timeline, _))| (timeline, back(*ends)));
+        links.remarks = self.remarks(met);
         self.finish(sim, wiring.terrain.as_ref())?;
-        let remarks = self.remarks().into_iter();
-        let remarks = remarks.map(|remark| format!("links: {remark}"));
-        links.remarks = remarks.chain(links.processors.remarks()).collect();
+        links.remarks.extend(links.processors.remarks());
         Ok(links)
     }
 
-    /// Declares the link `{from}-{to}`, and its changes; returns what it has without degradations.
-    /// A link through a radio is declared with it, by [`LinkBuilder::finish`].
+    /// Declares the link `{from}-{to}`, and its changes; `back` is what the link back has, if there
+    /// is one. A link through a radio is declared with it, by [`LinkBuilder::finish`].
     fn connect(
         &mut self,
         sim: &mut Simulation,
-        (from_host, from): (HostId, &str),
-        (to_host, to): (HostId, &str),
-    ) -> Arc<LinkParams> {
+        ((from_host, from), (to_host, to)): ((HostId, &str), (HostId, &str)),
+        timeline: Arc<Timeline>,
+        back: Option<&Arc<Timeline>>,
+    ) {
         let name = format!("{from}-{to}");
-        let known = self.resolve(from, to);
-        let (timeline, nominal) = (known.timeline.clone(), known.base.clone());
         let mut changes = Vec::new();
         for (before, (at, params)) in timeline.iter().zip(timeline.iter().skip(1)) {
             changes.push((at, LinkChange::planned(before.1, params)));
         }
         changes.extend(timeline.contact_changes(self.until));
         let Some(wanted) = timeline.at(SimTime::ZERO).radio.clone() else {
-            let id = sim.link(from_host, to_host, &name, Link::new(timeline));
+            let link = Link::new(timeline);
+            let link = match back {
+                Some(back) => link.answered_over(back.clone()),
+                None => link,
+            };
+            let id = sim.link(from_host, to_host, &name, link);
             for (at, change) in changes {
                 sim.change_at(at, id, change);
             }
-            return nominal;
+            return;
         };
         match self.radios.iter_mut().find(|radio| radio.name() == wanted) {
             Some(radio) => radio.join(&name, (from_host, to_host), timeline, changes),
             None => self.no_such_radio(&name, &wanted),
         }
-        nominal
     }
 
-    /// What the links declared so far are told that has no effect.
-    fn remarks(&self) -> BTreeSet<&'static str> {
-        let params = self.known.iter().flat_map(|known| known.timeline.iter());
-        params.flat_map(|(_, params)| params.remarks()).collect()
+    /// What links, radios and degradations are told that has no effect. Of each link: what it has,
+    /// and what the link back has.
+    fn remarks<'a>(
+        &self,
+        links: impl Iterator<Item = (&'a Arc<Timeline>, Option<&'a Arc<Timeline>>)>,
+    ) -> Vec<String> {
+        // Most links are alike.
+        let mut seen = BTreeSet::new();
+        let links = links
+            .filter(|(timeline, back)| seen.insert((Arc::as_ptr(timeline), back.map(Arc::as_ptr))));
+        let links = links.map(|(timeline, back)| (timeline.as_ref(), back.map(Arc::as_ref)));
+        let mut remarks = remarks_of_links(links);
+        remarks.sort_unstable();
+        let remarks = remarks.into_iter().map(|remark| format!("links: {remark}"));
+        let radios = self.radios.iter().flat_map(RadioBuilder::remarks);
+        let degrades = super::idle::of_degrades(&self.degrades, &self.known);
+        remarks.chain(radios).chain(degrades).collect()
     }
 
     fn no_such_radio(&mut self, link: &str, wanted: &str) {

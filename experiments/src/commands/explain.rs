@@ -43,6 +43,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let Some(name) = &args.name else {
         return list(&sections, registry, &all, args.json);
     };
+    let name = &of_any(name);
     let section = sections.iter().find(|section| section.name == *name);
     let found: Vec<&Entry<'_>> = match section {
         Some(section) => all.iter().filter(|entry| entry.is_in(section)).collect(),
@@ -69,6 +70,35 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     texts.extend(found.iter().map(|entry| entry.text()));
     print(texts.join("\n\n"))?;
     Ok(Exit::Done)
+}
+
+/// The name under which the keys of a table stand that scenarios name themselves, or number: those
+/// of `radios.uhf` are those of `radios.NAME`, those of `links.rover_*` those of `links.default`.
+fn of_any(name: &str) -> String {
+    let stands = |table: &str| match table {
+        "links" => Some("links.default"),
+        "radios" => Some("radios.NAME"),
+        _ => None,
+    };
+    let Some((table, rest)) = name.split_once('.') else {
+        return name.to_owned();
+    };
+    // Patterns and names have no dots, or stand in quotes.
+    let (own, key) = match rest.strip_prefix(['"', '\'']) {
+        Some(quoted) => quoted.split_once(['"', '\'']).unwrap_or((quoted, "")),
+        None => rest.split_once('.').unwrap_or((rest, "")),
+    };
+    let key = key.trim_start_matches('.');
+    let is_number = !own.is_empty() && own.bytes().all(|byte| byte.is_ascii_digit());
+    let table = match stands(table) {
+        Some(stands) => stands,
+        None if is_number => table,
+        None => return name.to_owned(),
+    };
+    match key {
+        "" => table.to_owned(),
+        key => format!("{table}.{key}"),
+    }
 }
 
 fn entries<'a>(sections: &[&'a Section], registry: &'a Registry) -> Vec<Entry<'a>> {
@@ -228,4 +258,46 @@ fn list(
     }
     print(lines.join("\n\n"))?;
     Ok(Exit::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_tables_that_scenarios_name_are_found() {
+        let shared = shared_sections();
+        let sections: Vec<&Section> = shared.iter().collect();
+        let registry = Registry::builtin();
+        let all = entries(&sections, &registry);
+        for (asked, found) in [
+            ("radios.uhf.sense_delay", "radios.NAME.sense_delay"),
+            (
+                "radios.uhf.path_loss.exponent",
+                "radios.NAME.path_loss.exponent",
+            ),
+            ("contacts.range", "contacts.range"),
+            ("contacts.file", "contacts.file"),
+            ("links.rover_*-node_*.window", "links.default.window"),
+            ("links.\"a.b-c\".mtu", "links.default.mtu"),
+            ("degrade.3.at", "degrade.at"),
+            ("links.default.ack", "links.default.ack"),
+        ] {
+            let name = of_any(asked);
+            let found_all: Vec<String> = all
+                .iter()
+                .filter(|entry| entry.is_called(&name))
+                .map(Entry::name)
+                .collect();
+            assert_eq!(found_all, [found], "{asked}");
+        }
+        for table in ["radios.uhf", "radios", "contacts", "links.\"a.b\"", "links"] {
+            let name = of_any(table);
+            let is_known = sections.iter().any(|section| section.name == name);
+            assert!(
+                is_known || ["radios", "links"].contains(&table),
+                "{table}: {name}"
+            );
+        }
+    }
 }

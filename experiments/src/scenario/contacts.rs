@@ -14,11 +14,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use farside::{SimDuration, Simulation};
-use farside_actors::units;
+use farside_actors::system::settings::{Table, one_of, such_that};
+use farside_actors::{settings, units};
 use farside_worlds::contacts::{
     Builtin, CapacityTrace, ContactFormat, ContactPlan, ContactWindow, MAX_FILE_BYTES, PlanSummary,
 };
-use serde::{Deserialize, Serialize};
 
 use farside::suggest::nearest;
 use farside_actors::system::{Files, SetupError};
@@ -26,39 +26,39 @@ use farside_actors::system::{Files, SetupError};
 /// The most pairs that are told of one by one.
 const MAX_NOTED: usize = 50;
 
-/// The `[contacts]` table.
-///
-/// ```
-/// use farside_experiments::scenario::contacts::ContactsConfig;
-/// let text = "file = 'plan.json'\nnodes = { 1 = 'earth' }";
-/// let config: ContactsConfig = toml::from_str(text)?;
-/// assert_eq!(config.nodes["1"], "earth");
-/// assert!(config.offset.is_zero());
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContactsConfig {
-    /// The plan's file, from the scenario's folder on; without a dot, the name of a built-in plan.
-    pub file: String,
-    /// The file's format, if its ending or first character does not tell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub format: Option<ContactFormat>,
-    /// Which node of the plan is which host; a node that is not here is the host of its own name.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub nodes: BTreeMap<String, String>,
-    /// When in the run the plan begins.
-    #[serde(default, with = "units::duration")]
-    pub offset: SimDuration,
-    /// The one-way light time of contacts of which the plan tells none: in ION, those without a
-    /// range, which are passed over unless it is given; in HDTN, those without `owlt`, 0 unless it
-    /// is given.
-    #[serde(
-        default,
-        with = "units::duration::option",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub range: Option<SimDuration>,
+settings! {
+    /// The `[contacts]` table.
+    ///
+    /// ```
+    /// use farside_experiments::scenario::contacts::ContactsConfig;
+    /// let text = "file = 'plan.json'\nnodes = { 1 = 'earth' }";
+    /// let config: ContactsConfig = toml::from_str(text)?;
+    /// assert_eq!(config.nodes["1"], "earth");
+    /// assert!(config.offset.is_zero());
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    pub struct ContactsConfig {
+        /// The plan's file, from the scenario's folder on; without a dot, the name of a built-in
+        /// plan.
+        pub file: String, such_that(
+            "the name of a file or of a built-in plan",
+            |file: &String| format!("{file:?}"),
+            |file: &String| !file.is_empty(),
+        );
+        /// The file's format, if its ending or first character does not tell.
+        pub format: Option<ContactFormat> [skip_serializing_if = "Option::is_none"],
+            one_of(&["ion", "hdtn"]);
+        /// Which node of the plan is which host; a node that is not here is the host of its own
+        /// name.
+        pub nodes: BTreeMap<String, String> [skip_serializing_if = "BTreeMap::is_empty"];
+        /// When in the run the plan begins.
+        pub offset: SimDuration [with = "units::duration"];
+        /// The one-way light time of contacts of which the plan tells none: in ION, those without a
+        /// range, which are passed over unless it is given; in HDTN, those without `owlt`, 0 unless
+        /// it is given.
+        pub range: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
+    }
 }
 
 /// When which host hears which, by their names. Hosts that the plan names hear each other by its
@@ -103,6 +103,7 @@ impl LinkContacts {
     /// When the file cannot be read or is no plan, with its line; when `nodes` names what the plan
     /// does not have, or one host twice.
     pub fn read(config: &ContactsConfig, files: &mut Files) -> Result<Self, SetupError> {
+        config.check("contacts")?;
         let wrong = |message: String| SetupError::value("contacts.file", message);
         let plans = || Builtin::plan_names();
         let (name, bytes) =

@@ -1,9 +1,11 @@
 //! What there is to know of the keys that every system shares.
 
 use farside_actors::link::LinkParams;
+use farside_actors::radio::RadioConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{Key, Section};
 
+use super::contacts::ContactsConfig;
 use super::crash::Crash;
 use super::{LogSettings, Shared};
 
@@ -34,6 +36,8 @@ pub fn shared_sections() -> Vec<Section> {
         keys: degrade_keys(),
         defaults: toml::Table::new(),
     });
+    all.extend(ContactsConfig::sections("contacts"));
+    all.extend(RadioConfig::sections("radios.NAME"));
     all.extend(Crash::sections("crash"));
     all.extend(LogSettings::sections("log"));
     all

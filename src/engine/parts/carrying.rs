@@ -7,10 +7,11 @@ use std::num::NonZeroU64;
 
 use super::{Effect, Parts};
 use crate::carrier::{Carriage, Parcel, Verdict, Verdicts};
-use crate::engine::{CellState, Class, Head, Pending, Sealed, Side};
+use crate::engine::{CellState, Class, Head, Parked, Pending, Sealed, Side};
 use crate::fault::FaultCause;
 use crate::ids::{EntityId, KindIndex};
 use crate::key::EventKey;
+use crate::queue::Entry;
 use crate::time::{SimDuration, SimTime};
 use crate::topology::Kind;
 
@@ -47,23 +48,103 @@ impl Parts {
         };
         let mut verdicts = std::mem::take(&mut self.verdicts);
         let cell = &mut self.links[topology.place(link).local as usize];
+        if let Some(held) = held.filter(|held| held.parked) {
+            cell.parked.remove(&held.token);
+        }
         cell.carrier.carry(&parcel, &mut verdicts);
         let mut count = cell.count;
         self.execute(link, &mut count, head, letter, kind, &verdicts);
+        for (token, delay) in verdicts.wakes.drain(..) {
+            self.wake(link, &mut count, token, delay);
+        }
         self.links[topology.place(link).local as usize].count = count;
         let charge_j = std::mem::take(&mut verdicts.charge_j);
+        let charge_receiver_j = std::mem::take(&mut verdicts.charge_receiver_j);
         verdicts.list.clear();
         self.verdicts = verdicts;
         if self.fault.is_none() {
             self.carrying = None;
+        }
+        if charge_receiver_j != 0.0 {
+            let charge = Carriage {
+                receive_j: charge_receiver_j,
+                ..Carriage::default()
+            };
+            self.charge_later(link, head.receiver, charge);
         }
         // Only while its sender is at hand can a message's cost be charged at once, and whether it
         // is must not hang on how hosts are dealt to engines.
         if charge_j == 0.0 || held.is_none() && !self.is_shared(link) {
             return charge_j;
         }
-        self.charge_later(link, head.sender, charge_j);
+        let charge = Carriage {
+            energy_j: charge_j,
+            ..Carriage::default()
+        };
+        self.charge_later(link, head.sender, charge);
         0.0
+    }
+
+    /// Brings forward a message that its link parked, unless it is shown sooner anyway.
+    fn wake(&mut self, link: EntityId, count: &mut u64, token: u64, delay: SimDuration) {
+        let local = self.topology.place(link).local as usize;
+        let at = self.key.time + delay;
+        let Some(parked) = self.links[local].parked.get(&token).copied() else {
+            return;
+        };
+        if parked.latest.is_some_and(|latest| latest <= at) {
+            return;
+        }
+        let key = self.later_key(link, count, delay);
+        let slot = match parked.latest {
+            None => {
+                self.queue.push(Entry::new(key, parked.slot));
+                parked.slot
+            }
+            Some(_) => {
+                let Pending {
+                    class,
+                    head,
+                    letter,
+                    side,
+                } = self.store.take_ahead(parked.slot);
+                let slot = self.insert(key, class, head, letter);
+                self.store.set_side(slot, side.unwrap_or_default());
+                slot
+            }
+        };
+        let latest = Some(at);
+        self.links[local]
+            .parked
+            .insert(token, Parked { slot, latest });
+        self.shed_voids();
+    }
+
+    /// Keeps a message that its link may wake.
+    fn park(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        latest: Option<SimDuration>,
+        (head, letter, side): (Head, Sealed, Side),
+    ) {
+        let head = Head {
+            has_side: true,
+            ..head
+        };
+        let slot = self.store.insert(Class::Held, head, Some(letter));
+        self.store.set_side(slot, side);
+        if let Some(after) = latest {
+            let key = self.later_key(link, count, after);
+            self.queue.push(Entry::new(key, slot));
+        }
+        let latest = latest.map(|after| self.key.time + after);
+        let cell = &mut self.links[self.topology.place(link).local as usize];
+        let before = cell.parked.insert(side.token, Parked { slot, latest });
+        assert!(
+            before.is_none(),
+            "a link parks two messages under one token"
+        );
     }
 
     fn is_shared(&self, link: EntityId) -> bool {
@@ -73,27 +154,23 @@ impl Parts {
             .is_some_and(|link| link.shared)
     }
 
-    fn charge_later(&mut self, link: EntityId, sender: EntityId, energy_j: f64) {
+    fn charge_later(&mut self, link: EntityId, whom: EntityId, charge: Carriage) {
         let topology = self.topology.clone();
         let min_delay = topology.links.get(&link).map(|link| link.min_delay);
         let cell = &mut self.links[topology.place(link).local as usize];
         let mut count = cell.count;
         let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
         self.links[topology.place(link).local as usize].count = count;
-        let carriage = Carriage {
-            energy_j,
-            ..Carriage::default()
-        };
         let pending = Pending {
             class: Class::Charge,
-            head: Head::of_entity(sender),
+            head: Head::of_entity(whom),
             letter: None,
             side: Some(Side {
-                carriage: Some(carriage),
+                carriage: Some(charge),
                 ..Side::default()
             }),
         };
-        self.schedule_with(topology.place(sender).engine, key, pending);
+        self.schedule_with(topology.place(whom).engine, key, pending);
     }
 
     /// Asks for a change of a link on behalf of an actor.
@@ -193,7 +270,7 @@ impl Parts {
             (carriage.is_some() || scheduled_by.is_some()).then_some(Side {
                 carriage,
                 scheduled_by,
-                token: 0,
+                ..Side::default()
             })
         };
         let (class, engine, after, side) = match verdict {
@@ -204,11 +281,26 @@ impl Parts {
             }
             Verdict::Hold { after, token } => {
                 let side = Side {
-                    carriage: None,
                     scheduled_by,
                     token,
+                    ..Side::default()
                 };
                 (Class::Held, self.index, after, Some(side))
+            }
+            Verdict::Park {
+                latest,
+                token,
+                copy,
+            } => {
+                head.copy = copy.unwrap_or(head.copy);
+                let side = Side {
+                    scheduled_by,
+                    token,
+                    parked: true,
+                    ..Side::default()
+                };
+                self.park(link, count, latest, (head, letter, side));
+                return Ok(());
             }
             Verdict::Lose {
                 after,

@@ -61,8 +61,8 @@ impl ContactPlan {
     /// let error = ContactPlan::from_hdtn(text.as_bytes()).unwrap_err();
     /// assert_eq!(
     ///     error.to_string(),
-    ///     "line 2: the contact has no \"rateBitsPerSec\", the rate in bits (not bytes) per second; \
-    ///      found \"rateBytesPerSec\" instead"
+    ///     "line 2: the contact has no \"rateBitsPerSec\", the rate in bits (not bytes) per \
+    ///      second; found \"rateBytesPerSec\" instead"
     /// );
     /// let plan = ContactPlan::from_hdtn(text.replace("Bytes", "Bits").as_bytes())?;
     /// assert_eq!(plan.contact_windows("1", "2")[0].rate_bit_per_s, Some(16_000));

@@ -69,10 +69,10 @@ struct Reader {
 
 impl ContactPlan {
     /// Reads the contacts and ranges of an ION `ionrc` file, or of the part for `ionadmin` of a
-    /// file for several programs. A contact has the light time of the range that covers its beginning,
-    /// also when that range ends; one that begins within a contact splits it. A range from a lower
-    /// to a higher node number holds for the way back, too, while the file has none for that way.
-    /// A contact without a range is passed over, with a remark, unless
+    /// file for several programs. A contact has the light time of the range that covers its
+    /// beginning, also when that range ends; one that begins within a contact splits it. A range
+    /// from a lower to a higher node number holds for the way back, too, while the file has none
+    /// for that way. A contact without a range is passed over, with a remark, unless
     /// [`read`](ContactPlan::read) is given a light time.
     ///
     /// The plan counts from the time that the first `@` line with a date sets; without one, from

@@ -115,7 +115,8 @@ fn a_range_that_goes_on_at_the_same_distance_parts_nothing() {
     assert_eq!(
         said,
         [
-            "line 3: no range covers the contact from 1 to 2 from 5s on: its light time stays as it was"
+            "line 3: no range covers the contact from 1 to 2 from 5s on: its light time stays \
+             as it was"
         ]
     );
 }
@@ -300,12 +301,14 @@ const HDTN_MISTAKES: [(&str, &str, &str); 12] = [
     (
         "startTime",
         "startTme",
-        "line 3: the contact has no \"startTime\", the start in seconds; found \"startTme\" instead",
+        "line 3: the contact has no \"startTime\", the start in seconds; found \"startTme\" \
+         instead",
     ),
     (
         "rateBitsPerSec",
         "rateBytesPerSec",
-        "line 3: the contact has no \"rateBitsPerSec\", the rate in bits (not bytes) per second; found \"rateBytesPerSec\"",
+        "line 3: the contact has no \"rateBitsPerSec\", the rate in bits (not bytes) per second; \
+         found \"rateBytesPerSec\"",
     ),
     (
         "rateBitsPerSec\": 8",
@@ -356,7 +359,10 @@ const HDTN_MISTAKES: [(&str, &str, &str); 12] = [
 
 #[test]
 fn each_mistake_in_an_hdtn_file_has_its_line() {
-    let good = r#"{ "source": 1, "dest": 2, "startTime": 0, "endTime": 9, "rateBitsPerSec": 8, "owlt": 1 }"#;
+    let good = concat!(
+        r#"{ "source": 1, "dest": 2, "startTime": 0, "endTime": 9, "#,
+        r#""rateBitsPerSec": 8, "owlt": 1 }"#
+    );
     let says = |text: &str, message: &str| {
         let error = hdtn_error(text);
         assert!(error.starts_with(message), "{text}: {error}");
@@ -374,7 +380,8 @@ fn each_mistake_in_an_hdtn_file_has_its_line() {
     );
     says(
         "{ \"contacts\": 5 }",
-        "line 1, column 15: not an HDTN contact plan: invalid type: integer `5`, expected an array of contacts",
+        "line 1, column 15: not an HDTN contact plan: invalid type: integer `5`, expected an \
+         array of contacts",
     );
     says(
         "{ \"contact\": [] }",

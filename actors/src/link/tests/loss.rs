@@ -63,7 +63,8 @@ proptest! {
             // Links rank by name: the second is a-c in both runs.
             let all = scenario(seed, &sends, &["b", "c"], text);
             let last = all.iter().map(|fate| fate.link).max();
-            let mut mine: Vec<Fate> = all.into_iter().filter(|fate| Some(fate.link) == last).collect();
+            let own = all.into_iter().filter(|fate| Some(fate.link) == last);
+            let mut mine: Vec<Fate> = own.collect();
             assert!(mine.len() >= 100, "all that went to c");
             mine.sort_by_key(|fate| (fate.ordinal, fate.copy));
             mine

@@ -78,6 +78,34 @@ fn trace() -> impl Strategy<Value = Trace> {
 
 /// Any parameters at all.
 fn any_params() -> impl Strategy<Value = LinkParams> {
+    prop_oneof![params_at_once(), followed()]
+}
+
+/// Parameters with which messages are followed.
+fn followed() -> impl Strategy<Value = LinkParams> {
+    let keys = (
+        1..6u32,
+        prop_oneof![Just(0), 0..60u64],
+        option::of(2_000..2_000_000u64),
+        option::of(0.0..0.6f64),
+        option::of(1..60u64),
+        0..10u64,
+        option::weighted(0.3, duration(300_000)),
+    );
+    (params_at_once(), keys).prop_map(|(params, keys)| LinkParams {
+        window: keys.0,
+        ack: keys.1,
+        ack_rate: keys.2,
+        ack_loss: keys.3,
+        mtu: keys.4,
+        fragment_header: keys.5,
+        lifetime: keys.6.filter(|lifetime| !lifetime.is_zero()),
+        ..params
+    })
+}
+
+/// Parameters with which all of a message is decided when it is sent.
+fn params_at_once() -> impl Strategy<Value = LinkParams> {
     let way = (
         duration(50_000),
         duration(30_000),
@@ -130,7 +158,13 @@ fn any_params() -> impl Strategy<Value = LinkParams> {
         contacts: air.4,
         store_and_forward: air.5,
         lifetime: None,
+        mtu: None,
+        fragment_header: 0,
         retries: more.0,
+        window: 1,
+        ack: 0,
+        ack_rate: None,
+        ack_loss: None,
         timeout: more.1.filter(|timeout| !timeout.is_zero()),
         radio: None,
         tx_power_w: more.2,
@@ -164,7 +198,7 @@ fn check_queue(seen: &[Fate], timeline: &Timeline) -> Result<(), TestCaseError> 
     let key = |fate: &&Fate| (fate.ordinal, fate.copy);
     let mut taken: Vec<&Fate> = seen
         .iter()
-        .filter(|fate| fate.reason != QUEUE_FULL)
+        .filter(|fate| ![QUEUE_FULL, DUPLICATE].contains(&fate.reason))
         .collect();
     taken.sort_by_key(key);
     for (index, fate) in taken.iter().enumerate() {
@@ -202,13 +236,26 @@ proptest! {
         let least = link.min_delay();
         // The kernel ends a run whose link undercuts its least delay; `over` refuses that.
         let seen = over(seed, &sends, link);
-        let reasons = ["", LOSS, BURST, OUTAGE, NO_CONTACT, QUEUE_FULL, CORRUPT];
+        let reasons = [
+            "", LOSS, BURST, OUTAGE, NO_CONTACT, QUEUE_FULL, CORRUPT, EXPIRED, DUPLICATE,
+        ];
         for fate in &seen {
             prop_assert!(reasons.contains(&fate.reason), "{}", fate.reason);
             prop_assert!(!fate.reason.is_empty() || fate.delay >= least);
             let Some(parts) = fate.carriage else { continue };
             prop_assert_eq!(parts.total(), fate.delay);
-            prop_assert!(parts.attempts <= 4 && (parts.attempts > 0 || !fate.reason.is_empty()));
+            let most = 4 * parts.fragments.max(1);
+            prop_assert!(parts.attempts <= most && (parts.attempts > 0 || !fate.reason.is_empty()));
+        }
+        for ordinal in 0..sends.len() as u64 {
+            // One fate for each copy, and one for each that was kept because an answer was lost.
+            let own = || seen.iter().filter(|fate| fate.ordinal == ordinal);
+            let copies = own().filter(|fate| fate.reason != DUPLICATE).count();
+            prop_assert!((1..=2).contains(&copies) && own().count() <= 2 * copies);
+            let numbers: BTreeSet<u32> = own().map(|fate| fate.copy).collect();
+            prop_assert!(numbers.len() == own().count());
+            let kept = own().count() - copies;
+            prop_assert!(kept <= own().filter(|fate| fate.reason.is_empty()).count());
         }
         check_queue(&seen, &timeline)?;
         if timeline.iter().all(|(_, params)| params.fifo) {
@@ -262,7 +309,8 @@ proptest! {
     ) {
         // Without a queue nothing is decided before it happens.
         let prompt = |params: LinkParams| LinkParams {
-            rate: None, trace: None, contacts: None, store_and_forward: false, retries: 0, ..params
+            rate: None, trace: None, contacts: None, store_and_forward: false, retries: 0,
+            window: 1, ack: 0, ack_loss: None, mtu: None, lifetime: None, ..params
         };
         let (base, later) = (prompt(base), prompt(later));
         let at = SimTime::ZERO + ms(at);

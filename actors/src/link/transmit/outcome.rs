@@ -1,4 +1,5 @@
-//! What becomes of a transmission and of a message, and what the world between two antennas adds to it.
+//! What becomes of a transmission and of a message, and what the world between two antennas adds to
+//! it.
 
 use farside::carrier::{Carriage, Verdicts};
 use farside::{SimDuration, SimTime};
@@ -59,6 +60,11 @@ pub struct Attempt {
 }
 
 impl Attempt {
+    /// How long the message is on its way if nothing else happens, and an answer too.
+    pub(in crate::link) fn way(&self) -> SimDuration {
+        self.answer
+    }
+
     /// When the sender has an answer, if it waits for one: the answer takes the propagation back,
     /// has no jitter, and is never lost.
     pub fn answered(&self) -> SimTime {

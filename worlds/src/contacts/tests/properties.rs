@@ -126,7 +126,8 @@ proptest! {
             for (start, end, rate) in spans {
                 // What no range covers when it begins is passed over; the rest must be right.
                 let line = format!("a contact +{start} +{end} {a} {b} {}\n", rate + 1);
-                let is_covered = ContactPlan::from_ion(format!("{ranges}{line}").as_bytes()).is_ok();
+                let both = format!("{ranges}{line}");
+                let is_covered = ContactPlan::from_ion(both.as_bytes()).is_ok();
                 let told = at_instant(&format!("{ranges}{line}"), a, b, start).is_some();
                 prop_assert_eq!(is_covered, told, "{}{}", ranges, line);
                 if is_covered {
@@ -143,7 +144,8 @@ proptest! {
             for at in 0..110 {
                 let instant = SimTime::ZERO + SimDuration::from_secs(at);
                 let open = windows.iter().find(|w| w.start <= instant && instant < w.end);
-                let told = open.map(|w| (w.rate_bit_per_s.unwrap(), w.owlt.as_nanos() / 1_000_000_000));
+                let owlt_s = |w: &ContactWindow| w.owlt.as_nanos() / 1_000_000_000;
+                let told = open.map(|w| (w.rate_bit_per_s.unwrap(), owlt_s(w)));
                 prop_assert_eq!(told, at_instant(&text, from, to, at), "{} at {}", text, at);
             }
         }
@@ -206,10 +208,16 @@ proptest! {
     fn any_damage_is_read_or_refused(
         plan in plans(),
         json in any::<bool>(),
-        damage in prop::collection::vec((any::<prop::sample::Index>(), "[-+0-9e.\":,\\[\\]{}a-z @/#\n]{0,4}"), 1..5),
+        damage in prop::collection::vec(
+            (any::<prop::sample::Index>(), "[-+0-9e.\":,\\[\\]{}a-z @/#\n]{0,4}"),
+            1..5,
+        ),
     ) {
         let lunar = Builtin::find("lunar-relay").unwrap().bytes;
-        let mut text = if json { String::from_utf8_lossy(lunar).into_owned() } else { plan.to_ion() };
+        let mut text = match json {
+            true => String::from_utf8_lossy(lunar).into_owned(),
+            false => plan.to_ion(),
+        };
         for (index, patch) in damage {
             let at = index.index(text.len());
             text.replace_range(at..at + 1, &patch);

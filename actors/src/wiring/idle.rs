@@ -1,0 +1,45 @@
+//! What degradations and radios are told that has no effect.
+
+use std::collections::BTreeSet;
+
+use super::build::{SharedTimeline, Worse};
+use crate::link::LinkOverrides;
+
+/// The keys that replace something.
+fn keys(over: &LinkOverrides) -> BTreeSet<String> {
+    let table = toml::Table::try_from(over).unwrap_or_default();
+    table.into_iter().map(|(key, _)| key).collect()
+}
+
+/// For each degradation of links, the keys that leave every link that it meets as it is: it has the
+/// same value anyway, and no other degradation meanwhile sets the key.
+pub(super) fn of_degrades(degrades: &[Worse], known: &[SharedTimeline]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    for (index, worse) in degrades.iter().enumerate() {
+        if worse.over.preset.is_some() {
+            // Of its many keys some are the same, as one expects.
+            continue;
+        }
+        let mut idle = keys(&worse.over);
+        for link in known.iter().filter(|link| link.degrades.contains(&index)) {
+            let changed = link.base.changes_to(&link.base.with(&worse.over));
+            idle.retain(|key| !keys(&changed).contains(key));
+            if idle.is_empty() {
+                break;
+            }
+            let others = link.degrades.iter().filter(|other| **other != index);
+            for other in others.map(|&other| &degrades[other]) {
+                if other.when.overlaps(&worse.when) {
+                    let theirs = keys(&other.over);
+                    let all = other.over.preset.is_some();
+                    idle.retain(|key| !all && !theirs.contains(key));
+                }
+            }
+        }
+        let number = worse.number;
+        remarks.extend(idle.iter().map(|key| {
+            format!("degrade.{number}.{key} has no effect: its links have that value anyway")
+        }));
+    }
+    remarks
+}
