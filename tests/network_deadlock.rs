@@ -69,9 +69,9 @@ fn run(case: &Case) -> (NetworkMetrics, BTreeMap<String, SimTime>, SimTime) {
 /// Crowded: as many rovers as there are vertices, or nearly.
 fn crowded() -> impl Strategy<Value = Case> {
     let bounds = Bounds {
-        vertices: 9,
+        vertices: 7,
         nodes: 3,
-        rovers: 9,
+        rovers: 10,
         loss_percent: 80,
         latency: SimDuration::from_millis(500),
         crashes: 2,
@@ -100,7 +100,7 @@ fn crowded() -> impl Strategy<Value = Case> {
     })
 }
 
-/// What is found of 400 cases, so that the property is not true for want of any.
+/// What is found in all cases, so that the property is not true for want of any.
 #[derive(Default)]
 struct Found {
     deadlocks: Cell<u32>,
@@ -116,7 +116,7 @@ fn more(count: &Cell<u32>) {
 #[test]
 fn what_is_called_a_deadlock_stays_one() {
     let config = ProptestConfig {
-        cases: 400,
+        cases: 1000,
         failure_persistence: None,
         max_shrink_iters: 400,
         ..ProptestConfig::default()

@@ -12,10 +12,17 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("cases/network")
 }
 
+type Metrics = serde_json::Map<String, serde_json::Value>;
+
 /// What the case of this name gives with these keys set.
-fn run(case: &str, sets: &[String]) -> serde_json::Map<String, serde_json::Value> {
+fn run(case: &str, sets: &[String]) -> Metrics {
+    run_with(case, "", sets)
+}
+
+/// The same with more tables at its end.
+fn run_with(case: &str, tables: &str, sets: &[String]) -> Metrics {
     let file = folder().join(case);
-    let text = std::fs::read_to_string(&file).expect("the case is there");
+    let text = std::fs::read_to_string(&file).expect("the case is there") + tables;
     let files = Files::on_disk(folder());
     let scenario = Scenario::parse(case, text, sets, &Registry::builtin(), files);
     let scenario = scenario.expect("it is a scenario");
@@ -82,12 +89,11 @@ fn with_more_lost_and_late_all_arrive_too() {
 #[test]
 fn what_is_fixed_to_come_is_waited_for() {
     for (case, rovers, _) in CASES {
-        let table = "crash = [{ actor = 'node_*1', at = '10s', restart_after = '900s' }]";
-        let sets = [table.to_owned(), "links.default.loss=0.2".to_owned()];
-        let metrics = run(case, &sets);
+        let down = "[[crash]]\nactor = 'node_*1'\nat = '10s'\nrestart_after = '900s'\n";
+        let metrics = run_with(case, down, &["links.default.loss=0.2".to_owned()]);
         assert_eq!(metrics["arrived"], rovers, "{case} with a node down");
-        let outage = "degrade = [{ link = '*', at = '10s', until = '910s', loss = 1 }]";
-        let metrics = run(case, &[outage.to_owned()]);
+        let outage = "[[degrade]]\nlinks = '*'\nat = '10s'\nuntil = '910s'\nloss = 1\n";
+        let metrics = run_with(case, outage, &[]);
         assert_eq!(metrics["arrived"], rovers, "{case} with links down");
         let times = metrics["arrival_s"].as_array().expect("one for each");
         assert!(

@@ -122,6 +122,8 @@ pub struct NetworkMetrics {
     pub total_steps: u64,
     /// Cycles between entry and goal in which the rover did not set out.
     pub mean_stops: f64,
+    /// Cycles in the queue at the entry, which are neither steps nor stops.
+    pub mean_queued: f64,
     /// Moves back to the vertex just left.
     pub mean_backtracks: f64,
     /// Cycles until the last rover arrived, or the run ended.
@@ -149,7 +151,8 @@ pub struct NetworkMetrics {
     /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
     /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
-    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends
+    /// Circles of rovers that wait for each other which nodes' probes confirmed, as nodes knew them
+    /// then; they may dissolve, and are no proof of a `deadlock`. 0 unless `network.max_plus.deadlock_probes` sends
     /// any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.

@@ -523,6 +523,7 @@ impl Score {
             };
             metrics.mean_steps += f64::from(steps);
             metrics.total_steps += u64::from(steps);
+            metrics.mean_queued += f64::from(entered);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
             metrics.mean_backtracks += f64::from(track.backtracks);
         }
@@ -531,6 +532,7 @@ impl Score {
             &mut metrics.path_ratio,
             &mut metrics.time_ratio,
             &mut metrics.mean_steps,
+            &mut metrics.mean_queued,
             &mut metrics.mean_stops,
             &mut metrics.mean_backtracks,
         ] {

@@ -5,7 +5,7 @@ use farside_actors::system::Metric;
 use farside_actors::system::MetricKind::{Number, Rate, Sample, Word};
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 42] = [
+pub(crate) const ALL: [Metric; 43] = [
     Metric::new("arrival_s", "time to the goal", "s", Sample, Lower),
     Metric::new("arrived", "rovers at their goals", "rovers", Number, Higher),
     Metric::new(
@@ -33,7 +33,7 @@ pub(crate) const ALL: [Metric; 42] = [
     Metric::new("completed", "all rovers at their goals", "", Rate, Higher),
     Metric::new(
         "confirmed_deadlocks",
-        "deadlocks confirmed by probes",
+        "circles of waits that probes confirmed",
         "",
         Number,
         Neither,
@@ -80,6 +80,13 @@ pub(crate) const ALL: [Metric; 42] = [
         Neither,
     ),
     Metric::new("mean_backtracks", "moves back per rover", "", Number, Lower),
+    Metric::new(
+        "mean_queued",
+        "cycles in the queue per rover",
+        "cycles",
+        Number,
+        Lower,
+    ),
     Metric::new("mean_steps", "steps per rover", "", Number, Lower),
     Metric::new("mean_stops", "stops per rover", "", Number, Lower),
     Metric::new(
