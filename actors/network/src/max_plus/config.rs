@@ -3,9 +3,10 @@
 
 use std::ops::RangeInclusive;
 
+use farside::SimDuration;
 use farside_actors::processor::Speed;
-use farside_actors::settings;
 use farside_actors::system::settings::{one_of, such_that};
+use farside_actors::{settings, units};
 use serde::{Deserialize, Serialize};
 
 use super::processor::{self, PAPER_SPEED};
@@ -56,6 +57,11 @@ settings! {
         /// `"unlimited"`. The optimisation uses what is ready in its time.
         pub processor: Speed [with = "processor"] = PAPER_SPEED,
             such_that("more than 0/s", Speed::to_string, |speed: &Speed| *speed != Speed::PerS(0));
+        /// How long an iteration takes at least, whatever there is to compute: what it costs to
+        /// bring the messages of all pairs from process to process, and to wait for the slowest.
+        /// The paper's 500 ms end the optimisation, or 100 iterations; it does not say how many
+        /// there were.
+        pub iteration_time: SimDuration [with = "units::duration"];
         /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as
         /// computed. 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum
         /// on DCOPs through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus
