@@ -146,7 +146,7 @@ pub use payload::Message;
 pub use report::{Counts, End, Report};
 pub use simulation::Simulation;
 pub use time::{SimDuration, SimTime};
-pub use topology::{Entity, EntityRole, Kind, RunInfo};
+pub use topology::{Entity, EntityRole, Kind, PlannedAction, PlannedEvent, RunInfo};
 
 /// Everything that an actor's author needs.
 pub mod prelude {

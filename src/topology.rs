@@ -145,6 +145,68 @@ pub struct RunInfo {
     pub kinds: Vec<Arc<Kind>>,
     /// The least delay between hosts.
     pub look_ahead: SimDuration,
+    /// What is fixed before the run and will happen whatever else does: who crashes and restarts,
+    /// which links change, who is told something. In order of time; the run may end before.
+    pub planned: Vec<PlannedEvent>,
+}
+
+/// An event that is fixed before a run, such as the restart of an actor.
+///
+/// ```
+/// use farside::prelude::*;
+/// use farside::PlannedAction;
+/// use farside::record::{Flow, Observer, ObserverError, Record};
+/// use std::sync::Arc;
+///
+/// struct Rover;
+/// impl Actor for Rover { type Accepts = (); }
+///
+/// /// Knows at the start when somebody comes back.
+/// struct Patient;
+/// impl Observer for Patient {
+///     fn begin(&mut self, run: &Arc<farside::RunInfo>) -> Result<(), ObserverError> {
+///         let [crash, restart] = &run.planned[..] else { panic!("{:?}", run.planned) };
+///         assert_eq!((crash.action, crash.time), (PlannedAction::Crash, SimTime::from_secs(2)));
+///         let back = (restart.action, restart.time);
+///         assert_eq!(back, (PlannedAction::Restart, SimTime::from_secs(9)));
+///         assert_eq!(run.name(restart.entity), "rover_01");
+///         Ok(())
+///     }
+///     fn record(&mut self, _: &Record<'_>) -> Result<Flow, ObserverError> {
+///         Ok(Flow::Continue)
+///     }
+/// }
+///
+/// let mut sim = Simulation::new(1);
+/// let host = sim.host("rover_01");
+/// sim.actor(host, "rover_01", |_| Rover);
+/// sim.restart_named_at(SimTime::from_secs(9), "rover_01")?;
+/// sim.crash_named_at(SimTime::from_secs(2), "rover_01")?;
+/// sim.observe(Patient);
+/// sim.run(Executor::Inline)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlannedEvent {
+    /// When it happens.
+    pub time: SimTime,
+    /// The actor or the link that it happens to.
+    pub entity: EntityId,
+    /// What it is.
+    pub action: PlannedAction,
+}
+
+/// What a [`PlannedEvent`] does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlannedAction {
+    /// It crashes an actor.
+    Crash,
+    /// It restarts an actor.
+    Restart,
+    /// It changes a link.
+    Change,
+    /// It hands an actor a message.
+    Tell,
 }
 
 impl RunInfo {

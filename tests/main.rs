@@ -9,6 +9,7 @@ mod golden;
 mod house;
 mod layering;
 mod network_complete;
+mod network_deadlock;
 mod network_planning;
 mod network_safety;
 mod network_team;

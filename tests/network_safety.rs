@@ -14,7 +14,8 @@ use farside_experiments::scenario::Scenario;
 use farside_network::cases::strategies::{Bounds, cases, cases_with_gaps, cut_grid};
 use farside_network::cases::{Case, Downtime};
 use farside_network::{
-    Deadlock, Gaps, NetworkConfig, NetworkMetrics, Policy, Sabotage, TeamConfig, WorldConfig,
+    Deadlock, Gaps, NetworkConfig, NetworkMetrics, NoProgress, Outcome, Policy, Sabotage,
+    TeamConfig, WorldConfig,
 };
 use farside_worlds::{Ownership, VertexId};
 use proptest::prelude::*;
@@ -308,10 +309,17 @@ fn with_everything_lost_nobody_moves_and_the_run_ends() {
     case.link.loss = 1.0;
     let (metrics, report) = run(&case);
     assert_eq!((metrics.arrived, metrics.collisions), (0, 0));
-    assert_eq!(metrics.deadlock, Deadlock::Passive);
+    let ended = (metrics.deadlock, metrics.no_progress, metrics.outcome);
+    let expected = (Deadlock::None, NoProgress::Standing, Outcome::NoProgress);
+    assert_eq!(
+        ended, expected,
+        "a link that loses all may do better next time"
+    );
     assert!(metrics.wait_cycles.is_empty(), "all are in their queues");
     let detail = report.end.detail();
-    assert!(detail.contains("deadlock: 6 rovers left"), "{detail}");
+    let cycles = metrics.no_progress_cycles;
+    let says = format!("no progress within {cycles} cycles: 6 rovers left");
+    assert!(detail.contains(&says) && cycles > 2000, "{detail}");
 }
 
 #[test]
@@ -355,7 +363,12 @@ fn a_rover_that_is_gone_for_good_is_named() {
     assert_eq!(metrics.deadlock, Deadlock::Passive);
     assert!(metrics.wait_cycles.is_empty(), "it waits for nobody");
     let detail = report.end.detail();
-    assert!(detail.contains("rover_01 at vertex"), "{detail}");
+    assert!(
+        detail.contains("deadlock: 1 rovers left, rover_01 at vertex"),
+        "{detail}"
+    );
+    let why = metrics.deadlock_reason.unwrap_or_default();
+    assert!(why.ends_with("; rover_01 is down for good"), "{why}");
 }
 
 #[test]
@@ -411,7 +424,7 @@ fn rovers_that_wait_in_a_circle_are_named() {
         let report = sim.run(Executor::Inline).expect("it starts");
         let metrics = system.metrics();
         let deadlock = metrics.deadlock_reason.unwrap_or_default();
-        if metrics.deadlock == Deadlock::None {
+        if !metrics.stuck {
             assert!(metrics.wait_cycles.is_empty());
             continue;
         }
@@ -432,7 +445,7 @@ fn rovers_that_wait_in_a_circle_are_named() {
         }
         match metrics.wait_cycles.first() {
             Some(shortest) => assert!(deadlock.ends_with(&format!("; {shortest}"))),
-            None if metrics.deadlock == Deadlock::Livelock => {
+            None if metrics.no_progress == NoProgress::Moving => {
                 assert!(deadlock.ends_with("rovers moved without coming nearer to their goals"));
             }
             None => {}

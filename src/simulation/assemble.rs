@@ -14,7 +14,8 @@ use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
-    Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, Routes, RunInfo, Topology,
+    Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, PlannedAction, PlannedEvent, Routes,
+    RunInfo, Topology,
 };
 
 /// Which entity each declaration became.
@@ -28,6 +29,29 @@ struct Ranked {
 struct Kinds {
     list: Vec<Arc<Kind>>,
     of_type: FixedMap<TypeId, KindIndex>,
+}
+
+/// What observers are told of control events: all but stops, in order.
+fn planned(controls: &[Control]) -> Vec<PlannedEvent> {
+    let of = |control: &Control| {
+        let ControlAction::Entity(entity, action) = &control.what else {
+            return None;
+        };
+        Some(PlannedEvent {
+            time: control.time,
+            entity: *entity,
+            action: match action {
+                Action::Crash => PlannedAction::Crash,
+                Action::Restart => PlannedAction::Restart,
+                Action::Change(_) => PlannedAction::Change,
+                Action::Tell(..) => PlannedAction::Tell,
+            },
+        })
+    };
+    let mut planned: Vec<PlannedEvent> = controls.iter().filter_map(of).collect();
+    // What is declared first goes first at an instant, as in the run.
+    planned.sort_by_key(|event| event.time);
+    planned
 }
 
 impl Simulation {
@@ -81,6 +105,7 @@ impl Simulation {
                 entities: ranked.entities.clone(),
                 kinds: kinds.list,
                 look_ahead,
+                planned: planned(&controls),
             }),
         });
         let schedule = Schedule::new(controls, look_ahead);

@@ -20,8 +20,8 @@ use farside::prelude::*;
 use farside_actors::link::{Link, LinkParams};
 use farside_actors::units::parse_duration;
 use farside_network::{
-    Deadlock, Missions, Motion, NetworkConfig, NetworkMetrics, Parts, Policy, Priority, TeamConfig,
-    WorldConfig, assemble_over, missions,
+    Missions, Motion, NetworkConfig, NetworkMetrics, NoProgress, Parts, Policy, Priority,
+    TeamConfig, WorldConfig, assemble_over, missions,
 };
 use farside_worlds::{Endpoints, Ownership, Roadmap};
 
@@ -210,10 +210,10 @@ fn print_cell(map: &str, nodes: u32, rovers: u32, results: &[(NetworkMetrics, Re
     };
     println!(
         "{map:13} {nodes:5} {rovers:6}  {:5.0} {:5.0}{:5.0}{:5.0}  {:7.1}  {:4.2}  {:4.2}  {:5.1}  {:5.1}  {:4.2}  {:7.1}  {:4.1}  {:6.0}  {:10.0}  {:7.0}  {:5.0}  {:4.0}  {:9.1}  {:5.1}  {:6.2}  {:4.1}",
-        percent(&|m| m.deadlock != Deadlock::None),
-        percent(&|m| m.deadlock == Deadlock::Passive),
-        percent(&|m| m.deadlock == Deadlock::Livelock),
-        percent(&|m| m.deadlock == Deadlock::None && m.arrived < m.rovers),
+        percent(&|m| m.stuck),
+        percent(&|m| m.stuck && m.no_progress != NoProgress::Moving),
+        percent(&|m| m.no_progress == NoProgress::Moving),
+        percent(&|m| !m.stuck && m.arrived < m.rovers),
         all(&|(m, _)| f64::from(m.arrived)),
         mean(&|m| m.path_ratio),
         mean(&|m| m.time_ratio),

@@ -138,10 +138,15 @@ settings! {
         /// stay closed until it is back.
         pub failover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
             if_set(1..);
-        /// Deadlock: no move and no entry for so many cycles.
+        /// A run ends when no rover has moved or entered for so many cycles: as a deadlock if that
+        /// is certain, else for want of progress. Here and below so many cycles are meant in which
+        /// all messages come through; others count with the square of the share that is delivered,
+        /// a hundredth at least. Cycles in which somebody is down who will be restarted, or before
+        /// a planned change of links or processors, do not count.
         pub deadlock_window: u32 = 20,
             1..;
-        /// Livelock: no new minimum of the sum of remaining distances for so many cycles.
+        /// And when the sum of what all rovers have left to drive has not become less than ever
+        /// before for so many cycles, though rovers move.
         pub livelock_window: u32 = 300,
             1..;
         /// The run ends after so many cycles, arrived or not.

@@ -133,9 +133,9 @@ pub use config::{
 };
 pub use error::NetworkError;
 pub use max_plus::candidates::{CandidatePath, Destination, FirstStep};
-pub use max_plus::config::{MaxPlusConfig, Priority};
+pub use max_plus::config::{Backtrack, MaxPlusConfig, Priority};
 pub use max_plus::processor::PAPER_SPEED;
-pub use metrics::{Costs, Deadlock, NetworkMetrics};
+pub use metrics::{Costs, Deadlock, NetworkMetrics, NoProgress, Outcome};
 pub use missions::missions;
 pub use node::Node;
 pub use reservation::config::CompleteConfig;

@@ -10,17 +10,51 @@ use farside_actors::invariants::{Collision, WaitCycle};
 
 pub(crate) use catalogue::ALL;
 
-/// How a team came to a stop before its goals.
+/// How a run ended.
+#[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It was ended from outside, as by `until`.
+    #[default]
+    Unfinished,
+    /// All rovers that have a way arrived.
+    Arrived,
+    /// Some rover could not arrive any more, and nothing moved or came nearer any more.
+    Deadlock,
+    /// Nothing moved or came nearer for so long that the run was ended, which proves nothing.
+    NoProgress,
+    /// After `network.cycle_limit` cycles.
+    CycleLimit,
+}
+
+/// Whether a team came to a deadlock: whether it is certain that it would never have arrived.
+///
+/// It is, when the run ended, if a rover that had not arrived stood among others so that each
+/// vertex beside any of them was held by one of them; or was down, and was not to be restarted; or
+/// had no plan, of a policy that plans before the start. A vertex is granted only when it is free,
+/// and no message, repetition or timer frees one of theirs.
 #[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Deadlock {
-    /// It did not.
+    /// That is not certain.
     #[default]
     None,
-    /// A deadlock: no rover moved or entered for `network.deadlock_window` cycles.
+    /// It is.
     Passive,
-    /// Rovers moved, and came no nearer to their goals for `network.livelock_window` cycles.
-    Livelock,
+}
+
+/// What a team did that was ended for want of progress, without being certain not to arrive.
+#[derive(Serialize, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum NoProgress {
+    /// It was not.
+    #[default]
+    None,
+    /// It stood: no rover moved or entered for `network.deadlock_window`.
+    Standing,
+    /// Rovers moved, and came no nearer to their goals for `network.livelock_window`: what the
+    /// network-guided paper calls an active deadlock.
+    Moving,
 }
 
 /// The result of a run. Means are over the rovers that arrived, and 0 if none did.
@@ -43,8 +77,13 @@ pub struct NetworkMetrics {
     pub refused_missions: Vec<String>,
     /// Every rover reached its goal.
     pub completed: bool,
-    /// The team came to a deadlock or a livelock, see `deadlock`.
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// The team came to a deadlock that is certain, see `deadlock`.
     pub deadlocked: bool,
+    /// It came to a deadlock, or was ended for want of progress: what the network-guided paper
+    /// counts as deadlocks, passive and active ones.
+    pub stuck: bool,
     /// When each rover reached its goal, in seconds of virtual time, rover by rover; none for those
     /// that had not when the run ended.
     pub arrival_s: Vec<Option<f64>>,
@@ -55,8 +94,16 @@ pub struct NetworkMetrics {
     pub collisions: u32,
     /// The first of them: when, who, where.
     pub collided: Vec<Collision<VertexId>>,
-    /// How the team came to a deadlock, if it did.
+    /// Whether the team came to a deadlock.
     pub deadlock: Deadlock,
+    /// The rovers that can never move again, for a team that came to a deadlock: of those that stand
+    /// each has only others of them beside it. Empty if the deadlock has another reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub locked_rovers: Vec<String>,
+    /// What the team did, if the run was ended for want of progress.
+    pub no_progress: NoProgress,
+    /// For how many cycles it then had made none; 0 otherwise.
+    pub no_progress_cycles: u32,
     /// Cycles in which at least one rover was kept from a vertex that its path entered.
     pub interventions: u32,
     /// The same as a share of all cycles.
@@ -75,6 +122,8 @@ pub struct NetworkMetrics {
     pub total_steps: u64,
     /// Cycles between entry and goal in which the rover did not set out.
     pub mean_stops: f64,
+    /// Cycles in the queue at the entry, which are neither steps nor stops.
+    pub mean_queued: f64,
     /// Moves back to the vertex just left.
     pub mean_backtracks: f64,
     /// Cycles until the last rover arrived, or the run ended.
@@ -102,7 +151,8 @@ pub struct NetworkMetrics {
     /// Of what had to be computed in an iteration of max-plus, the share that was handed over to
     /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
-    /// Deadlocks that nodes' probes confirmed; 0 unless `network.max_plus.deadlock_probes` sends
+    /// Circles of rovers that wait for each other which nodes' probes confirmed, as nodes knew them
+    /// then; they may dissolve, and are no proof of a `deadlock`. 0 unless `network.max_plus.deadlock_probes` sends
     /// any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
@@ -117,13 +167,14 @@ pub struct NetworkMetrics {
     pub failovers: u32,
     /// Which node was replaced by which, and in which cycle, in order.
     pub failed_over: Vec<String>,
-    /// Why rovers are still out, for a team that came to a deadlock: how many, and where the first
-    /// of them stands; who waits for whom in the shortest of `wait_cycles`, or how many rovers move
-    /// in vain.
+    /// Why the run was ended with rovers out: how many, and where the first of them stands; who
+    /// waits for whom in the shortest of `wait_cycles`, or what makes a deadlock certain, or how
+    /// many rovers move in vain.
     pub deadlock_reason: Option<String>,
-    /// The circles of rovers that wait for each other when a team of the policy `max-plus`, or one
-    /// that stays on the map, came to a deadlock: no rover on one can come nearer to its goal
-    /// before the next one moves. The shortest first. Pictures of the run name the same.
+    /// The circles of rovers that wait for each other when a team came to a deadlock, or was ended
+    /// for want of progress: no rover on one can come nearer to its goal before the next one moves,
+    /// but where there is no deadlock one may still go aside. The shortest first. Pictures of the
+    /// run name the same.
     pub wait_cycles: Vec<WaitCycle<VertexId>>,
     /// What published solvers are compared by; only where rovers stay at their goals.
     #[serde(flatten)]

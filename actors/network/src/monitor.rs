@@ -3,7 +3,12 @@
 //!
 //! **Collision.** As [`Collisions`] has it; in entry queues and beyond goals nothing is claimed.
 //!
-//! **Who waits for whom**, when a team deadlocks: as [`waits`](crate::waits) has it.
+//! **Deadlock.** As [`waits`](crate::waits) has it: some rover cannot arrive any more, whatever is
+//! said, repeated or waited for. A run in which nothing comes of anything for longer than messages
+//! take to come through ([`pauses`]) ends as a deadlock if that is proved, and otherwise for want of
+//! progress, which proves nothing.
+
+mod pauses;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,8 +16,8 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside::{RunInfo, SimTime};
 use farside_worlds::{NodeId, VertexId};
 
-use super::config::Motion;
-use super::metrics::{Costs, Deadlock, NetworkMetrics};
+use super::config::{Motion, Sabotage};
+use super::metrics::{Costs, Deadlock, NetworkMetrics, NoProgress, Outcome};
 use super::waits::{Standing, WaitRule, Waits};
 use crate::failover::messages::FailedOver;
 use crate::ids::RoverId;
@@ -21,6 +26,18 @@ use crate::max_plus::messages::NodeState;
 use crate::safety::messages::RoverState;
 use crate::shared::Shared;
 use farside_actors::invariants::{Collisions, Place, WaitCycle};
+use pauses::{Fixed, Pause, Pauses};
+
+fn wait_rule(site: &Shared) -> WaitRule {
+    WaitRule::of(site.config.policy, site.stay_at_target)
+}
+
+/// Why a team never arrives.
+struct Proof {
+    /// Who can never move again, if that is why.
+    locked: Vec<u32>,
+    sentence: String,
+}
 
 /// What the monitor keeps of a rover, beside where it is.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +50,10 @@ struct Track {
     /// Moves begun.
     moves: u32,
     backtracks: u32,
+    /// Steps that it has completed.
+    step: u32,
+    /// It is down, and nothing will restart it.
+    is_down: bool,
     /// The cycle of its last move.
     moved: Option<u32>,
     /// Edges between where it is, or will be, and its goal.
@@ -57,10 +78,14 @@ pub(crate) struct Score {
     informed: Vec<SimTime>,
     messages: u64,
     bytes: u64,
-    last_move: u32,
-    /// The least sum of remaining distances so far, and when it was reached.
-    nearest: (u32, u32),
+    pauses: Pauses,
+    /// The least sum of remaining distances so far.
+    nearest: u32,
+    outcome: Outcome,
     deadlock: Deadlock,
+    no_progress: NoProgress,
+    no_progress_cycles: u32,
+    locked: Vec<u32>,
     deadlock_reason: Option<String>,
     wait_cycles: Vec<WaitCycle<VertexId>>,
     failed_over: Vec<FailedOver>,
@@ -74,6 +99,7 @@ pub(crate) struct Monitor {
     score: Arc<Mutex<Score>>,
     /// Who takes part, to tell rovers' samples by.
     rovers: Vec<Option<RoverId>>,
+    fixed: Fixed,
 }
 
 impl Monitor {
@@ -99,13 +125,14 @@ impl Monitor {
         let score = Arc::new(Mutex::new(Score {
             tracks,
             collisions,
-            nearest: (sum, 0),
+            nearest: sum,
             ..Score::default()
         }));
         let monitor = Monitor {
             site,
             score: score.clone(),
             rovers: Vec::new(),
+            fixed: Fixed::default(),
         };
         (monitor, score)
     }
@@ -123,6 +150,7 @@ impl Observer for Monitor {
         let id = |name: &String| self.site.rover_names.iter().position(|n| n == name);
         let rover = |entity: &farside::Entity| id(&entity.name).map(|id| RoverId(id as u32));
         self.rovers = run.entities.iter().map(rover).collect();
+        self.fixed = Fixed::of(run);
         Ok(())
     }
 
@@ -131,12 +159,22 @@ impl Observer for Monitor {
         let cycle = self.site.cycle_at(record.time());
         // What is on its way at the end is recorded with the time that it would have come at.
         if cycle > score.cycle && record.class != RecordClass::InFlight {
-            score.cycle = cycle;
+            let is_pending = self.fixed.is_pending(record.time());
+            let over = std::mem::replace(&mut score.cycle, cycle);
+            score.pauses.count(over, cycle, is_pending);
             if let Some(reason) = score.verdict(&self.site) {
                 return Ok(Flow::Stop(reason));
             }
         }
+        if matches!(record.class, RecordClass::Crash | RecordClass::Restart) {
+            self.fixed.note(record);
+            if let Some(rover) = self.rovers[record.receiver.index()] {
+                let track = &mut score.tracks[rover.0 as usize];
+                track.is_down = self.fixed.is_down_for_good(record.receiver, record.time());
+            }
+        }
         if record.class.is_fate() && record.link.is_some() && record.copy == 0 {
+            score.pauses.fate(record.class);
             score.messages += 1;
             // The digest had it encoded: looking costs nothing.
             score.bytes += record.body.len() as u64;
@@ -184,6 +222,7 @@ impl Score {
     fn follow(&mut self, site: &Shared, rover: RoverId, state: &RoverState, now: SimTime) -> Flow {
         let at = rover.0 as usize;
         self.tracks[at].transmit_energy_j = state.transmit_energy_j;
+        self.tracks[at].step = state.whereabouts.step;
         let old = self.collisions.place(at);
         let place = state.whereabouts.place();
         if place == old {
@@ -221,10 +260,11 @@ impl Score {
             track.remaining = site.roadmap.distance(claim, state.goal);
         }
         track.moved = Some(cycle);
-        self.last_move = cycle;
+        self.pauses.standstill.ends(cycle);
         let gone = |rover: usize| !self.is_out(site, rover);
         if !self.ended && (0..self.tracks.len()).all(gone) {
             self.ended = true;
+            self.outcome = Outcome::Arrived;
             let all = match site.refused.is_empty() {
                 true => "all rovers have arrived",
                 false => "all rovers that have a way have arrived",
@@ -237,8 +277,9 @@ impl Score {
     /// Looks back when a new cycle begins: why the run should end, if it should.
     fn verdict(&mut self, site: &Shared) -> Option<String> {
         let sum: u32 = self.tracks.iter().map(|t| t.remaining).sum();
-        if sum < self.nearest.0 {
-            self.nearest = (sum, self.cycle);
+        if sum < self.nearest {
+            self.nearest = sum;
+            self.pauses.no_nearer.ends(self.cycle);
             for track in &mut self.tracks {
                 track.remaining_then = track.remaining;
             }
@@ -246,27 +287,85 @@ impl Score {
         if self.ended {
             return None;
         }
-        let config = &site.config;
-        let still = |since: u32, window| self.cycle.saturating_sub(since) > window;
-        let reason = if still(self.last_move, config.deadlock_window + site.patience) {
-            self.deadlock = Deadlock::Passive;
-            "deadlock"
-        } else if still(self.nearest.1, config.livelock_window + site.patience) {
-            self.deadlock = Deadlock::Livelock;
-            "livelock"
+        let (config, pauses) = (&site.config, &self.pauses);
+        let too_long = |pause: Pause, window| pause.is_as_long_as(window + site.patience);
+        let (pause, no_progress) = if too_long(pauses.standstill, config.deadlock_window) {
+            (pauses.standstill, NoProgress::Standing)
+        } else if too_long(pauses.no_nearer, config.livelock_window) {
+            (pauses.no_nearer, NoProgress::Moving)
         } else if self.cycle >= config.cycle_limit {
-            "cycle limit"
+            (pauses.no_nearer, NoProgress::None)
         } else {
             return None;
         };
         self.ended = true;
+        let proof = self.proof(site);
+        let cycles = self.cycle - pause.since();
+        let (outcome, what) = match (&proof, no_progress) {
+            (Some(_), _) => (Outcome::Deadlock, "deadlock".to_owned()),
+            (None, NoProgress::None) => (Outcome::CycleLimit, "cycle limit".to_owned()),
+            (None, _) => {
+                let what = format!("no progress within {cycles} cycles");
+                (Outcome::NoProgress, what)
+            }
+        };
+        self.outcome = outcome;
+        match outcome {
+            Outcome::Deadlock => self.deadlock = Deadlock::Passive,
+            Outcome::NoProgress => {
+                (self.no_progress, self.no_progress_cycles) = (no_progress, cycles);
+            }
+            _ => {}
+        }
         // Why the run stopped is part of its digest, and stays as short as it was.
-        let reason = format!("{reason}: {}", self.remaining(site));
-        if self.deadlock != Deadlock::None {
+        let reason = format!("{what}: {}", self.remaining(site));
+        if outcome != Outcome::CycleLimit {
             self.wait_cycles = self.circles(site);
         }
-        self.deadlock_reason = Some(format!("{reason}{}", self.why()));
+        if let Some(proof) = &proof {
+            self.locked.clone_from(&proof.locked);
+        }
+        self.deadlock_reason = Some(format!("{reason}{}", self.why(proof)));
         Some(reason)
+    }
+
+    /// Why some rover that is still out can never arrive, whatever is said, repeated or waited for;
+    /// none if that is not certain. See [`waits`](crate::waits) for the argument.
+    fn proof(&self, site: &Shared) -> Option<Proof> {
+        if site.config.sabotage != Sabotage::None {
+            // The argument rests on the safety protocol.
+            return None;
+        }
+        let is_out =
+            |rover: &usize| self.tracks[*rover].arrived.is_none() && self.is_out(site, *rover);
+        let out: Vec<usize> = (0..self.tracks.len()).filter(is_out).collect();
+        let name = |rover: usize| &site.rover_names[rover];
+        let of = |sentence: String| Proof {
+            locked: Vec::new(),
+            sentence,
+        };
+        if let Some(&down) = out.iter().find(|rover| self.tracks[**rover].is_down) {
+            return Some(of(format!("{} is down for good", name(down))));
+        }
+        let waits = Waits::of(&site.roadmap, wait_rule(site), &self.standing(site));
+        let is_locked = |rover: &&usize| waits.locked.contains(&(**rover as u32));
+        if let Some(&first) = out.iter().find(is_locked) {
+            let (locked, first) = (waits.locked.into_iter().collect::<Vec<u32>>(), name(first));
+            let count = locked.len();
+            let sentence =
+                format!("{count} rovers can never move again, the first of them {first}");
+            return Some(Proof { locked, sentence });
+        }
+        let schedule = site.schedule.as_ref()?;
+        let has_driven = |rover: &&usize| {
+            let mut visits = schedule.visits.iter();
+            let mine = visits.find(|(id, _)| id.0 as usize == **rover);
+            let visits = mine.map_or(0, |(_, visits)| visits.len());
+            // Where rovers leave, one that has driven its way has arrived.
+            visits == 0 || site.stay_at_target && self.tracks[**rover].step as usize >= visits
+        };
+        let done = *out.iter().find(has_driven)?;
+        Some(of(format!("{} has no planned way", name(done))))
     }
 
     /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
@@ -298,28 +397,36 @@ impl Score {
         }
     }
 
-    /// The circles of rovers that wait for each other.
-    fn circles(&self, site: &Shared) -> Vec<WaitCycle<VertexId>> {
+    /// All rovers as the wait-for graph has them.
+    fn standing(&self, site: &Shared) -> Vec<Standing> {
         let standing = |(rover, &(_, goal)): (u32, &(VertexId, VertexId))| Standing {
             rover,
             place: self.collisions.place(rover as usize),
             goal,
+            is_down: self.tracks[rover as usize].is_down,
         };
-        let rovers: Vec<Standing> = (0..).zip(&site.missions).map(standing).collect();
-        let rule = WaitRule::of(site.config.policy, site.stay_at_target);
+        (0..).zip(&site.missions).map(standing).collect()
+    }
+
+    /// The circles of rovers that wait for each other.
+    fn circles(&self, site: &Shared) -> Vec<WaitCycle<VertexId>> {
+        let rovers = self.standing(site);
         let name = |rover: u32| site.rover_names[rover as usize].clone();
-        Waits::of(&site.roadmap, rule, &rovers).named(name, &rovers)
+        Waits::of(&site.roadmap, wait_rule(site), &rovers).named(name, &rovers)
     }
 
     /// What holds the team up, as far as can be seen from outside; the end of a sentence.
-    fn why(&self) -> String {
+    fn why(&self, proof: Option<Proof>) -> String {
         if let Some(shortest) = self.wait_cycles.first() {
             return format!("; {shortest}");
         }
-        if self.deadlock != Deadlock::Livelock {
+        if let Some(proof) = proof {
+            return format!("; {}", proof.sentence);
+        }
+        if self.no_progress != NoProgress::Moving {
             return String::new();
         }
-        let since = self.nearest.1;
+        let since = self.pauses.no_nearer.since();
         let moved = |track: &&Track| track.moved.is_some_and(|cycle| cycle > since);
         let no_nearer = |track: &&Track| track.remaining >= track.remaining_then;
         let tracks = self.tracks.iter().filter(moved).filter(no_nearer);
@@ -337,12 +444,18 @@ impl Score {
     }
 
     pub(crate) fn metrics(&self, site: &Shared) -> NetworkMetrics {
+        let rover_name = |rover: &u32| site.rover_names[*rover as usize].clone();
         let mut metrics = NetworkMetrics {
             rovers: self.tracks.len() as u32,
             collisions: self.collisions(),
             collided: self.collisions.named().to_vec(),
             wait_cycles: self.wait_cycles.clone(),
+            outcome: self.outcome,
             deadlock: self.deadlock,
+            locked_rovers: self.locked.iter().map(rover_name).collect(),
+            no_progress: self.no_progress,
+            no_progress_cycles: self.no_progress_cycles,
+            stuck: self.deadlock != Deadlock::None || self.no_progress != NoProgress::None,
             interventions: self.interventions,
             cycles: self.cycle + 1,
             confirmed_deadlocks: self.confirmed_deadlocks,
@@ -410,6 +523,7 @@ impl Score {
             };
             metrics.mean_steps += f64::from(steps);
             metrics.total_steps += u64::from(steps);
+            metrics.mean_queued += f64::from(entered);
             metrics.mean_stops += f64::from(steps.saturating_sub(track.moves));
             metrics.mean_backtracks += f64::from(track.backtracks);
         }
@@ -418,6 +532,7 @@ impl Score {
             &mut metrics.path_ratio,
             &mut metrics.time_ratio,
             &mut metrics.mean_steps,
+            &mut metrics.mean_queued,
             &mut metrics.mean_stops,
             &mut metrics.mean_backtracks,
         ] {

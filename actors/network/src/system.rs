@@ -18,7 +18,8 @@ use crate::scene::NetworkScene;
 use crate::world::{RoadmapGround, crater, ground, in_crater, place};
 use crate::{
     CompleteConfig, ConfigError, MaxPlusConfig, Missions, Network, NetworkConfig, NetworkError,
-    NetworkMetrics, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics, missions, picture,
+    NetworkMetrics, NoProgress, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics,
+    missions, picture,
 };
 
 /// The network-guided system.
@@ -264,6 +265,14 @@ fn results(metrics: &NetworkMetrics) -> Results {
     let deadlock = results.metrics.get("deadlock").and_then(Value::as_str);
     let deadlock = deadlock.unwrap_or("unknown").to_owned();
     line("deadlock", deadlock);
+    if metrics.no_progress != NoProgress::None {
+        let (cycles, did) = (metrics.no_progress_cycles, metrics.no_progress);
+        let did = match did {
+            NoProgress::Moving => "rovers moved, and came no nearer",
+            _ => "no rover moved",
+        };
+        line("no progress", format!("within {cycles} cycles: {did}"));
+    }
     if let Some(shortest) = metrics.wait_cycles.first() {
         line("circles of rovers", metrics.wait_cycles.len().to_string());
         line("the shortest", shortest.to_string());

@@ -88,6 +88,8 @@ impl Sighting {
             rover: self.rover,
             place: self.place,
             goal: self.goal,
+            // A log does not say of who is down whether it comes back.
+            is_down: false,
         }
     }
 }

@@ -3,9 +3,10 @@
 
 use std::ops::RangeInclusive;
 
+use farside::SimDuration;
 use farside_actors::processor::Speed;
-use farside_actors::settings;
 use farside_actors::system::settings::{one_of, such_that};
+use farside_actors::{settings, units};
 use serde::{Deserialize, Serialize};
 
 use super::processor::{self, PAPER_SPEED};
@@ -25,6 +26,21 @@ pub enum Priority {
     LowestId,
 }
 
+/// Which paths "cause a robot to backtrack", and so pay [`MaxPlusConfig::backtrack_penalty`]
+/// (section 3.4).
+#[derive(Deserialize, Serialize, Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Backtrack {
+    /// Those whose first vertex is the one that the rover has just left.
+    #[default]
+    FirstStep,
+    /// Those whose first edge leads back, by more than a right angle from the way that the rover
+    /// has come.
+    Direction,
+    /// All, once for each step that leads away from the rover's goal.
+    EachStepAway,
+}
+
 settings! {
     /// The `[network.max_plus]` table: what only the policy `max-plus` reads.
     ///
@@ -41,6 +57,11 @@ settings! {
         /// `"unlimited"`. The optimisation uses what is ready in its time.
         pub processor: Speed [with = "processor"] = PAPER_SPEED,
             such_that("more than 0/s", Speed::to_string, |speed: &Speed| *speed != Speed::PerS(0));
+        /// How long an iteration takes at least, whatever there is to compute: what it costs to
+        /// bring the messages of all pairs from process to process, and to wait for the slowest.
+        /// The paper's 500 ms end the optimisation, or 100 iterations; it does not say how many
+        /// there were.
+        pub iteration_time: SimDuration [with = "units::duration"];
         /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as
         /// computed. 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum
         /// on DCOPs through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus
@@ -70,9 +91,23 @@ settings! {
         /// C, the estimate of the longest path, in diameters of the roadmap.
         pub longest_path_factor: f64 = 20.0,
             WEIGHTS;
-        /// What a path loses that leads back to the vertex just left.
+        /// Which paths lead back.
+        pub backtrack: Backtrack,
+            one_of(&["first_step", "direction", "each_step_away"]);
+        /// What a path loses that leads back; with `each_step_away` for each such step.
         pub backtrack_penalty: f64 = 40.0,
             WEIGHTS;
+        /// What a path gains that leads to where the rover's path of the cycle before led: how much
+        /// better another one must be for a rover to change its mind. The paper says nothing of it.
+        pub keep_bonus: f64,
+            WEIGHTS;
+        /// The payoff of the zero path; 0 is the paper's.
+        pub zero_payoff: f64,
+            -1e9..=1e9;
+        /// Whether a path to a leaf holds the leaf after its end, as the zero path holds its
+        /// vertex. By default it claims nothing then: where the rover goes on is another cycle's
+        /// decision.
+        pub leaf_paths_hold: bool;
         /// What it costs a rover that stands on a leaf of the local neighbourhood graph to wait
         /// there. Below `backtrack_penalty`, rovers that face each other wait for ever; near C,
         /// none ever waits in a pocket for another to pass, and two of them go round in circles. A

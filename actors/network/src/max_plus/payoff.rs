@@ -7,14 +7,22 @@ use farside_worlds::{Roadmap, VertexId};
 
 use crate::config::{NetworkConfig, Policy};
 use crate::max_plus::candidates::{CandidatePath, Destination};
+use crate::max_plus::config::Backtrack;
 
 /// The constants of the payoff functions for one roadmap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Payoffs {
     /// C, "an estimate of the maximum path length in the roadmap" [cycles].
     pub(crate) longest: f64,
-    /// What a path loses whose first vertex is the one just left.
+    /// What a path loses that leads back, and which do.
     pub(crate) backtrack: f64,
+    pub(crate) leads_back: Backtrack,
+    /// What the zero path is worth.
+    pub(crate) zero: f64,
+    /// What a path gains that leads where the last one led.
+    pub(crate) keep: f64,
+    /// A path to a leaf holds it after its end.
+    pub(crate) leaf_paths_hold: bool,
     /// What the path of length 0 of a rover that stands on a leaf loses.
     pub(crate) leaf_wait: f64,
     /// The payoff of a pair that collides in the cycle to come: "a highly negative constant".
@@ -39,6 +47,10 @@ impl Payoffs {
         Payoffs {
             longest,
             backtrack: config.max_plus.backtrack_penalty,
+            leads_back: config.max_plus.backtrack,
+            zero: config.max_plus.zero_payoff,
+            keep: config.max_plus.keep_bonus,
+            leaf_paths_hold: config.max_plus.leaf_paths_hold,
             leaf_wait: config.max_plus.leaf_wait_penalty,
             imminent: -config.max_plus.collision_penalty_factor * longest,
         }
@@ -56,7 +68,7 @@ impl Payoffs {
     ) -> f32 {
         let end = *path.vertices.last().expect("a path has a start");
         let worth = match path.destination {
-            Destination::Stay => 0.0,
+            Destination::Stay => self.zero,
             Destination::Goal => self.longest - f64::from(path.length()),
             Destination::Leaf => {
                 let waits = path.length() == 0;
@@ -64,9 +76,35 @@ impl Payoffs {
                 self.longest - f64::from(path.length() + roadmap.distance(end, goal)) - penalty
             }
         };
-        let backtracks = previous.is_some() && path.next_vertex() == previous;
-        let penalty = if backtracks { self.backtrack } else { 0.0 };
+        let penalty = self.backtrack * f64::from(self.backtracks(roadmap, path, goal, previous));
         (worth - penalty + noise) as f32
+    }
+
+    /// How often a path pays for leading back.
+    fn backtracks(
+        &self,
+        roadmap: &Roadmap,
+        path: &CandidatePath,
+        goal: VertexId,
+        previous: Option<VertexId>,
+    ) -> u32 {
+        let next = path.next_vertex();
+        match self.leads_back {
+            Backtrack::FirstStep => u32::from(previous.is_some() && next == previous),
+            Backtrack::Direction => {
+                let (Some(from), Some(next)) = (previous, next) else {
+                    return 0;
+                };
+                let at = |v| roadmap.position_m(v);
+                let here = at(path.vertices[0]);
+                u32::from((here - at(from)).dot(&(at(next) - here)) < 0.0)
+            }
+            Backtrack::EachStepAway => {
+                let left = |v: &VertexId| roadmap.distance(*v, goal);
+                let steps = path.vertices.windows(2);
+                steps.filter(|step| left(&step[1]) > left(&step[0])).count() as u32
+            }
+        }
     }
 
     /// The pairwise payoff of two paths with these unary payoffs that collide in cycle `collision`.
@@ -87,11 +125,19 @@ pub(crate) fn divisor(t: u32) -> f64 {
 
 /// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where
 /// it is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero
-/// path, and the wait on a leaf) holds its vertex for ever; any other claims nothing after its end.
-pub(crate) fn collision_from(a: &CandidatePath, b: &CandidatePath, first: u32) -> Option<u32> {
-    let stays = |path: &CandidatePath| path.length() == 0;
+/// path, and the wait on a leaf) holds its vertex for ever, and with `leaf_paths_hold` any path to a
+/// leaf its end; any other claims nothing after its end.
+pub(crate) fn collision_from(
+    a: &CandidatePath,
+    b: &CandidatePath,
+    first: u32,
+    leaf_paths_hold: bool,
+) -> Option<u32> {
+    let stays = |path: &CandidatePath| {
+        path.length() == 0 || leaf_paths_hold && path.destination == Destination::Leaf
+    };
     let cycles = match (stays(a), stays(b)) {
-        (true, true) => 1,
+        (true, true) => a.length().max(b.length()).max(1),
         (true, false) => b.length(),
         (false, true) => a.length(),
         (false, false) => a.length().min(b.length()),
@@ -118,7 +164,7 @@ pub(crate) fn collision_from(a: &CandidatePath, b: &CandidatePath, first: u32) -
 /// The first cycle of all in which two paths collide.
 #[cfg(test)]
 pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
-    collision_from(a, b, 1)
+    collision_from(a, b, 1, false)
 }
 
 #[cfg(test)]
@@ -182,6 +228,38 @@ mod tests {
             Some(1)
         );
         assert_eq!(collision(&path(Stay, &[0]), &path(Stay, &[1])), None);
+        let held = |a, b| collision_from(a, b, 1, true);
+        let (east, west) = (path(Leaf, &[0, 1, 2]), path(Leaf, &[5, 4, 3, 2]));
+        assert_eq!(collision(&east, &west), None);
+        assert_eq!((held(&east, &west), held(&west, &east)), (Some(3), Some(3)));
+        let past = path(Goal, &[5, 4, 3, 2, 1]);
+        assert_eq!((held(&east, &past), held(&past, &east)), (Some(3), Some(3)));
+    }
+
+    #[test]
+    fn what_leads_back_is_a_reading() {
+        let map = grid(6, 1, &[]);
+        let lost = |reading: &str, vertices: &[u32], previous| {
+            let text = format!("max_plus = {{ backtrack = '{reading}', backtrack_penalty = 7 }}");
+            let config: NetworkConfig = toml::from_str(&text).unwrap();
+            let (payoffs, path) = (
+                Payoffs::new(&config, &map),
+                path(Destination::Leaf, vertices),
+            );
+            let free = Payoffs {
+                backtrack: 0.0,
+                ..payoffs
+            };
+            let worth = |p: Payoffs| p.unary(&map, &path, v(5), Some(v(previous)), 0.0);
+            worth(free) - worth(payoffs)
+        };
+        // Back where it came from; on; and back after it came from elsewhere.
+        assert_eq!(lost("first_step", &[3, 2, 1], 2), 7.0);
+        assert_eq!(lost("first_step", &[3, 4, 5], 2), 0.0);
+        assert_eq!(lost("direction", &[3, 3, 2], 1), 7.0);
+        assert_eq!(lost("direction", &[3, 4], 2), 0.0);
+        assert_eq!(lost("each_step_away", &[3, 2, 1], 4), 14.0);
+        assert_eq!(lost("each_step_away", &[3, 3, 4], 4), 0.0);
     }
 
     #[test]

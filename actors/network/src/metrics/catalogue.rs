@@ -5,7 +5,7 @@ use farside_actors::system::Metric;
 use farside_actors::system::MetricKind::{Number, Rate, Sample, Word};
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 38] = [
+pub(crate) const ALL: [Metric; 43] = [
     Metric::new("arrival_s", "time to the goal", "s", Sample, Lower),
     Metric::new("arrived", "rovers at their goals", "rovers", Number, Higher),
     Metric::new(
@@ -33,14 +33,14 @@ pub(crate) const ALL: [Metric; 38] = [
     Metric::new("completed", "all rovers at their goals", "", Rate, Higher),
     Metric::new(
         "confirmed_deadlocks",
-        "deadlocks confirmed by probes",
+        "circles of waits that probes confirmed",
         "",
         Number,
         Neither,
     ),
     Metric::new("cycles", "planning cycles", "cycles", Number, Lower),
     Metric::new("deadlock", "deadlock", "", Word, Neither),
-    Metric::new("deadlocked", "deadlock or livelock", "", Rate, Lower),
+    Metric::new("deadlocked", "deadlock, proved", "", Rate, Lower),
     Metric::new("failovers", "failovers", "", Number, Neither),
     Metric::new(
         "intervention_rate",
@@ -80,6 +80,13 @@ pub(crate) const ALL: [Metric; 38] = [
         Neither,
     ),
     Metric::new("mean_backtracks", "moves back per rover", "", Number, Lower),
+    Metric::new(
+        "mean_queued",
+        "cycles in the queue per rover",
+        "cycles",
+        Number,
+        Lower,
+    ),
     Metric::new("mean_steps", "steps per rover", "", Number, Lower),
     Metric::new("mean_stops", "stops per rover", "", Number, Lower),
     Metric::new(
@@ -89,6 +96,15 @@ pub(crate) const ALL: [Metric; 38] = [
         Number,
         Lower,
     ),
+    Metric::new("no_progress", "no progress", "", Word, Neither),
+    Metric::new(
+        "no_progress_cycles",
+        "cycles without progress that ended the run",
+        "cycles",
+        Number,
+        Neither,
+    ),
+    Metric::new("outcome", "how the run ended", "", Word, Neither),
     Metric::new(
         "outsourced",
         "share of the work that was handed over",
@@ -133,6 +149,7 @@ pub(crate) const ALL: [Metric; 38] = [
         Neither,
     ),
     Metric::new("rovers", "rovers", "rovers", Number, Neither),
+    Metric::new("stuck", "deadlock or no progress", "", Rate, Lower),
     Metric::new(
         "suboptimality",
         "sum of costs over its bound",

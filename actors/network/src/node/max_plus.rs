@@ -15,6 +15,7 @@ mod resolution;
 mod tests;
 
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use farside::prelude::*;
@@ -26,6 +27,7 @@ use super::Node;
 use super::base::Base;
 use super::policy::{NodePolicy, Phase, PhaseBegins};
 use super::reservations::Reservations;
+use crate::ids::RoverId;
 use crate::max_plus::assignment::Request;
 use crate::max_plus::lng::LocalGraph;
 use crate::safety::News;
@@ -62,6 +64,8 @@ pub(super) struct MaxPlusPolicy {
     /// Own rovers that leave their vertex in this cycle without accelerating.
     leaving: Vec<VertexId>,
     forced_stops: u32,
+    /// Where rovers' paths of the cycle before led, with `network.max_plus.keep_bonus`.
+    assigned: BTreeMap<RoverId, VertexId>,
     probes: Probes,
     resolution: Resolution,
     /// What carries the roadmap to nodes that are given it over the network.
@@ -81,6 +85,7 @@ impl MaxPlusPolicy {
             requests: Vec::new(),
             leaving: Vec::new(),
             forced_stops: 0,
+            assigned: BTreeMap::new(),
             probes: Probes::default(),
             resolution: Resolution::default(),
             roadmap_carrier: base.site.roadmap_from.map(|_| Reservations::default()),

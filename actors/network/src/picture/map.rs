@@ -63,6 +63,10 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         ));
         says.push_str(&run.shortest_circle(&waits, &rovers));
     }
+    if !waits.locked.is_empty() {
+        let locked = counted(waits.locked.len(), "rover");
+        says.push_str(&format!(" {locked} can never move again."));
+    }
     let pairs = sheet.coordination(&rovers);
     let body = html! {
         style { (PreEscaped(super::STYLE)) }

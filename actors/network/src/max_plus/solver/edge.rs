@@ -47,7 +47,7 @@ impl Edge {
     pub(super) fn between(a: &Paths, b: &Paths, payoffs: &Payoffs, cycles: &mut Vec<u32>) -> Edge {
         let size = (a.list.len(), b.list.len());
         let sum = |at_a: usize, at_b: usize| a.list[at_a].payoff + b.list[at_b].payoff;
-        if !a.meet(b, cycles) {
+        if !a.meet(b, payoffs.leaf_paths_hold, cycles) {
             return Edge::new(size, |at_a, at_b| payoffs.pairwise(sum(at_a, at_b), None));
         }
         Edge::new(size, |at_a, at_b| {

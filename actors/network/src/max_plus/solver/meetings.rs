@@ -57,7 +57,7 @@ impl Paths {
 
     /// The cycle in which each path first collides with each of `other`'s, 0 for never: a row of
     /// `other`'s paths for each path. False, and nothing in `cycles`, if none meets any.
-    pub(super) fn meet(&self, other: &Paths, cycles: &mut Vec<u32>) -> bool {
+    pub(super) fn meet(&self, other: &Paths, leaf_paths_hold: bool, cycles: &mut Vec<u32>) -> bool {
         cycles.clear();
         if !meet(&self.all, &other.all) {
             return false;
@@ -80,7 +80,8 @@ impl Paths {
                         Some((cycle, _)) => cycle,
                         None => {
                             let first = shared_a.max(shared_b).max(1);
-                            collision_from(path, &other.list[b], first).unwrap_or(0)
+                            collision_from(path, &other.list[b], first, leaf_paths_hold)
+                                .unwrap_or(0)
                         }
                     };
                 }
@@ -96,7 +97,6 @@ impl Paths {
 mod tests {
     use super::*;
     use crate::max_plus::candidates::Destination;
-    use crate::max_plus::payoff::collision;
     use farside_worlds::VertexId;
     use proptest::prelude::*;
 
@@ -116,13 +116,15 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
         #[test]
-        fn collisions_are_those_of_each_pair(a in paths(), b in paths()) {
+        fn collisions_are_those_of_each_pair(
+            a in paths(), b in paths(), hold in any::<bool>(),
+        ) {
             let (a, b) = (Paths::new(a), Paths::new(b));
             let mut cycles = vec![7];
-            let any = a.meet(&b, &mut cycles);
+            let any = a.meet(&b, hold, &mut cycles);
             for (at_a, path_a) in a.list.iter().enumerate() {
                 for (at_b, path_b) in b.list.iter().enumerate() {
-                    let expected = collision(path_a, path_b).unwrap_or(0);
+                    let expected = collision_from(path_a, path_b, 1, hold).unwrap_or(0);
                     let found = if any { cycles[at_a * b.list.len() + at_b] } else { 0 };
                     prop_assert_eq!(found, expected, "{:?} and {:?}", path_a, path_b);
                 }

@@ -1,8 +1,10 @@
 //! Max-plus against brute force and against its definition.
 
 use super::*;
+use crate::NetworkConfig;
 use crate::max_plus::candidates::Destination;
 use crate::max_plus::payoff::collision;
+use crate::testing::grid;
 use farside::random::{RandomKey, Stream};
 
 const PLAIN: Rules = Rules {
@@ -17,6 +19,7 @@ fn payoffs() -> Payoffs {
         backtrack: 40.0,
         leaf_wait: 45.0,
         imminent: -1000.0,
+        ..Payoffs::new(&NetworkConfig::default(), &grid(2, 1, &[]))
     }
 }
 

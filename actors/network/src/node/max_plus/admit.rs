@@ -126,6 +126,12 @@ impl MaxPlusPolicy {
             if !base.is_rover(assignment.rover) {
                 continue;
             }
+            if base.site.payoffs.keep > 0.0
+                && let Some(end) = assignment.path.vertices.last()
+            {
+                // The rover may come to this node's vertices.
+                self.assigned.insert(assignment.rover, *end);
+            }
             if message.cycle == base.cycle && !decided {
                 self.file(base, assignment);
                 continue;

@@ -129,6 +129,9 @@ impl MaxPlusPolicy {
             let (roadmap, payoffs) = (&base.site.roadmap, &base.site.payoffs);
             path.payoff = payoffs.unary(roadmap, path, goal, previous, noise);
             path.payoff -= self.congestion(base, path, here_now) as f32;
+            if self.assigned.get(&held.rover) == path.vertices.last() {
+                path.payoff += payoffs.keep as f32;
+            }
         }
         paths
     }
@@ -137,7 +140,11 @@ impl MaxPlusPolicy {
     pub(super) fn assign(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
         let occupancy = ctx.durable::<OccupancyTable>();
         let mut rovers = Vec::new();
+        let keeps = base.site.payoffs.keep > 0.0;
         for (rover, path) in self.optimiser.best() {
+            if keeps && let Some(end) = path.vertices.last() {
+                self.assigned.insert(rover, *end);
+            }
             let here = path.vertices[0];
             let still_here = |o: &&Occupant| o.rover == rover && o.arrived;
             let Some(held) = occupancy.occupant(here).filter(still_here) else {

@@ -198,6 +198,7 @@ impl MaxPlusPolicy {
         let cycle = base.cycle;
         let pairs = solver.pairs();
         let takes = self.processor.time_for(ctx.now(), pairs);
+        let takes = takes.max(config.max_plus.iteration_time);
         let left = |until: SimTime| until.since(until.min(ctx.now()));
         // Its messages are to go out when the last are on the air, and not to be older than that.
         let idle = left(optimiser.sent).saturating_sub(takes);
