@@ -100,6 +100,8 @@ pub enum Item {
     Roadmap(RoadmapPart),
     /// Forward: where and when the rover could be if others made room.
     Wish(Wish),
+    /// Forward: the same as a probe, along a path that keeps clear of all others' places.
+    Clear(Clear),
 }
 
 /// A part of the roadmap.
@@ -204,6 +206,16 @@ pub struct Wish {
     pub probe: Probe,
     /// As in [`Displace`].
     pub priority: (u64, RoverId),
+}
+
+/// A probe that follows a path past no start and no goal of any other rover. What each node hands
+/// on has the path's own vertex among it, for late enough.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Clear {
+    /// The probe.
+    pub probe: Probe,
+    /// Where the path leaves each node of the probe's route; at the last one, the goal.
+    pub exits: Vec<VertexId>,
 }
 
 /// The backward half: the path is entered in the tables of all that own a part of it.

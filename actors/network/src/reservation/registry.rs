@@ -7,13 +7,13 @@ mod displacement;
 mod failover;
 mod requests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::messages::{Item, Probe, ReservationRequest, Reserve};
+use super::messages::{Clear, Item, Probe, ReservationRequest, Reserve};
 use super::relay::Line;
-use super::routes::routes;
+use super::routes::{ClearRoute, clear_route, routes};
 use super::table::{ReservationTable, Visit};
 use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
@@ -33,6 +33,21 @@ struct Applicant {
     again: Option<(ReservationRequest, u64)>,
     /// Attempts that found no path at all.
     in_vain: u32,
+    /// Along which nodes it was last asked, and between which vertices.
+    routes: Option<((VertexId, VertexId), Vec<Vec<NodeId>>)>,
+    /// The same of the path past no other rover's start or goal, if there is one.
+    clear: Option<((VertexId, VertexId), Option<ClearRoute>)>,
+}
+
+/// What a request asks for, along its routes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Question {
+    /// A path as things stand.
+    Plain,
+    /// What the path would be if nobody stood still for ever.
+    Wish,
+    /// A path as things stand, past no start and no goal of any other rover.
+    Clear,
 }
 
 impl Applicant {
@@ -215,6 +230,8 @@ impl Registry {
             request: None,
             again: None,
             in_vain: 0,
+            routes: None,
+            clear: None,
         });
     }
 
@@ -247,7 +264,6 @@ impl Registry {
         let applicant = &mut self.applicants[at];
         applicant.request = Some((request, desk.now));
         applicant.again = None;
-        let in_vain = applicant.in_vain;
         let mut goal = desk.site.missions[request.rover.0 as usize].1;
         let soon = desk.now + self.request_time;
         let (labels, entry, first_step) = match applicant.origin {
@@ -282,22 +298,14 @@ impl Registry {
             }
             Origin::Done => return,
         };
-        let site = desk.site;
-        // Every second time that there is no path it asks what the path would be without those who
-        // stand still.
-        let wishful = site.stay_at_target && in_vain % 2 == 1;
-        let routes = routes(
-            &site.roadmap,
-            &site.sensors,
-            (entry, goal),
-            site.config.complete.routes,
-        );
+        let question = self.question(desk, at, (entry, goal));
+        let routes = self.routes_of(desk, at, question, (entry, goal));
         let priority = match &self.applicants[at].aim {
             Aim::Aside(aside) => aside.priority,
             Aim::Goal => request.age(),
         };
         let probes = routes.len() as u32;
-        for route in routes {
+        for (route, exits) in routes {
             let probe = Probe {
                 request,
                 probes,
@@ -306,12 +314,82 @@ impl Registry {
                 at: 0,
                 goal,
                 first_step,
-                wishful,
+                wishful: question == Question::Wish,
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
-            self.probe(desk, probe, priority);
+            self.probe(desk, probe, priority, exits);
         }
+    }
+
+    /// What an attempt asks for. Where rovers stay, every second time that there was no path as
+    /// things stand it asks for another one: for one that is clear of all others' starts and goals,
+    /// if there is one, which in a well-formed instance all have; else for one on which others make
+    /// room.
+    fn question(
+        &mut self,
+        desk: &Desk<'_>,
+        at: usize,
+        ends: (VertexId, VertexId),
+    ) -> Question {
+        let in_vain = self.applicants[at].in_vain;
+        if !desk.site.stay_at_target || in_vain.is_multiple_of(2) {
+            return Question::Plain;
+        }
+        let turn = desk.site.is_well_formed || in_vain % 4 == 1;
+        match turn && self.clear_route(desk, at, ends).is_some() {
+            true => Question::Clear,
+            false => Question::Wish,
+        }
+    }
+
+    /// The path of an applicant past no start and no goal of any other rover.
+    fn clear_route(
+        &mut self,
+        desk: &Desk<'_>,
+        at: usize,
+        ends: (VertexId, VertexId),
+    ) -> Option<&ClearRoute> {
+        let applicant = &mut self.applicants[at];
+        if applicant.clear.as_ref().is_none_or(|(of, _)| *of != ends) {
+            let Origin::Stand { rover, .. } = applicant.origin else {
+                return None;
+            };
+            let site = desk.site;
+            let others: BTreeSet<VertexId> = (0..)
+                .map(RoverId)
+                .zip(&site.missions)
+                .filter(|(other, _)| *other != rover)
+                .flat_map(|(_, &(start, goal))| [start, goal])
+                .collect();
+            let avoided = |v| others.contains(&v);
+            let route = clear_route(&site.roadmap, &site.sensors, ends, avoided);
+            applicant.clear = Some((ends, route));
+        }
+        applicant.clear.as_ref()?.1.as_ref()
+    }
+
+    /// The routes of an attempt; of one that follows a path, where it leaves each node. They depend
+    /// on the roadmap alone, and are kept until they are asked for between other vertices.
+    fn routes_of(
+        &mut self,
+        desk: &Desk<'_>,
+        at: usize,
+        question: Question,
+        ends: (VertexId, VertexId),
+    ) -> Vec<(Vec<NodeId>, Vec<VertexId>)> {
+        if question == Question::Clear {
+            let clear = self.clear_route(desk, at, ends).cloned();
+            return clear.into_iter().map(|c| (c.nodes, c.exits)).collect();
+        }
+        let site = desk.site;
+        let known = &mut self.applicants[at].routes;
+        if known.as_ref().is_none_or(|(of, _)| *of != ends) {
+            let count = site.config.complete.routes;
+            *known = Some((ends, routes(&site.roadmap, &site.sensors, ends, count)));
+        }
+        let routes = known.iter().flat_map(|(_, routes)| routes);
+        routes.map(|route| (route.clone(), Vec::new())).collect()
     }
 
     fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&SearchSpace<'_>) -> T) -> T {
@@ -338,9 +416,13 @@ impl Registry {
         match item {
             Item::Probe(probe) => {
                 let priority = probe.request.age();
-                self.probe(desk, probe, priority);
+                self.probe(desk, probe, priority, Vec::new());
             }
-            Item::Wish(wish) => self.probe(desk, wish.probe, wish.priority),
+            Item::Wish(wish) => self.probe(desk, wish.probe, wish.priority, Vec::new()),
+            Item::Clear(Clear { probe, exits }) => {
+                let priority = probe.request.age();
+                self.probe(desk, probe, priority, exits);
+            }
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Displace(request) => self.displace(desk, request),

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::{Desk, Offers, Registry, owners};
+use super::{Aim, Desk, Offers, Origin, Question, Registry, owners};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
 use crate::reservation::messages::{
-    Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
+    Clear, Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
 };
 use crate::reservation::table::{Clash, Visit};
 
@@ -19,8 +19,15 @@ const MAX_FRONTIER: usize = 24;
 impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     ///
-    /// A wish is in the name of a request that began with `priority`.
-    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, priority: (u64, RoverId)) {
+    /// A wish is in the name of a request that began with `priority`. Along a clear path `exits`
+    /// are where it leaves each node of the route; else there are none.
+    pub(crate) fn probe(
+        &mut self,
+        desk: &Desk<'_>,
+        mut probe: Probe,
+        priority: (u64, RoverId),
+        exits: Vec<VertexId>,
+    ) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
             let busy = |v| self.busy_for_priority(v, priority);
@@ -39,12 +46,16 @@ impl Registry {
                 && onward.iter().any(|&v| site.sensors.owner(v) == next)
         };
         let has_gaps = !site.sensors.gaps().is_empty();
-        let frontier = frontier(&labels, has_gaps, borders);
+        let mut frontier = frontier(&labels, has_gaps, borders);
+        if let Some(exit) = exits.get(probe.at as usize) {
+            keep_exit(&labels, *exit, &mut frontier);
+        }
         probe.frontier = prune(&mut labels, &frontier);
         probe.labels = labels;
         probe.at += 1;
         let item = match probe.wishful {
             true => Item::Wish(Wish { probe, priority }),
+            false if !exits.is_empty() => Item::Clear(Clear { probe, exits }),
             false => Item::Probe(probe),
         };
         self.post(next, item);
@@ -339,6 +350,15 @@ impl Registry {
         let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(1);
         applicant.in_vain += 1;
         applicant.again = Some((next, desk.now + pause));
+        // Where a clear path is known there is nobody to wait for.
+        let Origin::Stand { rover, vertex, .. } = applicant.origin else {
+            return;
+        };
+        let goal = desk.site.missions[rover.0 as usize].1;
+        let to_goal = matches!(applicant.aim, Aim::Goal);
+        if to_goal && self.question(desk, at, (vertex, goal)) == Question::Clear {
+            self.begin(desk, at, next);
+        }
     }
 
     pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
@@ -390,4 +410,16 @@ fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) 
     }
     all.truncate(MAX_FRONTIER);
     all.into_iter().map(|(_, at)| at).collect()
+}
+
+/// Makes sure that the frontier has the earliest label at `exit` that can be kept up for ever.
+fn keep_exit(labels: &[Label], exit: VertexId, frontier: &mut Vec<u32>) {
+    let lasts = |label: &Label| label.vertex == exit && label.until == FOREVER;
+    let lasting = (0..).zip(labels).filter(|(_, label)| lasts(label));
+    let Some((at, _)) = lasting.min_by_key(|(at, label)| (label.ready, *at)) else {
+        return;
+    };
+    if !frontier.contains(&at) {
+        frontier.push(at);
+    }
 }
