@@ -173,6 +173,7 @@ impl Reservations {
         let mut next_due = None;
         for (region, registry) in &mut registries.all {
             registry.decide_overdue(&desk(*region));
+            registry.resolve_jointly(&desk(*region));
             let next_grant = match atlas.is_known(site.roadmap_from) {
                 true => grant_heads(base, ctx, registry, now),
                 false => None,

@@ -102,6 +102,8 @@ pub enum Item {
     Wish(Wish),
     /// Forward: the same as a probe, along a path that keeps clear of all others' places.
     Clear(Clear),
+    /// To a parent or to children in the tree of nodes: a step of a joint resolution.
+    Joint(Joint),
 }
 
 /// A part of the roadmap.
@@ -216,6 +218,78 @@ pub struct Clear {
     pub probe: Probe,
     /// Where the path leaves each node of the probe's route; at the last one, the goal.
     pub exits: Vec<VertexId>,
+}
+
+/// A step of a joint resolution: one node plans for all rovers of a map on which they stay.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// Who says it.
+    pub from: NodeId,
+    /// Which resolution, from 1.
+    pub round: u32,
+    /// The step.
+    pub step: JointStep,
+}
+
+/// What is said in a joint resolution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum JointStep {
+    /// Towards the root: a request has found no path.
+    Ask,
+    /// From the root: begin no request.
+    Hold,
+    /// Towards the root: no request that began in this part of the tree is under way.
+    Held,
+    /// From the root: say who stands where.
+    Tell,
+    /// Towards the root: who stands in this part of the tree.
+    Told(Positions),
+    /// From the root: the visits that are planned in this part of the tree.
+    Plan {
+        /// They, rover by rover, each rover's in order.
+        visits: Vec<PlannedVisit>,
+    },
+    /// From the root: there is no plan; go on as before.
+    GoOn {
+        /// There never will be one.
+        is_hopeless: bool,
+    },
+}
+
+/// Where rovers stand when all that is reserved is driven.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Positions {
+    /// They.
+    pub standing: Vec<Standing>,
+    /// The other vertices that are still to be visited, and when the last of these visits is
+    /// planned to end \[ns\].
+    pub busy: Vec<(VertexId, u64)>,
+}
+
+/// A rover that stands, or will stand, at a vertex for ever, as far as is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Standing {
+    /// The rover.
+    pub rover: RoverId,
+    /// Where.
+    pub vertex: VertexId,
+    /// The step with which it comes there.
+    pub step: u32,
+    /// From when on it is there \[ns\].
+    pub ready: u64,
+}
+
+/// A visit of a joint plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlannedVisit {
+    /// What stands for the plan in the tables.
+    pub request: ReservationRequest,
+    /// The step with which the rover comes.
+    pub step: u32,
+    /// Where it comes from; none for where it stands as the plan begins.
+    pub from: Option<VertexId>,
+    /// Where and when.
+    pub visit: TimedVisit,
 }
 
 /// The backward half: the path is entered in the tables of all that own a part of it.

@@ -1,10 +1,12 @@
 //! What is kept for the vertices of one region with the `complete` policy, all of it durable, and
 //! who seeks a path from where. A node keeps a registry for itself, and one for each region that it
 //! takes over. Pure: items go to `lines`, grants to the caller. What is done with items is in
-//! [`requests`], what becomes of it when a node is replaced in [`failover`].
+//! [`requests`], what becomes of it when a node is replaced in [`failover`]; how rovers that stay
+//! on a map get out of each other's way in [`joint`] and [`displacement`].
 
 mod displacement;
 mod failover;
+mod joint;
 mod requests;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,6 +23,7 @@ use crate::mapf::safe_intervals::{FOREVER, Label, SearchSpace, TimedVisit};
 use crate::shared::Shared;
 use displacement::{Aside, Claims};
 use failover::RegionFailover;
+use joint::JointResolution;
 
 /// A rover, or a queue of rovers, for which a path is sought.
 #[derive(Debug)]
@@ -117,6 +120,7 @@ pub(crate) struct Registry {
     /// How long a request takes from its first probe to its confirmation, smoothed [ns].
     request_time: u64,
     failover: RegionFailover,
+    joint: JointResolution,
 }
 
 /// For whose vertices something is done, and when.
@@ -262,6 +266,10 @@ impl Registry {
 
     fn begin(&mut self, desk: &Desk<'_>, at: usize, request: ReservationRequest) {
         let applicant = &mut self.applicants[at];
+        if self.joint.holds() {
+            (applicant.request, applicant.again) = (None, Some((request, desk.now)));
+            return;
+        }
         applicant.request = Some((request, desk.now));
         applicant.again = None;
         let mut goal = desk.site.missions[request.rover.0 as usize].1;
@@ -324,16 +332,12 @@ impl Registry {
 
     /// What an attempt asks for. Where rovers stay, every second time that there was no path as
     /// things stand it asks for another one: for one that is clear of all others' starts and goals,
-    /// if there is one, which in a well-formed instance all have; else for one on which others make
-    /// room.
-    fn question(
-        &mut self,
-        desk: &Desk<'_>,
-        at: usize,
-        ends: (VertexId, VertexId),
-    ) -> Question {
+    /// which in a well-formed instance all have; else for one on which others make room. If the
+    /// instance is not well-formed, a joint resolution comes first, where there can be one.
+    fn question(&mut self, desk: &Desk<'_>, at: usize, ends: (VertexId, VertexId)) -> Question {
         let in_vain = self.applicants[at].in_vain;
-        if !desk.site.stay_at_target || in_vain.is_multiple_of(2) {
+        let is_plain = !desk.site.stay_at_target || in_vain.is_multiple_of(2);
+        if is_plain || self.joint.is_due(desk) {
             return Question::Plain;
         }
         let turn = desk.site.is_well_formed || in_vain % 4 == 1;
@@ -426,6 +430,7 @@ impl Registry {
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Displace(request) => self.displace(desk, request),
+            Item::Joint(item) => self.take_joint(desk, item),
             // Taken before: see `Atlas::receive`.
             Item::Roadmap(_) => {}
         }
@@ -474,7 +479,8 @@ impl Registry {
             .offers
             .values()
             .filter(|o| !o.decided && o.best.is_some());
-        lines.chain(open.map(|o| o.deadline)).chain(proposals).min()
+        let lines = lines.chain(open.map(|o| o.deadline)).chain(proposals);
+        lines.chain(self.joint.next_due()).min()
     }
 }
 

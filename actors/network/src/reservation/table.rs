@@ -97,6 +97,18 @@ impl ReservationTable {
         (last.end == FOREVER && last.confirmed).then_some(last)
     }
 
+    /// When the last visit at `v` is planned to end, if there is one.
+    pub(crate) fn last_end(&self, v: VertexId) -> Option<u64> {
+        let last = self.pages[self.page(v)?].1.last();
+        last.map(|visit| visit.end)
+    }
+
+    /// Whether all visits are confirmed.
+    pub(crate) fn is_settled(&self) -> bool {
+        let mut visits = self.pages.iter().flat_map(|page| &page.1);
+        visits.all(|visit| visit.confirmed)
+    }
+
     /// The rover that stands at `v` for ever will leave it after all.
     pub(crate) fn leave_by(&mut self, v: VertexId, end: u64) {
         let Some(page) = self.page(v) else { return };

@@ -358,6 +358,8 @@ impl Registry {
         let to_goal = matches!(applicant.aim, Aim::Goal);
         if to_goal && self.question(desk, at, (vertex, goal)) == Question::Clear {
             self.begin(desk, at, next);
+        } else {
+            self.ask_for_joint_plan(desk);
         }
     }
 

@@ -1,0 +1,200 @@
+//! A plan for a whole team, from where it stands: made by one node of a joint resolution
+//! ([`registry`](super::registry)), entered in the tables of all.
+
+use std::collections::BTreeMap;
+
+use farside_worlds::VertexId;
+
+use super::messages::{PlannedVisit, Positions, ReservationRequest};
+use super::registry::Desk;
+use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
+use crate::mapf::{CoupledError, LacamConfig, Mission, Problem, Rules, lacam};
+
+/// The visits of a plan by which all get from where they stand to their goals.
+///
+/// # Errors
+/// When there is none, or none is found within `max_expansions`.
+pub(crate) fn joint_plan(
+    desk: &Desk<'_>,
+    positions: &Positions,
+    headway: u64,
+    max_expansions: u64,
+) -> Result<Vec<PlannedVisit>, CoupledError> {
+    let site = desk.site;
+    let missions = positions.standing.iter().map(|stands| {
+        let (_, goal) = site.missions[stands.rover.0 as usize];
+        Mission::new(stands.vertex, goal)
+    });
+    let exhausted = CoupledError::Exhausted { expansions: 0 };
+    let problem = Problem::new(&site.roadmap, missions.collect(), Rules::StayAtTarget);
+    let problem = problem.map_err(|_| exhausted)?;
+    let limits = LacamConfig {
+        max_expansions,
+        improvements: improvements(site.roadmap.len()),
+        ..LacamConfig::default()
+    };
+    let plan = lacam(&problem, &limits)?.plan;
+    let soon = desk.now + headway;
+    let ready = positions.standing.iter().map(|s| s.ready.max(soon));
+    let pace = Timing {
+        ready: ready.collect(),
+        busy: positions.busy.iter().copied().collect(),
+        travel: &|u, v| site.planned_step(u, v).as_nanos(),
+        headway,
+    };
+    let ways = timed(&plan.visits(&problem), &pace);
+    let mut visits = Vec::new();
+    for (stands, way) in positions.standing.iter().zip(ways) {
+        if way.len() < 2 {
+            continue;
+        }
+        let request = ReservationRequest {
+            rover: stands.rover,
+            attempt: 0,
+            since: desk.now,
+        };
+        visits.extend((0..way.len()).map(|i| PlannedVisit {
+            request,
+            step: stands.step + i as u32,
+            from: i.checked_sub(1).map(|before| way[before].vertex),
+            visit: way[i],
+        }));
+    }
+    Ok(visits)
+}
+
+/// How many times a plan is improved: fewer times on large maps, where each takes longer.
+fn improvements(vertices: usize) -> u32 {
+    (MOST_WORK / vertices.max(1)).min(400) as u32
+}
+
+/// Vertices times improvements.
+const MOST_WORK: usize = 4_000_000;
+
+/// From when on what is free.
+struct Timing<'a> {
+    /// When each rover may set out.
+    ready: Vec<u64>,
+    /// When the last visit that was planned before at a vertex ends, where there was any.
+    busy: BTreeMap<VertexId, u64>,
+    travel: &'a dyn Fn(VertexId, VertexId) -> u64,
+    headway: u64,
+}
+
+/// The ways of a plan in cycles, as soon as can be: at each vertex rovers come in the order of the
+/// plan, each when the one before has gone on.
+fn timed(ways: &[Vec<TimedVisit>], pace: &Timing<'_>) -> Vec<Vec<TimedVisit>> {
+    let mut order: Vec<(u64, usize, usize)> = Vec::new();
+    let mut last = BTreeMap::<VertexId, (usize, usize)>::new();
+    for (rover, way) in ways.iter().enumerate() {
+        order.extend((0..way.len()).map(|i| (way[i].start, rover, i)));
+    }
+    order.sort_unstable();
+    let mut before = BTreeMap::new();
+    for &(_, rover, i) in &order {
+        if let Some(other) = last.insert(ways[rover][i].vertex, (rover, i)) {
+            before.insert((rover, i), other);
+        }
+    }
+    let mut starts: Vec<Vec<Option<u64>>> = ways.iter().map(|way| vec![None; way.len()]).collect();
+    let mut open = order;
+    // Of those that begin in one cycle some wait for others of it. No ring turns, so each time
+    // round some begin.
+    while !open.is_empty() {
+        let count = open.len();
+        open.retain(|&(_, rover, i)| {
+            let start = start(ways, &starts, pace, (rover, i), before.get(&(rover, i)));
+            starts[rover][i] = start;
+            start.is_none()
+        });
+        assert!(open.len() < count, "a plan in which rovers wait in a ring");
+    }
+    let way = |(way, starts): (&Vec<TimedVisit>, &Vec<Option<u64>>)| {
+        let start = |i: usize| starts.get(i).copied().flatten();
+        let visit = |(i, visit): (usize, &TimedVisit)| TimedVisit {
+            vertex: visit.vertex,
+            start: start(i).unwrap_or(0),
+            end: start(i + 1).unwrap_or(FOREVER),
+        };
+        way.iter().enumerate().map(visit).collect()
+    };
+    ways.iter().zip(&starts).map(way).collect()
+}
+
+/// When a visit can begin, if that is known: when its rover is ready, and whoever is to be there
+/// before it has gone on.
+fn start(
+    ways: &[Vec<TimedVisit>],
+    starts: &[Vec<Option<u64>>],
+    pace: &Timing<'_>,
+    (rover, i): (usize, usize),
+    before: Option<&(usize, usize)>,
+) -> Option<u64> {
+    let way = &ways[rover];
+    let ready = match i {
+        0 => return Some(0),
+        1 => pace.ready[rover],
+        _ => starts[rover][i - 1]? + (pace.travel)(way[i - 2].vertex, way[i - 1].vertex),
+    };
+    let free = match before {
+        Some(&(other, at)) => (*starts[other].get(at + 1)?)?,
+        None => match pace.busy.get(&way[i].vertex) {
+            Some(&end) => end,
+            None => return Some(ready),
+        },
+    };
+    Some(ready.max(free + pace.headway))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{grid, v};
+
+    #[test]
+    fn rovers_follow_each_other_as_planned_and_as_soon_as_can_be() {
+        // 0 1 2 3, and 4 below 1: the first goes aside, the second passes, the first goes on.
+        let visit = |vertex, start, end| TimedVisit {
+            vertex: v(vertex),
+            start,
+            end,
+        };
+        let first = vec![visit(1, 0, 1), visit(4, 1, 4), visit(1, 4, FOREVER)];
+        let second = vec![
+            visit(0, 0, 1),
+            visit(1, 1, 2),
+            visit(2, 2, 3),
+            visit(3, 3, FOREVER),
+        ];
+        let pace = Timing {
+            ready: vec![100, 250],
+            busy: BTreeMap::from([(v(4), 130), (v(2), 7)]),
+            travel: &|_, _| 50,
+            headway: 2,
+        };
+        let ways = timed(&[first, second], &pace);
+        let spans = |way: &[TimedVisit]| -> Vec<_> {
+            way.iter().map(|visit| (visit.start, visit.end)).collect()
+        };
+        assert_eq!(spans(&ways[0]), [(0, 132), (132, 302), (302, FOREVER)]);
+        let passes = [(0, 250), (250, 300), (300, 350), (350, FOREVER)];
+        assert_eq!(spans(&ways[1]), passes);
+    }
+
+    #[test]
+    fn a_train_sets_out_one_after_the_other_in_one_cycle() {
+        let map = grid(9, 1, &[]);
+        let missions = (0..8).map(|i| Mission::new(v(i), v(i + 1))).collect();
+        let problem = Problem::new(&map, missions, Rules::StayAtTarget).unwrap();
+        let plan = lacam(&problem, &LacamConfig::default()).unwrap().plan;
+        let pace = Timing {
+            ready: vec![10; 8],
+            busy: BTreeMap::new(),
+            travel: &|_, _| 50,
+            headway: 3,
+        };
+        let ways = timed(&plan.visits(&problem), &pace);
+        let starts: Vec<u64> = ways.iter().map(|way| way[1].start).collect();
+        assert_eq!(starts, [31, 28, 25, 22, 19, 16, 13, 10]);
+    }
+}
