@@ -174,7 +174,8 @@ impl Reservations {
         for (region, registry) in &mut registries.all {
             registry.decide_overdue(&desk(*region));
             registry.resolve_jointly(&desk(*region));
-            let next_grant = match atlas.is_known(site.roadmap_from) {
+            let may_grant = registry.may_grant() && atlas.is_known(site.roadmap_from);
+            let next_grant = match may_grant {
                 true => grant_heads(base, ctx, registry, now),
                 false => None,
             };

@@ -1,16 +1,19 @@
-//! A plan for a whole team, from where it stands: made by one node of a joint resolution
+//! A plan for a whole team, from where it stops: made by one node of a joint resolution
 //! ([`registry`](super::registry)), entered in the tables of all.
 
 use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::messages::{PlannedVisit, Positions, ReservationRequest};
+use super::messages::{Held, PlannedVisit, Positions, ReservationRequest};
 use super::registry::Desk;
+use crate::config::Motion;
+use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 use crate::mapf::{CoupledError, LacamConfig, Mission, Problem, Rules, lacam};
 
-/// The visits of a plan by which all get from where they stand to their goals.
+/// The visits of a plan by which all get from where they stop to their goals; each rover's first is
+/// where it stops.
 ///
 /// # Errors
 /// When there is none, or none is found within `max_expansions`.
@@ -21,46 +24,58 @@ pub(crate) fn joint_plan(
     max_expansions: u64,
 ) -> Result<Vec<PlannedVisit>, CoupledError> {
     let site = desk.site;
-    let missions = positions.standing.iter().map(|stands| {
-        let (_, goal) = site.missions[stands.rover.0 as usize];
-        Mission::new(stands.vertex, goal)
+    // Where each rover will stop, and what it passes until then.
+    let mut stops = BTreeMap::<RoverId, Held>::new();
+    let mut busy = BTreeMap::new();
+    for &held in &positions.held {
+        let stop = stops.entry(held.rover).or_insert(held);
+        let passed = match held.step > stop.step {
+            true => std::mem::replace(stop, held),
+            false => held,
+        };
+        if passed.step < stop.step {
+            busy.insert(passed.vertex, passed.until);
+        }
+    }
+    let missions = stops.values().map(|stop| {
+        let (_, goal) = site.missions[stop.rover.0 as usize];
+        Mission::new(stop.vertex, goal)
     });
-    let exhausted = CoupledError::Exhausted { expansions: 0 };
     let problem = Problem::new(&site.roadmap, missions.collect(), Rules::StayAtTarget);
-    let problem = problem.map_err(|_| exhausted)?;
+    let problem = problem.map_err(|_| CoupledError::Exhausted { expansions: 0 })?;
     let limits = LacamConfig {
         max_expansions,
         improvements: improvements(site.roadmap.len()),
         ..LacamConfig::default()
     };
     let plan = lacam(&problem, &limits)?.plan;
-    let soon = desk.now + headway;
-    let ready = positions.standing.iter().map(|s| s.ready.max(soon));
+    let mut soon = desk.now + headway;
+    if site.config.motion == Motion::Cycles {
+        // Whole steps, as all planners count them.
+        soon = soon.next_multiple_of(site.timing.cycle.as_nanos());
+    }
     let pace = Timing {
-        ready: ready.collect(),
-        busy: positions.busy.iter().copied().collect(),
+        ready: stops.values().map(|stop| stop.ready.max(soon)).collect(),
+        busy,
         travel: &|u, v| site.planned_step(u, v).as_nanos(),
         headway,
     };
     let ways = timed(&plan.visits(&problem), &pace);
-    let mut visits = Vec::new();
-    for (stands, way) in positions.standing.iter().zip(ways) {
-        if way.len() < 2 {
-            continue;
-        }
+    let visits = stops.values().zip(ways).flat_map(|(stop, way)| {
         let request = ReservationRequest {
-            rover: stands.rover,
+            rover: stop.rover,
             attempt: 0,
             since: desk.now,
         };
-        visits.extend((0..way.len()).map(|i| PlannedVisit {
+        let planned = |i: usize| PlannedVisit {
             request,
-            step: stands.step + i as u32,
+            step: stop.step + i as u32,
             from: i.checked_sub(1).map(|before| way[before].vertex),
             visit: way[i],
-        }));
-    }
-    Ok(visits)
+        };
+        (0..way.len()).map(planned).collect::<Vec<_>>()
+    });
+    Ok(visits.collect())
 }
 
 /// How many times a plan is improved: fewer times on large maps, where each takes longer.
@@ -75,7 +90,7 @@ const MOST_WORK: usize = 4_000_000;
 struct Timing<'a> {
     /// When each rover may set out.
     ready: Vec<u64>,
-    /// When the last visit that was planned before at a vertex ends, where there was any.
+    /// When rovers go on from where they have still to pass.
     busy: BTreeMap<VertexId, u64>,
     travel: &'a dyn Fn(VertexId, VertexId) -> u64,
     headway: u64,

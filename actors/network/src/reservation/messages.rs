@@ -240,9 +240,9 @@ pub enum JointStep {
     Hold,
     /// Towards the root: no request that began in this part of the tree is under way.
     Held,
-    /// From the root: say who stands where.
+    /// From the root: grant nothing any more, and say who has what.
     Tell,
-    /// Towards the root: who stands in this part of the tree.
+    /// Towards the root: who has what in this part of the tree.
     Told(Positions),
     /// From the root: the visits that are planned in this part of the tree.
     Plan {
@@ -256,27 +256,26 @@ pub enum JointStep {
     },
 }
 
-/// Where rovers stand when all that is reserved is driven.
+/// The vertices that rovers have, or have been granted, before a joint plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Positions {
-    /// They.
-    pub standing: Vec<Standing>,
-    /// The other vertices that are still to be visited, and when the last of these visits is
-    /// planned to end \[ns\].
-    pub busy: Vec<(VertexId, u64)>,
+    /// They. Of a rover that has several, it will stop at the one that it comes to last.
+    pub held: Vec<Held>,
 }
 
-/// A rover that stands, or will stand, at a vertex for ever, as far as is known.
+/// A vertex that a rover has, or has been granted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Standing {
+pub struct Held {
     /// The rover.
     pub rover: RoverId,
     /// Where.
     pub vertex: VertexId,
     /// The step with which it comes there.
     pub step: u32,
-    /// From when on it is there \[ns\].
+    /// From when on it is there, as planned \[ns\].
     pub ready: u64,
+    /// When it goes on, as planned before \[ns\].
+    pub until: u64,
 }
 
 /// A visit of a joint plan.
@@ -286,7 +285,7 @@ pub struct PlannedVisit {
     pub request: ReservationRequest,
     /// The step with which the rover comes.
     pub step: u32,
-    /// Where it comes from; none for where it stands as the plan begins.
+    /// Where it comes from; none for where it stops as the plan begins.
     pub from: Option<VertexId>,
     /// Where and when.
     pub visit: TimedVisit,

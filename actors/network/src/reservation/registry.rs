@@ -470,6 +470,11 @@ impl Registry {
         self.apply(desk);
     }
 
+    /// Whether vertices may be granted now.
+    pub(crate) fn may_grant(&self) -> bool {
+        !self.joint.stops_grants()
+    }
+
     /// When something is to be done without being told; of lines, only those that may be used.
     pub(crate) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
         let lines = self.lines.iter().filter(|(to, _)| may_use(**to));

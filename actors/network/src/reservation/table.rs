@@ -97,10 +97,15 @@ impl ReservationTable {
         (last.end == FOREVER && last.confirmed).then_some(last)
     }
 
-    /// When the last visit at `v` is planned to end, if there is one.
-    pub(crate) fn last_end(&self, v: VertexId) -> Option<u64> {
-        let last = self.pages[self.page(v)?].1.last();
-        last.map(|visit| visit.end)
+    /// The visit of the rover to which `v` was granted, until it is heard to have gone on.
+    pub(crate) fn granted(&self, v: VertexId) -> Option<&Visit> {
+        let first = self.pages[self.page(v)?].1.first()?;
+        first.granted.then_some(first)
+    }
+
+    /// Strikes out all that was not granted yet.
+    pub(crate) fn strike_ungranted(&mut self) {
+        self.retain(|visit| visit.granted);
     }
 
     /// Whether all visits are confirmed.

@@ -9,14 +9,18 @@
 //! 2. *Hold.* The root tells all. From then on a node begins no request. When none that it began is
 //!    under way any more and its children have said the same, it says so to its parent. When the
 //!    root knows it of all, no part of a path will be entered any more, anywhere.
-//! 3. *Tell.* The root asks all. A node answers when each visit in its table is confirmed: who is
-//!    to stand on its vertices in the end, from when on, and until when they are passed before.
+//! 3. *Tell.* The root asks all. From then on a node grants nothing. It answers when each visit in
+//!    its table is confirmed: which of its vertices are granted to whom. A rover stops at the last
+//!    vertex that it was granted, wherever that is.
 //! 4. *Plan.* The root plans ([`lacam`](fn@crate::mapf::lacam)) how all come from there to their
-//!    goals, and sends each node the visits to its vertices. A node enters them behind all that it
-//!    has, and goes on as usual. If there is no plan, or none is found, the root says that instead.
+//!    goals, and sends each node the visits to its vertices. They take the place of all that was
+//!    reserved and not granted. If there is no plan, or none is found, the root says that instead,
+//!    and what was reserved holds.
 //!
-//! What is reserved before holds: the plan begins where reserved paths end. And its visits, like
-//! those of any reserved path, each wait only for visits that were to begin before.
+//! A node that has the plan may grant what one has that does not have it yet: that one grants
+//! nothing. And what was granted before is what the plan begins with. So there is no instant at
+//! which anybody acts on two plans. Within the plan each visit waits only for such as were to begin
+//! before, like those of any reserved path.
 //!
 //! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if all
 //! rovers can get to their goals at all, they do, as long as the search finds it. Where it has no
@@ -29,14 +33,14 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use farside_worlds::{NodeId, SensorNetwork, VertexId};
+use farside_worlds::{NodeId, SensorNetwork};
 
 use super::displacement::Claims;
 use super::{Desk, Registry};
 use crate::mapf::CoupledError;
 use crate::reservation::joint_plan::joint_plan;
 use crate::reservation::messages::{
-    Item, Joint, JointStep, PlannedVisit, Positions, Standing,
+    Held, Item, Joint, JointStep, PlannedVisit, Positions,
 };
 use crate::reservation::table::Visit;
 
@@ -82,8 +86,6 @@ struct Branch {
     parent: Option<NodeId>,
     /// Each with all regions below it, itself included.
     children: Vec<(NodeId, BTreeSet<NodeId>)>,
-    /// At the root all regions of the tree.
-    all: BTreeSet<NodeId>,
 }
 
 impl Branch {
@@ -104,7 +106,6 @@ impl Branch {
         Branch {
             parent: parents[&region],
             children: below.into_iter().collect(),
-            all: parents.into_keys().collect(),
         }
     }
 }
@@ -128,6 +129,11 @@ impl JointResolution {
     /// One is under way: nothing else is begun.
     pub(crate) fn holds(&self) -> bool {
         self.phase != Phase::Idle
+    }
+
+    /// Nothing is granted, because the plan begins with what is.
+    pub(crate) fn stops_grants(&self) -> bool {
+        matches!(self.phase, Phase::Settling | Phase::Settled)
     }
 
     /// Whether one may help. Until one was tried nobody is asked to make room.
@@ -198,8 +204,7 @@ impl Registry {
             JointStep::Tell => self.tell(desk),
             JointStep::Told(positions) => {
                 joint.heard.insert(from);
-                joint.gathered.standing.extend(positions.standing);
-                joint.gathered.busy.extend(positions.busy);
+                joint.gathered.held.extend(positions.held);
             }
             JointStep::Plan { visits } => self.take_plan(desk, &visits),
             JointStep::GoOn { is_hopeless } => self.go_on(desk, is_hopeless),
@@ -233,7 +238,7 @@ impl Registry {
             let gathered = std::mem::take(&mut self.joint.gathered);
             match parent {
                 Some(parent) => self.say(desk, parent, JointStep::Told(gathered)),
-                None => self.plan_jointly(desk, gathered),
+                None => self.plan_jointly(desk, &gathered),
             }
         }
     }
@@ -256,31 +261,24 @@ impl Registry {
     fn gather(&mut self, desk: &Desk<'_>) {
         let step_time = desk.site.longest_step.as_nanos();
         for &vertex in desk.site.sensors.owned(desk.region) {
-            if let Some(visit) = self.table.standing(vertex) {
-                let came = visit.start + step_time;
-                self.joint.gathered.standing.push(Standing {
-                    rover: visit.request.rover,
-                    vertex,
-                    step: visit.step,
-                    ready: if visit.start == 0 { 0 } else { came },
-                });
-            } else if let Some(end) = self.table.last_end(vertex) {
-                self.joint.gathered.busy.push((vertex, end));
-            }
+            let Some(visit) = self.table.granted(vertex) else {
+                continue;
+            };
+            let came = visit.start + step_time;
+            self.joint.gathered.held.push(Held {
+                rover: visit.request.rover,
+                vertex,
+                step: visit.step,
+                ready: if visit.start == 0 { 0 } else { came },
+                until: visit.end,
+            });
         }
     }
 
     /// At the root: plans, and tells all.
-    fn plan_jointly(&mut self, desk: &Desk<'_>, mut positions: Positions) {
-        positions.standing.sort_unstable_by_key(|stands| stands.rover);
-        let here = |v: VertexId| {
-            let region = desk.site.sensors.owner(v);
-            self.joint.branch.as_ref().is_some_and(|branch| branch.all.contains(&region))
-        };
-        let team = desk.site.missions.iter().filter(|(start, _)| here(*start));
-        debug_assert_eq!(positions.standing.len(), team.count(), "some have not been told");
+    fn plan_jointly(&mut self, desk: &Desk<'_>, positions: &Positions) {
         let limit = FIRST_EXPANSIONS << self.joint.failed.min(MOST_DOUBLINGS);
-        match joint_plan(desk, &positions, self.headway(), limit) {
+        match joint_plan(desk, positions, self.headway(), limit) {
             Ok(visits) => self.take_plan(desk, &visits),
             Err(error) => {
                 let pause = desk.site.timing.cycle.as_nanos() * PAUSE << self.joint.failed.min(8);
@@ -294,6 +292,7 @@ impl Registry {
     /// Enters what is planned for this region; all have their ways then.
     fn take_plan(&mut self, desk: &Desk<'_>, visits: &[PlannedVisit]) {
         self.joint.begin_phase(Phase::Idle);
+        self.table.strike_ungranted();
         let owner = |planned: &PlannedVisit| desk.site.sensors.owner(planned.visit.vertex);
         for planned in visits.iter().filter(|planned| owner(planned) == desk.region) {
             let timed = planned.visit;
@@ -373,7 +372,8 @@ mod tests {
         let mut roots = 0;
         for region in sensors.nodes() {
             let branch = Branch::of(&sensors, region);
-            assert_eq!(branch.all.len(), 9);
+            let below: usize = branch.children.iter().map(|(_, below)| below.len()).sum();
+            assert!(branch.parent.is_some() || below == 8);
             roots += u32::from(branch.parent.is_none());
             for (child, below) in &branch.children {
                 assert_eq!(Branch::of(&sensors, *child).parent, Some(region));
