@@ -121,6 +121,8 @@ pub(crate) struct Registry {
     request_time: u64,
     failover: RegionFailover,
     joint: JointResolution,
+    /// Of neighbouring regions on to which more leads than a probe hands on: see `requests`.
+    parts: BTreeMap<NodeId, BTreeMap<VertexId, VertexId>>,
 }
 
 /// For whose vertices something is done, and when.

@@ -1,9 +1,9 @@
 //! How requests proceed: what a node does with a probe, a path to be reserved, and the news of what
 //! became of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 
 use super::{Aim, Desk, Offers, Origin, Question, Registry, owners};
 use crate::ids::RoverId;
@@ -47,6 +47,10 @@ impl Registry {
         };
         let has_gaps = !site.sensors.gaps().is_empty();
         let mut frontier = frontier(&labels, has_gaps, borders);
+        if frontier.len() >= MAX_FRONTIER {
+            let parts = self.parts.entry(next).or_insert_with(|| parts_of(desk, next));
+            keep_one_for_each_part(desk, parts, &labels, &mut frontier);
+        }
         if let Some(exit) = exits.get(probe.at as usize) {
             keep_exit(&labels, *exit, &mut frontier);
         }
@@ -412,6 +416,59 @@ fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) 
     }
     all.truncate(MAX_FRONTIER);
     all.into_iter().map(|(_, at)| at).collect()
+}
+
+/// For each vertex at which the next region borders on this one, the part of that region in which
+/// it lies, as the lowest vertex of that part. What lies in one part does not lead to another
+/// without leaving the region.
+fn parts_of(desk: &Desk<'_>, next: NodeId) -> BTreeMap<VertexId, VertexId> {
+    let site = desk.site;
+    let mut part_of = BTreeMap::new();
+    for &first in site.sensors.owned(next) {
+        let mut open = vec![first];
+        while let Some(here) = open.pop() {
+            if site.sensors.owner(here) == next && !part_of.contains_key(&here) {
+                part_of.insert(here, first);
+                open.extend(site.roadmap.neighbors(here));
+            }
+        }
+    }
+    let is_beside = |v: &VertexId| {
+        let mut beside = site.roadmap.neighbors(*v).iter();
+        beside.any(|&u| site.sensors.owner(u) == desk.region)
+    };
+    part_of.retain(|v, _| is_beside(v));
+    part_of
+}
+
+/// Makes sure that the frontier has a label that can be kept up for ever at the border of each part
+/// of the next region, if there is one. Of a long border only the nearest vertices were kept.
+fn keep_one_for_each_part(
+    desk: &Desk<'_>,
+    part_of: &BTreeMap<VertexId, VertexId>,
+    labels: &[Label],
+    frontier: &mut Vec<u32>,
+) {
+    let lasts = |label: &Label| {
+        label.until == FOREVER && desk.site.sensors.owner(label.vertex) == desk.region
+    };
+    let mut earliest = BTreeMap::<VertexId, (u64, u32)>::new();
+    let mut kept = BTreeSet::new();
+    for (at, label) in (0..).zip(labels).filter(|(_, label)| lasts(label)) {
+        for beside in desk.site.roadmap.neighbors(label.vertex) {
+            let Some(&part) = part_of.get(beside) else {
+                continue;
+            };
+            let found = earliest.entry(part).or_insert((label.ready, at));
+            *found = (*found).min((label.ready, at));
+            if frontier.contains(&at) {
+                kept.insert(part);
+            }
+        }
+    }
+    earliest.retain(|part, _| !kept.contains(part));
+    let missing: BTreeSet<u32> = earliest.into_values().map(|(_, at)| at).collect();
+    frontier.extend(missing);
 }
 
 /// Makes sure that the frontier has the earliest label at `exit` that can be kept up for ever.
