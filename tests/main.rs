@@ -8,6 +8,7 @@ mod golden;
 mod house;
 mod layering;
 mod network_complete;
+mod network_maps;
 mod network_planning;
 mod network_safety;
 mod network_team;
