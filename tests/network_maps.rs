@@ -182,12 +182,16 @@ fn a_joint_resolution_outlives_crashes_and_losses() {
         let network = network.expect("it makes sense");
         let at = |ms: u64| SimTime::ZERO + SimDuration::from_millis(ms);
         for (i, name) in (0..).zip(network.node_names()) {
-            sim.crash_named_at(at(150 + 130 * i), name).expect("it is there");
-            sim.restart_named_at(at(2500 + 400 * i), name).expect("it is there");
+            sim.crash_named_at(at(150 + 130 * i), name)
+                .expect("it is there");
+            sim.restart_named_at(at(2500 + 400 * i), name)
+                .expect("it is there");
         }
         for (i, name) in (0..).zip(network.rover_names()).step_by(3) {
-            sim.crash_named_at(at(3000 + 70 * i), name).expect("it is there");
-            sim.restart_named_at(at(8000 + 70 * i), name).expect("it is there");
+            sim.crash_named_at(at(3000 + 70 * i), name)
+                .expect("it is there");
+            sim.restart_named_at(at(8000 + 70 * i), name)
+                .expect("it is there");
         }
         sim.run(Executor::Inline).expect("it runs");
         let metrics = network.metrics();
@@ -209,7 +213,10 @@ fn a_crowd_costs_little_more_than_planned_from_the_start() {
             };
             let (map, tasks) = (roadmap.clone(), tasks.clone());
             let metrics = standing_with(&config, map, 8, tasks, PERFECT, 1).expect("it is solved");
-            metrics.costs.and_then(|costs| costs.sum_of_costs).expect("all arrive")
+            metrics
+                .costs
+                .and_then(|costs| costs.sum_of_costs)
+                .expect("all arrive")
         };
         let (here, there) = (cost(Policy::Complete), cost(Policy::Lacam));
         assert!(here * 4 < there * 5, "seed {seed}: {here} where {there} do");

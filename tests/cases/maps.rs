@@ -18,7 +18,9 @@ fn run(name: &str, policy: &str, nodes: u32) -> Results {
     ];
     let files = Files::on_disk(folder);
     let scenario = Scenario::parse(&file, text, &sets, &Registry::builtin(), files);
-    let assembled = scenario.and_then(|s| s.assemble()).expect("it is a scenario");
+    let assembled = scenario
+        .and_then(|s| s.assemble())
+        .expect("it is a scenario");
     let report = assembled.sim.run(Executor::Inline).expect("it runs");
     (assembled.system.conclude)(&report)
 }
@@ -46,7 +48,12 @@ fn chains_of_rovers_that_have_to_push_each_other_come_apart() {
         ("tiny_666_18", 6, 23),
     ];
     for (name, rovers, least) in cases {
-        for (policy, nodes) in [("complete", 1), ("complete", 2), ("complete", 4), ("lacam", 2)] {
+        for (policy, nodes) in [
+            ("complete", 1),
+            ("complete", 2),
+            ("complete", 4),
+            ("lacam", 2),
+        ] {
             let results = run(name, policy, nodes);
             let what = format!("{name}, {policy}, {nodes} nodes");
             assert_eq!(figure(&results, "arrived"), Some(rovers), "{what}");

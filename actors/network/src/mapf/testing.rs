@@ -368,7 +368,11 @@ pub(crate) fn least_loss(problem: &Problem<'_>) -> u64 {
             steps = steps.into_iter().flat_map(longer).collect();
         }
         for step in steps {
-            let pairs: Vec<_> = at.iter().zip(&step).map(|(a, b)| (Some(*a), Some(*b))).collect();
+            let pairs: Vec<_> = at
+                .iter()
+                .zip(&step)
+                .map(|(a, b)| (Some(*a), Some(*b)))
+                .collect();
             if clash(&pairs) {
                 continue;
             }

@@ -1,45 +1,57 @@
 //! A plan for a whole team, from where it stops: made by one node of a joint resolution
 //! ([`registry`](super::registry)), entered in the tables of all.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::messages::{Held, PlannedVisit, Positions, ReservationRequest};
+use super::messages::{PlannedVisit, ReservationRequest, ReservedVisit, Stop};
 use super::registry::Desk;
 use crate::config::Motion;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 use crate::mapf::{CoupledError, LacamConfig, Mission, Problem, Rules, lacam};
 
-/// The visits of a plan by which all get from where they stop to their goals; each rover's first is
-/// where it stops.
+/// A plan by which all get from where they stop to their goals.
+#[derive(Debug)]
+pub(crate) struct JointPlan {
+    /// Where each rover stops, by rover.
+    pub(crate) stops: Vec<Stop>,
+    /// Rover by rover; each one's first visit is where it stops.
+    pub(crate) visits: Vec<PlannedVisit>,
+}
+
+/// The plan for a team of which this is reserved.
 ///
 /// # Errors
 /// When there is none, or none is found within `max_expansions`.
 pub(crate) fn joint_plan(
     desk: &Desk<'_>,
-    positions: &Positions,
+    reserved: &[ReservedVisit],
     headway: u64,
     max_expansions: u64,
-) -> Result<Vec<PlannedVisit>, CoupledError> {
+) -> Result<JointPlan, CoupledError> {
     let site = desk.site;
-    // Where each rover will stop, and what it passes until then.
-    let mut stops = BTreeMap::<RoverId, Held>::new();
-    let mut busy = BTreeMap::new();
-    for &held in &positions.held {
-        let stop = stops.entry(held.rover).or_insert(held);
-        let passed = match held.step > stop.step {
-            true => std::mem::replace(stop, held),
-            false => held,
-        };
-        if passed.step < stop.step {
-            busy.insert(passed.vertex, passed.until);
+    let stops = stops(reserved);
+    // What rovers still pass before they stop, and where they do.
+    let mut busy = BTreeMap::<VertexId, u64>::new();
+    let mut last = BTreeMap::<RoverId, TimedVisit>::new();
+    for held in reserved {
+        match held.step.cmp(&stops[&held.rover]) {
+            Ordering::Less => {
+                let until = busy.entry(held.visit.vertex).or_default();
+                *until = (*until).max(held.visit.end);
+            }
+            Ordering::Equal => {
+                last.insert(held.rover, held.visit);
+            }
+            Ordering::Greater => {}
         }
     }
-    let missions = stops.values().map(|stop| {
-        let (_, goal) = site.missions[stop.rover.0 as usize];
-        Mission::new(stop.vertex, goal)
+    let missions = last.iter().map(|(rover, visit)| {
+        let (_, goal) = site.missions[rover.0 as usize];
+        Mission::new(visit.vertex, goal)
     });
     let problem = Problem::new(&site.roadmap, missions.collect(), Rules::StayAtTarget);
     let problem = problem.map_err(|_| CoupledError::Exhausted { expansions: 0 })?;
@@ -54,28 +66,63 @@ pub(crate) fn joint_plan(
         // Whole steps, as all planners count them.
         soon = soon.next_multiple_of(site.timing.cycle.as_nanos());
     }
+    let ready = last.values().map(|visit| match visit.start {
+        0 => soon,
+        start => soon.max(start + site.longest_step.as_nanos()),
+    });
     let pace = Timing {
-        ready: stops.values().map(|stop| stop.ready.max(soon)).collect(),
+        ready: ready.collect(),
         busy,
         travel: &|u, v| site.planned_step(u, v).as_nanos(),
         headway,
     };
     let ways = timed(&plan.visits(&problem), &pace);
-    let visits = stops.values().zip(ways).flat_map(|(stop, way)| {
+    let visits = last.keys().zip(ways).flat_map(|(&rover, way)| {
         let request = ReservationRequest {
-            rover: stop.rover,
+            rover,
             attempt: 0,
             since: desk.now,
         };
         let planned = |i: usize| PlannedVisit {
             request,
-            step: stop.step + i as u32,
+            step: stops[&rover] + i as u32,
             from: i.checked_sub(1).map(|before| way[before].vertex),
             visit: way[i],
         };
         (0..way.len()).map(planned).collect::<Vec<_>>()
     });
-    Ok(visits.collect())
+    let visits = visits.collect();
+    let stop = |(rover, step)| Stop { rover, step };
+    let stops = stops.into_iter().map(stop).collect();
+    Ok(JointPlan { stops, visits })
+}
+
+/// How far each rover goes on what is reserved: at least to the last vertex that it was granted,
+/// and off each vertex that another one, going that far, comes to after it.
+fn stops(reserved: &[ReservedVisit]) -> BTreeMap<RoverId, u32> {
+    let mut stops = BTreeMap::new();
+    for held in reserved.iter().filter(|held| held.granted) {
+        let step = stops.entry(held.rover).or_insert(held.step);
+        *step = held.step.max(*step);
+    }
+    let mut in_order: Vec<&ReservedVisit> = reserved.iter().collect();
+    in_order.sort_unstable_by_key(|held| (held.visit.vertex, held.visit.start));
+    loop {
+        let mut is_done = true;
+        for pair in in_order.chunk_by(|a, b| a.visit.vertex == b.visit.vertex) {
+            let holds = |held: &&&ReservedVisit| stops.get(&held.rover) >= Some(&held.step);
+            let kept: Vec<_> = pair.iter().filter(holds).collect();
+            for held in kept.iter().rev().skip(1) {
+                if stops[&held.rover] == held.step {
+                    stops.insert(held.rover, held.step + 1);
+                    is_done = false;
+                }
+            }
+        }
+        if is_done {
+            return stops;
+        }
+    }
 }
 
 /// How many times a plan is improved: fewer times on large maps, where each takes longer.
@@ -194,6 +241,39 @@ mod tests {
         assert_eq!(spans(&ways[0]), [(0, 132), (132, 302), (302, FOREVER)]);
         let passes = [(0, 250), (250, 300), (300, 350), (350, FOREVER)];
         assert_eq!(spans(&ways[1]), passes);
+    }
+
+    fn reserved(rover: u32, step: u32, vertex: u32, start: u64, granted: bool) -> ReservedVisit {
+        ReservedVisit {
+            rover: RoverId(rover),
+            step,
+            visit: TimedVisit {
+                vertex: v(vertex),
+                start,
+                end: start + 9,
+            },
+            granted,
+        }
+    }
+
+    /// The first rover was granted its third vertex and not yet its second, on which the second one
+    /// stands; that one has to go on, and so has the third, which is in its way.
+    #[test]
+    fn rovers_stop_where_they_are_in_the_way_of_no_grant() {
+        let all = [
+            reserved(0, 1, 0, 0, true),
+            reserved(0, 2, 1, 30, false),
+            reserved(0, 3, 2, 40, true),
+            reserved(0, 4, 3, 50, false),
+            reserved(1, 7, 1, 0, true),
+            reserved(1, 8, 4, 20, false),
+            reserved(1, 9, 5, 30, false),
+            reserved(2, 5, 4, 0, true),
+            reserved(2, 6, 6, 10, false),
+            reserved(2, 7, 1, 50, false),
+        ];
+        let expected = [(0, 3), (1, 8), (2, 6)].map(|(rover, step)| (RoverId(rover), step));
+        assert_eq!(stops(&all), BTreeMap::from(expected));
     }
 
     #[test]

@@ -240,13 +240,15 @@ pub enum JointStep {
     Hold,
     /// Towards the root: no request that began in this part of the tree is under way.
     Held,
-    /// From the root: grant nothing any more, and say who has what.
+    /// From the root: grant nothing any more, and say what is reserved.
     Tell,
-    /// Towards the root: who has what in this part of the tree.
-    Told(Positions),
-    /// From the root: the visits that are planned in this part of the tree.
+    /// Towards the root: what is reserved in this part of the tree.
+    Told(Reserved),
+    /// From the root: the plan.
     Plan {
-        /// They, rover by rover, each rover's in order.
+        /// How much holds of what was reserved, of each rover.
+        stops: Vec<Stop>,
+        /// What is planned in this part of the tree, rover by rover, each rover's visits in order.
         visits: Vec<PlannedVisit>,
     },
     /// From the root: there is no plan; go on as before.
@@ -256,26 +258,33 @@ pub enum JointStep {
     },
 }
 
-/// The vertices that rovers have, or have been granted, before a joint plan.
+/// All that is reserved before a joint plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Positions {
-    /// They. Of a rover that has several, it will stop at the one that it comes to last.
-    pub held: Vec<Held>,
+pub struct Reserved {
+    /// The visits.
+    pub visits: Vec<ReservedVisit>,
 }
 
-/// A vertex that a rover has, or has been granted.
+/// A visit that is reserved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Held {
+pub struct ReservedVisit {
+    /// Whose.
+    pub rover: RoverId,
+    /// The step with which the rover comes.
+    pub step: u32,
+    /// Where and when.
+    pub visit: TimedVisit,
+    /// The vertex was given to the rover.
+    pub granted: bool,
+}
+
+/// The last of a rover's reserved visits that holds when a joint plan begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stop {
     /// The rover.
     pub rover: RoverId,
-    /// Where.
-    pub vertex: VertexId,
-    /// The step with which it comes there.
+    /// The visit's step.
     pub step: u32,
-    /// From when on it is there, as planned \[ns\].
-    pub ready: u64,
-    /// When it goes on, as planned before \[ns\].
-    pub until: u64,
 }
 
 /// A visit of a joint plan.

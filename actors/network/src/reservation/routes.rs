@@ -176,9 +176,8 @@ mod tests {
         // 0 1 2 / 3 4 5 / 6 7 8
         let map = grid(3, 3, &[]);
         let sensors = SensorNetwork::place(&map, 3, 60.0, 1).unwrap();
-        let round = |avoided: &[u32]| {
-            clear_route(&map, &sensors, (v(0), v(2)), |u| avoided.contains(&u.0))
-        };
+        let round =
+            |avoided: &[u32]| clear_route(&map, &sensors, (v(0), v(2)), |u| avoided.contains(&u.0));
         let straight = round(&[]).unwrap();
         assert_eq!(straight.exits.last(), Some(&v(2)));
         let detour = round(&[1, 4]).unwrap();
@@ -186,7 +185,12 @@ mod tests {
         for (node, exit) in detour.nodes.iter().zip(&detour.exits) {
             assert!(owners.contains(&(*node, *exit)), "{detour:?}");
         }
-        assert!(detour.nodes.windows(2).all(|w| sensors.are_neighbors(w[0], w[1])));
+        assert!(
+            detour
+                .nodes
+                .windows(2)
+                .all(|w| sensors.are_neighbors(w[0], w[1]))
+        );
         assert_eq!(round(&[1, 4, 7]), None);
         // The ends themselves do not count.
         assert_eq!(round(&[0, 2]), Some(straight));

@@ -1,9 +1,11 @@
 //! The visits planned at a node's vertices, in order. Pure: what is in the table, and what may be
 //! entered; who is admitted when is the affair of `admit`.
 
+use std::collections::BTreeMap;
+
 use farside_worlds::VertexId;
 
-use super::messages::ReservationRequest;
+use super::messages::{ReservationRequest, ReservedVisit};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 
@@ -97,15 +99,28 @@ impl ReservationTable {
         (last.end == FOREVER && last.confirmed).then_some(last)
     }
 
-    /// The visit of the rover to which `v` was granted, until it is heard to have gone on.
-    pub(crate) fn granted(&self, v: VertexId) -> Option<&Visit> {
-        let first = self.pages[self.page(v)?].1.first()?;
-        first.granted.then_some(first)
+    /// All visits.
+    pub(crate) fn all(&self) -> impl Iterator<Item = ReservedVisit> + '_ {
+        let all = self.pages.iter();
+        let all = all.flat_map(|(v, visits)| visits.iter().map(|visit| (*v, visit)));
+        all.map(|(vertex, visit)| ReservedVisit {
+            rover: visit.request.rover,
+            step: visit.step,
+            visit: TimedVisit {
+                vertex,
+                start: visit.start,
+                end: visit.end,
+            },
+            granted: visit.granted,
+        })
     }
 
-    /// Strikes out all that was not granted yet.
-    pub(crate) fn strike_ungranted(&mut self) {
-        self.retain(|visit| visit.granted);
+    /// Strikes out each rover's visits after this step.
+    pub(crate) fn strike_beyond(&mut self, last: &BTreeMap<RoverId, u32>) {
+        self.retain(|visit| {
+            last.get(&visit.request.rover)
+                .is_none_or(|&step| visit.step <= step)
+        });
     }
 
     /// Whether all visits are confirmed.

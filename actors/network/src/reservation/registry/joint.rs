@@ -10,17 +10,19 @@
 //!    under way any more and its children have said the same, it says so to its parent. When the
 //!    root knows it of all, no part of a path will be entered any more, anywhere.
 //! 3. *Tell.* The root asks all. From then on a node grants nothing. It answers when each visit in
-//!    its table is confirmed: which of its vertices are granted to whom. A rover stops at the last
-//!    vertex that it was granted, wherever that is.
-//! 4. *Plan.* The root plans ([`lacam`](fn@crate::mapf::lacam)) how all come from there to their
-//!    goals, and sends each node the visits to its vertices. They take the place of all that was
-//!    reserved and not granted. If there is no plan, or none is found, the root says that instead,
-//!    and what was reserved holds.
+//!    its table is confirmed: with all of them, and which are granted.
+//! 4. *Plan.* A rover goes on to the last vertex that it was granted; and where it would stop on a
+//!    vertex that another one, going on so far, is to come to after it, one vertex further. From
+//!    these stops the root plans ([`lacam`](fn@crate::mapf::lacam)) how all come to their goals. It
+//!    sends each node all stops, and the visits to its vertices. They take the place of all that
+//!    was reserved beyond the stops. If there is no plan, or none is found, the root says that
+//!    instead, and what was reserved holds.
 //!
 //! A node that has the plan may grant what one has that does not have it yet: that one grants
 //! nothing. And what was granted before is what the plan begins with. So there is no instant at
-//! which anybody acts on two plans. Within the plan each visit waits only for such as were to begin
-//! before, like those of any reserved path.
+//! which anybody acts on two plans. All come to their stops: a visit up to there waits only for
+//! visits up to stops, that were to begin before. And a visit of the plan waits only for these and
+//! for visits of the plan that are to begin before.
 //!
 //! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if all
 //! rovers can get to their goals at all, they do, as long as the search finds it. Where it has no
@@ -37,11 +39,10 @@ use farside_worlds::{NodeId, SensorNetwork};
 
 use super::displacement::Claims;
 use super::{Desk, Registry};
+use crate::ids::RoverId;
 use crate::mapf::CoupledError;
-use crate::reservation::joint_plan::joint_plan;
-use crate::reservation::messages::{
-    Held, Item, Joint, JointStep, PlannedVisit, Positions,
-};
+use crate::reservation::joint_plan::{JointPlan, joint_plan};
+use crate::reservation::messages::{Item, Joint, JointStep, PlannedVisit, Reserved, ReservedVisit};
 use crate::reservation::table::Visit;
 
 /// What a registry keeps of joint resolutions.
@@ -53,7 +54,7 @@ pub(crate) struct JointResolution {
     phase: Phase,
     /// Which children have said what this phase waits for.
     heard: BTreeSet<NodeId>,
-    gathered: Positions,
+    gathered: Reserved,
     /// It has asked since the last one.
     asked: bool,
     /// There was one that found no plan: until there is one, others have to make room.
@@ -202,11 +203,11 @@ impl Registry {
                 joint.heard.insert(from);
             }
             JointStep::Tell => self.tell(desk),
-            JointStep::Told(positions) => {
+            JointStep::Told(reserved) => {
                 joint.heard.insert(from);
-                joint.gathered.held.extend(positions.held);
+                joint.gathered.visits.extend(reserved.visits);
             }
-            JointStep::Plan { visits } => self.take_plan(desk, &visits),
+            JointStep::Plan { stops, visits } => self.take_plan(desk, JointPlan { stops, visits }),
             JointStep::GoOn { is_hopeless } => self.go_on(desk, is_hopeless),
             JointStep::Ask | JointStep::Hold => {}
         }
@@ -234,11 +235,11 @@ impl Registry {
             && self.table.is_settled()
         {
             self.joint.begin_phase(Phase::Settled);
-            self.gather(desk);
-            let gathered = std::mem::take(&mut self.joint.gathered);
+            let mut gathered = std::mem::take(&mut self.joint.gathered);
+            gathered.visits.extend(self.table.all());
             match parent {
                 Some(parent) => self.say(desk, parent, JointStep::Told(gathered)),
-                None => self.plan_jointly(desk, &gathered),
+                None => self.plan_jointly(desk, &gathered.visits),
             }
         }
     }
@@ -252,34 +253,16 @@ impl Registry {
     }
 
     fn tell(&mut self, desk: &Desk<'_>) {
-        self.joint.gathered = Positions::default();
+        self.joint.gathered = Reserved::default();
         self.joint.begin_phase(Phase::Settling);
         self.say_below(desk, &JointStep::Tell);
     }
 
-    /// Adds what this region has to tell.
-    fn gather(&mut self, desk: &Desk<'_>) {
-        let step_time = desk.site.longest_step.as_nanos();
-        for &vertex in desk.site.sensors.owned(desk.region) {
-            let Some(visit) = self.table.granted(vertex) else {
-                continue;
-            };
-            let came = visit.start + step_time;
-            self.joint.gathered.held.push(Held {
-                rover: visit.request.rover,
-                vertex,
-                step: visit.step,
-                ready: if visit.start == 0 { 0 } else { came },
-                until: visit.end,
-            });
-        }
-    }
-
     /// At the root: plans, and tells all.
-    fn plan_jointly(&mut self, desk: &Desk<'_>, positions: &Positions) {
+    fn plan_jointly(&mut self, desk: &Desk<'_>, reserved: &[ReservedVisit]) {
         let limit = FIRST_EXPANSIONS << self.joint.failed.min(MOST_DOUBLINGS);
-        match joint_plan(desk, positions, self.headway(), limit) {
-            Ok(visits) => self.take_plan(desk, &visits),
+        match joint_plan(desk, reserved, self.headway(), limit) {
+            Ok(plan) => self.take_plan(desk, plan),
             Err(error) => {
                 let pause = desk.site.timing.cycle.as_nanos() * PAUSE << self.joint.failed.min(8);
                 self.joint.not_before = desk.now + pause;
@@ -290,11 +273,16 @@ impl Registry {
     }
 
     /// Enters what is planned for this region; all have their ways then.
-    fn take_plan(&mut self, desk: &Desk<'_>, visits: &[PlannedVisit]) {
+    fn take_plan(&mut self, desk: &Desk<'_>, plan: JointPlan) {
+        let JointPlan { stops, visits } = plan;
         self.joint.begin_phase(Phase::Idle);
-        self.table.strike_ungranted();
+        let last: BTreeMap<RoverId, u32> = stops.iter().map(|s| (s.rover, s.step)).collect();
+        self.table.strike_beyond(&last);
         let owner = |planned: &PlannedVisit| desk.site.sensors.owner(planned.visit.vertex);
-        for planned in visits.iter().filter(|planned| owner(planned) == desk.region) {
+        for planned in visits
+            .iter()
+            .filter(|planned| owner(planned) == desk.region)
+        {
             let timed = planned.visit;
             if planned.from.is_none() {
                 self.table.leave_by(timed.vertex, timed.end);
@@ -316,12 +304,15 @@ impl Registry {
         let children = self.joint.branch.iter().flat_map(|b| &b.children);
         let parts: Vec<_> = children
             .map(|(child, below)| {
-                let part = visits.iter().filter(|planned| below.contains(&owner(planned)));
+                let part = visits
+                    .iter()
+                    .filter(|planned| below.contains(&owner(planned)));
                 (*child, part.cloned().collect())
             })
             .collect();
         for (child, visits) in parts {
-            self.say(desk, child, JointStep::Plan { visits });
+            let stops = stops.clone();
+            self.say(desk, child, JointStep::Plan { stops, visits });
         }
     }
 

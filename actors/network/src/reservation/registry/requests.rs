@@ -48,7 +48,10 @@ impl Registry {
         let has_gaps = !site.sensors.gaps().is_empty();
         let mut frontier = frontier(&labels, has_gaps, borders);
         if frontier.len() >= MAX_FRONTIER {
-            let parts = self.parts.entry(next).or_insert_with(|| parts_of(desk, next));
+            let parts = self
+                .parts
+                .entry(next)
+                .or_insert_with(|| parts_of(desk, next));
             keep_one_for_each_part(desk, parts, &labels, &mut frontier);
         }
         if let Some(exit) = exits.get(probe.at as usize) {
