@@ -3,4 +3,8 @@
 
 mod links;
 mod logs;
+<<<<<<< HEAD
 mod network;
+=======
+mod maps;
+>>>>>>> w-node

@@ -10,6 +10,7 @@ mod house;
 mod layering;
 mod network_complete;
 mod network_deadlock;
+mod network_maps;
 mod network_planning;
 mod network_safety;
 mod network_team;

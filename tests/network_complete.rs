@@ -16,13 +16,13 @@ use farside_network::{
 use farside_worlds::movingai::{Builtin, GridMap, GridWorld, TaskList};
 use farside_worlds::{Endpoints, Roadmap, SensorNetwork, VertexId};
 
-#[derive(Clone, Copy)]
-struct Radio {
-    latency_ms: u64,
-    loss: f64,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Radio {
+    pub(crate) latency_ms: u64,
+    pub(crate) loss: f64,
 }
 
-const PERFECT: Radio = Radio {
+pub(crate) const PERFECT: Radio = Radio {
     latency_ms: 5,
     loss: 0.0,
 };
@@ -37,7 +37,7 @@ impl Radio {
     }
 }
 
-fn config(policy: Policy) -> NetworkConfig {
+pub(crate) fn config(policy: Policy) -> NetworkConfig {
     NetworkConfig {
         policy,
         ..NetworkConfig::default()
@@ -73,17 +73,24 @@ fn standing(
         .expect("the missions can be assembled")
 }
 
-/// None where the policy plans ahead and finds no plan.
-fn standing_with(
+/// Rovers that stand on a map, with as many nodes as can be placed on it, at most `nodes`.
+pub(crate) fn standing_network(
     config: &NetworkConfig,
     roadmap: Roadmap,
     nodes: usize,
     tasks: Vec<(VertexId, VertexId)>,
     radio: Radio,
     seed: u64,
-) -> Option<NetworkMetrics> {
-    let radius_m = SensorNetwork::default_radius_m(&roadmap, nodes);
-    let sensors = SensorNetwork::place(&roadmap, nodes, radius_m, seed).unwrap();
+) -> (Simulation, Result<Network, NetworkError>) {
+    let place = |nodes: usize| {
+        let radius_m = SensorNetwork::default_radius_m(&roadmap, nodes);
+        let radii = (0..6).map(|times| radius_m * f64::from(1 << times));
+        let mut placed =
+            radii.filter_map(|radius_m| SensorNetwork::place(&roadmap, nodes, radius_m, seed).ok());
+        placed.next()
+    };
+    let sensors = (1..=nodes.min(roadmap.len())).rev().find_map(place);
+    let sensors = sensors.expect("one node that reaches everywhere can be placed anywhere");
     let mut sim = Simulation::new(seed);
     let parts = Parts {
         world: &WorldConfig::default(),
@@ -95,12 +102,24 @@ fn standing_with(
     let network = assemble_over(&mut sim, &parts, &Missions::Standing(tasks), |_, _| {
         radio.link()
     });
-    let network = match network {
-        Err(NetworkError::NoPlan(_)) => return None,
-        network => network.unwrap(),
+    (sim, network)
+}
+
+/// None where the policy plans ahead and finds no plan.
+pub(crate) fn standing_with(
+    config: &NetworkConfig,
+    roadmap: Roadmap,
+    nodes: usize,
+    tasks: Vec<(VertexId, VertexId)>,
+    radio: Radio,
+    seed: u64,
+) -> Option<NetworkMetrics> {
+    let network = match standing_network(config, roadmap, nodes, tasks, radio, seed) {
+        (_, Err(NetworkError::NoPlan(_))) => return None,
+        (sim, network) => (sim, network.unwrap()),
     };
-    sim.run(Executor::Inline).unwrap();
-    Some(network.metrics())
+    network.0.run(Executor::Inline).unwrap();
+    Some(network.1.metrics())
 }
 
 #[track_caller]

@@ -24,6 +24,7 @@ use super::shared::Shared;
 use super::timing::Timing;
 use crate::baseline::Schedule;
 use crate::ids::RoverId;
+use crate::mapf::{Mission, Problem, Rules};
 use crate::max_plus::lng::LocalGraph;
 use crate::max_plus::payoff::Payoffs;
 use crate::max_plus::processor::PLANNER;
@@ -174,6 +175,7 @@ pub fn assemble(
         Some(_) => failover::backup_lists(&roadmap, sensors),
         None => Vec::new(),
     };
+    let is_well_formed = stay_at_target && is_well_formed(&roadmap, &missions);
     let site = Arc::new(Shared {
         backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
@@ -191,12 +193,20 @@ pub fn assemble(
         sensors: sensors.clone(),
         missions,
         stay_at_target,
+        is_well_formed,
     });
     declare_nodes(sim, &site, &wired);
     declare_rovers(sim, &site);
     let (monitor, score) = Monitor::new(site.clone());
     sim.observe(monitor);
     Ok(Network { site, score })
+}
+
+/// Whether each rover that stands on the map has a path round all others' starts and goals.
+fn is_well_formed(roadmap: &Roadmap, missions: &[(VertexId, VertexId)]) -> bool {
+    let missions = missions.iter().copied().map(Mission::from).collect();
+    let problem = Problem::new(roadmap, missions, Rules::StayAtTarget);
+    problem.is_ok_and(|problem| problem.ill_formed().is_empty())
 }
 
 /// Who waits at each entry, in order: all rovers that have a way to their goals.

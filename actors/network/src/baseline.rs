@@ -7,8 +7,8 @@ use crate::config::{Motion, NetworkConfig, Policy};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 use crate::mapf::{
-    CoupledConfig, Mission, Order, Pace, Problem, Rules, coupled, prioritised_in_time,
-    reference_in_time,
+    CoupledConfig, LacamConfig, Mission, Order, Pace, Plan, Problem, Rules, coupled, lacam,
+    prioritised_in_time, reference_in_time,
 };
 use crate::motion::EdgeTimes;
 use crate::timing::Timing;
@@ -46,8 +46,9 @@ impl Schedule {
         let of_rover = |visits: Vec<Vec<TimedVisit>>| rovers.into_iter().zip(visits).collect();
         let missions = missions.into_iter().map(Mission::from).collect();
         let problem = Problem::new(roadmap, missions, rules).map_err(|error| error.to_string())?;
-        if config.policy == Policy::Coupled {
-            let (visits, expansions) = Schedule::coupled(config, timing, &problem)?;
+        if let Policy::Coupled | Policy::Lacam = config.policy {
+            let (plan, expansions) = Schedule::joint(config, &problem)?;
+            let visits = in_ns(plan.visits(&problem), timing.cycle.as_nanos());
             let visits = of_rover(visits);
             return Ok(Some(Schedule { visits, expansions }));
         }
@@ -78,16 +79,28 @@ impl Schedule {
         }))
     }
 
-    /// The visits of the joint search's plan, and what it took to find it.
-    fn coupled(
-        config: &NetworkConfig,
-        timing: &Timing,
-        problem: &Problem<'_>,
-    ) -> Result<(Vec<Vec<TimedVisit>>, u64), String> {
+    /// The plan of a search over all rovers at once, and what it took to find it.
+    fn joint(config: &NetworkConfig, problem: &Problem<'_>) -> Result<(Plan, u64), String> {
+        let is_exact = config.policy == Policy::Coupled;
+        let name = if is_exact { "coupled" } else { "lacam" };
         if config.motion == Motion::Continuous {
-            let why = "network.policy \"coupled\" searches in whole cycles, and so cannot plan for \
-                       network.motion \"continuous\"; \"reference\" can";
-            return Err(why.to_owned());
+            return Err(format!(
+                "network.policy \"{name}\" searches in whole cycles, and so cannot plan for \
+                 network.motion \"continuous\"; \"reference\" can"
+            ));
+        }
+        if !is_exact {
+            if problem.rules() == Rules::DisappearAtTarget {
+                let why = "network.policy \"lacam\" is for maps where rovers stay at their goals; \
+                           where they queue and leave, \"reference\" always has a plan";
+                return Err(why.to_owned());
+            }
+            let limits = LacamConfig {
+                max_expansions: config.max_expansions,
+                ..LacamConfig::default()
+            };
+            let found = lacam(problem, &limits).map_err(|error| error.to_string())?;
+            return Ok((found.plan, found.expansions));
         }
         let limits = CoupledConfig {
             max_expansions: config.max_expansions,
@@ -96,8 +109,7 @@ impl Schedule {
             ..CoupledConfig::default()
         };
         let best = coupled(problem, &limits).map_err(|error| error.to_string())?;
-        let visits = in_ns(best.plan.visits(problem), timing.cycle.as_nanos());
-        Ok((visits, best.expansions))
+        Ok((best.plan, best.expansions))
     }
 }
 

@@ -38,6 +38,9 @@ pub enum Policy {
     /// A baseline that knows everything: the best plan of all, by a search over all rovers at once
     /// ([`crate::mapf::coupled`]). For small teams, and only in cycles.
     Coupled,
+    /// A baseline that knows everything, for maps where rovers stay at their goals: a plan however
+    /// crowded the map is ([`crate::mapf::lacam`]). Only in cycles.
+    Lacam,
 }
 
 /// How rovers move along edges.
@@ -73,7 +76,7 @@ settings! {
     pub struct NetworkConfig {
         /// Who decides which rover asks for which vertex.
         pub policy: Policy = Policy::MaxPlus,
-            one_of(&["max-plus", "complete", "reference", "prioritised", "coupled"]);
+            one_of(&["max-plus", "complete", "reference", "prioritised", "coupled", "lacam"]);
         /// What only the policy `max-plus` reads.
         pub max_plus: MaxPlusConfig, Within;
         /// What only the policy `complete` reads.

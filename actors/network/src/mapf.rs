@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`prioritised`] | the classic scheme (Erdmann and Lozano-Perez 1987; Bennewitz et al. 2002 for orders): fast, and fails |
 //! | [`coupled`](fn@coupled) | exact search over all rovers at once (Standley 2010): for a handful of rovers |
+//! | [`lacam`](fn@lacam) | search over whole teams' steps, each proposed by priority inheritance (Okumura 2023): for crowded maps where rovers stay |
 //! | [`reference`](fn@reference) | revised prioritised planning with safe intervals (Cap, Vokrinek and Kleiner 2015; Phillips and Likhachev 2011): always succeeds where rovers queue and leave |
 //!
 //! ```
@@ -47,6 +48,7 @@
 mod check;
 mod coupled;
 mod joint;
+mod lacam;
 mod order;
 mod plan;
 mod prioritised;
@@ -63,6 +65,7 @@ mod timetable;
 
 pub use check::Conflict;
 pub use coupled::{Coupled, CoupledConfig, coupled};
+pub use lacam::{Lacam, LacamConfig, lacam};
 pub use order::Order;
 pub use plan::{Failure, Outcome, Plan, PlanMetrics, Trip};
 pub use prioritised::{prioritised, prioritised_in_time};

@@ -49,7 +49,7 @@ fn policy_of(base: &Base, graph: Arc<LocalGraph>, processor: Processor) -> Box<d
     match base.site.config.policy {
         Policy::MaxPlus => Box::new(MaxPlusPolicy::new(base, graph, processor)),
         Policy::Complete => Box::new(CompletePolicy::default()),
-        Policy::Reference | Policy::Prioritised | Policy::Coupled => {
+        Policy::Reference | Policy::Prioritised | Policy::Coupled | Policy::Lacam => {
             Box::new(PlannedPolicy::default())
         }
     }

@@ -59,6 +59,7 @@
 
 mod atlas;
 pub(crate) mod config;
+mod joint_plan;
 pub mod messages;
 mod registries;
 mod registry;

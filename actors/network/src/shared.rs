@@ -35,6 +35,8 @@ pub(crate) struct Shared {
     pub(crate) missions: Vec<(VertexId, VertexId)>,
     /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
     pub(crate) stay_at_target: bool,
+    /// They do, and each of them has a path round all others' starts and goals.
+    pub(crate) is_well_formed: bool,
     /// Each node's backup list, with `network.failover_after`; else empty.
     pub(crate) backup_lists: Vec<Vec<NodeId>>,
     /// The plan of a policy that plans ahead.

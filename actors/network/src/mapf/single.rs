@@ -35,6 +35,19 @@ pub(crate) fn search(
     rover: usize,
     entry: Entry,
 ) -> Result<Vec<TimedVisit>, Failure> {
+    let left = times_to(problem.roadmap(), pace, problem.missions()[rover].goal);
+    search_with(problem, pace, table, rover, entry, &|v| left[v.0 as usize])
+}
+
+/// The same for who knows how long the way from each vertex takes at least.
+pub(crate) fn search_with(
+    problem: &Problem<'_>,
+    pace: &Pace<'_>,
+    table: &StayTable,
+    rover: usize,
+    entry: Entry,
+    left: &dyn Fn(VertexId) -> u64,
+) -> Result<Vec<TimedVisit>, Failure> {
     let (map, rules) = (problem.roadmap(), problem.rules());
     let mission = problem.missions()[rover];
     let ground = SearchSpace {
@@ -46,9 +59,8 @@ pub(crate) fn search(
         covers: &|_| true,
     };
     let mut labels = first_labels(&ground, pace, rules, mission, entry);
-    let left = times_to(map, pace, mission.goal);
     let aim = Aim {
-        left: &|v| left[v.0 as usize],
+        left,
         is_end: &|label| {
             label.vertex == mission.goal
                 && (rules == Rules::DisappearAtTarget || label.until == FOREVER)

@@ -342,3 +342,44 @@ fn the_oracle_knows_a_rotation_from_a_train() {
     ]));
     assert!(clash(&[(None, Some(v(0))), step(0, 0)]));
 }
+
+/// The least sum of steps in which rovers are not at rest at their goals, by trying all steps of
+/// the team from all places that it can be at, cheapest first. There has to be a plan.
+pub(crate) fn least_loss(problem: &Problem<'_>) -> u64 {
+    let map = problem.roadmap();
+    let goals: Vec<VertexId> = problem.missions().iter().map(|m| m.goal).collect();
+    let starts: Vec<VertexId> = problem.missions().iter().map(|m| m.entry).collect();
+    let mut open = BTreeSet::from([(0, starts)]);
+    let mut done = BTreeSet::new();
+    while let Some((cost, at)) = open.pop_first() {
+        if at == goals {
+            return cost;
+        }
+        if !done.insert(at.clone()) {
+            continue;
+        }
+        let mut steps = vec![Vec::new()];
+        for &here in &at {
+            let places = [map.neighbors(here), &[here]].concat();
+            let longer = |step: Vec<VertexId>| {
+                let longer = places.iter().map(move |&v| [&step[..], &[v]].concat());
+                longer.collect::<Vec<_>>()
+            };
+            steps = steps.into_iter().flat_map(longer).collect();
+        }
+        for step in steps {
+            let pairs: Vec<_> = at
+                .iter()
+                .zip(&step)
+                .map(|(a, b)| (Some(*a), Some(*b)))
+                .collect();
+            if clash(&pairs) {
+                continue;
+            }
+            let at_rest = |i: &usize| at[*i] == goals[*i] && step[*i] == goals[*i];
+            let moving = (0..at.len()).filter(|i| !at_rest(i)).count() as u64;
+            open.insert((cost + moving, step));
+        }
+    }
+    unreachable!("there is no plan")
+}

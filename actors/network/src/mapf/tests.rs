@@ -337,3 +337,54 @@ fn the_limit_holds() {
     assert_eq!(error, CoupledError::Exhausted { expansions });
     assert_eq!(coupled(&problem, &config(all.expansions)).unwrap(), all);
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Where the exact search finds a plan, so does the other, and where there is none it says so;
+    /// its plan is sound and costs no less.
+    #[test]
+    fn the_plan_for_crowds_is_there_when_there_is_one(case in case(4, 3, 4)) {
+        prop_assume!(case.rules == Rules::StayAtTarget);
+        let map = case.roadmap();
+        let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
+        let found = lacam(&problem, &LacamConfig::default());
+        match coupled(&problem, &CoupledConfig::default()) {
+            Ok(best) => {
+                let plan = found.unwrap().plan;
+                prop_assert_eq!(plan.conflicts(&problem), []);
+                let metrics = plan.metrics(&problem);
+                prop_assert_eq!(metrics.arrived, problem.missions().len());
+                prop_assert!(metrics.sum_of_costs >= best.cost);
+            }
+            Err(CoupledError::Unsolvable { .. }) => {
+                let unsolvable = matches!(found, Err(CoupledError::Unsolvable { .. }));
+                prop_assert!(unsolvable, "{:?}", found);
+            }
+            Err(CoupledError::Exhausted { .. }) => {}
+        }
+    }
+
+    /// Searched to the end, no plan has a smaller sum of steps that are not rest at goals.
+    #[test]
+    fn the_search_comes_to_the_best_plan(case in case(3, 2, 3)) {
+        prop_assume!(case.rules == Rules::StayAtTarget);
+        let map = case.roadmap();
+        let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
+        let limits = LacamConfig {
+            further_expansions: u64::MAX / 2,
+            improvements: 0,
+            ..LacamConfig::default()
+        };
+        let loss = |plan: &Plan| -> usize {
+            let loss = |(trip, mission): (&Option<Trip>, &Mission)| {
+                let steps = trip.as_ref().unwrap().vertices.windows(2);
+                steps.filter(|step| step.iter().any(|v| *v != mission.goal)).count()
+            };
+            plan.trips.iter().zip(problem.missions()).map(loss).sum()
+        };
+        if let Ok(found) = lacam(&problem, &limits) {
+            prop_assert_eq!(loss(&found.plan) as u64, testing::least_loss(&problem));
+        }
+    }
+}

@@ -1,5 +1,5 @@
 //! The policies that plan for the whole team before the start (`reference`, `prioritised`,
-//! `coupled`): the plan is in the reservation tables from the start, and vertices are granted in
+//! `coupled`, `lacam`): the plan is in the reservation tables from the start, and vertices are granted in
 //! their order. See [`baseline`](crate::baseline).
 
 use farside::prelude::*;

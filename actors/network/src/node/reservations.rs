@@ -173,7 +173,9 @@ impl Reservations {
         let mut next_due = None;
         for (region, registry) in &mut registries.all {
             registry.decide_overdue(&desk(*region));
-            let next_grant = match atlas.is_known(site.roadmap_from) {
+            registry.resolve_jointly(&desk(*region));
+            let may_grant = registry.may_grant() && atlas.is_known(site.roadmap_from);
+            let next_grant = match may_grant {
                 true => grant_heads(base, ctx, registry, now),
                 false => None,
             };

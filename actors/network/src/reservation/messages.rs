@@ -100,6 +100,10 @@ pub enum Item {
     Roadmap(RoadmapPart),
     /// Forward: where and when the rover could be if others made room.
     Wish(Wish),
+    /// Forward: the same as a probe, along a path that keeps clear of all others' places.
+    Clear(Clear),
+    /// To a parent or to children in the tree of nodes: a step of a joint resolution.
+    Joint(Joint),
 }
 
 /// A part of the roadmap.
@@ -204,6 +208,96 @@ pub struct Wish {
     pub probe: Probe,
     /// As in [`Displace`].
     pub priority: (u64, RoverId),
+}
+
+/// A probe that follows a path past no start and no goal of any other rover. What each node hands
+/// on has the path's own vertex among it, for late enough.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Clear {
+    /// The probe.
+    pub probe: Probe,
+    /// Where the path leaves each node of the probe's route; at the last one, the goal.
+    pub exits: Vec<VertexId>,
+}
+
+/// A step of a joint resolution: one node plans for all rovers of a map on which they stay.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// Who says it.
+    pub from: NodeId,
+    /// Which resolution, from 1.
+    pub round: u32,
+    /// The step.
+    pub step: JointStep,
+}
+
+/// What is said in a joint resolution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum JointStep {
+    /// Towards the root: a request has found no path.
+    Ask,
+    /// From the root: begin no request.
+    Hold,
+    /// Towards the root: no request that began in this part of the tree is under way.
+    Held,
+    /// From the root: grant nothing any more, and say what is reserved.
+    Tell,
+    /// Towards the root: what is reserved in this part of the tree.
+    Told(Reserved),
+    /// From the root: the plan.
+    Plan {
+        /// How much holds of what was reserved, of each rover.
+        stops: Vec<Stop>,
+        /// What is planned in this part of the tree, rover by rover, each rover's visits in order.
+        visits: Vec<PlannedVisit>,
+    },
+    /// From the root: there is no plan; go on as before.
+    GoOn {
+        /// There never will be one.
+        is_hopeless: bool,
+    },
+}
+
+/// All that is reserved before a joint plan.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reserved {
+    /// The visits.
+    pub visits: Vec<ReservedVisit>,
+}
+
+/// A visit that is reserved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReservedVisit {
+    /// Whose.
+    pub rover: RoverId,
+    /// The step with which the rover comes.
+    pub step: u32,
+    /// Where and when.
+    pub visit: TimedVisit,
+    /// The vertex was given to the rover.
+    pub granted: bool,
+}
+
+/// The last of a rover's reserved visits that holds when a joint plan begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stop {
+    /// The rover.
+    pub rover: RoverId,
+    /// The visit's step.
+    pub step: u32,
+}
+
+/// A visit of a joint plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlannedVisit {
+    /// What stands for the plan in the tables.
+    pub request: ReservationRequest,
+    /// The step with which the rover comes.
+    pub step: u32,
+    /// Where it comes from; none for where it stops as the plan begins.
+    pub from: Option<VertexId>,
+    /// Where and when.
+    pub visit: TimedVisit,
 }
 
 /// The backward half: the path is entered in the tables of all that own a part of it.

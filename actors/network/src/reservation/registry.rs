@@ -1,19 +1,21 @@
 //! What is kept for the vertices of one region with the `complete` policy, all of it durable, and
 //! who seeks a path from where. A node keeps a registry for itself, and one for each region that it
 //! takes over. Pure: items go to `lines`, grants to the caller. What is done with items is in
-//! [`requests`], what becomes of it when a node is replaced in [`failover`].
+//! [`requests`], what becomes of it when a node is replaced in [`failover`]; how rovers that stay
+//! on a map get out of each other's way in [`joint`] and [`displacement`].
 
 mod displacement;
 mod failover;
+mod joint;
 mod requests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use farside_worlds::{NodeId, VertexId};
 
-use super::messages::{Item, Probe, ReservationRequest, Reserve};
+use super::messages::{Clear, Item, Probe, ReservationRequest, Reserve};
 use super::relay::Line;
-use super::routes::routes;
+use super::routes::{ClearRoute, clear_route, routes};
 use super::table::{ReservationTable, Visit};
 use crate::failover::rank::Replacement;
 use crate::ids::RoverId;
@@ -21,6 +23,7 @@ use crate::mapf::safe_intervals::{FOREVER, Label, SearchSpace, TimedVisit};
 use crate::shared::Shared;
 use displacement::{Aside, Claims};
 use failover::RegionFailover;
+use joint::JointResolution;
 
 /// A rover, or a queue of rovers, for which a path is sought.
 #[derive(Debug)]
@@ -33,6 +36,21 @@ struct Applicant {
     again: Option<(ReservationRequest, u64)>,
     /// Attempts that found no path at all.
     in_vain: u32,
+    /// Along which nodes it was last asked, and between which vertices.
+    routes: Option<((VertexId, VertexId), Vec<Vec<NodeId>>)>,
+    /// The same of the path past no other rover's start or goal, if there is one.
+    clear: Option<((VertexId, VertexId), Option<ClearRoute>)>,
+}
+
+/// What a request asks for, along its routes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Question {
+    /// A path as things stand.
+    Plain,
+    /// What the path would be if nobody stood still for ever.
+    Wish,
+    /// A path as things stand, past no start and no goal of any other rover.
+    Clear,
 }
 
 impl Applicant {
@@ -102,6 +120,9 @@ pub(crate) struct Registry {
     /// How long a request takes from its first probe to its confirmation, smoothed [ns].
     request_time: u64,
     failover: RegionFailover,
+    joint: JointResolution,
+    /// Of neighbouring regions on to which more leads than a probe hands on: see `requests`.
+    parts: BTreeMap<NodeId, BTreeMap<VertexId, VertexId>>,
 }
 
 /// For whose vertices something is done, and when.
@@ -215,6 +236,8 @@ impl Registry {
             request: None,
             again: None,
             in_vain: 0,
+            routes: None,
+            clear: None,
         });
     }
 
@@ -245,9 +268,12 @@ impl Registry {
 
     fn begin(&mut self, desk: &Desk<'_>, at: usize, request: ReservationRequest) {
         let applicant = &mut self.applicants[at];
+        if self.joint.holds() {
+            (applicant.request, applicant.again) = (None, Some((request, desk.now)));
+            return;
+        }
         applicant.request = Some((request, desk.now));
         applicant.again = None;
-        let in_vain = applicant.in_vain;
         let mut goal = desk.site.missions[request.rover.0 as usize].1;
         let soon = desk.now + self.request_time;
         let (labels, entry, first_step) = match applicant.origin {
@@ -282,22 +308,14 @@ impl Registry {
             }
             Origin::Done => return,
         };
-        let site = desk.site;
-        // Every second time that there is no path it asks what the path would be without those who
-        // stand still.
-        let wishful = site.stay_at_target && in_vain % 2 == 1;
-        let routes = routes(
-            &site.roadmap,
-            &site.sensors,
-            (entry, goal),
-            site.config.complete.routes,
-        );
+        let question = self.question(desk, at, (entry, goal));
+        let routes = self.routes_of(desk, at, question, (entry, goal));
         let priority = match &self.applicants[at].aim {
             Aim::Aside(aside) => aside.priority,
             Aim::Goal => request.age(),
         };
         let probes = routes.len() as u32;
-        for route in routes {
+        for (route, exits) in routes {
             let probe = Probe {
                 request,
                 probes,
@@ -306,12 +324,78 @@ impl Registry {
                 at: 0,
                 goal,
                 first_step,
-                wishful,
+                wishful: question == Question::Wish,
                 frontier: (0..labels.len() as u32).collect(),
                 labels: labels.clone(),
             };
-            self.probe(desk, probe, priority);
+            self.probe(desk, probe, priority, exits);
         }
+    }
+
+    /// What an attempt asks for. Where rovers stay, every second time that there was no path as
+    /// things stand it asks for another one: for one that is clear of all others' starts and goals,
+    /// which in a well-formed instance all have; else for one on which others make room. If the
+    /// instance is not well-formed, a joint resolution comes first, where there can be one.
+    fn question(&mut self, desk: &Desk<'_>, at: usize, ends: (VertexId, VertexId)) -> Question {
+        let in_vain = self.applicants[at].in_vain;
+        let is_plain = !desk.site.stay_at_target || in_vain.is_multiple_of(2);
+        if is_plain || self.joint.is_due(desk) {
+            return Question::Plain;
+        }
+        let turn = desk.site.is_well_formed || in_vain % 4 == 1;
+        match turn && self.clear_route(desk, at, ends).is_some() {
+            true => Question::Clear,
+            false => Question::Wish,
+        }
+    }
+
+    /// The path of an applicant past no start and no goal of any other rover.
+    fn clear_route(
+        &mut self,
+        desk: &Desk<'_>,
+        at: usize,
+        ends: (VertexId, VertexId),
+    ) -> Option<&ClearRoute> {
+        let applicant = &mut self.applicants[at];
+        if applicant.clear.as_ref().is_none_or(|(of, _)| *of != ends) {
+            let Origin::Stand { rover, .. } = applicant.origin else {
+                return None;
+            };
+            let site = desk.site;
+            let others: BTreeSet<VertexId> = (0..)
+                .map(RoverId)
+                .zip(&site.missions)
+                .filter(|(other, _)| *other != rover)
+                .flat_map(|(_, &(start, goal))| [start, goal])
+                .collect();
+            let avoided = |v| others.contains(&v);
+            let route = clear_route(&site.roadmap, &site.sensors, ends, avoided);
+            applicant.clear = Some((ends, route));
+        }
+        applicant.clear.as_ref()?.1.as_ref()
+    }
+
+    /// The routes of an attempt; of one that follows a path, where it leaves each node. They depend
+    /// on the roadmap alone, and are kept until they are asked for between other vertices.
+    fn routes_of(
+        &mut self,
+        desk: &Desk<'_>,
+        at: usize,
+        question: Question,
+        ends: (VertexId, VertexId),
+    ) -> Vec<(Vec<NodeId>, Vec<VertexId>)> {
+        if question == Question::Clear {
+            let clear = self.clear_route(desk, at, ends).cloned();
+            return clear.into_iter().map(|c| (c.nodes, c.exits)).collect();
+        }
+        let site = desk.site;
+        let known = &mut self.applicants[at].routes;
+        if known.as_ref().is_none_or(|(of, _)| *of != ends) {
+            let count = site.config.complete.routes;
+            *known = Some((ends, routes(&site.roadmap, &site.sensors, ends, count)));
+        }
+        let routes = known.iter().flat_map(|(_, routes)| routes);
+        routes.map(|route| (route.clone(), Vec::new())).collect()
     }
 
     fn search<T>(&self, desk: &Desk<'_>, with: impl FnOnce(&SearchSpace<'_>) -> T) -> T {
@@ -338,12 +422,17 @@ impl Registry {
         match item {
             Item::Probe(probe) => {
                 let priority = probe.request.age();
-                self.probe(desk, probe, priority);
+                self.probe(desk, probe, priority, Vec::new());
             }
-            Item::Wish(wish) => self.probe(desk, wish.probe, wish.priority),
+            Item::Wish(wish) => self.probe(desk, wish.probe, wish.priority, Vec::new()),
+            Item::Clear(Clear { probe, exits }) => {
+                let priority = probe.request.age();
+                self.probe(desk, probe, priority, exits);
+            }
             Item::Reserve(reserve) => self.reserve(desk, reserve),
             Item::Settle(settle) => self.settle(desk, settle),
             Item::Displace(request) => self.displace(desk, request),
+            Item::Joint(item) => self.take_joint(desk, item),
             // Taken before: see `Atlas::receive`.
             Item::Roadmap(_) => {}
         }
@@ -383,6 +472,11 @@ impl Registry {
         self.apply(desk);
     }
 
+    /// Whether vertices may be granted now.
+    pub(crate) fn may_grant(&self) -> bool {
+        !self.joint.stops_grants()
+    }
+
     /// When something is to be done without being told; of lines, only those that may be used.
     pub(crate) fn next_due(&self, may_use: impl Fn(NodeId) -> bool) -> Option<u64> {
         let lines = self.lines.iter().filter(|(to, _)| may_use(**to));
@@ -392,7 +486,8 @@ impl Registry {
             .offers
             .values()
             .filter(|o| !o.decided && o.best.is_some());
-        lines.chain(open.map(|o| o.deadline)).chain(proposals).min()
+        let lines = lines.chain(open.map(|o| o.deadline)).chain(proposals);
+        lines.chain(self.joint.next_due()).min()
     }
 }
 

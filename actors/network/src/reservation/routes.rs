@@ -3,7 +3,7 @@
 //! request.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, VecDeque};
 
 use farside_worlds::{DistancesTo, NodeId, Roadmap, SensorNetwork, VertexId};
 
@@ -40,6 +40,54 @@ pub(crate) fn routes(
         most = paths.iter().map(price).min().unwrap_or(u32::MAX);
     }
     found
+}
+
+/// A route that follows one path: its nodes, and the vertex at which the path leaves each of them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ClearRoute {
+    pub(crate) nodes: Vec<NodeId>,
+    pub(crate) exits: Vec<VertexId>,
+}
+
+/// The route of a shortest path from the first vertex to the second on which no other vertex is
+/// one of `avoided`; none if there is no such path.
+pub(crate) fn clear_route(
+    roadmap: &Roadmap,
+    sensors: &SensorNetwork,
+    (from, to): (VertexId, VertexId),
+    avoided: impl Fn(VertexId) -> bool,
+) -> Option<ClearRoute> {
+    let mut before = vec![None; roadmap.len()];
+    before[from.0 as usize] = Some(from);
+    let mut open = VecDeque::from([from]);
+    while let Some(here) = open.pop_front() {
+        if here == to {
+            break;
+        }
+        for &next in roadmap.neighbors(here) {
+            let slot = &mut before[next.0 as usize];
+            if slot.is_none() && (next == to || !avoided(next)) {
+                *slot = Some(here);
+                open.push_back(next);
+            }
+        }
+    }
+    let mut path = vec![to];
+    while path[path.len() - 1] != from {
+        path.push(before[path[path.len() - 1].0 as usize]?);
+    }
+    let (mut nodes, mut exits) = (Vec::new(), Vec::new());
+    for vertex in path.into_iter().rev() {
+        let owner = sensors.owner(vertex);
+        match exits.last_mut() {
+            Some(exit) if nodes.last() == Some(&owner) => *exit = vertex,
+            _ => {
+                nodes.push(owner);
+                exits.push(vertex);
+            }
+        }
+    }
+    Some(ClearRoute { nodes, exits })
 }
 
 /// What a vertex costs that no path uses yet.
@@ -121,6 +169,31 @@ mod tests {
                 assert_eq!(found, path, "round {round}");
             }
         }
+    }
+
+    #[test]
+    fn a_clear_route_goes_round_what_is_avoided() {
+        // 0 1 2 / 3 4 5 / 6 7 8
+        let map = grid(3, 3, &[]);
+        let sensors = SensorNetwork::place(&map, 3, 60.0, 1).unwrap();
+        let round =
+            |avoided: &[u32]| clear_route(&map, &sensors, (v(0), v(2)), |u| avoided.contains(&u.0));
+        let straight = round(&[]).unwrap();
+        assert_eq!(straight.exits.last(), Some(&v(2)));
+        let detour = round(&[1, 4]).unwrap();
+        let owners = [0, 3, 6, 7, 8, 5, 2].map(|u| (sensors.owner(v(u)), v(u)));
+        for (node, exit) in detour.nodes.iter().zip(&detour.exits) {
+            assert!(owners.contains(&(*node, *exit)), "{detour:?}");
+        }
+        assert!(
+            detour
+                .nodes
+                .windows(2)
+                .all(|w| sensors.are_neighbors(w[0], w[1]))
+        );
+        assert_eq!(round(&[1, 4, 7]), None);
+        // The ends themselves do not count.
+        assert_eq!(round(&[0, 2]), Some(straight));
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! The visits planned at a node's vertices, in order. Pure: what is in the table, and what may be
 //! entered; who is admitted when is the affair of `admit`.
 
+use std::collections::BTreeMap;
+
 use farside_worlds::VertexId;
 
-use super::messages::ReservationRequest;
+use super::messages::{ReservationRequest, ReservedVisit};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 
@@ -95,6 +97,36 @@ impl ReservationTable {
     pub(crate) fn standing(&self, v: VertexId) -> Option<&Visit> {
         let last = self.pages[self.page(v)?].1.last()?;
         (last.end == FOREVER && last.confirmed).then_some(last)
+    }
+
+    /// All visits.
+    pub(crate) fn all(&self) -> impl Iterator<Item = ReservedVisit> + '_ {
+        let all = self.pages.iter();
+        let all = all.flat_map(|(v, visits)| visits.iter().map(|visit| (*v, visit)));
+        all.map(|(vertex, visit)| ReservedVisit {
+            rover: visit.request.rover,
+            step: visit.step,
+            visit: TimedVisit {
+                vertex,
+                start: visit.start,
+                end: visit.end,
+            },
+            granted: visit.granted,
+        })
+    }
+
+    /// Strikes out each rover's visits after this step.
+    pub(crate) fn strike_beyond(&mut self, last: &BTreeMap<RoverId, u32>) {
+        self.retain(|visit| {
+            last.get(&visit.request.rover)
+                .is_none_or(|&step| visit.step <= step)
+        });
+    }
+
+    /// Whether all visits are confirmed.
+    pub(crate) fn is_settled(&self) -> bool {
+        let mut visits = self.pages.iter().flat_map(|page| &page.1);
+        visits.all(|visit| visit.confirmed)
     }
 
     /// The rover that stands at `v` for ever will leave it after all.

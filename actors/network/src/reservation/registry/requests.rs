@@ -1,15 +1,15 @@
 //! How requests proceed: what a node does with a probe, a path to be reserved, and the news of what
 //! became of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use farside_worlds::VertexId;
+use farside_worlds::{NodeId, VertexId};
 
-use super::{Desk, Offers, Registry, owners};
+use super::{Aim, Desk, Offers, Origin, Question, Registry, owners};
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, Label, TimedVisit, prune, way_to};
 use crate::reservation::messages::{
-    Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
+    Clear, Displace, Item, Probe, ReservationRequest, Reserve, Settle, Verdict, Wish,
 };
 use crate::reservation::table::{Clash, Visit};
 
@@ -19,8 +19,15 @@ const MAX_FRONTIER: usize = 24;
 impl Registry {
     /// Works out where the rover could be in this node's part, and hands that on.
     ///
-    /// A wish is in the name of a request that began with `priority`.
-    pub(crate) fn probe(&mut self, desk: &Desk<'_>, mut probe: Probe, priority: (u64, RoverId)) {
+    /// A wish is in the name of a request that began with `priority`. Along a clear path `exits`
+    /// are where it leaves each node of the route; else there are none.
+    pub(crate) fn probe(
+        &mut self,
+        desk: &Desk<'_>,
+        mut probe: Probe,
+        priority: (u64, RoverId),
+        exits: Vec<VertexId>,
+    ) {
         let (mut labels, open) = (std::mem::take(&mut probe.labels), &probe.frontier);
         if probe.wishful {
             let busy = |v| self.busy_for_priority(v, priority);
@@ -39,12 +46,23 @@ impl Registry {
                 && onward.iter().any(|&v| site.sensors.owner(v) == next)
         };
         let has_gaps = !site.sensors.gaps().is_empty();
-        let frontier = frontier(&labels, has_gaps, borders);
+        let mut frontier = frontier(&labels, has_gaps, borders);
+        if frontier.len() >= MAX_FRONTIER {
+            let parts = self
+                .parts
+                .entry(next)
+                .or_insert_with(|| parts_of(desk, next));
+            keep_one_for_each_part(desk, parts, &labels, &mut frontier);
+        }
+        if let Some(exit) = exits.get(probe.at as usize) {
+            keep_exit(&labels, *exit, &mut frontier);
+        }
         probe.frontier = prune(&mut labels, &frontier);
         probe.labels = labels;
         probe.at += 1;
         let item = match probe.wishful {
             true => Item::Wish(Wish { probe, priority }),
+            false if !exits.is_empty() => Item::Clear(Clear { probe, exits }),
             false => Item::Probe(probe),
         };
         self.post(next, item);
@@ -339,6 +357,17 @@ impl Registry {
         let pause = desk.site.timing.cycle.as_nanos() << applicant.in_vain.min(1);
         applicant.in_vain += 1;
         applicant.again = Some((next, desk.now + pause));
+        // Where a clear path is known there is nobody to wait for.
+        let Origin::Stand { rover, vertex, .. } = applicant.origin else {
+            return;
+        };
+        let goal = desk.site.missions[rover.0 as usize].1;
+        let to_goal = matches!(applicant.aim, Aim::Goal);
+        if to_goal && self.question(desk, at, (vertex, goal)) == Question::Clear {
+            self.begin(desk, at, next);
+        } else {
+            self.ask_for_joint_plan(desk);
+        }
     }
 
     pub(crate) fn settle(&mut self, desk: &Desk<'_>, settle: Settle) {
@@ -390,4 +419,69 @@ fn frontier(labels: &[Label], has_gaps: bool, borders: impl Fn(&Label) -> bool) 
     }
     all.truncate(MAX_FRONTIER);
     all.into_iter().map(|(_, at)| at).collect()
+}
+
+/// For each vertex at which the next region borders on this one, the part of that region in which
+/// it lies, as the lowest vertex of that part. What lies in one part does not lead to another
+/// without leaving the region.
+fn parts_of(desk: &Desk<'_>, next: NodeId) -> BTreeMap<VertexId, VertexId> {
+    let site = desk.site;
+    let mut part_of = BTreeMap::new();
+    for &first in site.sensors.owned(next) {
+        let mut open = vec![first];
+        while let Some(here) = open.pop() {
+            if site.sensors.owner(here) == next && !part_of.contains_key(&here) {
+                part_of.insert(here, first);
+                open.extend(site.roadmap.neighbors(here));
+            }
+        }
+    }
+    let is_beside = |v: &VertexId| {
+        let mut beside = site.roadmap.neighbors(*v).iter();
+        beside.any(|&u| site.sensors.owner(u) == desk.region)
+    };
+    part_of.retain(|v, _| is_beside(v));
+    part_of
+}
+
+/// Makes sure that the frontier has a label that can be kept up for ever at the border of each part
+/// of the next region, if there is one. Of a long border only the nearest vertices were kept.
+fn keep_one_for_each_part(
+    desk: &Desk<'_>,
+    part_of: &BTreeMap<VertexId, VertexId>,
+    labels: &[Label],
+    frontier: &mut Vec<u32>,
+) {
+    let lasts = |label: &Label| {
+        label.until == FOREVER && desk.site.sensors.owner(label.vertex) == desk.region
+    };
+    let mut earliest = BTreeMap::<VertexId, (u64, u32)>::new();
+    let mut kept = BTreeSet::new();
+    for (at, label) in (0..).zip(labels).filter(|(_, label)| lasts(label)) {
+        for beside in desk.site.roadmap.neighbors(label.vertex) {
+            let Some(&part) = part_of.get(beside) else {
+                continue;
+            };
+            let found = earliest.entry(part).or_insert((label.ready, at));
+            *found = (*found).min((label.ready, at));
+            if frontier.contains(&at) {
+                kept.insert(part);
+            }
+        }
+    }
+    earliest.retain(|part, _| !kept.contains(part));
+    let missing: BTreeSet<u32> = earliest.into_values().map(|(_, at)| at).collect();
+    frontier.extend(missing);
+}
+
+/// Makes sure that the frontier has the earliest label at `exit` that can be kept up for ever.
+fn keep_exit(labels: &[Label], exit: VertexId, frontier: &mut Vec<u32>) {
+    let lasts = |label: &Label| label.vertex == exit && label.until == FOREVER;
+    let lasting = (0..).zip(labels).filter(|(_, label)| lasts(label));
+    let Some((at, _)) = lasting.min_by_key(|(at, label)| (label.ready, *at)) else {
+        return;
+    };
+    if !frontier.contains(&at) {
+        frontier.push(at);
+    }
 }

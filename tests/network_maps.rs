@@ -1,0 +1,224 @@
+//! The `complete` policy on maps where rovers stand from the start and stay at their goals: random
+//! small instances, whatever the number of nodes, over links that lose messages. On well-formed
+//! ones all arrive, and on all others that can be solved.
+
+use farside::prelude::*;
+use farside_network::cases::strategies::roadmaps;
+use farside_network::mapf::{CoupledConfig, CoupledError, Mission, Problem, Rules, coupled};
+use farside_network::{NetworkConfig, NetworkMetrics, Policy};
+use farside_worlds::movingai::{GridMap, GridWorld, TaskList};
+use farside_worlds::{Roadmap, VertexId, well_formed};
+use proptest::prelude::*;
+
+use crate::network_complete::{PERFECT, Radio, config, standing_network, standing_with};
+
+type Tasks = Vec<(VertexId, VertexId)>;
+
+#[derive(Clone, Debug)]
+struct Instance {
+    map: Roadmap,
+    tasks: Tasks,
+    nodes: usize,
+    radio: Radio,
+    seed: u64,
+}
+
+/// Up to so many rovers on up to so many vertices; no two starts and no two goals alike.
+fn instances(vertices: usize, rovers: usize) -> impl Strategy<Value = Instance> {
+    let picks = prop::collection::vec(any::<[prop::sample::Index; 2]>(), 1..=rovers);
+    let loss = prop_oneof![Just(0.0), Just(0.2)];
+    let parts = (roadmaps(vertices), picks, 1..=8usize, loss, 0..100u64);
+    parts.prop_map(|(map, picks, nodes, loss, seed)| {
+        let mut tasks = Tasks::new();
+        for [start, goal] in picks {
+            let [start, goal] = [start, goal].map(|at| VertexId(at.index(map.len()) as u32));
+            if tasks.iter().all(|&(a, b)| a != start && b != goal) {
+                tasks.push((start, goal));
+            }
+        }
+        let radio = Radio {
+            latency_ms: 5,
+            loss,
+        };
+        Instance {
+            map,
+            tasks,
+            nodes,
+            radio,
+            seed,
+        }
+    })
+}
+
+/// Patient enough for retries.
+fn complete() -> NetworkConfig {
+    NetworkConfig {
+        deadlock_window: 200,
+        livelock_window: 2000,
+        ..config(Policy::Complete)
+    }
+}
+
+fn run(instance: &Instance, config: &NetworkConfig) -> NetworkMetrics {
+    let Instance {
+        map,
+        tasks,
+        nodes,
+        radio,
+        seed,
+    } = instance.clone();
+    standing_with(config, map, nodes, tasks, radio, seed).expect("nothing is planned ahead")
+}
+
+/// Whether some path leads from the last vertex of `path` to `goal`, past no vertex twice and none
+/// that is `taken`, by trying all.
+fn leads_there(
+    map: &Roadmap,
+    path: &mut Vec<VertexId>,
+    goal: VertexId,
+    taken: &[VertexId],
+) -> bool {
+    let here = path[path.len() - 1];
+    if taken.contains(&here) {
+        return false;
+    }
+    here == goal
+        || map.neighbors(here).iter().any(|&next| {
+            !path.contains(&next) && {
+                path.push(next);
+                let found = leads_there(map, path, goal, taken);
+                path.pop();
+                found
+            }
+        })
+}
+
+fn is_well_formed(map: &Roadmap, tasks: &Tasks) -> bool {
+    (0..tasks.len()).all(|task| {
+        let others = tasks.iter().enumerate().filter(|(other, _)| *other != task);
+        let taken: Vec<VertexId> = others.flat_map(|(_, &(a, b))| [a, b]).collect();
+        let (start, goal) = tasks[task];
+        leads_there(map, &mut vec![start], goal, &taken)
+    })
+}
+
+/// The rovers of an instance that leave it well-formed, one after the other.
+fn made_well_formed(mut instance: Instance) -> Instance {
+    let mut tasks = Tasks::new();
+    for &task in &instance.tasks {
+        tasks.push(task);
+        if !is_well_formed(&instance.map, &tasks) {
+            tasks.pop();
+        }
+    }
+    instance.tasks = tasks;
+    instance
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 64,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn on_a_well_formed_instance_all_arrive(
+        instance in instances(24, 6).prop_map(made_well_formed),
+    ) {
+        prop_assert_eq!(well_formed(&instance.map, &instance.tasks), []);
+        let metrics = run(&instance, &complete());
+        prop_assert_eq!(metrics.arrived, metrics.rovers, "{:?}", metrics.deadlock_reason);
+        prop_assert_eq!(metrics.collisions, 0);
+    }
+
+    /// With failover there is no joint resolution: the argument is that of well-formed instances.
+    #[test]
+    fn nor_does_it_take_a_joint_plan(instance in instances(16, 5).prop_map(made_well_formed)) {
+        let config = NetworkConfig {
+            failover_after: Some(100),
+            ..complete()
+        };
+        let metrics = run(&instance, &config);
+        prop_assert_eq!(metrics.arrived, metrics.rovers, "{:?}", metrics.deadlock_reason);
+        prop_assert_eq!(metrics.collisions, 0);
+    }
+
+    /// The exact search says which instances can be solved.
+    #[test]
+    fn whatever_can_be_solved_is(instance in instances(9, 5)) {
+        let missions = instance.tasks.iter().copied().map(Mission::from).collect();
+        let problem = Problem::new(&instance.map, missions, Rules::StayAtTarget).expect("it is one");
+        let solvable = match coupled(&problem, &CoupledConfig::default()) {
+            Ok(_) => true,
+            Err(CoupledError::Unsolvable { .. }) => false,
+            Err(CoupledError::Exhausted { .. }) => return Ok(()),
+        };
+        let metrics = run(&instance, &complete());
+        prop_assert_eq!(metrics.collisions, 0);
+        let all = metrics.arrived == metrics.rovers;
+        prop_assert_eq!(all, solvable, "{:?}", metrics.deadlock_reason);
+    }
+}
+
+/// So many rovers on a map at random places, more than half of which may have no clear path.
+fn crowd(map: &GridMap, rovers: usize, seed: u64) -> (Roadmap, Tasks) {
+    let tasks = TaskList::random("x.map", map, rovers, seed).expect("there is room");
+    let grid = GridWorld::new("x.map", map, 10.0, tasks.tasks()).expect("all can be reached");
+    (grid.roadmap().clone(), grid.tasks().to_vec())
+}
+
+/// Nodes and rovers that crash in the middle of a joint resolution lose nothing of it.
+#[test]
+fn a_joint_resolution_outlives_crashes_and_losses() {
+    let map = GridMap::random(12, 12, 0.1, 4).expect("it is a map");
+    for seed in 1..4 {
+        let (roadmap, tasks) = crowd(&map, 45, seed);
+        let radio = Radio {
+            latency_ms: 50,
+            loss: 0.2,
+        };
+        let (mut sim, network) = standing_network(&complete(), roadmap, 6, tasks, radio, seed);
+        let network = network.expect("it makes sense");
+        let at = |ms: u64| SimTime::ZERO + SimDuration::from_millis(ms);
+        for (i, name) in (0..).zip(network.node_names()) {
+            sim.crash_named_at(at(150 + 130 * i), name)
+                .expect("it is there");
+            sim.restart_named_at(at(2500 + 400 * i), name)
+                .expect("it is there");
+        }
+        for (i, name) in (0..).zip(network.rover_names()).step_by(3) {
+            sim.crash_named_at(at(3000 + 70 * i), name)
+                .expect("it is there");
+            sim.restart_named_at(at(8000 + 70 * i), name)
+                .expect("it is there");
+        }
+        sim.run(Executor::Inline).expect("it runs");
+        let metrics = network.metrics();
+        let done = (metrics.arrived, metrics.collisions);
+        assert_eq!(done, (45, 0), "{:?}", metrics.deadlock_reason);
+    }
+}
+
+/// What a crowded map costs, beside what it costs who knows everything from the start.
+#[test]
+fn a_crowd_costs_little_more_than_planned_from_the_start() {
+    let map = GridMap::random(16, 16, 0.15, 7).expect("it is a map");
+    for seed in 1..4 {
+        let (roadmap, tasks) = crowd(&map, 70, seed);
+        let cost = |policy| {
+            let config = NetworkConfig {
+                grants_ahead: 0,
+                ..config(policy)
+            };
+            let (map, tasks) = (roadmap.clone(), tasks.clone());
+            let metrics = standing_with(&config, map, 8, tasks, PERFECT, 1).expect("it is solved");
+            metrics
+                .costs
+                .and_then(|costs| costs.sum_of_costs)
+                .expect("all arrive")
+        };
+        let (here, there) = (cost(Policy::Complete), cost(Policy::Lacam));
+        assert!(here * 4 < there * 5, "seed {seed}: {here} where {there} do");
+    }
+}
