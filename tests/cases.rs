@@ -3,8 +3,5 @@
 
 mod links;
 mod logs;
-<<<<<<< HEAD
-mod network;
-=======
 mod maps;
->>>>>>> w-node
+mod network;
