@@ -91,7 +91,7 @@ struct Frame {
     /// Transmissions so far.
     attempts: u32,
     /// How often it asked whose turn it is.
-    looks: u8,
+    looks: u32,
     /// Random waits so far.
     waits: u32,
     /// When the radio will look at it again.

@@ -11,7 +11,7 @@ use crate::link::{Attempt, EXPIRED, QUEUE_FULL, difference};
 /// How often a frame looks whether it is its turn, before it waits to be woken instead. Fewer would
 /// do; what a frame looks at is part of a run's digest, and built-in runs have lines in which one
 /// looks a hundred times.
-const MAX_LOOKS: u8 = u8::MAX;
+const MAX_LOOKS: u32 = 255;
 
 impl Radio {
     /// Takes the copies of a message into its link's line.
