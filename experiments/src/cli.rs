@@ -8,8 +8,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, diff, draw, explain, info, recover, report, reproduce, run,
-    study, verify,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, recover, report,
+    reproduce, run, study, verify,
 };
 use crate::registry::Registry;
 
@@ -97,8 +97,8 @@ pub fn main(registry: Registry) -> ExitCode {
             } else {
                 "error"
             };
-            // If stderr is gone too, the exit code still tells.
-            let _ = writeln!(std::io::stderr(), "{label}: {error}");
+            let _ = write!(std::io::stderr(), "{label}: ");
+            complain(&error);
             error.exit().into()
         }
     }

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use farside::BuildError;
-use farside_logs::LogError;
+use farside_logs::{LogError, is_hidden};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -118,9 +118,22 @@ pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), CommandError> {
     written.map_err(CommandError::Output)
 }
 
-/// Prints a text, and a newline if it has none at its end.
+/// Prints a text, and a newline if it has none at its end. Names in it may be anybody's: what a
+/// terminal would obey is escaped.
 pub(crate) fn print(text: impl ToString) -> Result<(), CommandError> {
-    let mut text = text.to_string();
+    print_lines(obeyed_by_no_terminal(&text.to_string(), &|letter| {
+        letter.escape_default().to_string()
+    }))
+}
+
+/// Prints a document that programs read, JSON or TOML: escapes are those of its strings.
+pub(crate) fn print_document(text: &str) -> Result<(), CommandError> {
+    print_lines(obeyed_by_no_terminal(text, &|letter| {
+        format!("\\u{:04x}", u32::from(letter))
+    }))
+}
+
+fn print_lines(mut text: String) -> Result<(), CommandError> {
     if !text.ends_with('\n') {
         text.push('\n');
     }
@@ -129,5 +142,30 @@ pub(crate) fn print(text: impl ToString) -> Result<(), CommandError> {
 
 /// Prints one JSON document.
 pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
-    print(serde_json::to_string_pretty(value)?)
+    print_document(&serde_json::to_string_pretty(value)?)
+}
+
+/// Says something on standard error. If that is gone, the exit code still tells.
+pub(crate) fn complain(text: impl ToString) {
+    let text = obeyed_by_no_terminal(&text.to_string(), &|letter| {
+        letter.escape_default().to_string()
+    });
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// A text of several lines in which what a terminal would obey is escaped, except for the ends of
+/// lines and tabs.
+fn obeyed_by_no_terminal(text: &str, escape: &dyn Fn(char) -> String) -> String {
+    let obeyed = |letter: char| !matches!(letter, '\n' | '\t') && is_hidden(letter);
+    if !text.chars().any(obeyed) {
+        return text.to_owned();
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for letter in text.chars() {
+        match obeyed(letter) {
+            true => out.push_str(&escape(letter)),
+            false => out.push(letter),
+        }
+    }
+    out
 }

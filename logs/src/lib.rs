@@ -81,6 +81,6 @@ pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use output::{may_hold_log, refuse_input};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
-pub use shown::escaped;
+pub use shown::{escaped, is_hidden};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

@@ -8,7 +8,7 @@ pub(crate) struct Shown<'a>(pub(crate) &'a str);
 
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.0.chars().any(hidden) {
+        if !self.0.chars().any(is_hidden) {
             return f.pad(self.0);
         }
         f.pad(&escaped(self.0))
@@ -24,7 +24,7 @@ impl fmt::Display for Shown<'_> {
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
-        if hidden(letter) {
+        if is_hidden(letter) {
             out.extend(letter.escape_default());
         } else {
             out.push(letter);
@@ -33,10 +33,15 @@ pub fn escaped(text: &str) -> String {
     out
 }
 
-/// Control characters, line separators, and what turns the direction of writing.
-fn hidden(letter: char) -> bool {
+/// True for control characters, line separators, and what turns the direction of writing.
+///
+/// ```
+/// assert!(farside_logs::is_hidden('\u{9b}') && !farside_logs::is_hidden('ö'));
+/// ```
+pub fn is_hidden(letter: char) -> bool {
     letter.is_control()
-        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}')
+        || matches!(letter, '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
 /// Nanoseconds as seconds, with every digit.

@@ -4,7 +4,7 @@ use farside_actors::system::Builtin;
 use serde_json::json;
 
 use super::Exit;
-use super::{CommandError, print, print_json};
+use super::{CommandError, print, print_document, print_json};
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -45,7 +45,7 @@ impl Shelf {
         let files = self.files.iter();
         if args.text {
             let texts = files.map(|file| format!("# --- {}\n{}", file.name, file.text));
-            print(texts.collect::<Vec<_>>().join("\n"))?;
+            print_document(&texts.collect::<Vec<_>>().join("\n"))?;
             return Ok(Exit::Done);
         }
         if args.json {

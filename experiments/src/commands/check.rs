@@ -1,7 +1,9 @@
 //! `farside check`: read, check, print the resolved scenario, and what became of its files.
 
 use super::Exit;
-use super::{CommandError, print};
+use super::{CommandError, print_document};
+use farside_logs::escaped;
+
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -23,8 +25,8 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let notes = assembled.notes.iter().chain(&assembled.remarks);
     for (at, note) in notes.enumerate() {
         let gap = if at == 0 { "\n" } else { "" };
-        text.push_str(&format!("{gap}# {note}\n"));
+        text.push_str(&format!("{gap}# {}\n", escaped(note)));
     }
-    print(text)?;
+    print_document(&text)?;
     Ok(Exit::Done)
 }

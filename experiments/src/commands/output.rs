@@ -39,7 +39,8 @@ impl Format {
     }
 }
 
-/// Writes a text, and says where.
+/// Writes a text, and says where. A page keeps no control characters, for which HTML has no
+/// place; figures have none.
 ///
 /// # Errors
 /// If the file is one of the inputs by any name, is there and of another kind, or cannot be written.
@@ -54,6 +55,15 @@ pub(super) fn write(
         let what = format.name();
         return Err(CommandError::InTheWay { path, what });
     }
+    let is_text = |letter: char| !letter.is_control() || matches!(letter, '\n' | '\t');
+    let cleaned: String;
+    let text = match format {
+        Format::Page if !text.chars().all(is_text) => {
+            cleaned = text.chars().filter(|letter| is_text(*letter)).collect();
+            &cleaned
+        }
+        _ => text,
+    };
     match std::fs::write(&path, text) {
         Ok(()) => Ok(path.display().to_string()),
         Err(source) => Err(CommandError::Write { path, source }),

@@ -1,6 +1,5 @@
 //! `farside reproduce`: one run of a study again, logged, and compared with its record.
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use farside::Executor;
@@ -10,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::Exit;
 use super::run::log_options;
-use super::{CommandError, interrupt, print, print_json, progress};
+use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario};
 use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
@@ -91,19 +90,13 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         unrecorded,
     }) = again
     else {
-        let _ = writeln!(
-            std::io::stderr(),
-            "interrupted before the end: nothing is compared"
-        );
+        complain("interrupted before the end: nothing is compared");
         return Ok(Exit::Failed);
     };
     if let Some(error) = unrecorded {
         let log = args.out.display();
         // A result of its own: neither the same nor different.
-        let _ = writeln!(
-            std::io::stderr(),
-            "error: {log}: cannot be recorded: {error}"
-        );
+        complain(format!("error: {log}: cannot be recorded: {error}"));
         return Ok(Exit::Failed);
     }
     let document = document(args, manifest, record, outcome, differences);

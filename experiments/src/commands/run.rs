@@ -1,7 +1,6 @@
 //! `farside run`: run a scenario, log every message, say what came of it.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
@@ -13,7 +12,7 @@ use serde_json::{Map, Value};
 
 use super::Exit;
 use super::table::{self, Group};
-use super::{CommandError, interrupt, print, print_json, progress};
+use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
 use crate::version::CODE_VERSION;
 use farside_actors::system::Results;
@@ -177,7 +176,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         if outcome.exit() == Exit::Failed {
             let ending = ending(&report);
             // The document says so too; if stderr is gone, that must do.
-            let _ = writeln!(std::io::stderr(), "error: {ending}");
+            complain(format!("error: {ending}"));
         }
         print_json(&outcome.document())
     } else {

@@ -1,6 +1,6 @@
 //! `farside study`: run a study, as far as its folder does not hold its runs already.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
-use super::{CommandError, interrupt, print, print_json};
+use super::{CommandError, complain, interrupt, print, print_json};
 use crate::registry::Registry;
 use crate::report::csv::results_csv;
 use crate::study::results::{Manifest, Results, RunOutcome};
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if ended? == Ended::Interrupted {
         let text = interrupted(args, last, &folder);
         // The exit code says so too.
-        let _ = writeln!(std::io::stderr(), "{text}");
+        complain(text);
         return Ok(Exit::Failed);
     }
     let results = Results::load(&folder)?;
@@ -160,7 +160,7 @@ fn tell(
     }
     let say = |text: String| {
         // The exit code says so too.
-        let _ = writeln!(std::io::stderr(), "{text}");
+        complain(text);
     };
     for run in violated.iter().take(3) {
         let (cell, seed) = (run.cell, run.seed);

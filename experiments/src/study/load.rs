@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use farside_logs::is_hidden;
 use serde_json::Value;
 
 use super::error::{StoreError, io};
 use super::lengths::Lengths;
-use super::results::{Claim, FORMAT, Manifest, Results, RunOutcome, RunRecord};
+use super::results::{Claim, FORMAT, Factor, Manifest, Metric, Results, RunOutcome, RunRecord};
 
 /// The file that says what is run.
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -123,6 +124,7 @@ pub(super) fn manifest(folder: &Path) -> Result<Manifest, StoreError> {
 /// Holds a manifest to what everything that reads one takes for granted: somebody may have edited
 /// it.
 fn check(manifest: &Manifest) -> Result<(), String> {
+    check_names(manifest)?;
     let cells = manifest.cells.len();
     if cells == 0 || manifest.seeds.is_empty() {
         return Err("a study has at least one cell and one seed".to_owned());
@@ -171,6 +173,41 @@ fn check(manifest: &Manifest) -> Result<(), String> {
         )),
         _ => Ok(()),
     }
+}
+
+/// Refuses names and labels that would break a line or that a terminal would obey: they stand in
+/// every table.
+pub(super) fn check_names(manifest: &Manifest) -> Result<(), String> {
+    let one = |what: &str, text: &str| match text.chars().any(is_hidden) {
+        true => Err(format!("{what} {text:?} has control characters")),
+        false => Ok(()),
+    };
+    one("the study's name", &manifest.study)?;
+    for Factor {
+        name, label, unit, ..
+    } in &manifest.factors
+    {
+        [name, label, unit]
+            .into_iter()
+            .try_for_each(|text| one("a factor's name, label or unit", text))?;
+    }
+    for Metric {
+        name, label, unit, ..
+    } in &manifest.metrics
+    {
+        [name, label, unit]
+            .into_iter()
+            .try_for_each(|text| one("a metric's name, label or unit", text))?;
+    }
+    let texts = manifest.cells.iter().flat_map(|cell| &cell.texts);
+    texts
+        .into_iter()
+        .try_for_each(|text| one("a factor's value", text))?;
+    for published in &manifest.published {
+        one("a title", &published.title)?;
+        one("a unit", &published.unit)?;
+    }
+    Ok(())
 }
 
 /// All records in a folder, in order.

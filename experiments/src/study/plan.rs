@@ -172,6 +172,7 @@ impl Study {
             stop,
             published,
         };
+        super::load::check_names(&manifest).map_err(StudyError::Argument)?;
         Ok(StudyPlan {
             manifest,
             scenarios,

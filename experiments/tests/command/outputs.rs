@@ -185,3 +185,77 @@ fn reports_and_runs_again_spare_what_is_there() {
     std::fs::hard_link(at.join("results/manifest.json"), page).unwrap();
     refused(at, &report, "results/manifest.json", READ);
 }
+
+/// Letters that a terminal obeys: the end of lines and tabs aside.
+fn obeyed(text: &str) -> Option<char> {
+    text.chars()
+        .find(|letter| !matches!(letter, '\n' | '\t') && farside_logs::is_hidden(*letter))
+}
+
+#[test]
+fn no_output_has_letters_that_a_terminal_obeys() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // Escape, delete, a control sequence in one letter, and a change of direction.
+    let hostile = "s\u{1b}[31m\u{7f}\u{9b}2J\u{202e}.toml";
+    std::fs::write(at.join(hostile), SCENARIO).unwrap();
+    let log = "r\u{1b}]0;x\u{7}\u{9b}\u{7f}.mcap";
+    let figure = "f\u{9b}\u{7f}.svg";
+    for arguments in [
+        &["check", hostile][..],
+        &["run", hostile, "--out", log],
+        &["run", hostile, "--out", log, "--json"],
+        &["info", log],
+        &["info", log, "--json"],
+        &["verify", log],
+        &["verify", log, "--json"],
+        &["diff", log, log],
+        &["diff", log, log, "--json"],
+        &["draw", log, "--out", figure],
+        &["draw", log, "--out", figure, "--json"],
+        &["check", "no\u{1b}[2J\u{7f}where.toml"],
+        &["check", hostile, "--set", "te\u{9b}am=\u{7f}"],
+        &["run", hostile, "--out", hostile],
+        &["explain", "li\u{1b}nks"],
+        &["draw", log, "ma\u{9b}p"],
+        &["recover", log, "--out", "x\u{9b}.mcap", "--json"],
+        &["report", "no\u{9b}where"],
+        &["study", "no\u{1b}where"],
+    ] {
+        let output = farside(at, arguments);
+        for said in [&output.stdout, &output.stderr] {
+            let said = text(said);
+            assert_eq!(obeyed(said), None, "{arguments:?}: {said:?}");
+        }
+        let asked_for_json = arguments.contains(&"--json");
+        if asked_for_json {
+            assert!(
+                output.status.success(),
+                "{arguments:?}: {}",
+                text(&output.stderr)
+            );
+            let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            let read_back = value.to_string();
+            let names = [log, hostile, figure, "x\u{9b}.mcap"];
+            let named = names.iter().any(|name| {
+                let quoted = serde_json::Value::from(*name).to_string();
+                read_back.contains(quoted.trim_matches('"'))
+            });
+            assert!(
+                named || arguments[0] == "info" || arguments[0] == "recover",
+                "{read_back}"
+            );
+        }
+    }
+
+    let study = "question = 'How late?'\nscenario = 's.toml'\nseeds = 1\nmetrics = ['time_ratio']\n\
+        [[factor]]\nname = 'loss'\nlabel = \"lo\\u001b[2Jss\"\nkey = 'links.default.loss'\n\
+        values = ['0%', '10%']\n";
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let output = farside(at, &["study", "study.toml", "--out", "results"]);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("has control characters"), "{said}");
+    assert_eq!(obeyed(said), None, "{said:?}");
+}
