@@ -27,7 +27,7 @@ pub(crate) const SCENARIOS: [Builtin; 5] = [
 ];
 
 /// Sorted by name.
-pub(crate) const STUDIES: [Builtin; 15] = [
+pub(crate) const STUDIES: [Builtin; 16] = [
     Builtin {
         name: "degradation/bursts",
         text: include_str!("../studies/degradation/bursts.toml"),
@@ -75,6 +75,10 @@ pub(crate) const STUDIES: [Builtin; 15] = [
     Builtin {
         name: "network/node-loss",
         text: include_str!("../studies/network/node-loss.toml"),
+    },
+    Builtin {
+        name: "network/readings",
+        text: include_str!("../studies/network/readings.toml"),
     },
     Builtin {
         name: "network/robust",
