@@ -5,12 +5,14 @@
 use farside::prelude::*;
 use farside_network::cases::strategies::roadmaps;
 use farside_network::mapf::{CoupledConfig, CoupledError, Mission, Problem, Rules, coupled};
-use farside_network::{NetworkConfig, NetworkMetrics, Policy};
-use farside_worlds::movingai::{GridMap, GridWorld, TaskList};
-use farside_worlds::{Roadmap, VertexId, well_formed};
+use farside_network::{Missions, NetworkConfig, NetworkMetrics, Policy};
+use farside_worlds::movingai::{Cell, GridMap, GridWorld, TaskList};
+use farside_worlds::{Roadmap, SensorNetwork, VertexId, well_formed};
 use proptest::prelude::*;
 
-use crate::network_complete::{PERFECT, Radio, config, standing_network, standing_with};
+use crate::network_complete::{
+    PERFECT, Radio, config, network_of, standing_network, standing_with,
+};
 
 type Tasks = Vec<(VertexId, VertexId)>;
 
@@ -221,4 +223,64 @@ fn a_crowd_costs_little_more_than_planned_from_the_start() {
         let (here, there) = (cost(Policy::Complete), cost(Policy::Lacam));
         assert!(here * 4 < there * 5, "seed {seed}: {here} where {there} do");
     }
+}
+
+/// Two nodes side by side on 20 columns of 40 rows, the left one's border with the right one 40
+/// vertices long. Of the right one's first column leads one on, at its far end; nearer vertices
+/// lead nowhere but along the column, in which `in_column` is in row 30.
+fn long_border(in_column: char) -> (GridWorld, SensorNetwork) {
+    let row = |y: usize| match y {
+        39 => ".".repeat(20) + "\n",
+        30 => format!("..........{in_column}@@@@@@@@@\n"),
+        _ => "...........@@@@@@@@@\n".to_owned(),
+    };
+    let rows: String = (0..40).map(row).collect();
+    let text = format!("type octile\nheight 40\nwidth 20\nmap\n{rows}");
+    let map = GridMap::from_movingai(text.as_bytes()).expect("it is a map");
+    let line = |from: &str, to: &str| format!("0\tx.map\t20\t40\t{from}\t{to}\t0\n");
+    let mut scen = "version 1\n".to_owned() + &line("0\t0", "19\t39");
+    if in_column == '.' {
+        scen += &line("10\t30", "10\t30");
+    }
+    let tasks = TaskList::from_movingai(scen.as_bytes()).expect("they are tasks");
+    let grid = GridWorld::new("x.map", &map, 10.0, tasks.tasks()).expect("all can be reached");
+    let place = |column: u32| {
+        let [top, bottom] = [0, 39].map(|y| {
+            let vertex = grid.vertex(Cell { x: column, y }).expect("it is free");
+            grid.roadmap().position_m(vertex)
+        });
+        top + (bottom - top) * 0.5
+    };
+    // As far from the border on either side.
+    let (left, right) = (place(9), place(10));
+    let sensors = SensorNetwork::new(grid.roadmap(), vec![left, right], 1000.0);
+    (grid, sensors.expect("they cover all"))
+}
+
+/// A parked rover cuts off what is nearest; the clear path goes on from where the border is far.
+#[test]
+fn a_clear_path_is_handed_on_past_a_long_border() {
+    let (grid, sensors) = long_border('.');
+    assert_eq!(grid.blocked().len(), 0);
+    let missions = Missions::Standing(grid.tasks().to_vec());
+    let places = (grid.roadmap().clone(), sensors);
+    let (sim, network) = network_of(&complete(), places, &missions, PERFECT, 1);
+    let network = network.expect("it makes sense");
+    sim.run(Executor::Inline).expect("it runs");
+    let metrics = network.metrics();
+    assert_eq!(metrics.arrived, 2, "{:?}", metrics.deadlock_reason);
+}
+
+/// A wall cuts off what is nearest: what is left of the other region is two parts. Queued rovers
+/// know no clear paths.
+#[test]
+fn what_lies_far_along_a_border_is_found() {
+    let (grid, sensors) = long_border('@');
+    let missions = Missions::Queued(grid.tasks().to_vec());
+    let places = (grid.roadmap().clone(), sensors);
+    let (sim, network) = network_of(&complete(), places, &missions, PERFECT, 1);
+    let network = network.expect("it makes sense");
+    sim.run(Executor::Inline).expect("it runs");
+    let metrics = network.metrics();
+    assert_eq!(metrics.arrived, 1, "{:?}", metrics.deadlock_reason);
 }

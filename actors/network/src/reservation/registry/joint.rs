@@ -33,6 +33,8 @@
 //! Neither with `network.failover_after`, where a rover may refuse a path, and a plan with it; nor
 //! where gaps have to be crossed; nor on well-formed instances, which do not need it.
 
+mod plan;
+
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use farside_worlds::{NodeId, SensorNetwork};
@@ -41,9 +43,9 @@ use super::displacement::Claims;
 use super::{Desk, Registry};
 use crate::ids::RoverId;
 use crate::mapf::CoupledError;
-use crate::reservation::joint_plan::{JointPlan, joint_plan};
 use crate::reservation::messages::{Item, Joint, JointStep, PlannedVisit, Reserved, ReservedVisit};
 use crate::reservation::table::Visit;
+use plan::{JointPlan, joint_plan};
 
 /// What a registry keeps of joint resolutions.
 #[derive(Debug, Default)]

@@ -1,17 +1,17 @@
-//! A plan for a whole team, from where it stops: made by one node of a joint resolution
-//! ([`registry`](super::registry)), entered in the tables of all.
+//! A plan for a whole team, from where it stops: made by the root of a joint resolution, entered in
+//! the tables of all.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::messages::{PlannedVisit, ReservationRequest, ReservedVisit, Stop};
-use super::registry::Desk;
 use crate::config::Motion;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 use crate::mapf::{CoupledError, LacamConfig, Mission, Problem, Rules, lacam};
+use crate::reservation::messages::{PlannedVisit, ReservationRequest, ReservedVisit, Stop};
+use crate::reservation::registry::Desk;
 
 /// A plan by which all get from where they stop to their goals.
 #[derive(Debug)]
