@@ -266,7 +266,7 @@ impl Registry {
         match joint_plan(desk, reserved, self.headway(), limit) {
             Ok(plan) => self.take_plan(desk, plan),
             Err(error) => {
-                let pause = desk.site.timing.cycle.as_nanos() * PAUSE << self.joint.failed.min(8);
+                let pause = (PAUSE << self.joint.failed.min(8)) * desk.site.timing.cycle.as_nanos();
                 self.joint.not_before = desk.now + pause;
                 let is_hopeless = matches!(error, CoupledError::Unsolvable { .. });
                 self.go_on(desk, is_hopeless);
