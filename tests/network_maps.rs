@@ -4,7 +4,9 @@
 
 use farside::prelude::*;
 use farside_network::cases::strategies::roadmaps;
-use farside_network::mapf::{CoupledConfig, CoupledError, Mission, Problem, Rules, coupled};
+use farside_network::mapf::{
+    CoupledConfig, CoupledError, LacamConfig, Mission, Problem, Rules, coupled, lacam,
+};
 use farside_network::{Missions, NetworkConfig, NetworkMetrics, Policy};
 use farside_worlds::movingai::{Cell, GridMap, GridWorld, TaskList};
 use farside_worlds::{Roadmap, SensorNetwork, VertexId, well_formed};
@@ -25,15 +27,18 @@ struct Instance {
     seed: u64,
 }
 
-/// Up to so many rovers on up to so many vertices; no two starts and no two goals alike.
+/// Up to so many rovers on up to so many vertices; no two starts and no two goals alike. Some are
+/// at their goals from the start.
 fn instances(vertices: usize, rovers: usize) -> impl Strategy<Value = Instance> {
-    let picks = prop::collection::vec(any::<[prop::sample::Index; 2]>(), 1..=rovers);
+    let pick = (any::<[prop::sample::Index; 2]>(), any::<bool>());
+    let picks = prop::collection::vec(pick, 1..=rovers);
     let loss = prop_oneof![Just(0.0), Just(0.2)];
     let parts = (roadmaps(vertices), picks, 1..=8usize, loss, 0..100u64);
     parts.prop_map(|(map, picks, nodes, loss, seed)| {
         let mut tasks = Tasks::new();
-        for [start, goal] in picks {
-            let [start, goal] = [start, goal].map(|at| VertexId(at.index(map.len()) as u32));
+        for (ends, is_parked) in picks {
+            let [start, goal] = ends.map(|at| VertexId(at.index(map.len()) as u32));
+            let goal = if is_parked { start } else { goal };
             if tasks.iter().all(|&(a, b)| a != start && b != goal) {
                 tasks.push((start, goal));
             }
@@ -119,14 +124,14 @@ fn made_well_formed(mut instance: Instance) -> Instance {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 64,
+        cases: 96,
         failure_persistence: None,
         ..ProptestConfig::default()
     })]
 
     #[test]
     fn on_a_well_formed_instance_all_arrive(
-        instance in instances(24, 6).prop_map(made_well_formed),
+        instance in instances(30, 10).prop_map(made_well_formed),
     ) {
         prop_assert_eq!(well_formed(&instance.map, &instance.tasks), []);
         let metrics = run(&instance, &complete());
@@ -136,7 +141,7 @@ proptest! {
 
     /// With failover there is no joint resolution: the argument is that of well-formed instances.
     #[test]
-    fn nor_does_it_take_a_joint_plan(instance in instances(16, 5).prop_map(made_well_formed)) {
+    fn nor_does_it_take_a_joint_plan(instance in instances(24, 8).prop_map(made_well_formed)) {
         let config = NetworkConfig {
             failover_after: Some(100),
             ..complete()
@@ -168,6 +173,78 @@ fn crowd(map: &GridMap, rovers: usize, seed: u64) -> (Roadmap, Tasks) {
     let tasks = TaskList::random("x.map", map, rovers, seed).expect("there is room");
     let grid = GridWorld::new("x.map", map, 10.0, tasks.tasks()).expect("all can be reached");
     (grid.roadmap().clone(), grid.tasks().to_vec())
+}
+
+/// A crowd, its nodes and links, and when its nodes and every third rover crash and come back \[ms\].
+#[derive(Clone, Debug)]
+struct Trouble {
+    walls: u64,
+    rovers: usize,
+    nodes: usize,
+    radio: Radio,
+    crashes: Vec<(u64, u64)>,
+    seed: u64,
+}
+
+fn trouble() -> impl Strategy<Value = Trouble> {
+    let crashes = prop::collection::vec((0..6000u64, 100..6000u64), 0..4);
+    let radio = (5..400u64, 0..30u32);
+    let parts = (
+        0..50u64,
+        12..34usize,
+        1..=9usize,
+        radio,
+        crashes,
+        0..1000u64,
+    );
+    parts.prop_map(
+        |(walls, rovers, nodes, (latency_ms, loss), crashes, seed)| Trouble {
+            walls,
+            rovers,
+            nodes,
+            radio: Radio {
+                latency_ms,
+                loss: f64::from(loss) / 100.0,
+            },
+            crashes,
+            seed,
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 24,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    /// What all together can do they do, whatever is lost, late, or down for a while.
+    #[test]
+    fn a_crowd_in_trouble_arrives(trouble in trouble()) {
+        let Trouble { walls, rovers, nodes, radio, crashes, seed } = trouble;
+        let map = GridMap::random(9, 9, 0.15, walls).expect("it is a map");
+        let (roadmap, tasks) = crowd(&map, rovers, seed);
+        let missions = tasks.iter().copied().map(Mission::from).collect();
+        let problem = Problem::new(&roadmap, missions, Rules::StayAtTarget).expect("it is one");
+        prop_assume!(lacam(&problem, &LacamConfig::default()).is_ok());
+        let (mut sim, network) = standing_network(&complete(), roadmap, nodes, tasks, radio, seed);
+        let network = network.expect("it makes sense");
+        let at = |ms: u64| SimTime::ZERO + SimDuration::from_millis(ms);
+        for (i, (down, length)) in crashes.into_iter().enumerate() {
+            let all = match i % 2 {
+                0 => network.node_names(),
+                _ => network.rover_names(),
+            };
+            let name = &all[(seed as usize + i) % all.len()];
+            sim.crash_named_at(at(down), name).expect("it is there");
+            sim.restart_named_at(at(down + length), name).expect("it is there");
+        }
+        sim.run(Executor::Inline).expect("it runs");
+        let metrics = network.metrics();
+        prop_assert_eq!(metrics.collisions, 0);
+        prop_assert_eq!(metrics.arrived, metrics.rovers, "{:?}", metrics.deadlock_reason);
+    }
 }
 
 /// Nodes and rovers that crash in the middle of a joint resolution lose nothing of it.

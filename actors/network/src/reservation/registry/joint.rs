@@ -63,6 +63,10 @@ pub(crate) struct JointResolution {
     failed: u32,
     /// There is no plan, ever.
     is_hopeless: bool,
+    /// There was one: all have their ways.
+    is_planned: bool,
+    /// The next one has begun, before it was heard what became of this one.
+    next_round: Option<u32>,
     /// At the root: when the next may begin [ns].
     not_before: u64,
 }
@@ -173,7 +177,7 @@ impl Registry {
     /// A request found no path: all rovers together may find some.
     pub(crate) fn ask_for_joint_plan(&mut self, desk: &Desk<'_>) {
         let joint = &mut self.joint;
-        if !is_possible(desk) || joint.is_hopeless || joint.holds() {
+        if !is_possible(desk) || joint.is_hopeless || joint.is_planned || joint.holds() {
             return;
         }
         let branch = &mut joint.branch;
@@ -191,8 +195,9 @@ impl Registry {
         let Joint { from, round, step } = item;
         let joint = &mut self.joint;
         if matches!(step, JointStep::Hold) && round > joint.round {
-            joint.round = round;
-            return self.hold(desk);
+            // What is said later may come sooner.
+            joint.next_round = Some(round);
+            return self.hold_next(desk);
         }
         if matches!(step, JointStep::Ask) {
             return self.ask_for_joint_plan(desk);
@@ -243,6 +248,15 @@ impl Registry {
                 Some(parent) => self.say(desk, parent, JointStep::Told(gathered)),
                 None => self.plan_jointly(desk, &gathered.visits),
             }
+        }
+    }
+
+    fn hold_next(&mut self, desk: &Desk<'_>) {
+        if !self.joint.holds()
+            && let Some(round) = self.joint.next_round.take()
+        {
+            self.joint.round = round;
+            self.hold(desk);
         }
     }
 
@@ -316,6 +330,7 @@ impl Registry {
             let stops = stops.clone();
             self.say(desk, child, JointStep::Plan { stops, visits });
         }
+        self.joint.is_planned = true;
     }
 
     /// There is no plan: all go on as before.
@@ -324,6 +339,7 @@ impl Registry {
         self.joint.failed += 1;
         self.joint.is_hopeless = is_hopeless;
         self.say_below(desk, &JointStep::GoOn { is_hopeless });
+        self.hold_next(desk);
     }
 
     fn say_below(&mut self, desk: &Desk<'_>, step: &JointStep) {
