@@ -60,8 +60,8 @@ fn instances(vertices: usize, rovers: usize) -> impl Strategy<Value = Instance> 
 /// Patient enough for retries.
 fn complete() -> NetworkConfig {
     NetworkConfig {
-        deadlock_window: 200,
-        livelock_window: 2000,
+        deadlock_window: 400,
+        livelock_window: 4000,
         ..config(Policy::Complete)
     }
 }

@@ -26,7 +26,7 @@
 //!
 //! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if all
 //! rovers can get to their goals at all, they do, as long as the search finds it. Where it has no
-//! limit it is complete. Its limit is [`FIRST_EXPANSIONS`] at first, and twice as much each time.
+//! limit it is complete. Its limit is [`FIRST_STATES`] at first, and twice as much each time.
 //! Meanwhile, and where it is certain that there is no plan, rovers make room for each other as
 //! `displacement` has it.
 //!
@@ -42,7 +42,7 @@ use farside_worlds::{NodeId, SensorNetwork};
 use super::displacement::Claims;
 use super::{Desk, Registry};
 use crate::ids::RoverId;
-use crate::mapf::CoupledError;
+use crate::mapf::{CoupledError, LacamConfig};
 use crate::reservation::messages::{Item, Joint, JointStep, PlannedVisit, Reserved, ReservedVisit};
 use crate::reservation::table::Visit;
 use plan::{JointPlan, joint_plan};
@@ -276,8 +276,13 @@ impl Registry {
 
     /// At the root: plans, and tells all.
     fn plan_jointly(&mut self, desk: &Desk<'_>, reserved: &[ReservedVisit]) {
-        let limit = FIRST_EXPANSIONS << self.joint.failed.min(MOST_DOUBLINGS);
-        match joint_plan(desk, reserved, self.headway(), limit) {
+        let limit = FIRST_STATES / desk.site.missions.len().max(1) as u64;
+        let limits = LacamConfig {
+            max_expansions: limit << self.joint.failed.min(MOST_DOUBLINGS),
+            seed: u64::from(self.joint.round),
+            ..LacamConfig::default()
+        };
+        match joint_plan(desk, reserved, self.headway(), limits) {
             Ok(plan) => self.take_plan(desk, plan),
             Err(error) => {
                 let pause = (PAUSE << self.joint.failed.min(8)) * desk.site.timing.cycle.as_nanos();
@@ -359,8 +364,8 @@ impl Registry {
     }
 }
 
-/// How many states of the team the first search looks at.
-const FIRST_EXPANSIONS: u64 = 20_000;
+/// How many expansions the first search has, times the rovers of the team: 10,000 for 200.
+const FIRST_STATES: u64 = 2_000_000;
 
 /// How often that is doubled.
 const MOST_DOUBLINGS: u32 = 4;

@@ -25,12 +25,12 @@ pub(crate) struct JointPlan {
 /// The plan for a team of which this is reserved.
 ///
 /// # Errors
-/// When there is none, or none is found within `max_expansions`.
+/// When there is none, or none is found within the limits.
 pub(crate) fn joint_plan(
     desk: &Desk<'_>,
     reserved: &[ReservedVisit],
     headway: u64,
-    max_expansions: u64,
+    limits: LacamConfig,
 ) -> Result<JointPlan, CoupledError> {
     let site = desk.site;
     let stops = stops(reserved);
@@ -56,9 +56,8 @@ pub(crate) fn joint_plan(
     let problem = Problem::new(&site.roadmap, missions.collect(), Rules::StayAtTarget);
     let problem = problem.map_err(|_| CoupledError::Exhausted { expansions: 0 })?;
     let limits = LacamConfig {
-        max_expansions,
         improvements: improvements(site.roadmap.len()),
-        ..LacamConfig::default()
+        ..limits
     };
     let plan = lacam(&problem, &limits)?.plan;
     let mut soon = desk.now + headway;
