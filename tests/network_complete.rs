@@ -91,6 +91,18 @@ pub(crate) fn standing_network(
     };
     let sensors = (1..=nodes.min(roadmap.len())).rev().find_map(place);
     let sensors = sensors.expect("one node that reaches everywhere can be placed anywhere");
+    let missions = Missions::Standing(tasks);
+    network_of(config, (roadmap, sensors), &missions, radio, seed)
+}
+
+/// A network of these nodes.
+pub(crate) fn network_of(
+    config: &NetworkConfig,
+    (roadmap, sensors): (Roadmap, SensorNetwork),
+    missions: &Missions,
+    radio: Radio,
+    seed: u64,
+) -> (Simulation, Result<Network, NetworkError>) {
     let mut sim = Simulation::new(seed);
     let parts = Parts {
         world: &WorldConfig::default(),
@@ -99,9 +111,7 @@ pub(crate) fn standing_network(
         config,
         terrain: None,
     };
-    let network = assemble_over(&mut sim, &parts, &Missions::Standing(tasks), |_, _| {
-        radio.link()
-    });
+    let network = assemble_over(&mut sim, &parts, missions, |_, _| radio.link());
     (sim, network)
 }
 

@@ -326,6 +326,19 @@ mod motion {
         case.network.motion = Motion::Cycles;
         case.arrives();
     }
+
+    #[test]
+    fn the_planner_for_crowds_says_what_it_is_for() {
+        let mut case = Case::new(continuous(Policy::Lacam));
+        case.rovers = 2;
+        let text = case.run().err().unwrap().to_string();
+        let motion = "\"lacam\" searches in whole cycles, and so cannot plan for network.motion";
+        assert!(text.contains(motion), "{text}");
+        case.network.motion = Motion::Cycles;
+        let text = case.run().err().unwrap().to_string();
+        let rules = "\"lacam\" is for maps where rovers stay at their goals";
+        assert!(text.contains(rules), "{text}");
+    }
 }
 
 mod location {

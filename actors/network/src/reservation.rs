@@ -54,12 +54,41 @@
 //! *Nor does the loss of a node.* Whoever takes over for it (`network.failover_after`) has the same
 //! paths in its table, in the same order: see [`failover`](super::NetworkConfig::failover_after).
 //!
-//! Both need links that lose less than all, and nodes and rovers that come back: what they keep is
-//! durable.
+//! All this needs links that lose less than all, and nodes and rovers that come back: what they keep
+//! is durable.
+//!
+//! # Rovers that stay on the map
+//!
+//! On maps where rovers stand from the start and stay at their goals, the last visit of each has no
+//! end, and "there is always a way to find" needs another reason.
+//!
+//! *Well-formed instances.* There each rover has a **clear path**: one past no start and no goal of
+//! any other rover (Cap, Vokrinek and Kleiner, 2015). A rover stands at its start until its whole
+//! path is reserved, so at any time each rover stands at its start, or has a path to its goal that
+//! is reserved to its end. Nobody is ever asked to step aside. So after the last planned visit that
+//! ends, all vertices but starts and goals are free for ever; and so is the goal of a rover that
+//! has no path yet, since nobody else stays there. Its clear path is then free, and until then it
+//! can wait where it stands.
+//!
+//! The request must find that path, however the map is divided among nodes. The routes that it
+//! tries first are those of the empty map, and a rover that is parked on all of them stops it
+//! there. When they lead nowhere, it follows the clear path itself: through the nodes whose
+//! vertices that passes, and each hands on, whatever else it hands on, the earliest label that
+//! lasts for ever at the vertex at which the clear path leaves its region. By induction over the
+//! regions there is one: the clear path's part in a region leads from a vertex at which the rover
+//! may be for ever from some time on, through vertices that are free for ever from some time on.
+//! All nodes know all missions, as they know the roadmap. So a request ends as above, and
+//! **on a well-formed instance all arrive, whatever the number of nodes**.
+//!
+//! *Other instances.* There a rover may have to move that has nowhere to go itself. What becomes of
+//! them is the affair of a joint resolution (`registry/joint.rs`): one node gathers what is reserved
+//! and plans for all. If all can get to their goals at all, they do, as long as the search finds
+//! how: it is complete, but for a limit on its expansions. Where there is none, or it finds none,
+//! and with `network.failover_after`, rovers make room one for another, the older request first
+//! (`registry/displacement.rs`), which guarantees nothing.
 
 mod atlas;
 pub(crate) mod config;
-mod joint_plan;
 pub mod messages;
 mod registries;
 mod registry;

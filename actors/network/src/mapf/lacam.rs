@@ -97,17 +97,32 @@ pub fn lacam(problem: &Problem<'_>, config: &LacamConfig) -> Result<Lacam, Coupl
         .iter()
         .map(|&goal| problem.roadmap().distances_to(goal))
         .collect();
-    let starts = missions.iter().map(|mission| mission.entry).collect();
-    let mut draws = RandomKey::new(config.seed).text("lacam").stream();
-    let stepper = Stepper::new(problem.roadmap(), &goals, &left);
-    let mut search = Search::new(stepper, &goals, &left);
-    let states = search.run(problem, starts, config, &mut draws);
-    let expansions = search.expansions;
-    let Some(states) = states else {
-        return Err(match search.open.is_empty() {
-            true => CoupledError::Unsolvable { expansions },
-            false => CoupledError::Exhausted { expansions },
-        });
+    let starts: Rc<[VertexId]> = missions.iter().map(|mission| mission.entry).collect();
+    let (mut expansions, mut limit) = (0, FIRST_TRY);
+    // A search that goes astray early does not come back soon: it is begun anew, with other ties
+    // and a higher limit, so that the last one has half of all expansions.
+    let (states, mut draws) = loop {
+        let key = RandomKey::new(config.seed).text("lacam");
+        let mut draws = key.number(expansions).stream();
+        let rest = config.max_expansions - expansions;
+        let limits = LacamConfig {
+            max_expansions: if rest < 3 * limit { rest } else { limit },
+            ..*config
+        };
+        let stepper = Stepper::new(problem.roadmap(), &goals, &left);
+        let mut search = Search::new(stepper, &goals, &left);
+        let states = search.run(problem, starts.clone(), &limits, &mut draws);
+        expansions += search.expansions;
+        match states {
+            Some(states) => break (states, draws),
+            None if search.open.is_empty() => {
+                return Err(CoupledError::Unsolvable { expansions });
+            }
+            None if expansions >= config.max_expansions => {
+                return Err(CoupledError::Exhausted { expansions });
+            }
+            None => limit *= 2,
+        }
     };
     let trips = (0..missions.len()).map(|rover| Some(trip(&states, rover)));
     let plan = Plan {
@@ -345,6 +360,9 @@ fn left(left: &[DistancesTo<'_>], at: &[VertexId]) -> u64 {
         .map(|(left, v)| u64::from(left.from(*v)))
         .sum()
 }
+
+/// How many states the first search looks at.
+const FIRST_TRY: u64 = 1_000;
 
 /// How many steps are proposed, of which the best is taken.
 const PROPOSALS: usize = 4;

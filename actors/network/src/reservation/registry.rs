@@ -37,10 +37,13 @@ struct Applicant {
     /// Attempts that found no path at all.
     in_vain: u32,
     /// Along which nodes it was last asked, and between which vertices.
-    routes: Option<((VertexId, VertexId), Vec<Vec<NodeId>>)>,
+    routes: Option<(Ends, Vec<Vec<NodeId>>)>,
     /// The same of the path past no other rover's start or goal, if there is one.
-    clear: Option<((VertexId, VertexId), Option<ClearRoute>)>,
+    clear: Option<(Ends, Option<ClearRoute>)>,
 }
+
+/// From where, and to where.
+type Ends = (VertexId, VertexId);
 
 /// What a request asks for, along its routes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -336,7 +339,7 @@ impl Registry {
     /// things stand it asks for another one: for one that is clear of all others' starts and goals,
     /// which in a well-formed instance all have; else for one on which others make room. If the
     /// instance is not well-formed, a joint resolution comes first, where there can be one.
-    fn question(&mut self, desk: &Desk<'_>, at: usize, ends: (VertexId, VertexId)) -> Question {
+    fn question(&mut self, desk: &Desk<'_>, at: usize, ends: Ends) -> Question {
         let in_vain = self.applicants[at].in_vain;
         let is_plain = !desk.site.stay_at_target || in_vain.is_multiple_of(2);
         if is_plain || self.joint.is_due(desk) {
@@ -350,12 +353,7 @@ impl Registry {
     }
 
     /// The path of an applicant past no start and no goal of any other rover.
-    fn clear_route(
-        &mut self,
-        desk: &Desk<'_>,
-        at: usize,
-        ends: (VertexId, VertexId),
-    ) -> Option<&ClearRoute> {
+    fn clear_route(&mut self, desk: &Desk<'_>, at: usize, ends: Ends) -> Option<&ClearRoute> {
         let applicant = &mut self.applicants[at];
         if applicant.clear.as_ref().is_none_or(|(of, _)| *of != ends) {
             let Origin::Stand { rover, .. } = applicant.origin else {
@@ -382,7 +380,7 @@ impl Registry {
         desk: &Desk<'_>,
         at: usize,
         question: Question,
-        ends: (VertexId, VertexId),
+        ends: Ends,
     ) -> Vec<(Vec<NodeId>, Vec<VertexId>)> {
         if question == Question::Clear {
             let clear = self.clear_route(desk, at, ends).cloned();

@@ -26,12 +26,14 @@
 //!
 //! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if all
 //! rovers can get to their goals at all, they do, as long as the search finds it. Where it has no
-//! limit it is complete. Its limit is [`FIRST_EXPANSIONS`] at first, and twice as much each time.
+//! limit it is complete. Its limit is [`FIRST_STATES`] at first, and twice as much each time.
 //! Meanwhile, and where it is certain that there is no plan, rovers make room for each other as
 //! `displacement` has it.
 //!
 //! Neither with `network.failover_after`, where a rover may refuse a path, and a plan with it; nor
 //! where gaps have to be crossed; nor on well-formed instances, which do not need it.
+
+mod plan;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -40,10 +42,10 @@ use farside_worlds::{NodeId, SensorNetwork};
 use super::displacement::Claims;
 use super::{Desk, Registry};
 use crate::ids::RoverId;
-use crate::mapf::CoupledError;
-use crate::reservation::joint_plan::{JointPlan, joint_plan};
+use crate::mapf::{CoupledError, LacamConfig};
 use crate::reservation::messages::{Item, Joint, JointStep, PlannedVisit, Reserved, ReservedVisit};
 use crate::reservation::table::Visit;
+use plan::{JointPlan, joint_plan};
 
 /// What a registry keeps of joint resolutions.
 #[derive(Debug, Default)]
@@ -61,6 +63,10 @@ pub(crate) struct JointResolution {
     failed: u32,
     /// There is no plan, ever.
     is_hopeless: bool,
+    /// There was one: all have their ways.
+    is_planned: bool,
+    /// The next one has begun, before it was heard what became of this one.
+    next_round: Option<u32>,
     /// At the root: when the next may begin [ns].
     not_before: u64,
 }
@@ -171,7 +177,7 @@ impl Registry {
     /// A request found no path: all rovers together may find some.
     pub(crate) fn ask_for_joint_plan(&mut self, desk: &Desk<'_>) {
         let joint = &mut self.joint;
-        if !is_possible(desk) || joint.is_hopeless || joint.holds() {
+        if !is_possible(desk) || joint.is_hopeless || joint.is_planned || joint.holds() {
             return;
         }
         let branch = &mut joint.branch;
@@ -189,8 +195,9 @@ impl Registry {
         let Joint { from, round, step } = item;
         let joint = &mut self.joint;
         if matches!(step, JointStep::Hold) && round > joint.round {
-            joint.round = round;
-            return self.hold(desk);
+            // What is said later may come sooner.
+            joint.next_round = Some(round);
+            return self.hold_next(desk);
         }
         if matches!(step, JointStep::Ask) {
             return self.ask_for_joint_plan(desk);
@@ -244,6 +251,15 @@ impl Registry {
         }
     }
 
+    fn hold_next(&mut self, desk: &Desk<'_>) {
+        if !self.joint.holds()
+            && let Some(round) = self.joint.next_round.take()
+        {
+            self.joint.round = round;
+            self.hold(desk);
+        }
+    }
+
     fn hold(&mut self, desk: &Desk<'_>) {
         let branch = &mut self.joint.branch;
         branch.get_or_insert_with(|| Branch::of(&desk.site.sensors, desk.region));
@@ -260,11 +276,16 @@ impl Registry {
 
     /// At the root: plans, and tells all.
     fn plan_jointly(&mut self, desk: &Desk<'_>, reserved: &[ReservedVisit]) {
-        let limit = FIRST_EXPANSIONS << self.joint.failed.min(MOST_DOUBLINGS);
-        match joint_plan(desk, reserved, self.headway(), limit) {
+        let limit = FIRST_STATES / desk.site.missions.len().max(1) as u64;
+        let limits = LacamConfig {
+            max_expansions: limit << self.joint.failed.min(MOST_DOUBLINGS),
+            seed: u64::from(self.joint.round),
+            ..LacamConfig::default()
+        };
+        match joint_plan(desk, reserved, self.headway(), limits) {
             Ok(plan) => self.take_plan(desk, plan),
             Err(error) => {
-                let pause = desk.site.timing.cycle.as_nanos() * PAUSE << self.joint.failed.min(8);
+                let pause = (PAUSE << self.joint.failed.min(8)) * desk.site.timing.cycle.as_nanos();
                 self.joint.not_before = desk.now + pause;
                 let is_hopeless = matches!(error, CoupledError::Unsolvable { .. });
                 self.go_on(desk, is_hopeless);
@@ -314,6 +335,7 @@ impl Registry {
             let stops = stops.clone();
             self.say(desk, child, JointStep::Plan { stops, visits });
         }
+        self.joint.is_planned = true;
     }
 
     /// There is no plan: all go on as before.
@@ -322,6 +344,7 @@ impl Registry {
         self.joint.failed += 1;
         self.joint.is_hopeless = is_hopeless;
         self.say_below(desk, &JointStep::GoOn { is_hopeless });
+        self.hold_next(desk);
     }
 
     fn say_below(&mut self, desk: &Desk<'_>, step: &JointStep) {
@@ -341,8 +364,8 @@ impl Registry {
     }
 }
 
-/// How many states of the team the first search looks at.
-const FIRST_EXPANSIONS: u64 = 20_000;
+/// How many expansions the first search has, times the rovers of the team: 10,000 for 200.
+const FIRST_STATES: u64 = 2_000_000;
 
 /// How often that is doubled.
 const MOST_DOUBLINGS: u32 = 4;

@@ -1,17 +1,17 @@
-//! A plan for a whole team, from where it stops: made by one node of a joint resolution
-//! ([`registry`](super::registry)), entered in the tables of all.
+//! A plan for a whole team, from where it stops: made by the root of a joint resolution, entered in
+//! the tables of all.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use farside_worlds::VertexId;
 
-use super::messages::{PlannedVisit, ReservationRequest, ReservedVisit, Stop};
-use super::registry::Desk;
 use crate::config::Motion;
 use crate::ids::RoverId;
 use crate::mapf::safe_intervals::{FOREVER, TimedVisit};
 use crate::mapf::{CoupledError, LacamConfig, Mission, Problem, Rules, lacam};
+use crate::reservation::messages::{PlannedVisit, ReservationRequest, ReservedVisit, Stop};
+use crate::reservation::registry::Desk;
 
 /// A plan by which all get from where they stop to their goals.
 #[derive(Debug)]
@@ -25,12 +25,12 @@ pub(crate) struct JointPlan {
 /// The plan for a team of which this is reserved.
 ///
 /// # Errors
-/// When there is none, or none is found within `max_expansions`.
+/// When there is none, or none is found within the limits.
 pub(crate) fn joint_plan(
     desk: &Desk<'_>,
     reserved: &[ReservedVisit],
     headway: u64,
-    max_expansions: u64,
+    limits: LacamConfig,
 ) -> Result<JointPlan, CoupledError> {
     let site = desk.site;
     let stops = stops(reserved);
@@ -56,9 +56,8 @@ pub(crate) fn joint_plan(
     let problem = Problem::new(&site.roadmap, missions.collect(), Rules::StayAtTarget);
     let problem = problem.map_err(|_| CoupledError::Exhausted { expansions: 0 })?;
     let limits = LacamConfig {
-        max_expansions,
         improvements: improvements(site.roadmap.len()),
-        ..LacamConfig::default()
+        ..limits
     };
     let plan = lacam(&problem, &limits)?.plan;
     let mut soon = desk.now + headway;
