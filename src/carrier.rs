@@ -331,6 +331,80 @@ impl Verdicts {
     /// shown it again, with `token`. For lines: who is first wakes the next, and nobody has to look
     /// again and again whether it is their turn.
     ///
+    /// ```
+    /// use std::collections::VecDeque;
+    /// use farside::carrier::{Carrier, NoChange, Parcel, Verdicts};
+    /// use farside::prelude::*;
+    /// use serde::{Deserialize, Serialize};
+    ///
+    /// /// Carries one message at a time, each in a second.
+    /// #[derive(Default)]
+    /// struct OneByOne {
+    ///     line: VecDeque<u64>,
+    ///     free: SimTime,
+    ///     known: u64,
+    /// }
+    ///
+    /// impl Carrier for OneByOne {
+    ///     type Change = NoChange;
+    ///
+    ///     fn min_delay(&self) -> SimDuration {
+    ///         SimDuration::from_secs(1)
+    ///     }
+    ///
+    ///     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+    ///         let now = parcel.now();
+    ///         if parcel.token().is_none() {
+    ///             let turn = self.line.is_empty().then(|| self.free.since(now));
+    ///             verdicts.park(turn, self.known);
+    ///             self.line.push_back(self.known);
+    ///             self.known += 1;
+    ///             return;
+    ///         }
+    ///         verdicts.deliver(self.min_delay());
+    ///         self.free = now + self.min_delay();
+    ///         self.line.pop_front();
+    ///         if let Some(next) = self.line.front() {
+    ///             verdicts.wake(self.min_delay(), *next);
+    ///         }
+    ///     }
+    ///
+    ///     fn change(&mut self, _change: NoChange, _now: SimTime) {}
+    /// }
+    ///
+    /// #[derive(Serialize, Deserialize)]
+    /// struct Ping;
+    ///
+    /// struct Sink;
+    /// impl Actor for Sink {
+    ///     type Accepts = (Ping,);
+    /// }
+    /// impl Handler<Ping> for Sink {
+    ///     fn handle(&mut self, _ping: Ping, _ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// struct Source(Address<Sink>);
+    /// impl Actor for Source {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         for _ in 0..3 {
+    ///             ctx.send(self.0, Ping);
+    ///         }
+    ///         Ok(())
+    ///     }
+    /// }
+    ///
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// let sink = sim.actor(b, "sink", |_| Sink);
+    /// sim.actor(a, "source", move |_| Source(sink));
+    /// sim.link(a, b, "a-b", OneByOne::default());
+    /// let report = sim.run(Executor::Inline).unwrap();
+    /// assert_eq!((report.counts.delivered, report.end_time), (3, SimTime::from_secs(3)));
+    /// ```
+    ///
     /// A copy that is never woken is in flight when the run ends. Two copies that are parked at one
     /// time have different tokens: a link that mixes them up is at fault.
     pub fn park(&mut self, latest: Option<SimDuration>, token: u64) {

@@ -5,6 +5,7 @@
 //! What this is not: the list of systems that a program knows, which is the program's.
 
 mod builtin;
+mod error;
 mod files;
 mod metric;
 mod own_table;
@@ -19,12 +20,12 @@ use farside::scene::Scene;
 use farside::{Report, SimDuration, Simulation};
 use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
-use thiserror::Error;
 
 use crate::link::LinkConfigError;
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
+pub use error::SetupError;
 pub use files::{Files, no_file};
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};
 pub use own_table::OwnTable;
@@ -315,47 +316,5 @@ impl Results {
     /// Adds a line for people.
     pub fn line(&mut self, label: impl Into<String>, text: impl Into<String>) {
         self.summary.push((label.into(), text.into()));
-    }
-}
-
-/// Settings that cannot be.
-#[derive(Debug, Error)]
-pub enum SetupError {
-    /// Links or degradations.
-    #[error(transparent)]
-    Links(#[from] LinkConfigError),
-    /// A value of the system's own.
-    #[error("{key}: {message}")]
-    Value {
-        /// The dotted key.
-        key: String,
-        /// What was found and what was expected.
-        message: String,
-    },
-}
-
-impl SetupError {
-    /// A value that cannot be, by its dotted key.
-    ///
-    /// ```
-    /// use farside_actors::system::SetupError;
-    /// let error = SetupError::value("team.rovers", "0: expected at least 1");
-    /// assert_eq!(error.to_string(), "team.rovers: 0: expected at least 1");
-    /// ```
-    pub fn value(key: &str, message: impl ToString) -> Self {
-        SetupError::Value {
-            key: key.to_owned(),
-            message: message.to_string(),
-        }
-    }
-
-    /// The key, part by part, and the message.
-    pub fn into_parts(self) -> (Vec<String>, String) {
-        match self {
-            SetupError::Links(error) => (error.key().to_vec(), error.to_string()),
-            SetupError::Value { key, message } => {
-                (key.split('.').map(str::to_owned).collect(), message)
-            }
-        }
     }
 }

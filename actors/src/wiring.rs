@@ -1,7 +1,7 @@
 //! Which links and processors a system wants, and what it may know of them once they are declared.
 
 mod build;
-mod idle;
+mod degrades;
 mod pattern;
 mod processors;
 

@@ -61,6 +61,24 @@ impl Draws {
     }
 }
 
+/// What is transmitted at once: a message, or so many bytes of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Piece {
+    Whole,
+    Part(u64),
+}
+
+impl Piece {
+    /// The bytes on the air. To ask for a whole message's costs an encoding.
+    pub(super) fn bytes(self, params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
+        let own = match self {
+            Piece::Whole => parcel.size_bytes(),
+            Piece::Part(bytes) => bytes,
+        };
+        own.saturating_add(params.overhead)
+    }
+}
+
 /// How many copies of the message set out: one, or two.
 pub(super) fn copies(params: &LinkParams, parcel: &Parcel<'_>) -> u32 {
     let twice = Draws::first(0).happens(parcel, Purpose::Duplicate, params.duplicate);

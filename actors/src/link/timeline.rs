@@ -26,6 +26,8 @@ const MAX_TOLD: usize = 10_000;
 pub struct Timeline {
     /// In order; the first holds from the start.
     pub(super) spans: Vec<Span>,
+    /// Whether messages have to be followed, whatever holds when they are sent.
+    followed: bool,
 }
 
 /// The parameters from one instant to the next.
@@ -79,6 +81,7 @@ impl Timeline {
     /// These parameters for ever.
     pub fn new(params: LinkParams) -> Self {
         Timeline {
+            followed: params.is_followed(),
             spans: vec![Span::new(SimTime::ZERO, params)],
         }
     }
@@ -105,8 +108,10 @@ impl Timeline {
         self.settle();
     }
 
-    /// Keeping the order needs to know what arrived before it was asked for.
+    /// Keeping the order needs to know what arrived before it was asked for, and so does following
+    /// messages.
     fn settle(&mut self) {
+        self.followed = self.spans.iter().any(|span| span.params.is_followed());
         if self.spans.iter().any(|span| span.params.fifo) {
             for span in &mut self.spans {
                 span.plain = false;
@@ -116,7 +121,7 @@ impl Timeline {
 
     /// Whether messages have to be followed, whatever holds when they are sent.
     pub(super) fn is_followed(&self) -> bool {
-        self.spans.iter().any(|span| span.params.is_followed())
+        self.followed
     }
 
     /// The parameters at `at`.

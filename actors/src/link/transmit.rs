@@ -15,7 +15,7 @@ use farside::{SimDuration, SimTime};
 
 use super::burst::KnownState;
 use super::queue::{Backlog, WaitsFor};
-use super::stage::{self, Draws, Purpose};
+use super::stage::{self, Draws, Piece, Purpose};
 use super::timeline::Timeline;
 use super::trace::{self, Opportunity, Trace};
 use super::{
@@ -581,22 +581,4 @@ fn is_corrupt(params: &LinkParams, parcel: &Parcel<'_>, draws: Draws, piece: Pie
     };
     draws.happens(parcel, Purpose::Corrupt, params.corrupt)
         || draws.happens(parcel, Purpose::BitErrors, wrong)
-}
-
-/// What is transmitted at once: a message, or so many bytes of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Piece {
-    Whole,
-    Part(u64),
-}
-
-impl Piece {
-    /// The bytes on the air. To ask for a whole message's costs an encoding.
-    fn bytes(self, params: &LinkParams, parcel: &Parcel<'_>) -> u64 {
-        let own = match self {
-            Piece::Whole => parcel.size_bytes(),
-            Piece::Part(bytes) => bytes,
-        };
-        own.saturating_add(params.overhead)
-    }
 }

@@ -8,6 +8,7 @@ use farside_worlds::HeightField;
 use farside_worlds::contacts::{CapacityTrace, ContactPlan};
 use nalgebra::Point3;
 
+use super::degrades::{SharedTimeline, Worse};
 use super::pattern::{Pattern, shape};
 use super::processors::Slowdowns;
 use super::{Links, Wiring};
@@ -62,23 +63,6 @@ pub struct LinkBuilder {
     plan: Option<Arc<ContactPlan>>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<SharedTimeline>,
-}
-
-/// A degradation of links.
-pub(super) struct Worse {
-    /// Its place among `[[degrade]]`.
-    pub(super) number: usize,
-    pattern: Pattern,
-    pub(super) when: Degrade,
-    pub(super) over: LinkOverrides,
-}
-
-/// The timeline of all links with one base and one set of degradations.
-pub(super) struct SharedTimeline {
-    pub(super) base: Arc<LinkParams>,
-    /// Indices into the degradations.
-    pub(super) degrades: Vec<usize>,
-    timeline: Arc<Timeline>,
 }
 
 /// The most patterns, and the most degradations.
@@ -344,7 +328,7 @@ impl LinkBuilder {
         remarks.sort_unstable();
         let remarks = remarks.into_iter().map(|remark| format!("links: {remark}"));
         let radios = self.radios.iter().flat_map(RadioBuilder::remarks);
-        let degrades = super::idle::of_degrades(&self.degrades, &self.known);
+        let degrades = super::degrades::without_effect(&self.degrades, &self.known);
         remarks.chain(radios).chain(degrades).collect()
     }
 

@@ -5,7 +5,8 @@ use std::ops::{Index, IndexMut};
 use farside::carrier::{Carriage, Parcel};
 use farside::{SimDuration, SimTime};
 
-use super::super::transmit::{Attempt, Piece};
+use super::super::stage::Piece;
+use super::super::transmit::Attempt;
 use super::super::{LinkParams, difference};
 
 /// A message that is followed.

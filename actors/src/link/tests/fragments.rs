@@ -63,11 +63,11 @@ fn each_fragment_is_lost_by_itself() {
     // Of ten fragments, each lost with probability p and sent r times more, all arrive with
     // (1 - p^(r + 1))^10.
     let n = 4_000;
-    let sends = vec![of(1_000)[0]; 1];
+    let send = of(1_000)[0];
     let sends: Vec<Send> = (0..n)
         .map(|i| Send {
             at: SimTime::ZERO + ms(1_000) * i,
-            ..sends[0]
+            ..send
         })
         .collect();
     for (loss, retries) in [(0.05, 0), (0.3, 1), (0.3, 3)] {

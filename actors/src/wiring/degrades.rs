@@ -1,9 +1,27 @@
-//! What degradations and radios are told that has no effect.
+//! Degradations of links, what links have with them, and which of them have no effect.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use super::build::{SharedTimeline, Worse};
-use crate::link::LinkOverrides;
+use super::pattern::Pattern;
+use crate::link::{Degrade, LinkOverrides, LinkParams, Timeline};
+
+/// A degradation of links.
+pub(super) struct Worse {
+    /// Its place among `[[degrade]]`.
+    pub(super) number: usize,
+    pub(super) pattern: Pattern,
+    pub(super) when: Degrade,
+    pub(super) over: LinkOverrides,
+}
+
+/// The timeline of all links with one base and one set of degradations.
+pub(super) struct SharedTimeline {
+    pub(super) base: Arc<LinkParams>,
+    /// Indices into the degradations.
+    pub(super) degrades: Vec<usize>,
+    pub(super) timeline: Arc<Timeline>,
+}
 
 /// The keys that replace something.
 fn keys(over: &LinkOverrides) -> BTreeSet<String> {
@@ -13,7 +31,7 @@ fn keys(over: &LinkOverrides) -> BTreeSet<String> {
 
 /// For each degradation of links, the keys that leave every link that it meets as it is: it has the
 /// same value anyway, and no other degradation meanwhile sets the key.
-pub(super) fn of_degrades(degrades: &[Worse], known: &[SharedTimeline]) -> Vec<String> {
+pub(super) fn without_effect(degrades: &[Worse], known: &[SharedTimeline]) -> Vec<String> {
     let mut remarks = Vec::new();
     for (index, worse) in degrades.iter().enumerate() {
         if worse.over.preset.is_some() {
