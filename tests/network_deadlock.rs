@@ -170,8 +170,8 @@ fn what_is_called_a_deadlock_stays_one() {
         found.arrived_all_the_same.get(),
     );
     println!(
-        "{deadlocks} deadlocks with {locked} rovers, {without} without progress, {arrived} of which \
-         arrive if they may go on"
+        "{deadlocks} deadlocks with {locked} rovers, {without} without progress, {arrived} of \
+         which arrive if they may go on"
     );
     assert!(deadlocks >= 30 && locked >= 60, "{deadlocks}, {locked}");
 }

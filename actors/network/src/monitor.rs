@@ -5,8 +5,8 @@
 //!
 //! **Deadlock.** As [`waits`](crate::waits) has it: some rover cannot arrive any more, whatever is
 //! said, repeated or waited for. A run in which nothing comes of anything for longer than messages
-//! take to come through ([`pauses`]) ends as a deadlock if that is proved, and otherwise for want of
-//! progress, which proves nothing.
+//! take to come through ([`pauses`]) ends as a deadlock if that is proved, and otherwise for want
+//! of progress, which proves nothing.
 
 mod pauses;
 
