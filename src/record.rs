@@ -181,6 +181,31 @@ pub trait Observer: Send {
     }
 }
 
+/// A closure that looks at each record and never stops the run.
+///
+/// ```
+/// use farside::prelude::*;
+/// use std::sync::{Arc, Mutex};
+/// # struct Idle;
+/// # impl Actor for Idle { type Accepts = (); }
+/// let times = Arc::new(Mutex::new(Vec::new()));
+/// let seen = times.clone();
+/// let mut sim = Simulation::new(1);
+/// let host = sim.host("rover_01");
+/// sim.actor(host, "rover_01", |_| Idle);
+/// sim.observe(move |record: &farside::record::Record<'_>| {
+///     seen.lock().unwrap().push(record.time());
+/// });
+/// sim.run(Executor::Inline).unwrap();
+/// assert_eq!(*times.lock().unwrap(), [SimTime::ZERO]);
+/// ```
+impl<F: FnMut(&Record<'_>) + Send> Observer for F {
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        self(record);
+        Ok(Flow::Continue)
+    }
+}
+
 /// What stands for the cause of an event that has none.
 const NO_CAUSE: EventKey = EventKey {
     time: SimTime::MAX,

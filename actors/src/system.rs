@@ -313,6 +313,19 @@ impl Results {
         results
     }
 
+    /// With one more figure for programs; a [`Series`] is a curve.
+    ///
+    /// ```
+    /// use farside_actors::system::{Results, Series};
+    /// let results = Results::default().metric("heard", 3).metric("over_time", Series::counted([0.0]));
+    /// assert_eq!(results.metrics["over_time"]["index"][0], 0.0);
+    /// ```
+    #[must_use]
+    pub fn metric(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.metrics.insert(name.to_owned(), value.into());
+        self
+    }
+
     /// Adds a line for people.
     pub fn line(&mut self, label: impl Into<String>, text: impl Into<String>) {
         self.summary.push((label.into(), text.into()));

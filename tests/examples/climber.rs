@@ -5,10 +5,9 @@ use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
 use farside_actors::settings;
-use farside_actors::system::settings::{Table, in_unit};
+use farside_actors::system::settings::in_unit;
 use farside_actors::system::{
-    Assembly, Better, Metric, Results, Section, Series, SeriesIndex, Settings, Setup, SetupError,
-    System,
+    Assembly, Better, Metric, OwnTable, Results, Series, SeriesIndex, Setup, SetupError,
 };
 use farside_experiments::{cli, registry::Registry};
 use serde::{Deserialize, Serialize};
@@ -21,11 +20,6 @@ settings! {
         /// How many steps there are.
         steps: u32 = 20, 1..=1000;
     }
-}
-
-#[derive(Clone, Serialize, Deserialize)]
-struct Scenario {
-    climb: Climb,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -58,70 +52,33 @@ impl Handler<Step> for Climber {
     }
 }
 
-struct ClimbSystem;
-
-impl System for ClimbSystem {
-    fn name(&self) -> &str {
-        "climb"
-    }
-
-    fn about(&self) -> &str {
-        "a planner climbs a hill"
-    }
-
-    fn sections(&self) -> Vec<Section> {
-        Climb::sections("climb")
-    }
-
-    fn metrics(&self) -> &[Metric] {
-        const STEP: SeriesIndex = SeriesIndex::new("step", "");
-        const ALL: [Metric; 1] = [Metric::series(
-            "height",
-            "height reached",
-            "m",
-            STEP,
-            Better::Higher,
-        )];
-        &ALL
-    }
-
-    fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
-        Ok(Box::new(Scenario::deserialize(keys)?))
-    }
-}
-
-impl Settings for Scenario {
-    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
-        toml::Table::try_from(self)
-    }
-
-    fn check(&self) -> Result<(), SetupError> {
-        self.climb.check("climb")
-    }
+impl OwnTable for Climb {
+    const NAME: &'static str = "climb";
+    const ABOUT: &'static str = "a planner climbs a hill";
+    const METRICS: &'static [Metric] = &[Metric::series(
+        "height",
+        "height reached",
+        "m",
+        SeriesIndex::new("step", ""),
+        Better::Higher,
+    )];
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let hill = farside::random::RandomKey::new(setup.problem_seed).text("hill");
         let hill_m = hill.stream().normal(5.0, 2.0);
         let heights_m = Arc::new(Mutex::new(Vec::new()));
-        let (climb, of_actor, host) = (
-            self.climb.clone(),
-            heights_m.clone(),
-            setup.sim.host("hill"),
-        );
-        let build = move |_: &str| Climber(climb.clone(), hill_m, of_actor.clone());
-        setup.sim.actor(host, "climber", build);
+        let (climb, of_actor) = (self.clone(), heights_m.clone());
+        let host = setup.sim.host("hill");
+        setup.sim.actor(host, "climber", move |_| {
+            Climber(climb.clone(), hill_m, of_actor.clone())
+        });
         Ok(Assembly::new(move |_| {
-            let heights_m = heights_m.lock().expect("the run is over");
-            let index = (0..heights_m.len()).map(|step| step as f64).collect();
-            let values = heights_m.iter().copied().map(Some).collect();
-            let mut results = Results::default();
-            let curve = Series::new(index, values).expect("as many of both, and they rise");
-            results.metrics.insert("height".to_owned(), curve.into());
-            results
+            let heights_m = heights_m.lock().expect("the run is over").clone();
+            Results::default().metric("height", Series::counted(heights_m))
         }))
     }
 }
 
 fn main() -> std::process::ExitCode {
-    cli::main(Registry::empty().with(ClimbSystem))
+    cli::main(Registry::empty().with(Climb::system()))
 }

@@ -1,21 +1,65 @@
 //! Systems whose scenario has one table of their own: less to write for what most systems are.
 
 use std::collections::BTreeMap;
+use std::marker::PhantomData;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::settings::Table;
 use super::{
-    Assembly, Files, PictureError, PictureRequest, Recording, Settings, Setup, SetupError,
+    Assembly, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
+    Section, Settings, Setup, SetupError, System,
 };
 use crate::figure::Figure;
 
-/// A table of settings that says how its system is assembled: [`Settings`] of a system that reads
-/// no other table.
+/// A table of settings that says how its system is assembled: the whole of a system that reads no
+/// other table. `tests/outside` in the repository is one, with all that a system can have.
+///
+/// ```
+/// use farside_actors::settings;
+/// use farside_actors::system::{Assembly, OwnTable, Results, Setup, SetupError, System};
+///
+/// settings! {
+///     /// The `[beacons]` table.
+///     struct Beacons {
+///         /// How many beacons there are.
+///         count: u32 = 2, 1..=100;
+///     }
+/// }
+///
+/// impl OwnTable for Beacons {
+///     const NAME: &'static str = "beacons";
+///     const ABOUT: &'static str = "beacons that do nothing yet";
+///
+///     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+///         (1..=self.count).for_each(|beacon| drop(setup.sim.host(&format!("beacon_{beacon}"))));
+///         let count = self.count;
+///         Ok(Assembly::new(move |_| Results::default().metric("beacons", count)))
+///     }
+/// }
+///
+/// assert_eq!(Beacons::system().name(), "beacons");
+/// assert_eq!(Beacons::system().sections()[0].keys[0].name, "count");
+/// ```
 pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
-    /// The table's name.
+    /// The name of the table and of the system.
     const NAME: &'static str;
+
+    /// As [`System::about`].
+    const ABOUT: &'static str;
+
+    /// As [`System::metrics`].
+    const METRICS: &'static [Metric] = &[];
+
+    /// As [`System::scenarios`].
+    const SCENARIOS: &'static [Builtin] = &[];
+
+    /// As [`System::studies`].
+    const STUDIES: &'static [Builtin] = &[];
+
+    /// As [`System::pictures`].
+    const PICTURES: &'static [PictureInfo] = &[];
 
     /// As [`Settings::assemble`].
     ///
@@ -38,15 +82,47 @@ pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
         })
     }
 
-    /// Reads the table, if it is there: what [`System::parse`](super::System::parse) is to do.
-    ///
-    /// # Errors
-    /// Those of serde.
-    fn parse(sections: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
-        let mut tables = BTreeMap::<String, Self>::deserialize(sections)?;
-        Ok(Box::new(Alone(
-            tables.remove(Self::NAME).unwrap_or_default(),
-        )))
+    /// The system.
+    fn system() -> impl System + 'static {
+        OfTable(PhantomData::<fn() -> Self>)
+    }
+}
+
+/// The system of a table.
+struct OfTable<T>(PhantomData<fn() -> T>);
+
+impl<T: OwnTable> System for OfTable<T> {
+    fn name(&self) -> &str {
+        T::NAME
+    }
+
+    fn about(&self) -> &str {
+        T::ABOUT
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        T::sections(T::NAME)
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        T::METRICS
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        T::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        T::STUDIES
+    }
+
+    fn pictures(&self) -> &[PictureInfo] {
+        T::PICTURES
+    }
+
+    fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
+        let mut tables = BTreeMap::<String, T>::deserialize(keys)?;
+        Ok(Box::new(Alone(tables.remove(T::NAME).unwrap_or_default())))
     }
 }
 

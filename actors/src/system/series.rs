@@ -61,6 +61,18 @@ impl TryFrom<Parts> for Series {
 }
 
 impl Series {
+    /// A curve over 0, 1, 2 and so on, with a value at each.
+    ///
+    /// ```
+    /// use farside_actors::system::Series;
+    /// assert_eq!(Series::counted([0.5, 0.7]).at(1.0), Some(0.7));
+    /// ```
+    pub fn counted(values: impl IntoIterator<Item = f64>) -> Series {
+        let values: Vec<Option<f64>> = values.into_iter().map(Some).collect();
+        let index = (0..values.len()).map(|index| index as f64).collect();
+        Series { index, values }
+    }
+
     /// A series. A value that is no finite number counts as none.
     ///
     /// # Errors

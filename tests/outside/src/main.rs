@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex};
 
 use farside::RunInfo;
 use farside::prelude::*;
-use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Level, Scene};
 use farside_actors::figure::{Figure, svg};
-use farside_actors::system::settings::{Table, over};
+use farside_actors::system::settings::over;
 use farside_actors::system::{
     Assembly, Better, Builtin, Metric, OwnTable, PictureError, PictureInfo, PictureRequest,
-    Recording, Results, Section, Series, SeriesIndex, Settings, Setup, SetupError, System,
+    Recording, Results, Series, SeriesIndex, Setup, SetupError,
 };
 use farside_actors::wiring::Wiring;
 use farside_actors::{settings, units};
@@ -74,98 +74,47 @@ impl Handler<Call> for Lander {
     }
 }
 
-/// When calls were heard \[s\], from the committed records.
-#[derive(Clone, Default)]
-struct Heard(Arc<Mutex<Vec<f64>>>);
-
-impl Observer for Heard {
-    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        if record.class == RecordClass::Delivered {
-            let mut heard = self.0.lock().expect("nobody panics with it");
-            heard.push(record.key.time.as_secs_f64());
-        }
-        Ok(Flow::Continue)
-    }
-}
-
 #[derive(Debug)]
 struct Calls;
 
 impl Scene for Calls {
     fn record(&mut self, record: &Record<'_>, run: &RunInfo, out: &mut Vec<Drawing>) {
         if record.class == RecordClass::Delivered {
-            let (level, message) = (Level::Info, "calls".to_owned());
-            let name = run.name(record.sender).to_owned();
             out.push(Drawing::Text {
-                level,
-                name,
-                message,
+                level: Level::Info,
+                name: run.name(record.sender).to_owned(),
+                message: "calls".to_owned(),
             });
         }
     }
 }
 
-struct BeaconSystem;
-
-impl System for BeaconSystem {
-    fn name(&self) -> &str {
-        "beacons"
-    }
-
-    fn about(&self) -> &str {
-        "beacons call a lander"
-    }
-
-    fn sections(&self) -> Vec<Section> {
-        Beacons::sections("beacons")
-    }
-
-    fn metrics(&self) -> &[Metric] {
-        const CALL: SeriesIndex = SeriesIndex::new("call", "");
-        const ALL: [Metric; 2] = [
-            Metric::number("heard", "calls heard", "calls", Better::Higher),
-            Metric::series(
-                "heard_over_calls",
-                "calls heard so far",
-                "calls",
-                CALL,
-                Better::Higher,
-            ),
-        ];
-        &ALL
-    }
-
-    fn scenarios(&self) -> &[Builtin] {
-        const TEXT: &str = include_str!("../files/quiet.toml");
-        &[Builtin {
-            name: "beacons/quiet",
-            text: TEXT,
-        }]
-    }
-
-    fn studies(&self) -> &[Builtin] {
-        const TEXT: &str = include_str!("../files/loss.toml");
-        &[Builtin {
-            name: "beacons/loss",
-            text: TEXT,
-        }]
-    }
-
-    fn pictures(&self) -> &[PictureInfo] {
-        &[PictureInfo {
-            name: "calls",
-            about: "when calls were heard",
-            takes: &[],
-        }]
-    }
-
-    fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
-        Beacons::parse(keys)
-    }
-}
-
 impl OwnTable for Beacons {
     const NAME: &'static str = "beacons";
+    const ABOUT: &'static str = "beacons call a lander";
+    const METRICS: &'static [Metric] = &[
+        Metric::number("heard", "calls heard", "calls", Better::Higher),
+        Metric::series(
+            "heard_over_calls",
+            "calls heard so far",
+            "calls",
+            SeriesIndex::new("call", ""),
+            Better::Higher,
+        ),
+    ];
+    const SCENARIOS: &'static [Builtin] = &[Builtin {
+        name: "beacons/quiet",
+        text: include_str!("../files/quiet.toml"),
+    }];
+    const STUDIES: &'static [Builtin] = &[Builtin {
+        name: "beacons/loss",
+        text: include_str!("../files/loss.toml"),
+    }];
+    const PICTURES: &'static [PictureInfo] = &[PictureInfo {
+        name: "calls",
+        about: "when calls were heard",
+        takes: &[],
+    }];
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let (lander, mut wiring) = (setup.sim.host("lander"), Wiring::default());
@@ -178,23 +127,24 @@ impl OwnTable for Beacons {
             wiring.link((host, &name), (lander, "lander"));
         }
         setup.link(&wiring)?;
-        let heard = Heard::default();
-        setup.sim.observe(heard.clone());
+        // When calls were heard [s], from the committed records.
+        let heard = Arc::new(Mutex::new(Vec::new()));
+        let hears = heard.clone();
+        setup.sim.observe(move |record: &Record<'_>| {
+            if record.class == RecordClass::Delivered {
+                let mut heard = hears.lock().expect("nobody panics with it");
+                heard.push(record.key.time.as_secs_f64());
+            }
+        });
         let settings = self.clone();
         let conclude = move |_: &Report| {
-            let times = heard.0.lock().expect("the run is over").clone();
-            let mut results = Results::default();
-            results
-                .metrics
-                .insert("heard".to_owned(), times.len().into());
+            let times = heard.lock().expect("the run is over");
             let until = |call: u32| settings.interval.as_secs_f64() * f64::from(call + 2);
             let by = |call| times.iter().filter(|time| **time < until(call)).count() as f64;
-            let index = (0..settings.calls).map(f64::from).collect();
-            let values = (0..settings.calls).map(|call| Some(by(call))).collect();
-            let curve = Series::new(index, values).expect("as many of both, and they rise");
-            results
-                .metrics
-                .insert("heard_over_calls".to_owned(), curve.into());
+            let mut results = Results::default().metric("heard", times.len()).metric(
+                "heard_over_calls",
+                Series::counted((0..settings.calls).map(by)),
+            );
             results.line("calls heard", times.len().to_string());
             if times.is_empty() {
                 results.violations.push("no call was heard".to_owned());
@@ -231,5 +181,5 @@ impl OwnTable for Beacons {
 }
 
 fn main() -> std::process::ExitCode {
-    cli::main(Registry::empty().with(BeaconSystem))
+    cli::main(Registry::empty().with(Beacons::system()))
 }
