@@ -1,6 +1,7 @@
 //! The tests that cross crates, one module for each behaviour.
 
 mod cases;
+mod claims;
 mod contacts;
 mod coupling;
 mod determinism;

@@ -55,6 +55,10 @@ fn every_command_speaks_of_a_system_of_somebody_elses() {
     );
     assert!(text.contains("calls heard"), "{text}");
     assert!(said(folder, &["verify", "run.mcap"]).contains("same"));
+    assert!(said(folder, &["info", "run.mcap"]).contains("beacons/quiet"));
+    assert!(said(folder, &["diff", "run.mcap", "run.mcap"]).contains("identical"));
+    said(folder, &["recover", "run.mcap", "--out", "saved.mcap"]);
+    said(folder, &["check", "beacons/quiet"]);
     let text = said(folder, &["draw", "run.mcap", "--list"]);
     assert_eq!(text, "calls  when calls were heard\n");
     let text = said(folder, &["draw", "run.mcap"]);
@@ -62,6 +66,17 @@ fn every_command_speaks_of_a_system_of_somebody_elses() {
     assert!(folder.join("run-calls.svg").exists());
     said(folder, &["study", "beacons/loss", "--out", "loss"]);
     said(folder, &["report", "loss"]);
+    let again = [
+        "reproduce",
+        "loss",
+        "--cell",
+        "0",
+        "--seed",
+        "1",
+        "--out",
+        "point.mcap",
+    ];
+    assert!(said(folder, &again).contains("the same"));
     let page = std::fs::read_to_string(folder.join("loss/report.html")).unwrap();
     assert!(page.contains("calls heard so far") && page.contains("How many calls"));
     let text = said(folder, &["explain"]);

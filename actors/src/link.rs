@@ -49,8 +49,10 @@
 //!
 //! # The keys of `[links.default]`, `[links.PATTERN]` and `[[degrade]]`
 //!
-//! Everything is off by default. What is on is turned off with `"off"`, 0 or false. What each key
-//! is, the fields of [`LinkParams`] say, and `farside explain links.default`.
+//! All but a latency of 5 ms is off by default. `"off"` turns off what is `off`, `none` or
+//! `unlimited` in this table (not `preset`), false a bool, 0 what has 0 there; a `window` of 1 is
+//! off. `queue = 0` is a queue of no messages. What each key is, the fields of [`LinkParams`] say,
+//! and `farside explain links.default`.
 //!
 //! | key | alias | unit | default |
 //! |---|---|---|---|

@@ -32,7 +32,7 @@
 //! [[factor]]
 //! name = "policy"
 //! variants = [
-//!     { name = "paper", set = { network.policy = "paper" } },
+//!     { name = "paper", set = { network.policy = "max-plus" } },
 //!     { name = "chained", set = { network.max_plus.acceleration_chains = true } },
 //! ]
 //! ```

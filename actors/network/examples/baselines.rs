@@ -2,7 +2,7 @@
 //! simulator gives its rovers: how often prioritised planning succeeds, how far the reference gets,
 //! and how the coupled search grows.
 //!
-//!     cargo run --release -p farside-actors --example baselines -- [SEEDS] [TRIES] [LIMIT]
+//!     cargo run --release -p farside-network --example baselines -- [SEEDS] [TRIES] [LIMIT]
 //!
 //! SEEDS runs each (20), TRIES random orders (10), at most LIMIT expansions of a coupled search
 //! (300000).

@@ -2,7 +2,7 @@
 //! it: 14, 21 and 28 nodes with 25, 50, 75 and 100 rovers on both roadmaps, over links of 5 ms that
 //! lose nothing unless told to.
 //!
-//!     cargo run --release -p farside-actors --example table_1 -- [SEEDS] [KEY=VALUE]...
+//!     cargo run --release -p farside-network --example table_1 -- [SEEDS] [KEY=VALUE]...
 //!
 //! Keys: `first_seed`, `maps`, `nodes`, `rovers` (lists with commas), `loss`, `latency_ms`,
 //! `jitter_ms`, `digest` (true, false), `cycle`, `optimisation`, `iteration_timeout` (durations),

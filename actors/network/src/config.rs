@@ -158,7 +158,7 @@ settings! {
         /// Breaks the safety protocol, to show that the monitor notices.
         pub sabotage: Sabotage [skip_serializing_if = "Sabotage::is_none"],
             such_that(
-                "a probability from 0 to 1",
+                "the name of a rule to break, with a probability from 0 to 1",
                 |sabotage: &Sabotage| format!("{sabotage:?}"),
                 Sabotage::is_possible,
             );

@@ -36,7 +36,7 @@
 //! The paper leaves much open; what was chosen is a key of [`NetworkConfig`], with its reason. Two
 //! choices decide how well the algorithm does. C, which the paper calls an estimate of the longest
 //! path, is 20 diameters: with one or two, waiting is nearly as good as driving, and nearly every
-//! team of 50 comes to a deadlock. And a rover that stands on a leaf of its node's local
+//! team of 50 gets stuck. And a rover that stands on a leaf of its node's local
 //! neighbourhood graph has a path of length 0 to that leaf
 //! ([`leaf_wait_penalty`](MaxPlusConfig::leaf_wait_penalty)): without it two rovers that meet at a
 //! pocket push each other in and out of it for ever, because the zero path is worth nothing.
@@ -49,9 +49,9 @@
 //!
 //! The paper's Table 1 is about processors as much as about paths. With all the computing that it
 //! asks for (`network.max_plus.processor = "unlimited"`), max-plus converges, and hardly a team
-//! comes to a deadlock on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms
+//! gets stuck on the dense roadmap with 21 or 28 nodes. The paper stopped it after 500 ms
 //! of a core of 2006. With one constant for all cells, `network.max_plus.processor = "paper"`
-//! ([`PAPER_SPEED`], the default), its pattern appears: teams come to a deadlock sooner with
+//! ([`PAPER_SPEED`], the default), its pattern appears: teams get stuck sooner with
 //! fewer nodes, which compare more and longer candidate paths. With fewer than three iterations in
 //! a cycle nearly all do.
 //!
@@ -61,15 +61,20 @@
 //! the computing. Three answers can be switched on. A node with more than it can compute has
 //! neighbours compute for it ([`outsourcing`](MaxPlusConfig::outsourcing)); rovers are led round
 //! crowds ([`congestion_weight`](MaxPlusConfig::congestion_weight)); vertices are divided among
-//! nodes more evenly ([`ownership`](WorldConfig::ownership)). Deadlocks in 16 teams each, in per
-//! cent; dense roadmap, links of 5 ms, `livelock_window = 150`:
+//! nodes more evenly ([`ownership`](WorldConfig::ownership)). Teams in 16 that came to a
+//! stop (`stuck`), in per cent; dense roadmap, links of 5 ms; `farside study
+//! network/load-balancing --seeds 16 --set network.livelock_window=150` repeats it:
 //!
-//! | rovers, nodes | as it comes | outsourcing | weight 30 | the same, spread 0.5 | outsourcing, weight 30 | `balanced` | gates | gates, outsourcing |
-//! |---|---|---|---|---|---|---|---|---|
-//! | 75, 21 | 31 | 0 | 0 | 0 | 0 | 6 | 0 | |
-//! | 100, 28 | 50 | 12 | 31 | 19 | 0 | 12 | 0 | |
-//! | 100, 21 | 94 | 81 | | 75 | 50 | 88 | 0 | 0 |
-//! | 75, 14 | 100 | 94 | | 100 | 75 | 94 | 25 | 0 |
+//! | rovers, nodes | 75, 21 | 100, 28 | 100, 21 | 75, 14 |
+//! |---|---|---|---|---|
+//! | as it comes | 31 | 50 | 94 | 100 |
+//! | outsourcing | 0 | 12 | 81 | 94 |
+//! | weight 30 | 0 | 31 | | |
+//! | weight 30, spread 0.5 | 0 | 19 | 75 | 100 |
+//! | outsourcing and weight 30 | 0 | 0 | 50 | 75 |
+//! | `balanced` | 6 | 12 | 88 | 94 |
+//! | gates | 0 | 0 | 0 | 25 |
+//! | gates and outsourcing | | | 0 | 0 |
 //!
 //! Each helps where some nodes have too much to do and others have not. Where all have, nobody is
 //! there to hand work to, and what helps is to let fewer rovers in:

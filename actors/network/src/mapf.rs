@@ -3,12 +3,14 @@
 //! plan one rover after the other with the search that nodes share among them, too:
 //! [`safe_intervals`].
 //!
-//! | planner | what it is |
-//! |---|---|
-//! | [`prioritised`] | the classic scheme (Erdmann and Lozano-Perez 1987; Bennewitz et al. 2002 for orders): fast, and fails |
-//! | [`coupled`](fn@coupled) | exact search over all rovers at once (Standley 2010): for a handful of rovers |
-//! | [`lacam`](fn@lacam) | search over whole teams' steps, each proposed by priority inheritance (Okumura 2023): for crowded maps where rovers stay |
-//! | [`reference`](fn@reference) | revised prioritised planning with safe intervals (Cap, Vokrinek and Kleiner 2015; Phillips and Likhachev 2011): always succeeds where rovers queue and leave |
+//! - [`prioritised`]: the classic scheme (Erdmann and Lozano-Perez 1987; Bennewitz et al. 2002 for
+//!   orders), fast, and fails.
+//! - [`coupled`](fn@coupled): exact search over all rovers at once (Standley 2010), for a handful of
+//!   rovers.
+//! - [`lacam`](fn@lacam): search over whole teams' steps, each proposed by priority inheritance
+//!   (Okumura 2023), for crowded maps where rovers stay.
+//! - [`reference`](fn@reference): revised prioritised planning with safe intervals (Cap, Vokrinek
+//!   and Kleiner 2015; Phillips and Likhachev 2011), always succeeds where rovers queue and leave.
 //!
 //! ```
 //! use farside_network::mapf::{Mission, Order, Problem, Rules, reference};

@@ -96,8 +96,8 @@ pub struct NetworkMetrics {
     pub collided: Vec<Collision<VertexId>>,
     /// Whether the team came to a deadlock.
     pub deadlock: Deadlock,
-    /// The rovers that can never move again, for a team that came to a deadlock: of those that stand
-    /// each has only others of them beside it. Empty if the deadlock has another reason.
+    /// The rovers that can never move again, for a team that came to a deadlock: of those that
+    /// stand each has only others of them beside it. Empty if the deadlock has another reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub locked_rovers: Vec<String>,
     /// What the team did, if the run was ended for want of progress.
@@ -152,8 +152,8 @@ pub struct NetworkMetrics {
     /// neighbours; 0 without `network.max_plus.outsourcing`.
     pub outsourced: f64,
     /// Circles of rovers that wait for each other which nodes' probes confirmed, as nodes knew them
-    /// then; they may dissolve, and are no proof of a `deadlock`. 0 unless `network.max_plus.deadlock_probes` sends
-    /// any.
+    /// then; they may dissolve, and are no proof of a `deadlock`. 0 unless
+    /// `network.max_plus.deadlock_probes` sends any.
     pub confirmed_deadlocks: u32,
     /// The last of them: each rover waits for the next, the last for the first.
     pub last_confirmed: Option<String>,

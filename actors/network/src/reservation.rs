@@ -54,8 +54,8 @@
 //! *Nor does the loss of a node.* Whoever takes over for it (`network.failover_after`) has the same
 //! paths in its table, in the same order: see [`failover`](super::NetworkConfig::failover_after).
 //!
-//! All this needs links that lose less than all, and nodes and rovers that come back: what they keep
-//! is durable.
+//! All this needs links that lose less than all, and nodes and rovers that come back: what they
+//! keep is durable.
 //!
 //! # Rovers that stay on the map
 //!
@@ -81,11 +81,11 @@
 //! **on a well-formed instance all arrive, whatever the number of nodes**.
 //!
 //! *Other instances.* There a rover may have to move that has nowhere to go itself. What becomes of
-//! them is the affair of a joint resolution (`registry/joint.rs`): one node gathers what is reserved
-//! and plans for all. If all can get to their goals at all, they do, as long as the search finds
-//! how: it is complete, but for a limit on its expansions. Where there is none, or it finds none,
-//! and with `network.failover_after`, rovers make room one for another, the older request first
-//! (`registry/displacement.rs`), which guarantees nothing.
+//! them is the affair of a joint resolution (`registry/joint.rs`): one node gathers what is
+//! reserved and plans for all. If all can get to their goals at all, they do, as long as the search
+//! finds how: it is complete, but for a limit on its expansions. Where there is none, or it finds
+//! none, and with `network.failover_after`, rovers make room one for another, the older request
+//! first (`registry/displacement.rs`), which guarantees nothing.
 
 mod atlas;
 pub(crate) mod config;

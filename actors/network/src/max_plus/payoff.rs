@@ -125,8 +125,8 @@ pub(crate) fn divisor(t: u32) -> f64 {
 
 /// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where
 /// it is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero
-/// path, and the wait on a leaf) holds its vertex for ever, and with `leaf_paths_hold` any path to a
-/// leaf its end; any other claims nothing after its end.
+/// path, and the wait on a leaf) holds its vertex for ever, and with `leaf_paths_hold` any path to
+/// a leaf its end; any other claims nothing after its end.
 pub(crate) fn collision_from(
     a: &CandidatePath,
     b: &CandidatePath,

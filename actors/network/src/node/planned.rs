@@ -1,6 +1,6 @@
 //! The policies that plan for the whole team before the start (`reference`, `prioritised`,
-//! `coupled`, `lacam`): the plan is in the reservation tables from the start, and vertices are granted in
-//! their order. See [`baseline`](crate::baseline).
+//! `coupled`, `lacam`): the plan is in the reservation tables from the start, and vertices are
+//! granted in their order. See [`baseline`](crate::baseline).
 
 use farside::prelude::*;
 

@@ -290,7 +290,7 @@ fn judge_curve(
 mod tests {
     use super::*;
     use crate::study::fabricated::{self, loss, with_curves};
-    use crate::study::results::PublishedFigure;
+    use crate::study::results::{PublishedFigure, RunOutcome};
     use crate::study::summary::{MetricSummary, summarise};
 
     fn claim(least: Option<f64>, most: Option<f64>, within: Option<f64>) -> Comparison {
@@ -382,5 +382,45 @@ mod tests {
         assert_eq!(verdicts[..2], [Holds, DoesNotHold]);
         // Before the half nothing differs; past it the claim that the worse one is more is wrong.
         assert_eq!(verdicts[6..8], [DoesNotHold, Undecided]);
+    }
+
+    /// Of many indices some differ by chance. Holm's correction keeps that from counting against a
+    /// claim.
+    #[test]
+    fn chance_at_one_of_many_indices_is_nothing_against_a_claim() {
+        let mut results = with_curves(fabricated::study("one", vec![loss()], 20), 80);
+        // In the first half all cells are alike but for chance.
+        for run in &mut results.runs {
+            let RunOutcome::Done { metrics, .. } = &mut run.outcome else {
+                continue;
+            };
+            for part in ["index", "values"] {
+                let list = metrics["reward"][part].as_array_mut().unwrap();
+                list.truncate(40);
+            }
+        }
+        let claim = claim(None, None, None);
+        let bounds = Bounds::new(&claim, 1.0);
+        let mut by_chance = 0;
+        for cells in [
+            (1, 0),
+            (2, 0),
+            (3, 0),
+            (4, 0),
+            (0, 1),
+            (0, 2),
+            (0, 3),
+            (0, 4),
+        ] {
+            let points = series::difference(&results, cells, "reward").points;
+            let alone = points.iter().map(|point| bounds.verdict(&point.difference));
+            by_chance += alone.filter(|one| *one == Verdict::DoesNotHold).count();
+            let judged = judge_curve(&results, "reward", cells, &claim, bounds);
+            assert_eq!(judged.verdict, Verdict::Undecided, "{cells:?}");
+        }
+        assert!(
+            by_chance > 0,
+            "no index differs by chance: nothing is shown"
+        );
     }
 }

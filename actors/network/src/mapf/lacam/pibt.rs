@@ -3,8 +3,8 @@
 //! 310, 2022), with the pull that lets two rovers change places in a corridor (Okumura, *Improving
 //! LaCAM for scalable eventually optimal multi-agent pathfinding*, IJCAI 2023, section 5).
 //!
-//! Rings may not turn here ([the model](super::super#the-model)), so a rover does not follow a chain
-//! that ends at its own vertex, as none swaps.
+//! Rings may not turn here ([the model](super::super#the-model)), so a rover does not follow a
+//! chain that ends at its own vertex, as none swaps.
 
 use farside::random::Stream;
 use farside_worlds::roadmap::DistancesTo;

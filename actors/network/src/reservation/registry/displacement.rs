@@ -10,8 +10,9 @@
 //! This is the order of priority inheritance with backtracking (Okumura et al., *Priority
 //! inheritance with backtracking for iterative multi-agent path finding*, AIJ 310, 2022), over
 //! reserved paths. It guarantees nothing: a rover in a dead end behind another one's goal may still
-//! be stuck. So it is what is left where a joint resolution ([`joint`](super::joint)) is not possible
-//! or has found no plan; and never on a well-formed instance, where nobody has to make room.
+//! be stuck. So it is what is left where a joint resolution ([`joint`](super::joint)) is not
+//! possible or has found no plan; and never on a well-formed instance, where nobody has to make
+//! room.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

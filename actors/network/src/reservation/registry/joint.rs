@@ -24,9 +24,9 @@
 //! visits up to stops, that were to begin before. And a visit of the plan waits only for these and
 //! for visits of the plan that are to begin before.
 //!
-//! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if all
-//! rovers can get to their goals at all, they do, as long as the search finds it. Where it has no
-//! limit it is complete. Its limit is [`FIRST_STATES`] at first, and twice as much each time.
+//! **What it guarantees.** Together with the argument of [`reservation`](crate::reservation): if
+//! all rovers can get to their goals at all, they do, as long as the search finds it. Where it has
+//! no limit it is complete. Its limit is [`FIRST_STATES`] at first, and twice as much each time.
 //! Meanwhile, and where it is certain that there is no plan, rovers make room for each other as
 //! `displacement` has it.
 //!

@@ -1,0 +1,120 @@
+//! What README and ARCHITECTURE name is there.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use farside_experiments::registry::Registry;
+use farside_experiments::scenario::Scenario;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn read(name: &str) -> String {
+    std::fs::read_to_string(root().join(name)).expect("it is there")
+}
+
+/// What stands in backticks.
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+#[test]
+fn every_file_that_the_map_names_is_there() {
+    let folders = [
+        "",
+        "src",
+        "actors/src",
+        "actors/src/link",
+        "actors/src/radio",
+        "actors/network/src",
+        "actors/src/invariants",
+        "logs/src",
+        "experiments/src",
+        "experiments/src/study",
+    ];
+    let map = read("ARCHITECTURE.md");
+    let named = quoted(&map).filter(|name| name.ends_with(".rs") && !name.contains(' '));
+    let named: BTreeSet<&str> = named.collect();
+    assert!(named.len() > 80, "{}", named.len());
+    let crates = ["src", "worlds", "logs", "actors", "experiments", "tests"];
+    let all: Vec<String> = crates
+        .iter()
+        .flat_map(|one| files(&root().join(one)))
+        .collect();
+    for name in named {
+        let found = folders
+            .iter()
+            .any(|folder| root().join(folder).join(name).exists());
+        // Parts of a file that was just named stand without its folder.
+        let ends = format!("/{name}");
+        let part = all.iter().any(|path| path.ends_with(&ends));
+        assert!(found || part, "ARCHITECTURE.md names {name}");
+    }
+}
+
+/// All files below a folder, with slashes.
+fn files(folder: &Path) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        match path.is_dir() {
+            true => found.extend(files(&path)),
+            false => found.push(path.to_string_lossy().replace('\\', "/")),
+        }
+    }
+    found
+}
+
+#[test]
+fn every_scenario_and_study_that_readme_and_changelog_name_is_built_in() {
+    let registry = Registry::builtin();
+    let known: BTreeSet<&str> = registry
+        .scenario_names()
+        .into_iter()
+        .chain(registry.study_names())
+        .collect();
+    for file in ["README.md", "CHANGELOG.md"] {
+        let text = read(file);
+        let words = text.split(|c: char| !(c.is_alphanumeric() || "/-_".contains(c)));
+        let named = words.filter(|word| {
+            let kind = word.split_once('/').map(|(kind, _)| kind);
+            matches!(kind, Some("network" | "traffic" | "degradation")) && !word.ends_with('/')
+        });
+        for name in named {
+            let built_in = known.iter().any(|known| known == &name);
+            let is_path = root().join("actors").join(name).exists() || name.contains("/src");
+            assert!(built_in || is_path, "{file} names {name}");
+        }
+    }
+}
+
+#[test]
+fn every_policy_that_the_table_of_readme_has_can_be_run() {
+    let readme = read("README.md");
+    let table = readme
+        .split("| policy | knows |")
+        .nth(1)
+        .expect("the table");
+    let rows = table.lines().take_while(|line| !line.is_empty());
+    let policies: Vec<&str> = rows
+        .filter_map(|row| row.strip_prefix("| `")?.split('`').next())
+        .collect();
+    assert!(policies.len() >= 6, "{policies:?}");
+    for policy in &policies {
+        let set = vec![format!("network.policy={policy}")];
+        let opened = Scenario::open("network/rubble", &set, &Registry::builtin());
+        assert!(opened.is_ok(), "{policy}");
+    }
+    let wrong = vec!["network.policy=none".to_owned()];
+    let refused = Scenario::open("network/rubble", &wrong, &Registry::builtin());
+    let told = refused.err().expect("there is no such policy").to_string();
+    let known = told.split("one of").nth(1).unwrap_or(&told);
+    for policy in &policies {
+        assert!(known.contains(policy), "{policy}: {told}");
+    }
+    // The old name of one is still read.
+    let names = known.lines().next().unwrap_or_default().split(',');
+    let names = names.filter(|name| name.trim() != "paper").count();
+    assert_eq!(names, policies.len(), "{known}");
+}
