@@ -112,11 +112,13 @@ macro_rules! parameters {
                     name: "preset",
                     about: &["What all parameters are replaced by, before the others here."],
                     expected: String::new(),
+                    aliases: &[],
                 };
                 let own = [$(crate::system::Key {
                     name: $key,
                     about: &[$($doc),*],
                     expected: String::new(),
+                    aliases: &[$($alias),*],
                 }),*];
                 std::iter::once(preset).chain(own).collect()
             }

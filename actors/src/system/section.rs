@@ -22,6 +22,8 @@ pub struct Key {
     pub about: &'static [&'static str],
     /// What it may be: `in [0, 1)`; empty if its type says all.
     pub expected: String,
+    /// Its other names.
+    pub aliases: &'static [&'static str],
 }
 
 impl Section {

@@ -324,6 +324,7 @@ macro_rules! settings {
                         name: $crate::settings!(@key $field $($key)?),
                         about: &[$($doc),+],
                         expected: Rule::<$type>::expected(&$crate::settings!(@rule $($rule)?)),
+                        aliases: &[],
                     }),+],
                     defaults: $crate::system::settings::defaults::<Self>(),
                 }];

@@ -137,8 +137,12 @@ impl Entry<'_> {
 
     /// Whether somebody who writes `name` may mean it: the whole name, or the last part of a key.
     fn is_called(&self, name: &str) -> bool {
-        let last = matches!(self, Entry::Key { key, .. } if key.name == name);
-        last || self.name() == name
+        let Entry::Key { section, key } = self else {
+            return self.name() == name;
+        };
+        let last = name.strip_prefix(&section.name);
+        let last = last.and_then(|rest| rest.strip_prefix('.')).unwrap_or(name);
+        self.name() == name || key.name == last || key.aliases.contains(&last)
     }
 
     fn text(&self) -> String {
@@ -146,6 +150,9 @@ impl Entry<'_> {
         match self {
             Entry::Key { section, key } => {
                 text += &format!("\n{}", prose(key.about, "  "));
+                if !key.aliases.is_empty() {
+                    text += &format!("\n  also called: {}", key.aliases.join(", "));
+                }
                 if !key.expected.is_empty() {
                     text += &format!("\n  expected: {}", key.expected);
                 }
@@ -177,6 +184,7 @@ impl Entry<'_> {
             Entry::Key { section, key } => json!({
                 "key": self.name(),
                 "about": prose(key.about, ""),
+                "aliases": key.aliases,
                 "expected": key.expected,
                 "default": section.defaults.get(key.name),
             }),

@@ -49,6 +49,7 @@ fn degrade_keys() -> Vec<Key> {
         name,
         about,
         expected: String::new(),
+        aliases: &[],
     };
     let own = [
         key("at", &["When it begins, from the start of the run."][..]),
@@ -70,6 +71,7 @@ fn degrade_keys() -> Vec<Key> {
                 "By how much processors are slower meanwhile: 50 is a fiftieth of their speed.",
             ],
             expected: "a factor above 0, from 0.000001 to 1000000000".to_owned(),
+            aliases: &[],
         },
     ];
     own.into_iter().chain(LinkParams::keys()).collect()

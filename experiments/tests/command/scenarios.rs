@@ -107,3 +107,34 @@ fn a_roadmap_of_ones_own_travels_in_the_log() {
         text(&verified.stderr)
     );
 }
+
+/// The table of keys in the docs of links, and what `explain` knows.
+#[test]
+fn every_key_of_links_and_its_other_names_are_explained() {
+    let docs = include_str!("../../../actors/src/link.rs");
+    let rows = docs.lines().filter_map(|line| line.strip_prefix("//! | `"));
+    let folder = tempfile::tempdir().unwrap();
+    let mut names = 0;
+    for row in rows {
+        let cells: Vec<&str> = row.split('|').collect();
+        let key = cells[0].trim().trim_end_matches('`');
+        let aliases = cells.get(1).into_iter().flat_map(|cell| cell.split(','));
+        let aliases = aliases.map(|alias| alias.trim().trim_matches('`'));
+        for name in aliases.chain([key]).filter(|name| !name.is_empty()) {
+            names += 1;
+            // A name alone may be that of a table, as `contacts` is.
+            let alone = (name != key).then(|| name.to_owned());
+            for asked in alone.into_iter().chain([format!("links.default.{name}")]) {
+                let output = farside(folder.path(), &["explain", &asked]);
+                let said = text(&output.stdout);
+                let whole = format!("links.default.{key}\n");
+                assert!(
+                    said.contains(&whole),
+                    "{asked}: {said}{}",
+                    text(&output.stderr)
+                );
+            }
+        }
+    }
+    assert!(names > 30, "{names}");
+}
