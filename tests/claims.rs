@@ -118,3 +118,29 @@ fn every_policy_that_the_table_of_readme_has_can_be_run() {
     let names = names.filter(|name| name.trim() != "paper").count();
     assert_eq!(names, policies.len(), "{known}");
 }
+
+/// The field's words took the place of these; the CHANGELOG alone still lists them.
+#[test]
+fn words_that_the_field_does_not_use_are_gone() {
+    let words = [
+        ["stand", "still"].concat(),
+        ["dep", "uty"].concat(),
+        ["making", " way"].concat(),
+        ["line of ", "succession"].concat(),
+    ];
+    let crates = ["src", "worlds", "logs", "actors", "experiments", "tests"];
+    let sources = crates.iter().flat_map(|one| files(&root().join(one)));
+    let sources = sources.filter(|path| path.ends_with(".rs") || path.ends_with(".toml"));
+    let pages = ["README.md", "ARCHITECTURE.md", "COMPARE.md"].map(|page| root().join(page));
+    let pages = pages.map(|page| page.to_string_lossy().into_owned());
+    let mut read = 0;
+    for path in sources.chain(pages) {
+        let text = std::fs::read_to_string(&path).expect("it is text");
+        let text = text.to_lowercase();
+        read += 1;
+        for word in &words {
+            assert!(!text.contains(word.as_str()), "{path}: {word}");
+        }
+    }
+    assert!(read > 400, "{read}");
+}

@@ -260,7 +260,7 @@ impl Score {
             track.remaining = site.roadmap.distance(claim, state.goal);
         }
         track.moved = Some(cycle);
-        self.pauses.standstill.ends(cycle);
+        self.pauses.standing.ends(cycle);
         let gone = |rover: usize| !self.is_out(site, rover);
         if !self.ended && (0..self.tracks.len()).all(gone) {
             self.ended = true;
@@ -289,8 +289,8 @@ impl Score {
         }
         let (config, pauses) = (&site.config, &self.pauses);
         let too_long = |pause: Pause, window| pause.is_as_long_as(window + site.patience);
-        let (pause, no_progress) = if too_long(pauses.standstill, config.deadlock_window) {
-            (pauses.standstill, NoProgress::Standing)
+        let (pause, no_progress) = if too_long(pauses.standing, config.deadlock_window) {
+            (pauses.standing, NoProgress::Standing)
         } else if too_long(pauses.no_nearer, config.livelock_window) {
             (pauses.no_nearer, NoProgress::Moving)
         } else if self.cycle >= config.cycle_limit {

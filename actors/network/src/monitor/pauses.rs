@@ -67,7 +67,7 @@ impl Pause {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pauses {
     /// Since a rover last moved or entered.
-    pub(super) standstill: Pause,
+    pub(super) standing: Pause,
     /// Since the sum of what is left to drive was last less than ever before.
     pub(super) no_nearer: Pause,
     delivered: u64,
@@ -90,7 +90,7 @@ impl Pauses {
         let fates = (self.delivered, self.lost);
         (self.delivered, self.lost) = (0, 0);
         if !is_pending {
-            self.standstill.count((first, now), fates);
+            self.standing.count((first, now), fates);
             self.no_nearer.count((first, now), fates);
         }
     }
@@ -163,7 +163,7 @@ mod tests {
                 });
             }
             pauses.count(cycle, cycle + 1, false);
-            if pauses.standstill.is_as_long_as(20) {
+            if pauses.standing.is_as_long_as(20) {
                 return cycle;
             }
         }
@@ -188,7 +188,7 @@ mod tests {
                 _ => RecordClass::Lost,
             });
             pauses.count(cycle, cycle + 1, false);
-            assert_eq!(pauses.standstill.is_as_long_as(20), cycle == 80, "{cycle}");
+            assert_eq!(pauses.standing.is_as_long_as(20), cycle == 80, "{cycle}");
         }
     }
 
@@ -196,12 +196,12 @@ mod tests {
     fn a_cycle_without_messages_counts_as_a_whole_and_one_before_a_restart_not_at_all() {
         let mut pauses = Pauses::default();
         pauses.count(1, 11, false);
-        assert!(pauses.standstill.is_as_long_as(10) && !pauses.standstill.is_as_long_as(11));
+        assert!(pauses.standing.is_as_long_as(10) && !pauses.standing.is_as_long_as(11));
         pauses.count(11, 31, true);
-        assert!(!pauses.standstill.is_as_long_as(11));
-        pauses.standstill.ends(40);
+        assert!(!pauses.standing.is_as_long_as(11));
+        pauses.standing.ends(40);
         pauses.count(31, 42, false);
-        assert!(pauses.standstill.is_as_long_as(1) && !pauses.standstill.is_as_long_as(2));
+        assert!(pauses.standing.is_as_long_as(1) && !pauses.standing.is_as_long_as(2));
         assert!(pauses.no_nearer.is_as_long_as(21), "that one went on");
     }
 }
