@@ -348,7 +348,9 @@ proptest! {
         prop_assume!(case.rules == Rules::StayAtTarget);
         let map = case.roadmap();
         let problem = Problem::new(&map, case.missions(), case.rules).unwrap();
-        let found = lacam(&problem, &LacamConfig::default());
+        // Enough to try every step from every state that so few rovers can be in.
+        let limits = LacamConfig { max_expansions: 20_000_000, ..LacamConfig::default() };
+        let found = lacam(&problem, &limits);
         match coupled(&problem, &CoupledConfig::default()) {
             Ok(best) => {
                 let plan = found.unwrap().plan;
