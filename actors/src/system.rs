@@ -7,6 +7,7 @@
 mod builtin;
 mod error;
 mod files;
+mod gathered;
 mod metric;
 mod own_table;
 mod picture;
@@ -27,6 +28,7 @@ use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
 pub use error::SetupError;
 pub use files::{Files, no_file};
+pub use gathered::Gathered;
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};
 pub use own_table::OwnTable;
 pub use picture::{
