@@ -1,5 +1,6 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
+mod cluster;
 mod common;
 mod contacts;
 mod logs;
