@@ -62,6 +62,15 @@ rm "$copy"
 echo "11;cluster"
 "#;
 
+/// Puts what stands in for Slurm into a folder, to be found there before Slurm itself.
+#[cfg(unix)]
+pub(crate) fn write_stand_in(folder: &Path) {
+    use std::os::unix::fs::PermissionsExt;
+    let sbatch = folder.join("sbatch");
+    std::fs::write(&sbatch, SBATCH).unwrap();
+    std::fs::set_permissions(&sbatch, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
 fn study(folder: &Path, more: &[&str]) -> Output {
     let output = farside(folder, &[&["study", NAME][..], &ARGUMENTS, more].concat());
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -134,14 +143,12 @@ fn answers(program: &str, arguments: &[&str]) -> bool {
 #[test]
 #[cfg(unix)]
 fn the_scripts_for_slurm_do_a_study_and_say_what_is_missing() {
-    use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     on_one_machine(folder.path());
     let place = place(folder.path(), "my 'cluster' $HOME");
-    let sbatch = folder.path().join("bin/sbatch");
-    std::fs::create_dir(folder.path().join("bin")).unwrap();
-    std::fs::write(&sbatch, SBATCH).unwrap();
-    std::fs::set_permissions(&sbatch, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let bin = folder.path().join("bin");
+    std::fs::create_dir(&bin).unwrap();
+    write_stand_in(&bin);
     let said = study(&place, &["--out", "results/r", "--array", "4"]);
     assert!(
         text(&said.stdout).starts_with("6 runs in 4 shards\n"),
@@ -149,7 +156,7 @@ fn the_scripts_for_slurm_do_a_study_and_say_what_is_missing() {
     );
     assert!(!place.join("results/r").exists(), "nothing is run");
     let path = std::env::var("PATH").unwrap_or_default();
-    let path = format!("{}:{path}", folder.path().join("bin").display());
+    let path = format!("{}:{path}", bin.display());
     let scripts = place.join("results/r-slurm");
     let submit = |arguments: &[&str], lost: &str| {
         let output = Command::new("bash")

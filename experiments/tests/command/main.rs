@@ -3,6 +3,7 @@
 mod cluster;
 mod common;
 mod contacts;
+mod guide;
 mod logs;
 mod outputs;
 mod pictures;
