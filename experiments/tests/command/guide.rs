@@ -14,11 +14,8 @@ use crate::common::farside;
 
 mod reference;
 
-/// Examples that the guide runs, and their packages.
-const EXAMPLES: [(&str, &str); 2] = [
-    ("own_actor", "farside-logs"),
-    ("own_system", "farside-experiments"),
-];
+/// Examples of this package that the guide runs.
+const EXAMPLES: [&str; 2] = ["own_actor", "own_system"];
 
 /// The most lines of a chapter that a person still reads.
 const MOST_LINES: usize = 150;
@@ -165,22 +162,26 @@ fn built() -> PathBuf {
     binary.parent().expect("it is in a folder").to_owned()
 }
 
-/// Builds an example as the binary was built; in a run of all tests it is there already.
-fn build(example: &str, package: &str) {
+/// Builds an example, if it is not there: in a run of all tests it is.
+fn build(example: &str) {
+    let changed = |path: PathBuf| {
+        std::fs::metadata(path)
+            .and_then(|found| found.modified())
+            .ok()
+    };
+    let source = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples")
+        .join(example);
+    let source = changed(source.with_extension("rs")).expect("the example is there");
+    if changed(built().join("examples").join(example)).is_some_and(|built| built > source) {
+        return;
+    }
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args([
-        "build",
-        "--offline",
-        "--quiet",
-        "--package",
-        package,
-        "--example",
-        example,
-    ]);
+    cargo.args(["build", "--offline", "--quiet", "--example", example]);
     if built().ends_with("release") {
         cargo.arg("--release");
     }
-    let status = cargo.current_dir(root()).status();
+    let status = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).status();
     assert!(status.is_ok_and(|status| status.success()), "{example}");
 }
 
@@ -211,8 +212,12 @@ fn run(block: &Block, folder: &Path, path: &str) {
         let place = &block.place;
         let code = output.status.code();
         assert_eq!(code, Some(wanted), "{place}: {command}\n{printed}");
-        let lines = |text: &'_ str| text.lines().map(str::to_owned).collect::<Vec<_>>();
-        let (shown, printed) = (lines(shown.trim()), lines(printed.trim()));
+        // Blank lines are for the eye.
+        let lines = |text: &str| -> Vec<String> {
+            let lines = text.lines().filter(|line| !line.trim().is_empty());
+            lines.map(str::to_owned).collect()
+        };
+        let (shown, printed) = (lines(shown), lines(&printed));
         let [s, p] =
             [&shown, &printed].map(|all| all.iter().map(String::as_str).collect::<Vec<_>>());
         assert!(
@@ -254,10 +259,10 @@ fn check_include(block: &Block) {
 fn follow(chapter: &str) {
     let blocks = blocks(chapter);
     let folder = tempfile::tempdir().expect("a folder");
-    for (example, package) in EXAMPLES {
+    for example in EXAMPLES {
         let mut consoles = blocks.iter().filter(|block| block.language == "console");
         if consoles.any(|block| block.text.contains(&format!("$ {example} "))) {
-            build(example, package);
+            build(example);
         }
     }
     let bin = folder.path().join(".bin");

@@ -7,7 +7,7 @@
 //!        ◀─moon-earth───              Odometry
 //! ```
 //!
-//! `cargo run -p farside-logs --example own_actor -- own.mcap`
+//! `cargo run -p farside-experiments --example own_actor -- own.mcap`
 
 use farside::prelude::*;
 use farside_logs::{LogOptions, LogWriter};
