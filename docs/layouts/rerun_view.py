@@ -75,8 +75,8 @@ def main():
         topics = {one.topic: schemas[one.schema_id].name for one in summary.channels.values()}
         shown = rrb.Spatial3DView(
             origin="/", contents=[f"+ {SCENE}/**", f"+ {FRAMES}"], name="map",
-            spatial_information=rrb.SpatialInformation(target_frame="map"), line_grid=False,
-            eye_controls=rrb.EyeControls3D(position=(0, -330, 330), look_target=(0, -20, 0)),
+            line_grid=False,
+            eye_controls=rrb.EyeControls3D(position=(0, -390, 400), look_target=(0, -25, 0)),
         )
         told = rrb.TextLogView(origin=EVENTS, name="events")
         plots = [plot(topics, *what) for what in PLOTS]
@@ -90,6 +90,8 @@ def main():
             rr.send_blueprint(blueprint)
         else:
             rr.save(given.save, default_blueprint=blueprint)
+        # What is not drawn yet stands in Rerun's own frame: say how that and the map's are one.
+        rr.log("map", rr.Transform3D(parent_frame="tf#/", child_frame="map"), static=True)
         rr.log_file_from_path(given.log)
         for _, _, message, update in reader.iter_decoded_messages(topics=[SCENE]):
             rr.set_time(TIMELINE, timestamp=np.datetime64(message.log_time, "ns"))

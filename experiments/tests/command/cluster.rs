@@ -1,11 +1,10 @@
 //! Studies on clusters: the scripts for Slurm, with a stand-in for it and, where there is one, with
 //! Slurm itself; and the script for Dask. Their results are one machine's, byte for byte.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::common::{farside, text};
+use crate::common::{farside, skip, text};
 
 /// 2 cells of 3 seeds.
 const STUDY: &str = "question = 'How many arrive?'\nscenario = 'network/crater-dense'\n\
@@ -126,11 +125,6 @@ fn assert_same(folder: &Path, other: &str) {
         compared += 1;
     }
     assert!(compared > 6, "{compared}");
-}
-
-/// Says why a test does nothing here, past the capture of what tests print.
-fn skip(test: &str, why: &str) {
-    let _ = writeln!(std::io::stderr(), "{test}: not tried: {why}");
 }
 
 fn answers(program: &str, arguments: &[&str]) -> bool {

@@ -6,11 +6,10 @@
 //! run. Any block may say `file=NAME`: it is written there. Rust is included from examples.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::farside;
+use crate::common::{farside, skip};
 
 mod reference;
 
@@ -144,10 +143,6 @@ fn what_is_left_out_of_a_listing_may_be_anything_and_the_rest_may_not() {
         let [shown, printed] = [shown, printed].map(|text| text.lines().collect::<Vec<_>>());
         assert_eq!(are_shown(&shown, &printed), is, "{shown:?}, {printed:?}");
     }
-}
-
-fn skip(place: &str, why: &str) {
-    let _ = writeln!(std::io::stderr(), "{place}: not tried: {why}");
 }
 
 fn has_python(package: &str) -> bool {
