@@ -95,6 +95,22 @@
 //! assert_eq!(report.end_time, SimTime::from_nanos(183_900_000_000));
 //! ```
 //!
+//! # Its log
+//!
+//! The kernel writes no files. The crate `farside-logs` has an observer that writes a run to an MCAP
+//! file while it goes on, each message with its fate. It takes one line before the run:
+//!
+//! ```ignore
+//! use farside_logs::{LogOptions, LogWriter};
+//!
+//! sim.observe(LogWriter::create("run.mcap", LogOptions::default())?);
+//! let report = sim.run(Executor::Inline)?;
+//! ```
+//!
+//! The digest is the same with it. (Here these lines are shown and not run, because the kernel knows
+//! no crate above it.) `experiments/examples/own_actor.rs` is this tutorial as a whole program that
+//! logs, and tests run it; `farside info run.mcap` then says what is in the file.
+//!
 //! # What to know next
 //!
 //! - [`SimTime`]: time is an integer count of nanoseconds.

@@ -85,7 +85,7 @@ pub enum Drawing {
         level: Level,
         /// Who says it, or whom it is about.
         name: String,
-        /// The text.
+        /// The text; viewers are told it with the name before it.
         message: String,
     },
 }

@@ -23,6 +23,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass};
+use farside_actors::settings;
+use farside_actors::system::settings::{Table, over};
 use farside_actors::system::{
     Assembly, Goal, Results, Section, Settings, Setup, SetupError, System,
 };
@@ -99,6 +101,7 @@ impl Handler<Pong> for Base {
     }
 }
 
+// ANCHOR: observer
 /// Counts what came back, from the committed records.
 struct Pongs(Arc<AtomicU32>);
 
@@ -111,25 +114,22 @@ impl Observer for Pongs {
         Ok(Flow::Continue)
     }
 }
+// ANCHOR_END: observer
 
-/// The `[ping]` table.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct PingSettings {
-    count: u32,
-    #[serde(with = "units::duration")]
-    interval: SimDuration,
-}
-
-impl Default for PingSettings {
-    fn default() -> Self {
-        PingSettings {
-            count: 10,
-            interval: SimDuration::from_secs(1),
-        }
+// ANCHOR: settings
+settings! {
+    /// The `[ping]` table: how many pings, and how often.
+    struct PingSettings {
+        /// How many pings are sent.
+        count: u32 = 10, 1..;
+        /// The time between two of them.
+        interval: SimDuration [with = "units::duration"] = SimDuration::from_secs(1),
+            over(SimDuration::ZERO);
     }
 }
+// ANCHOR_END: settings
 
+// ANCHOR: system
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct PingScenario {
     #[serde(default)]
@@ -148,7 +148,7 @@ impl System for PingSystem {
     }
 
     fn sections(&self) -> Vec<Section> {
-        vec![Section::named("ping")]
+        PingSettings::sections("ping")
     }
 
     fn parse(
@@ -158,17 +158,16 @@ impl System for PingSystem {
         Ok(Box::new(PingScenario::deserialize(sections)?))
     }
 }
+// ANCHOR_END: system
 
+// ANCHOR: assemble
 impl Settings for PingScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
     }
 
     fn check(&self) -> Result<(), SetupError> {
-        match self.ping.count {
-            0 => Err(SetupError::value("ping.count", "0: expected at least 1")),
-            _ => Ok(()),
-        }
+        self.ping.check("ping")
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
@@ -207,7 +206,10 @@ impl Settings for PingScenario {
         Ok(Assembly::new(conclude).with_goal(goal))
     }
 }
+// ANCHOR_END: assemble
 
+// ANCHOR: main
 fn main() -> ExitCode {
     cli::main(Registry::builtin().with(PingSystem))
 }
+// ANCHOR_END: main

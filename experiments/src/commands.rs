@@ -31,7 +31,7 @@ use crate::scenario::ScenarioError;
 use crate::study::{StoreError, StudyError};
 
 /// How a command ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Exit {
     Done = 0,
     Different = 1,

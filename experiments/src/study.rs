@@ -130,6 +130,7 @@ mod file;
 mod lengths;
 mod level;
 mod load;
+mod merge;
 mod metrics;
 mod plan;
 mod pool;
@@ -143,6 +144,7 @@ pub mod summary;
 
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
+pub(crate) use merge::Merged;
 pub(crate) use metrics::KERNEL as KERNEL_METRICS;
 pub use plan::{Study, StudyPlan};
 pub use runner::{Ended, Progress, RunOptions, run};

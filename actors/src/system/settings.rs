@@ -1,6 +1,7 @@
 //! Settings of a system, declared once: one list of keys gives the struct, its defaults, its
 //! reading and writing, range checks with the key's own place, and what `farside explain` says of
-//! each key.
+//! each key. The documentation of the struct's fields has all of it too, after what is written there:
+//! default, range, the name in scenarios, and the module that reads the value with its unit.
 //!
 //! ```
 //! use farside::SimDuration;
@@ -300,6 +301,10 @@ macro_rules! settings {
         $vis struct $name {
             $(
                 $(#[doc = $doc])+
+                $(#[doc = concat!("\n\nDefault: `", stringify!($default), "`")])?
+                $(#[doc = concat!("\n\nExpected: `", stringify!($rule), "`")])?
+                $(#[doc = concat!("\n\nIn scenarios: `", stringify!($key), "`")])?
+                $(#[doc = concat!("\n\nSerde: `", stringify!($($serde)+), "`")])?
                 $(#[serde(rename = $key)])?
                 $(#[serde($($serde)+)])?
                 $field_vis $field: $type,

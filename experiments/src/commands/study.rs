@@ -1,5 +1,7 @@
 //! `farside study`: run a study, as far as its folder does not hold its runs already.
 
+mod array;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +17,9 @@ use crate::study::results::{Manifest, Results, RunOutcome};
 use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
-use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
+use crate::study::{
+    self, Ended, Interrupts, Merged, Progress, RunOptions, Shard, Study, StudyPlan,
+};
 
 /// Drawings a second; more is unreadable.
 const DRAWINGS_HZ: u8 = 10;
@@ -37,6 +41,14 @@ pub(crate) struct Args {
     /// Do only this part of the runs, as in 1/4; parts may go to folders of their own
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Run nothing: write scripts for Slurm beside the folder, an array of N shards and their merge
+    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "merge"])]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    array: Option<u32>,
+    /// Run nothing: write results.csv of what N shards did, or name those that have runs left
+    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "jobs"])]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    merge: Option<u32>,
     /// Set a key of the scenario in every cell, as in team.rovers=25; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
@@ -77,6 +89,12 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
     let plan = study.plan(&args.sets, args.seeds, registry)?;
+    if let Some(shards) = args.array {
+        return array::write(args, shards, &plan, &folder);
+    }
+    if let Some(shards) = args.merge {
+        return merge(args, shards, &plan, &folder);
+    }
     let mut options = RunOptions::new(folder.clone());
     options.shard = args.shard.unwrap_or(Shard::WHOLE);
     options.keep_going = args.keep_going;
@@ -108,6 +126,27 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         study::replace(&folder.join("results.csv"), csv.as_bytes())?;
     }
     tell(args, &results, &folder, missing)
+}
+
+/// Puts together what shards have done, if they have done all.
+fn merge(args: &Args, shards: u32, plan: &StudyPlan, folder: &Path) -> Result<Exit, CommandError> {
+    let Merged { results, left } = Merged::load(plan, folder, shards)?;
+    let table = folder.join("results.csv");
+    let missing = left.values().sum();
+    if missing == 0 {
+        study::replace(&table, results_csv(&results).as_bytes())?;
+        return tell(args, &results, folder, 0);
+    }
+    // One of fewer runs would pass for the whole.
+    let _ = std::fs::remove_file(&table);
+    let exit = tell(args, &results, folder, missing)?;
+    let names: Vec<String> = left.keys().map(u32::to_string).collect();
+    complain(format!(
+        "{missing} runs are missing, of {} of {shards} shards; submit them again: --array={}",
+        left.len(),
+        names.join(",")
+    ));
+    Ok(exit.max(Exit::Failed))
 }
 
 fn interrupted(args: &Args, progress: Progress, folder: &Path) -> String {

@@ -303,13 +303,9 @@ impl<'a> Runs<'a> {
         runs
     }
 
-    /// Whether the run at these places is in this shard. With a stopping rule whole cells are,
-    /// because all runs of a cell decide together.
+    /// Whether the run at these places is in this shard.
     fn has(&self, cell: usize, place: usize) -> bool {
-        match self.manifest.stop {
-            Some(_) => self.shard.has(cell),
-            None => self.shard.has(cell + place),
-        }
+        self.shard.has(&self.manifest, cell, place)
     }
 
     fn is_ours(&self, cell: usize, seed: u64) -> bool {
@@ -516,26 +512,30 @@ impl Results {
     /// assert_eq!(results.missing(), 2);
     /// ```
     pub fn missing(&self) -> usize {
+        self.missing_runs().len()
+    }
+
+    /// The runs that are still to do, as cells and places of seeds.
+    pub(super) fn missing_runs(&self) -> Vec<(usize, usize)> {
         let seeds = &self.manifest.seeds;
         let missing = |cell: usize| {
             let runs = self.of_cell(cell);
-            let Some(stop) = &self.manifest.stop else {
-                return seeds.len() - runs.len();
-            };
             let samples: Vec<Option<Sample>> = seeds
                 .iter()
                 .map(|seed| {
-                    let run = runs.iter().find(|run| run.seed == *seed)?;
-                    Some(sample(&run.outcome, &stop.metric))
+                    let at = runs.binary_search_by_key(seed, |run| run.seed).ok()?;
+                    let stop = self.manifest.stop.as_ref();
+                    Some(stop.map_or(Sample::None, |stop| sample(&runs[at].outcome, &stop.metric)))
                 })
                 .collect();
-            let target = stop::target(stop, seeds.len(), self.manifest.block, &samples);
-            samples[..target]
-                .iter()
-                .filter(|sample| sample.is_none())
-                .count()
+            let target = match &self.manifest.stop {
+                Some(stop) => stop::target(stop, seeds.len(), self.manifest.block, &samples),
+                None => seeds.len(),
+            };
+            let places = (0..target).filter(move |place| samples[*place].is_none());
+            places.map(move |place| (cell, place))
         };
-        (0..self.manifest.cells.len()).map(missing).sum()
+        (0..self.manifest.cells.len()).flat_map(missing).collect()
     }
 }
 

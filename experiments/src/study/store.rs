@@ -36,9 +36,24 @@ impl Shard {
     /// All runs.
     pub const WHOLE: Shard = Shard { index: 1, of: 1 };
 
-    /// Whether the shard has what is at `place` of a count from 0.
-    pub(super) fn has(self, place: usize) -> bool {
-        place % self.of as usize == self.index as usize - 1
+    /// Which of `of` shards, from 1, has the run of a cell with the seed at `place`.
+    ///
+    /// Runs are numbered seed by seed, so that earlier ones keep their numbers when seeds are added,
+    /// and any number of shards gets as many runs each, but for one. Each seed begins with another
+    /// cell: else, where there are as many shards as cells, one would have all of the slowest.
+    /// With a stopping rule whole cells are in a shard, as all runs of a cell decide together.
+    pub(super) fn index_of(manifest: &Manifest, of: u32, cell: usize, place: usize) -> u32 {
+        let cells = manifest.cells.len();
+        let number = match manifest.stop {
+            Some(_) => cell,
+            None => place * cells + (cell + place) % cells,
+        };
+        (number % of as usize) as u32 + 1
+    }
+
+    /// Whether the run of a cell with the seed at `place` is in this shard.
+    pub(super) fn has(self, manifest: &Manifest, cell: usize, place: usize) -> bool {
+        Self::index_of(manifest, self.of, cell, place) == self.index
     }
 
     /// A file's name with the shard in it.
@@ -227,9 +242,19 @@ fn lock(path: &Path) -> Result<File, StoreError> {
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let process = std::process::id();
-    let beside = path.with_file_name(format!(".{name}.{process}"));
-    std::fs::write(&beside, bytes).map_err(io(&beside, "cannot write it"))?;
-    std::fs::rename(&beside, path).map_err(io(path, "cannot replace it"))
+    // On a folder that machines share, another's process may have the same number.
+    for attempt in 0_u32.. {
+        let beside = path.with_file_name(format!(".{name}.{process}-{attempt}"));
+        let mut file = match File::create_new(&beside) {
+            Ok(file) => file,
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => continue,
+            Err(error) => return Err(io(&beside, "cannot write it")(error)),
+        };
+        let written = file.write_all(bytes).and_then(|()| file.flush());
+        written.map_err(io(&beside, "cannot write it"))?;
+        return std::fs::rename(&beside, path).map_err(io(path, "cannot replace it"));
+    }
+    unreachable!("there are more names than files")
 }
 
 fn appending(path: PathBuf) -> Result<(PathBuf, File), StoreError> {
@@ -255,4 +280,52 @@ fn cut_off_half_a_line(path: &Path) -> Result<(), StoreError> {
     let file = file.map_err(io(path, "cannot open it"))?;
     file.set_len(whole as u64)
         .map_err(io(path, "cannot cut it"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::super::fabricated;
+    use super::{Shard, replace};
+
+    proptest! {
+        /// Any number of shards gets as many runs each, but for one, and none is nobody's.
+        #[test]
+        fn shards_have_as_many_runs(cells in 1_usize..9, seeds in 1_usize..20, of in 1_u32..40) {
+            let mut manifest = fabricated::study("s", vec![fabricated::loss()], 1).manifest;
+            manifest.cells = vec![manifest.cells[0].clone(); cells];
+            let mut counts: BTreeMap<u32, usize> = (1..=of).map(|index| (index, 0)).collect();
+            for cell in 0..cells {
+                for place in 0..seeds {
+                    let index = Shard::index_of(&manifest, of, cell, place);
+                    *counts.get_mut(&index).expect("a shard") += 1;
+                    let having = (1..=of).filter(|index| {
+                        Shard { index: *index, of }.has(&manifest, cell, place)
+                    });
+                    prop_assert_eq!(having.collect::<Vec<_>>(), [index]);
+                }
+            }
+            let least = counts.values().min();
+            let most = counts.values().max();
+            prop_assert!(most.zip(least).is_some_and(|(most, least)| most - least <= 1), "{counts:?}");
+        }
+    }
+
+    /// A process of another machine, with our number, that is about to do the same.
+    #[test]
+    fn a_file_is_replaced_beside_one_that_another_machine_writes() {
+        let folder = tempfile::tempdir().unwrap();
+        let theirs = format!(".x.json.{}-0", std::process::id());
+        std::fs::write(folder.path().join(&theirs), "half").unwrap();
+        replace(&folder.path().join("x.json"), b"whole").unwrap();
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+        assert_eq!(
+            (read("x.json"), read(&theirs)),
+            ("whole".to_owned(), "half".to_owned())
+        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
 }

@@ -1,5 +1,6 @@
 //! The binary, and what its output is read with.
 
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -26,4 +27,9 @@ pub(crate) fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
 
 pub(crate) fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).expect("stdout is one JSON document")
+}
+
+/// Says why a test, or a part of one, does nothing here; past the capture of what tests print.
+pub(crate) fn skip(what: &str, why: &str) {
+    let _ = writeln!(std::io::stderr(), "{what}: not tried: {why}");
 }

@@ -1,7 +1,10 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
+mod cluster;
 mod common;
 mod contacts;
+mod guide;
+mod layouts;
 mod logs;
 mod outputs;
 mod pictures;

@@ -91,7 +91,8 @@ impl Encoded {
                     let line = Log {
                         timestamp,
                         level: *level as i32,
-                        message: message.clone(),
+                        // Viewers that know no name, as Rerun, show the text alone.
+                        message: format!("{name}: {message}"),
                         name: name.clone(),
                     };
                     others.push(Encoded::new("/log", Published::Log, &line));
@@ -541,7 +542,8 @@ mod tests {
             }),
             json!({"timestamp": time, "frameId": "map",
                 "poses": [{"position": place, "orientation": turn}]}),
-            json!({"timestamp": time, "level": "ERROR", "message": "hit", "name": "monitor"}),
+            json!({"timestamp": time, "level": "ERROR", "message": "monitor: hit",
+                "name": "monitor"}),
         ];
         for (encoded, expected) in all.iter().zip(expected) {
             assert_eq!(decoded(encoded), expected, "{}", encoded.topic);
