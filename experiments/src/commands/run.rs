@@ -99,6 +99,10 @@ struct Document<'a> {
     messages: Messages<'a>,
     metrics: &'a Map<String, Value>,
     violations: &'a [String],
+    /// What the scenario says that has no effect, or is called otherwise now.
+    remarks: &'a [String],
+    /// What is planned for later than the run's end, and was not known to be before the run.
+    never_reached: &'a [String],
     log: Option<String>,
 }
 
@@ -160,15 +164,22 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let until = scenario.shared().until;
     progress::show(&mut assembled.sim, assembled.system.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
+    let (planned, remarks) = (assembled.planned, assembled.remarks);
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;
     let results = (assembled.system.conclude)(&report);
+    let never_reached = planned.never_reached(&report);
+    for never in &never_reached {
+        tracing::warn!("{never}");
+    }
     let outcome = Outcome {
         scenario: &scenario,
         executor,
         log: log.map(|path| path.display().to_string()),
         report: &report,
         results: &results,
+        remarks: &remarks,
+        never_reached: &never_reached,
         wall_s,
     };
     // The exit code must tell of a failure even where nobody reads the output.
@@ -234,6 +245,8 @@ struct Outcome<'a> {
     log: Option<String>,
     report: &'a Report,
     results: &'a Results,
+    remarks: &'a [String],
+    never_reached: &'a [String],
     wall_s: f64,
 }
 
@@ -264,6 +277,8 @@ impl Outcome<'_> {
             messages: (&self.report.counts).into(),
             metrics: &self.results.metrics,
             violations: &self.results.violations,
+            remarks: self.remarks,
+            never_reached: self.never_reached,
             log: self.log.clone(),
         }
     }

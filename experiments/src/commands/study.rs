@@ -13,6 +13,7 @@ use crate::registry::Registry;
 use crate::report::csv::results_csv;
 use crate::study::results::{Manifest, Results, RunOutcome};
 use crate::study::summary::comparisons::ComparisonSummary;
+use crate::study::summary::effect::{self, SameValues};
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
 use crate::study::{self, Ended, Interrupts, Progress, RunOptions, Shard, Study};
@@ -64,6 +65,12 @@ struct Document {
     /// Runs in which something happened that must never happen.
     violated: usize,
     cells: Value,
+    /// Values of factors that change nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    same_values: Vec<SameValues>,
+    /// What has no effect, in sentences: values that change nothing, and what no run reached.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notices: Vec<String>,
     /// Lines through cells, for what was published to be linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<LineSummary>,
@@ -77,6 +84,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
     let plan = study.plan(&args.sets, args.seeds, registry)?;
+    for remark in &plan.remarks {
+        tracing::warn!("{remark}");
+    }
     let mut options = RunOptions::new(folder.clone());
     options.shard = args.shard.unwrap_or(Shard::WHOLE);
     options.keep_going = args.keep_going;
@@ -139,6 +149,7 @@ fn tell(
     );
     let violated: Vec<_> = violated.collect();
     let summary = summarise(results);
+    let notices = effect::notices(manifest, &summary);
     let cells = with_totals(serde_json::to_value(&summary.cells)?, results);
     let document = Document {
         study: manifest.study.clone(),
@@ -150,6 +161,8 @@ fn tell(
         missing,
         violated: violated.len(),
         cells,
+        same_values: summary.same_values,
+        notices,
         lines: summary.lines,
         comparisons: summary.comparisons,
     };
@@ -244,8 +257,10 @@ fn text(results: &Results, document: &Document) -> String {
         0 => format!("{runs} runs{failed}; {out}/results.csv has each of them"),
         missing => format!("{runs} runs in {out}{failed}; {missing} are left to other shards"),
     };
+    let notices = document.notices.iter();
+    let notices: String = notices.map(|notice| format!("NOTE: {notice}\n")).collect();
     format!(
-        "{study}: {question}\n\n{}\n{curves}means, of lists the medians; {after}\n",
+        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians; {after}\n",
         columns(&rows)
     )
 }

@@ -262,6 +262,7 @@ fn outcome(cell: usize, seed: u64, harm: f64) -> RunOutcome {
         messages: messages(&mut stream, harm),
         metrics: into_map(metrics),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     }
 }
 

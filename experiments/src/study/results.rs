@@ -366,6 +366,10 @@ pub enum RunOutcome {
         metrics: Map<String, Value>,
         /// What must never happen and did.
         violations: Vec<String>,
+        /// The entries of the scenario for which the run ended too soon: `degrade.0`, `crash.1`.
+        /// None at all in results of older versions.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        never_reached: Vec<String>,
     },
     /// It failed: a panic, a fault, a scenario that cannot be.
     Failed {

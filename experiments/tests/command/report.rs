@@ -66,6 +66,7 @@ fn record(cell: usize, seed: u64) -> RunRecord {
             .cloned()
             .unwrap_or_default(),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     };
     RunRecord {
         cell,
