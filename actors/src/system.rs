@@ -5,6 +5,7 @@
 //! What this is not: the list of systems that a program knows, which is the program's.
 
 mod builtin;
+mod documented;
 mod error;
 mod files;
 mod metric;
@@ -25,6 +26,7 @@ use crate::link::LinkConfigError;
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
+pub use documented::{parted, with_about};
 pub use error::SetupError;
 pub use files::{Files, no_file};
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};

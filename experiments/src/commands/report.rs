@@ -6,8 +6,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
+use crate::registry::Registry;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
@@ -60,7 +62,7 @@ struct OfCell {
     beside: Beside,
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -72,6 +74,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
             return Err(CommandError::Arguments(message.to_owned()));
         }
     };
+    for folder in &args.folders {
+        kinds::expect(Kind::Results, folder, registry)?;
+    }
     let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
     let Some(results) = Results::merge(parts?)? else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));

@@ -1,7 +1,7 @@
 //! `farside run`: run a scenario, log every message, say what came of it.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use farside::{Counts, End, Executor, Report, SimDuration};
@@ -11,10 +11,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::table::{self, Group};
 use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Results;
 
 use crate::registry::Registry;
@@ -130,6 +130,7 @@ impl<'a> From<&'a Counts> for Messages<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Scenario, Path::new(&args.scenario), registry)?;
     let mut scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
@@ -155,7 +156,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         let mut inputs = assembled.files.paths();
         inputs.push(PathBuf::from(&args.scenario));
         may_hold_log(path, &inputs)?;
-        let mut options = log_options(&scenario, &assembled, executor)?;
+        let mut options = log_options(&scenario, &assembled, executor, registry)?;
         let draws = scenario.shared().log.viewer;
         options.scene = assembled.system.scene.take().filter(|_| draws);
         tracing::info!("logging to {}", path.display());
@@ -211,6 +212,7 @@ pub(super) fn log_options(
     scenario: &Scenario,
     assembled: &Assembled,
     executor: Executor,
+    registry: &Registry,
 ) -> Result<LogOptions, CommandError> {
     let host = [
         ("executor", executor.name().to_owned()),
@@ -230,7 +232,7 @@ pub(super) fn log_options(
     Ok(LogOptions {
         scenario: scenario.name().to_owned(),
         resolved: scenario.resolved()?,
-        code_version: CODE_VERSION.to_owned(),
+        code_version: registry.version(),
         host: host.map(|(key, value)| (key.to_owned(), value)).into(),
         attachments: attachments.collect(),
         exclude: scenario.shared().log.exclude.clone(),

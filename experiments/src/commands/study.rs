@@ -1,5 +1,7 @@
 //! `farside study`: run a study, as far as its folder does not hold its runs already.
 
+mod dry_run;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::{CommandError, complain, interrupt, print, print_json};
 use crate::registry::Registry;
 use crate::report::csv::results_csv;
@@ -44,6 +47,9 @@ pub(crate) struct Args {
     /// Go on where a cell's first runs all fail; failed runs are then no reason to exit with 3
     #[arg(long)]
     keep_going: bool,
+    /// Say how many runs there are to do, and about how long they take; write nothing
+    #[arg(long)]
+    dry_run: bool,
     /// Print the result as one JSON document
     #[arg(long)]
     json: bool,
@@ -80,6 +86,7 @@ struct Document {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Study, Path::new(&args.study), registry)?;
     let study = Study::open(&args.study, registry)?;
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
@@ -96,6 +103,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let interrupts = Interrupts::default();
     let raised = interrupts.clone();
     interrupt::on_interrupt(move || raised.raise());
+    if args.dry_run {
+        return dry_run::tell(&plan, &options, &interrupts, args.json);
+    }
     let bar = bar();
     let mut last = Progress::default();
     let ended = study::run(plan, &options, &interrupts, &mut |progress| {

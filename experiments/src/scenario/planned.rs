@@ -269,8 +269,10 @@ mod tests {
         let planned = planned();
         assert_eq!(
             planned.behind_until().collect::<Vec<_>>(),
-            ["degrade.0 is never reached: it begins at 100s, and the run ends at 100s at the \
-              latest"]
+            [
+                "degrade.0 is never reached: it begins at 100s, and the run ends at 100s at the \
+              latest"
+            ]
         );
         let free = Planned {
             until: None,
@@ -287,9 +289,7 @@ mod tests {
             planned.never_reached(&ended(45)),
             [
                 format!("degrade.1 was never reached: it begins at 50s, {end}"),
-                format!(
-                    "crash.0: 1 of its 3 crashes was never reached: the next is at 90s, {end}"
-                ),
+                format!("crash.0: 1 of its 3 crashes was never reached: the next is at 90s, {end}"),
                 format!("crash.1 was never reached: it is at 60s, {end}"),
             ]
         );

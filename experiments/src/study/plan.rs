@@ -10,7 +10,6 @@ use serde_json::{Map, Value};
 use farside::suggest::nearest;
 
 use crate::scenario::{self, Scenario, ScenarioError, Source, SourceLocation};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
@@ -170,7 +169,7 @@ impl Study {
         } = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
         let manifest = Manifest {
             format: FORMAT,
-            code_version: CODE_VERSION.to_owned(),
+            code_version: registry.version(),
             study: self.name,
             question: self.file.question,
             scenario: base.name().to_owned(),

@@ -193,11 +193,11 @@ fn foreign_entry(folder: &Path) -> Result<Option<String>, StoreError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(io(folder, "cannot read it")(error)),
+        Err(error) => return Err(io(folder, "cannot keep results in it")(error)),
     };
     let mut names = Vec::new();
     for entry in entries {
-        let entry = entry.map_err(io(folder, "cannot read it"))?;
+        let entry = entry.map_err(io(folder, "cannot keep results in it"))?;
         names.push(entry.file_name().to_string_lossy().into_owned());
     }
     names.sort();
@@ -244,7 +244,7 @@ fn cut_off_half_a_line(path: &Path) -> Result<(), StoreError> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(io(path, "cannot read it")(error)),
+        Err(error) => return Err(io(path, "cannot go on with it")(error)),
     };
     let whole = bytes.iter().rposition(|byte| *byte == b'\n');
     let whole = whole.map_or(0, |at| at + 1);
