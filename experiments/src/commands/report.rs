@@ -35,6 +35,8 @@ struct Document {
     results_csv: String,
     summary_csv: String,
     #[serde(skip_serializing_if = "Option::is_none")]
+    values_csv: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     series_csv: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     published_csv: Option<String>,
@@ -115,6 +117,7 @@ fn write(
         Some(text) => table(name, text).map(Some),
         None => Ok(None),
     };
+    let values_csv = if_any("values.csv", &report.values_csv)?;
     let series_csv = if_any("series.csv", &report.series_csv)?;
     let published_csv = if_any("published.csv", &report.published_csv)?;
     let cells = report.summary.cells.iter();
@@ -138,6 +141,7 @@ fn write(
     Ok(Document {
         results_csv,
         summary_csv,
+        values_csv,
         series_csv,
         published_csv,
         plots: plots?,
@@ -168,6 +172,10 @@ fn text(document: &Document) -> String {
         0 => String::new(),
         missing => format!(" of {}, the rest are not made yet", document.runs + missing),
     };
+    let values = match &document.values_csv {
+        Some(path) => format!("  lists    {path}\n"),
+        None => String::new(),
+    };
     let series = match &document.series_csv {
         Some(path) => format!("  curves   {path}\n"),
         None => String::new(),
@@ -177,7 +185,7 @@ fn text(document: &Document) -> String {
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  \
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{values}{series}{beside}  \
          plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )

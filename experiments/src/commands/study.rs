@@ -1,6 +1,8 @@
 //! `farside study`: run a study, as far as its folder does not hold its runs already.
 
+mod against;
 mod dry_run;
+mod junit;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -11,10 +13,12 @@ use serde_json::{Map, Value};
 
 use super::Exit;
 use super::kinds::{self, Kind};
+use super::output::{self, Format};
 use super::{CommandError, complain, interrupt, print, print_json};
 use crate::registry::Registry;
-use crate::report::csv::results_csv;
+use crate::report::csv::{results_csv, values_csv};
 use crate::study::results::{Manifest, Results, RunOutcome};
+use crate::study::summary::check::Check;
 use crate::study::summary::comparisons::ComparisonSummary;
 use crate::study::summary::effect::{self, SameValues};
 use crate::study::summary::published::LineSummary;
@@ -47,6 +51,13 @@ pub(crate) struct Args {
     /// Go on where a cell's first runs all fail; failed runs are then no reason to exit with 3
     #[arg(long)]
     keep_going: bool,
+    /// Compare with the results of an earlier study: a results folder, or a file in one. Exits with
+    /// 1 if a metric got worse
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["dry_run", "shard"])]
+    check: Option<PathBuf>,
+    /// Write what came of it as JUnit XML: each cell, or with --check each metric in it, is a case
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["dry_run", "shard"])]
+    junit: Option<PathBuf>,
     /// Say how many runs there are to do, and about how long they take; write nothing
     #[arg(long)]
     dry_run: bool,
@@ -57,7 +68,7 @@ pub(crate) struct Args {
 
 /// What `study --json` prints.
 #[derive(Serialize)]
-struct Document {
+struct Document<'a> {
     study: String,
     question: String,
     scenario: String,
@@ -83,6 +94,9 @@ struct Document {
     /// Cells against each other, for what was published to be more.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     comparisons: Vec<ComparisonSummary>,
+    /// What became of each metric since the results of `--check`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<&'a Check>,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
@@ -91,6 +105,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
     let plan = study.plan(&args.sets, args.seeds, registry)?;
+    let before = args.check.as_deref();
+    let before = before.map(|path| against::open(path, &plan.manifest));
+    let before = before.transpose()?;
     for remark in &plan.remarks {
         tracing::warn!("{remark}");
     }
@@ -126,8 +143,16 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if missing == 0 {
         let csv = results_csv(&results);
         study::replace(&folder.join("results.csv"), csv.as_bytes())?;
+        if let Some(csv) = values_csv(&results) {
+            study::replace(&folder.join("values.csv"), csv.as_bytes())?;
+        }
     }
-    tell(args, &results, &folder, missing)
+    let check = before.map(|before| before.check(&results)).transpose()?;
+    if let Some(path) = &args.junit {
+        let text = junit::junit(&results, check.as_ref());
+        output::write(path.clone(), &text, Format::Junit, &Results::files(&folder))?;
+    }
+    tell(args, &results, &folder, missing, check.as_ref())
 }
 
 fn interrupted(args: &Args, progress: Progress, folder: &Path) -> String {
@@ -149,6 +174,7 @@ fn tell(
     results: &Results,
     folder: &Path,
     missing: usize,
+    check: Option<&Check>,
 ) -> Result<Exit, CommandError> {
     let manifest = &results.manifest;
     let failures = |outcome: &RunOutcome| matches!(outcome, RunOutcome::Failed { .. });
@@ -175,6 +201,7 @@ fn tell(
         notices,
         lines: summary.lines,
         comparisons: summary.comparisons,
+        check,
     };
     if args.json {
         print_json(&document)?;
@@ -202,7 +229,7 @@ fn tell(
     }
     Ok(if !failed.is_empty() && !args.keep_going {
         Exit::Failed
-    } else if !violated.is_empty() {
+    } else if !violated.is_empty() || check.is_some_and(Check::is_worse) {
         Exit::Different
     } else {
         Exit::Done
@@ -238,7 +265,7 @@ fn with_totals(mut cells: Value, results: &Results) -> Value {
 }
 
 /// The figures of each cell, for people.
-fn text(results: &Results, document: &Document) -> String {
+fn text(results: &Results, document: &Document<'_>) -> String {
     let manifest = &results.manifest;
     let mut rows = Vec::new();
     let factors = manifest.factors.iter().map(|factor| factor.name.clone());
@@ -270,8 +297,9 @@ fn text(results: &Results, document: &Document) -> String {
     let notices = document.notices.iter();
     let notices: String = notices.map(|notice| format!("NOTE: {notice}\n")).collect();
     format!(
-        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians; {after}\n",
-        columns(&rows)
+        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians; {after}\n{}",
+        columns(&rows),
+        document.check.map(against::text).unwrap_or_default()
     )
 }
 

@@ -6,6 +6,7 @@ pub(super) mod published;
 mod runs;
 mod series;
 mod tables;
+mod worst;
 
 use std::collections::BTreeSet;
 
@@ -55,7 +56,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     }
                     (published::section(study))
                     @for (measure, plots) in measures.iter().zip(&plotted) {
-                        (metric_section(study, measure, plots, &notices))
+                        (metric_section(study, measure, plots, (&notices, folder)))
                     }
                     @if let Some(losses) = &losses { (losses_section(study, losses)) }
                     (runs::trouble(study))
@@ -115,7 +116,7 @@ fn metric_section(
     study: &Study<'_>,
     measure: &Measure<'_>,
     plots: &Plots,
-    notices: &[String],
+    (notices, folder): (&[String], &str),
 ) -> Markup {
     html! {
         section id=(anchor(measure)) {
@@ -138,6 +139,7 @@ fn metric_section(
                         (tables::of_metric(study, measure))
                     }
                 }
+                (worst::section(study, measure, folder))
             }
         }
     }

@@ -152,6 +152,7 @@ pub(crate) fn with_curves(mut results: Results, steps: u32) -> Results {
                 lengths_differ: false,
             }),
             kind: None,
+            better: None,
         },
     );
     let manifest = &results.manifest;
@@ -198,6 +199,7 @@ fn metrics() -> Vec<Metric> {
         unit: unit.to_owned(),
         index: None,
         kind: None,
+        better: None,
     };
     metrics.map(metric).to_vec()
 }

@@ -113,9 +113,15 @@ impl Store {
             return Ok(Found::Same);
         }
         // What others published decides nothing about the runs, and is often written after them.
+        // Nor does which way a metric is better, which older versions did not write.
+        let mut metrics = there.metrics.clone();
+        for (metric, ours) in metrics.iter_mut().zip(&manifest.metrics) {
+            metric.better = ours.better;
+        }
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
             published: manifest.published.clone(),
+            metrics,
             ..there.clone()
         };
         if extended == *manifest && manifest.seeds.starts_with(&there.seeds) {
@@ -151,6 +157,7 @@ impl Store {
             replace(&folder.join(MANIFEST), (text + "\n").as_bytes())?;
             // The table of a study with fewer seeds would pass for this one's.
             let _ = std::fs::remove_file(folder.join("results.csv"));
+            let _ = std::fs::remove_file(folder.join("values.csv"));
         }
         let runs = folder.join(shard.file("runs", ".jsonl"));
         cut_off_half_a_line(&runs)?;

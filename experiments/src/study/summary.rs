@@ -5,6 +5,7 @@
 //! seeds share problems, what varies by chance are the blocks of them. How each is
 //! computed, and after whom, is said in [`crate::stats`].
 
+pub mod check;
 pub mod comparisons;
 pub mod effect;
 mod figures;
@@ -313,7 +314,7 @@ pub struct OverallSummary {
 /// # use farside_experiments::study::results::*;
 /// # use serde_json::json;
 /// # let metric = |name: &str| Metric { name: name.into(), label: name.into(), unit: "s".into(),
-/// #     index: None, kind: None };
+/// #     index: None, kind: None, better: None };
 /// # let manifest = Manifest { format: FORMAT, code_version: "1".into(), study: "doc".into(),
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],

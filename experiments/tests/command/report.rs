@@ -36,6 +36,7 @@ fn manifest() -> Manifest {
             unit: String::new(),
             index: None,
             kind: None,
+            better: None,
         }],
         baseline: Some(0),
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
