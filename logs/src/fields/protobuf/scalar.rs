@@ -108,8 +108,10 @@ impl<'a> Scalar<'a> {
     pub(super) fn whole(&self) -> String {
         match self {
             Scalar::Absent => "absent".to_owned(),
-            Scalar::Double(value) => value.to_string(),
-            Scalar::Float(value) => value.to_string(),
+            // With an exponent where there are many zeros, and never like a whole number: as JSON
+            // and TOML write them.
+            Scalar::Double(value) => format!("{value:?}"),
+            Scalar::Float(value) => format!("{value:?}"),
             Scalar::Int(value) => value.to_string(),
             Scalar::Bool(value) => value.to_string(),
             Scalar::Text(value) => (*value).to_owned(),
@@ -126,8 +128,8 @@ impl<'a> Scalar<'a> {
 
     fn bits(&self) -> String {
         match self {
-            Scalar::Double(value) => format!("{value} (0x{:016x})", value.to_bits()),
-            Scalar::Float(value) => format!("{value} (0x{:08x})", value.to_bits()),
+            Scalar::Double(value) => format!("{value:?} (0x{:016x})", value.to_bits()),
+            Scalar::Float(value) => format!("{value:?} (0x{:08x})", value.to_bits()),
             Scalar::Wire(_) => format!("{} (of another wire type)", self.whole()),
             Scalar::Bytes(_) => format!("{} (bytes)", self.show()),
             other => format!("{} (as declared)", other.show()),
