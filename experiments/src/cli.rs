@@ -242,6 +242,19 @@ mod tests {
     }
 
     #[test]
+    fn the_table_of_readme_has_every_command() {
+        let readme = include_str!("../../README.md");
+        let table = readme.split("| command | what it does |").nth(1);
+        let table = table.and_then(|rest| rest.split("\n\n").next()).unwrap();
+        let named: Vec<&str> = table.split('`').skip(1).step_by(2).collect();
+        for command in Cli::command().get_subcommands() {
+            let name = command.get_name();
+            let is_named = |text: &&str| text.split(' ').next() == Some(name);
+            assert!(named.iter().any(is_named), "README's table lacks {name}");
+        }
+    }
+
+    #[test]
     fn a_binary_of_ones_own_has_its_own_name_and_version() {
         let mut cave = command_line(&Registry::builtin().named("cave", "3.1.4"));
         let version = cave.render_version();

@@ -8,6 +8,7 @@ mod pictures;
 mod report;
 mod running;
 mod scenarios;
+mod seams;
 mod snapshots;
 mod studies;
 mod traffic;

@@ -108,10 +108,8 @@ impl<'a> Scalar<'a> {
     pub(super) fn whole(&self) -> String {
         match self {
             Scalar::Absent => "absent".to_owned(),
-            // With an exponent where there are many zeros, and never like a whole number: as JSON
-            // and TOML write them.
-            Scalar::Double(value) => format!("{value:?}"),
-            Scalar::Float(value) => format!("{value:?}"),
+            Scalar::Double(value) => as_written(value, &format!("{value:?}")),
+            Scalar::Float(value) => as_written(value, &format!("{value:?}")),
             Scalar::Int(value) => value.to_string(),
             Scalar::Bool(value) => value.to_string(),
             Scalar::Text(value) => (*value).to_owned(),
@@ -128,11 +126,20 @@ impl<'a> Scalar<'a> {
 
     fn bits(&self) -> String {
         match self {
-            Scalar::Double(value) => format!("{value:?} (0x{:016x})", value.to_bits()),
-            Scalar::Float(value) => format!("{value:?} (0x{:08x})", value.to_bits()),
+            Scalar::Double(value) => format!("{value} (0x{:016x})", value.to_bits()),
+            Scalar::Float(value) => format!("{value} (0x{:08x})", value.to_bits()),
             Scalar::Wire(_) => format!("{} (of another wire type)", self.whole()),
             Scalar::Bytes(_) => format!("{} (bytes)", self.show()),
             other => format!("{} (as declared)", other.show()),
         }
+    }
+}
+
+/// A number as JSON writes it: the fewest digits that give it back, with an exponent where there
+/// would be many zeros.
+fn as_written(number: &impl fmt::Display, exact: &str) -> String {
+    match exact.contains('e') {
+        true => exact.to_owned(),
+        false => number.to_string(),
     }
 }
