@@ -5,6 +5,7 @@
 //! What this is not: the list of systems that a program knows, which is the program's.
 
 mod builtin;
+mod documented;
 mod error;
 mod files;
 mod gathered;
@@ -26,6 +27,7 @@ use crate::link::LinkConfigError;
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
+pub use documented::{parted, with_about};
 pub use error::SetupError;
 pub use files::{Files, no_file};
 pub use gathered::Gathered;
@@ -238,6 +240,10 @@ pub struct Assembly {
     pub scene: Option<Box<dyn Scene>>,
     /// What people may want to know of the world that is built, a line at a time.
     pub notes: Vec<String>,
+    /// What begins at an instant of the run, by the key of the scenario that says so. Who reads the
+    /// results is told if the run ends before. Crashes, degradations, contacts and what actors are
+    /// told are known without.
+    pub planned: Vec<(String, SimDuration)>,
 }
 
 impl Assembly {
@@ -248,7 +254,15 @@ impl Assembly {
             goal: None,
             scene: None,
             notes: Vec::new(),
+            planned: Vec::new(),
         }
+    }
+
+    /// With something that begins at an instant of the run, and the key that says so.
+    #[must_use]
+    pub fn with_planned(mut self, key: impl Into<String>, at: SimDuration) -> Self {
+        self.planned.push((key.into(), at));
+        self
     }
 
     /// With a goal to count towards.

@@ -127,6 +127,7 @@ mod error;
 mod execute;
 mod factors;
 mod file;
+mod forecast;
 mod lengths;
 mod level;
 mod load;
@@ -144,6 +145,7 @@ pub mod summary;
 
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
+pub use forecast::{Basis, Forecast, forecast};
 pub(crate) use merge::Merged;
 pub(crate) use metrics::KERNEL as KERNEL_METRICS;
 pub use plan::{Study, StudyPlan};

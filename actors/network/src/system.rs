@@ -71,7 +71,7 @@ impl System for NetworkSystem {
     }
 
     fn metrics(&self) -> &[Metric] {
-        &metrics::ALL
+        metrics::all()
     }
 
     fn scenarios(&self) -> &[Builtin] {

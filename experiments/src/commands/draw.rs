@@ -16,6 +16,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::output::{self, Format};
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
@@ -60,6 +61,7 @@ struct Document<'a> {
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let path = &args.log;
+    kinds::expect(Kind::Log, path, registry)?;
     let log = Log::open(path)?;
     let summary = farside_logs::info(path)?.run.unwrap_or_default();
     let scenario = scenario_of(path, &summary, registry)?;

@@ -17,6 +17,8 @@ pub(super) enum Format {
     Page,
     /// A table with a header: one of its kind starts with the same column.
     Table,
+    /// Results of tests in XML: all are alike up to the name.
+    Junit,
 }
 
 impl Format {
@@ -26,6 +28,7 @@ impl Format {
             Format::Svg => "viewBox=",
             Format::Page => "<title>",
             Format::Table => ",",
+            Format::Junit => "name=",
         };
         text.find(ends_with).map_or(text, |end| &text[..end])
     }
@@ -35,6 +38,7 @@ impl Format {
             Format::Svg => "figure",
             Format::Page => "report",
             Format::Table => "table of this kind",
+            Format::Junit => "JUnit file",
         }
     }
 }

@@ -6,8 +6,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
+use crate::registry::Registry;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
@@ -32,6 +34,8 @@ struct Document {
     page: String,
     results_csv: String,
     summary_csv: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values_csv: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     series_csv: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,7 +64,7 @@ struct OfCell {
     beside: Beside,
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -72,6 +76,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
             return Err(CommandError::Arguments(message.to_owned()));
         }
     };
+    for folder in &args.folders {
+        kinds::expect(Kind::Results, folder, registry)?;
+    }
     let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
     let Some(results) = Results::merge(parts?)? else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
@@ -110,6 +117,7 @@ fn write(
         Some(text) => table(name, text).map(Some),
         None => Ok(None),
     };
+    let values_csv = if_any("values.csv", &report.values_csv)?;
     let series_csv = if_any("series.csv", &report.series_csv)?;
     let published_csv = if_any("published.csv", &report.published_csv)?;
     let cells = report.summary.cells.iter();
@@ -133,6 +141,7 @@ fn write(
     Ok(Document {
         results_csv,
         summary_csv,
+        values_csv,
         series_csv,
         published_csv,
         plots: plots?,
@@ -163,6 +172,10 @@ fn text(document: &Document) -> String {
         0 => String::new(),
         missing => format!(" of {}, the rest are not made yet", document.runs + missing),
     };
+    let values = match &document.values_csv {
+        Some(path) => format!("  lists    {path}\n"),
+        None => String::new(),
+    };
     let series = match &document.series_csv {
         Some(path) => format!("  curves   {path}\n"),
         None => String::new(),
@@ -172,7 +185,7 @@ fn text(document: &Document) -> String {
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  \
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{values}{series}{beside}  \
          plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )

@@ -1,10 +1,12 @@
 //! The page that people read: one file, with its figures and its style, that loads nothing.
 
 mod method;
+mod notices;
 pub(super) mod published;
 mod runs;
 mod series;
 mod tables;
+mod worst;
 
 use std::collections::BTreeSet;
 
@@ -27,6 +29,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
     make_unique(figures);
     let losses = plots::losses(study);
     let manifest = &study.results.manifest;
+    let notices = notices::of(study);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -44,6 +47,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     p class="question" { (manifest.question) }
                 }
                 (runs::what_was_run(study))
+                (notices::first(&notices))
                 (contents(study, &measures, losses.is_some()))
                 main {
                     section id="cells" {
@@ -52,7 +56,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     }
                     (published::section(study))
                     @for (measure, plots) in measures.iter().zip(&plotted) {
-                        (metric_section(study, measure, plots))
+                        (metric_section(study, measure, plots, (&notices, folder)))
                     }
                     @if let Some(losses) = &losses { (losses_section(study, losses)) }
                     (runs::trouble(study))
@@ -108,7 +112,12 @@ fn contents(study: &Study<'_>, measures: &[Measure<'_>], losses: bool) -> Markup
     }
 }
 
-fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Markup {
+fn metric_section(
+    study: &Study<'_>,
+    measure: &Measure<'_>,
+    plots: &Plots,
+    (notices, folder): (&[String], &str),
+) -> Markup {
     html! {
         section id=(anchor(measure)) {
             h2 { (capital(&measure.metric.label)) }
@@ -121,6 +130,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                     div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
                 }
                 @for note in &plots.notes { p class="note" { (note) } }
+                (notices::beside(notices))
                 @if plots.figures.is_empty() {
                     (tables::of_metric(study, measure))
                 } @else {
@@ -129,6 +139,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                         (tables::of_metric(study, measure))
                     }
                 }
+                (worst::section(study, measure, folder))
             }
         }
     }

@@ -152,6 +152,7 @@ pub(crate) fn with_curves(mut results: Results, steps: u32) -> Results {
                 lengths_differ: false,
             }),
             kind: None,
+            better: None,
         },
     );
     let manifest = &results.manifest;
@@ -198,6 +199,7 @@ fn metrics() -> Vec<Metric> {
         unit: unit.to_owned(),
         index: None,
         kind: None,
+        better: None,
     };
     metrics.map(metric).to_vec()
 }
@@ -262,6 +264,7 @@ fn outcome(cell: usize, seed: u64, harm: f64) -> RunOutcome {
         messages: messages(&mut stream, harm),
         metrics: into_map(metrics),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     }
 }
 

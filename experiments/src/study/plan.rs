@@ -10,7 +10,6 @@ use serde_json::{Map, Value};
 use farside::suggest::nearest;
 
 use crate::scenario::{self, Scenario, ScenarioError, Source, SourceLocation};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
@@ -49,7 +48,16 @@ pub struct StudyPlan {
     pub manifest: Manifest,
     /// A scenario for each cell.
     pub(super) scenarios: Vec<Scenario>,
+    /// What the scenario says in some cell that has no effect, for people.
+    pub remarks: Vec<String>,
     source: Source,
+}
+
+/// Scenarios of cells, the files that they read, and what is remarked on them.
+struct Built {
+    scenarios: Vec<Scenario>,
+    files: FilesByName,
+    remarks: Vec<String>,
 }
 
 impl Study {
@@ -154,10 +162,14 @@ impl Study {
         let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
         super::blocks::check_problem(&base, block, &blame)?;
         let scenario_text = base.resolved()?;
-        let (scenarios, files) = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
+        let Built {
+            scenarios,
+            files,
+            remarks,
+        } = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
         let manifest = Manifest {
             format: FORMAT,
-            code_version: CODE_VERSION.to_owned(),
+            code_version: registry.version(),
             study: self.name,
             question: self.file.question,
             scenario: base.name().to_owned(),
@@ -176,6 +188,7 @@ impl Study {
         Ok(StudyPlan {
             manifest,
             scenarios,
+            remarks,
             source: self.source,
         })
     }
@@ -353,17 +366,21 @@ impl Study {
         text: &str,
         seed: u64,
         registry: &Registry,
-    ) -> Result<(Vec<Scenario>, FilesByName), StudyError> {
+    ) -> Result<Built, StudyError> {
         let mut files = base.files().clone();
         let mut scenarios = Vec::new();
+        let mut remarks: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, cell) in self.cells.iter().enumerate() {
             let built = of_cell(base.name(), text, cell, files.clone(), registry);
             let built = built.and_then(|scenario| {
                 let assembled = scenario.assemble_seeded(scenario.seeds_of(seed, None))?;
-                Ok((scenario, assembled.files))
+                Ok((scenario, assembled.files, assembled.remarks))
             });
-            let (scenario, read) = built.map_err(|error| self.refused(index, error))?;
+            let (scenario, read, remarked) = built.map_err(|error| self.refused(index, error))?;
             scenarios.push(scenario);
+            for remark in remarked {
+                remarks.entry(remark).or_default().push(index);
+            }
             files = read;
         }
         let all = files.all().clone();
@@ -371,7 +388,15 @@ impl Study {
             // What is on disk may change while the study runs.
             scenario.keep_files(Files::kept(all.clone()));
         }
-        Ok((scenarios, all))
+        let cells = self.cells.len();
+        let remarks = remarks
+            .into_iter()
+            .map(|(remark, within)| told_of_cells(&remark, &within, cells));
+        Ok(Built {
+            remarks: base.renamed_remarks().chain(remarks).collect(),
+            scenarios,
+            files: all,
+        })
     }
 
     /// A cell that the scenario refuses, with the value to blame.
@@ -480,6 +505,20 @@ impl StudyPlan {
             super::published::check_kind(index, table, results.get(&table.metric), &blame)?;
         }
         Ok(())
+    }
+}
+
+/// A remark, and on which of `cells` cells it is.
+fn told_of_cells(remark: &str, within: &[usize], cells: usize) -> String {
+    const SHOWN: usize = 12;
+    let mut names: Vec<String> = within.iter().take(SHOWN).map(usize::to_string).collect();
+    if within.len() > SHOWN {
+        names.push(format!("and {} more", within.len() - SHOWN));
+    }
+    match within.len() {
+        all if all == cells => format!("in each cell: {remark}"),
+        1 => format!("in cell {}: {remark}", names[0]),
+        _ => format!("in cells {}: {remark}", names.join(", ")),
     }
 }
 

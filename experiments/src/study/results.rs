@@ -186,6 +186,39 @@ pub struct Metric {
     /// tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<DeclaredKind>,
+    /// Which way is better, as its system declares it. None if neither way is, and of a metric that
+    /// no system declares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub better: Option<DeclaredBetter>,
+}
+
+/// Which way a metric is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeclaredBetter {
+    /// The more the better.
+    Higher,
+    /// The less the better.
+    Lower,
+}
+
+impl DeclaredBetter {
+    /// What a system declares; none where neither way is better.
+    ///
+    /// ```
+    /// use farside_actors::system::Better;
+    /// use farside_experiments::study::results::DeclaredBetter;
+    /// assert_eq!(DeclaredBetter::of(Better::Lower), Some(DeclaredBetter::Lower));
+    /// assert_eq!(DeclaredBetter::of(Better::Neither), None);
+    /// ```
+    pub fn of(better: farside_actors::system::Better) -> Option<Self> {
+        use farside_actors::system::Better;
+        match better {
+            Better::Higher => Some(DeclaredBetter::Higher),
+            Better::Lower => Some(DeclaredBetter::Lower),
+            Better::Neither => None,
+        }
+    }
 }
 
 /// How the values of a metric are summed up over runs, as its system says.
@@ -366,6 +399,10 @@ pub enum RunOutcome {
         metrics: Map<String, Value>,
         /// What must never happen and did.
         violations: Vec<String>,
+        /// The entries of the scenario for which the run ended too soon: `degrade.0`, `crash.1`.
+        /// None at all in results of older versions.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        never_reached: Vec<String>,
     },
     /// It failed: a panic, a fault, a scenario that cannot be.
     Failed {

@@ -170,7 +170,7 @@ pub fn run(
     }
 }
 
-fn unobserved(_: &mut Assembled) -> Result<(), Infallible> {
+pub(super) fn unobserved(_: &mut Assembled) -> Result<(), Infallible> {
     Ok(())
 }
 
@@ -540,7 +540,7 @@ impl Results {
 }
 
 /// What a run says about the metric that decides when a cell has seeds enough.
-fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
+pub(super) fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
     match value_of(outcome, metric).as_deref() {
         Some(Value::Bool(flag)) => Sample::Flag(*flag),
         Some(value) => value.as_f64().map_or(Sample::None, Sample::Number),

@@ -11,6 +11,7 @@ mod pictures;
 mod report;
 mod running;
 mod scenarios;
+mod seams;
 mod snapshots;
 mod studies;
 mod traffic;

@@ -36,6 +36,7 @@ fn manifest() -> Manifest {
             unit: String::new(),
             index: None,
             kind: None,
+            better: None,
         }],
         baseline: Some(0),
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
@@ -66,6 +67,7 @@ fn record(cell: usize, seed: u64) -> RunRecord {
             .cloned()
             .unwrap_or_default(),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     };
     RunRecord {
         cell,
