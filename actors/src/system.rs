@@ -115,7 +115,9 @@ pub trait Settings: Send + Sync {
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
 
-    /// Draws one of [`System::pictures`] from what a run recorded.
+    /// Draws one of [`System::pictures`] from what a run recorded. `setup` is what the run was built
+    /// from: what a system works out of its settings and links it works out in one place, for runs
+    /// and pictures alike.
     ///
     /// # Errors
     /// When the recording has not what the picture shows, or an option makes no sense.
@@ -124,7 +126,7 @@ pub trait Settings: Send + Sync {
         picture: &str,
         _run: &dyn Recording,
         _request: &PictureRequest,
-        _files: &mut Files,
+        _setup: &mut Setup<'_>,
     ) -> Result<crate::figure::Figure, PictureError> {
         Err(PictureError::Unknown {
             picture: picture.to_owned(),

@@ -15,7 +15,7 @@ mod spacetime;
 use farside::SimDuration;
 use farside_actors::figure::Figure;
 use farside_actors::system::{
-    Files, PictureError as Failure, PictureInfo, PictureOption, PictureRequest, Recording,
+    PictureError as Failure, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
 };
 use farside_worlds::VertexId;
 use thiserror::Error;
@@ -52,9 +52,9 @@ pub(crate) fn draw(
     picture: &str,
     run: &dyn Recording,
     request: &PictureRequest,
-    files: &mut Files,
+    setup: &mut Setup<'_>,
 ) -> Result<Figure, Failure> {
-    let site = ground::site(scenario, run.seeds().problem, files)?;
+    let site = ground::site(scenario, setup)?;
     let drawn = Drawn {
         site,
         tracks: Tracks::read(run).map_err(PictureError::from)?,

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use farside::SimDuration;
 use farside::encoding::Schema;
 use farside_logs::Log;
+use farside_network::NetworkConfig;
 use farside_network::messages::RoverState;
 
 use crate::common::{farside, json, text};
@@ -105,6 +107,35 @@ fn the_map_has_the_rovers_of_its_instant() {
         "expected auto, or vertices",
     );
     refused(&["corridor", "--along", "1,2,1"], "through vertex");
+}
+
+/// A cycle that is left to the links is as long in pictures as it was in the run.
+#[test]
+fn pictures_count_the_cycles_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let latency = SimDuration::from_secs(1);
+    let run = [
+        "run",
+        "--set",
+        "team.rovers=5",
+        "--set",
+        "links.default.latency=1s",
+        "--until",
+        "70s",
+        "--out",
+        "run.mcap",
+        "--json",
+    ];
+    let metrics = &json(&farside(folder.path(), &run))["metrics"];
+    let timing = NetworkConfig::default().timing(latency, None).unwrap();
+    let (cycle_s, whole) = (
+        timing.cycle.as_secs_f64(),
+        70.0 / timing.cycle.as_secs_f64(),
+    );
+    assert!(whole > 3.0 && whole < 4.0, "{cycle_s}");
+    assert_eq!(metrics["cycles"], 4, "{metrics}");
+    let map = drawn(folder.path(), &[]);
+    assert!(map.contains("Cycle 3."), "a cycle lasts {cycle_s} s");
 }
 
 /// The circle that a run reports and the one that its pictures name are the same.
