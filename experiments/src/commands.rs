@@ -69,6 +69,9 @@ pub(crate) enum CommandError {
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
+    /// A figure that is not to be had as this kind of file.
+    #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -103,6 +106,7 @@ impl CommandError {
             | CommandError::NotRepeatable { .. }
             | CommandError::NotDrawn { .. }
             | CommandError::InTheWay { .. }
+            | CommandError::Export(_)
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

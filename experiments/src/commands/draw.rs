@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 use farside::SimDuration;
 use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
@@ -16,9 +17,10 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::Exit;
-use super::output::{self, Format};
+use super::output;
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
+use crate::export::{self, Kind};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -31,7 +33,7 @@ pub(crate) struct Args {
     #[arg(value_name = "PICTURE")]
     picture: Option<String>,
     /// List the pictures that there are of this run, and what each takes
-    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "out"])]
+    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "out", "format"])]
     list: bool,
     /// The instant, or the end of a time span; the end of the run unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
@@ -42,9 +44,12 @@ pub(crate) struct Args {
     /// Along what it is drawn, as --list says
     #[arg(long, value_name = "WHAT")]
     along: Option<String>,
-    /// Where to write the picture; beside the log unless given
-    #[arg(long, value_name = "FILE.svg")]
+    /// Where to write the picture; beside the log unless given. It is SVG, or what the ending says
+    #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
+    /// What else it is written as, beside that
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    format: Vec<Kind>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -54,11 +59,19 @@ pub(crate) struct Args {
 #[derive(Serialize)]
 struct Document<'a> {
     out: String,
+    /// All that were written, `out` first.
+    files: Vec<String>,
     title: &'a str,
     description: &'a str,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let by_ending = |out: &PathBuf| {
+        let ending = out.extension()?.to_str()?;
+        Kind::from_str(ending, true).ok()
+    };
+    let first = args.out.as_ref().and_then(by_ending);
+    let kinds = export::kinds(first.unwrap_or(Kind::Svg), &args.format)?;
     let path = &args.log;
     let log = Log::open(path)?;
     let summary = farside_logs::info(path)?.run.unwrap_or_default();
@@ -74,10 +87,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         path: path.clone(),
         reason: error.to_string(),
     })?;
-    write(args, &figure)
+    write(args, &figure, &kinds)
 }
 
-fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
+/// Writes the first kind where it is to be, and the others beside it.
+fn write(args: &Args, figure: &Figure, kinds: &[Kind]) -> Result<Exit, CommandError> {
     let out = args.out.clone().unwrap_or_else(|| {
         let stem = args
             .log
@@ -87,15 +101,27 @@ fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
         args.log.with_file_name(name)
     });
     let inputs = std::slice::from_ref(&args.log);
-    let out = output::write(out, &figure.standalone(), Format::Svg, inputs)?;
+    let mut files = Vec::new();
+    for (index, kind) in kinds.iter().enumerate() {
+        let path = match index {
+            0 => out.clone(),
+            _ => out.with_extension(kind.ending()),
+        };
+        files.push(output::write_figure(path, figure, *kind, inputs)?);
+    }
     if args.json {
         print_json(&Document {
-            out,
+            out: files[0].clone(),
+            files,
             title: &figure.title,
             description: &figure.description,
         })?;
     } else {
-        print(format!("{out}: {}\n  {}", figure.title, figure.description))?;
+        let files = files.join(", ");
+        print(format!(
+            "{files}: {}\n  {}",
+            figure.title, figure.description
+        ))?;
     }
     Ok(Exit::Done)
 }

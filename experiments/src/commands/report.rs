@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::Exit;
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
+use crate::export::{self, Kind};
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
@@ -21,6 +22,9 @@ pub(crate) struct Args {
     /// Where to write the report, instead of into the results folder; needed with several
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// What plots are written as beside SVG, for papers and slides
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    format: Vec<Kind>,
     /// Print what was written where as JSON
     #[arg(long)]
     json: bool,
@@ -61,6 +65,7 @@ struct OfCell {
 }
 
 pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+    let kinds = export::kinds(Kind::Svg, &args.format)?;
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -82,7 +87,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
         .iter()
         .flat_map(|folder| Results::files(folder))
         .collect();
-    let document = write(&report, out, &inputs, &results)?;
+    let document = write(&report, out, &kinds, &inputs, &results)?;
     if args.json {
         print_json(&document)?;
     } else {
@@ -94,6 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
 fn write(
     report: &Report,
     out: &Path,
+    kinds: &[Kind],
     inputs: &[PathBuf],
     results: &Results,
 ) -> Result<Document, CommandError> {
@@ -121,8 +127,12 @@ fn write(
         })
     });
     let figures = report.figures.iter();
-    let plots: Result<Vec<String>, CommandError> = figures
-        .map(|figure| write(plots.join(&figure.file), &figure.standalone(), Format::Svg))
+    let files = figures.flat_map(|figure| kinds.iter().map(move |kind| (figure, *kind)));
+    let plots: Result<Vec<String>, CommandError> = files
+        .map(|(figure, kind)| {
+            let path = plots.join(&figure.file).with_extension(kind.ending());
+            output::write_figure(path, figure, kind, inputs)
+        })
         .collect();
     let failed = |run: &&RunRecord| {
         matches!(

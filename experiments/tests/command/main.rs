@@ -2,6 +2,7 @@
 
 mod common;
 mod contacts;
+mod ink;
 mod logs;
 mod outputs;
 mod pictures;

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use farside::SimDuration;
 use farside_actors::invariants::Place;
 use farside_worlds::{NodeId, VertexId};
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::Site;
 use super::colouring;
@@ -69,7 +69,6 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
     }
     let pairs = sheet.coordination(&rovers);
     let body = html! {
-        style { (PreEscaped(super::STYLE)) }
         text class="title" x=(Px(SIDE)) y="28" { (title) }
         text class="tick" x=(Px(SIDE)) y="50" { (says) }
         (sheet.ground())
@@ -89,6 +88,7 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         width: sheet.width + 2.0 * SIDE + LEGEND,
         height: (sheet.height + TOP + SIDE).max(TOP + 440.0),
         body,
+        style: super::STYLE,
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use farside::SimDuration;
 use farside_actors::invariants::Place;
 use farside_worlds::VertexId;
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::{Drawn, PictureError, VertexLine, colouring, corridor};
 use crate::tracks::Mark;
@@ -183,7 +183,6 @@ pub(super) fn figure(
     let locked = locked(run, &line, &waits, to_ns);
     let (title, says) = (diagram.title(), diagram.says(&visits, locked));
     let body = html! {
-        style { (PreEscaped(super::STYLE)) }
         text class="title" x="16" y="28" { (title) }
         text class="tick" x="16" y="50" { (says) }
         (diagram.legend())
@@ -199,6 +198,7 @@ pub(super) fn figure(
         width: area.left + area.width + 210.0,
         height: area.top + area.height + 66.0,
         body,
+        style: super::STYLE,
     })
 }
 
