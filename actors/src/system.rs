@@ -21,7 +21,7 @@ use farside::{Report, SimDuration, Simulation};
 use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 
-use crate::link::LinkConfigError;
+use crate::link::{Degrade, LinkConfigError};
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
@@ -160,6 +160,8 @@ pub struct Setup<'a> {
     /// Links follow it where `[links]` and `[[degrade]]` say nothing else: what one link has by all
     /// that is planned, [`Links::nominal`] says.
     pub contacts: Option<Arc<ContactPlan>>,
+    /// The scenario's `[[degrade]]` entries, for who shows them: links and processors have them.
+    pub degrades: Vec<Degrade>,
     links: Option<LinkBuilder>,
     remarks: Vec<String>,
 }
@@ -180,6 +182,7 @@ impl<'a> Setup<'a> {
             sim,
             files,
             contacts: links.plan().cloned(),
+            degrades: links.degrades().to_vec(),
             links: Some(links),
             remarks: Vec::new(),
         }

@@ -123,6 +123,24 @@ impl Area {
     }
 }
 
+/// The most that a line of an axis' label is wide, in pixels.
+const LABEL: f64 = 350.0;
+
+/// A label in a line, or in two where one is too narrow; what is too long for two is cut.
+fn in_two_lines(text: &str, width: f64) -> [String; 2] {
+    // Labels are bold, and wider for it.
+    let fits = |text: &str| 1.12 * text_width(text, TEXT) <= width;
+    if fits(text) {
+        return [text.to_owned(), String::new()];
+    }
+    let spaces = text.match_indices(' ').map(|(at, _)| at);
+    let cut = spaces.filter(|at| fits(&text[..*at])).last();
+    let Some(cut) = cut else {
+        return [shortened(text, 48), String::new()];
+    };
+    [text[..cut].to_owned(), shortened(text[cut..].trim(), 48)]
+}
+
 /// What is written along the axes.
 pub struct Frame<'a> {
     /// Where the marks go.
@@ -144,7 +162,11 @@ impl Frame<'_> {
         let bottom = area.y(0.0);
         let written = thinned(&self.x_ticks, area.width, TEXT);
         html! {
-            text class="label" x="8" y=(Px(area.top - 30.0)) { (self.y_label) }
+            @let [first, second] = in_two_lines(&self.y_label, LABEL);
+            text class="label" x="8" y=(Px(area.top - 30.0)) { (first) }
+            @if !second.is_empty() {
+                text class="label" x="8" y=(Px(area.top - 14.0)) { (second) }
+            }
             @for tick in &self.y_ticks {
                 @let y = area.y(tick.at);
                 path class="grid" d=(path([(area.left, y), (area.x(1.0), y)])) {}

@@ -33,7 +33,7 @@ pub(crate) struct Args {
     #[arg(value_name = "PICTURE")]
     picture: Option<String>,
     /// List the pictures that there are of this run, and what each takes
-    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "out", "format"])]
+    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "with", "out", "format"])]
     list: bool,
     /// The instant, or the end of a time span; the end of the run unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
@@ -44,6 +44,9 @@ pub(crate) struct Args {
     /// Along what it is drawn, as --list says
     #[arg(long, value_name = "WHAT")]
     along: Option<String>,
+    /// What it shows besides, as --list says
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    with: Vec<String>,
     /// Where to write the picture; beside the log unless given. It is SVG, or what the ending says
     #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
@@ -134,7 +137,7 @@ fn options(picture: &PictureInfo) -> Vec<String> {
 
 fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
     if args.json {
-        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture) });
+        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture), "extras": picture.extras.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect::<Vec<_>>() });
         print_json(&pictures.iter().map(entry).collect::<Vec<_>>())?;
         return Ok(Exit::Done);
     }
@@ -149,7 +152,10 @@ fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
             [] => String::new(),
             _ => format!("\n{:width$}  takes {}", "", options(picture).join(", ")),
         };
-        format!("{:width$}  {}{takes}", picture.name, picture.about)
+        let extra =
+            |(name, about): &(&str, &str)| format!("\n{:width$}  --with {name}: {about}", "");
+        let extras: String = picture.extras.iter().map(extra).collect();
+        format!("{:width$}  {}{takes}{extras}", picture.name, picture.about)
     };
     print(pictures.iter().map(line).collect::<Vec<_>>().join("\n"))?;
     Ok(Exit::Done)
@@ -185,6 +191,7 @@ fn draw(
         (PictureOption::At, args.at.is_some()),
         (PictureOption::From, args.from.is_some()),
         (PictureOption::Along, args.along.is_some()),
+        (PictureOption::With, !args.with.is_empty()),
     ];
     for (option, given) in given {
         if given && !picture.takes.contains(&option) {
@@ -196,10 +203,24 @@ fn draw(
             )));
         }
     }
+    let extras = || picture.extras.iter().map(|(name, _)| *name);
+    if let Some(wanted) = args
+        .with
+        .iter()
+        .find(|wanted| !extras().any(|name| name == *wanted))
+    {
+        let hint = did_you_mean(nearest(wanted, extras()).as_deref());
+        let known = extras().collect::<Vec<_>>().join(", ");
+        return Err(PictureError::NotDrawn(format!(
+            "--with {wanted:?}: the picture {:?} has no such extra{hint}; expected {known}",
+            picture.name
+        )));
+    }
     let request = PictureRequest {
         at: args.at,
         from: args.from,
         along: args.along.clone(),
+        with: args.with.clone(),
     };
     let seeds = scenario.seeds_of(log.seed(), None);
     scenario.draw(picture.name, &Logged { log, seeds }, &request)
@@ -234,6 +255,7 @@ impl Recording for Logged<'_> {
             visit(&Recorded {
                 time_ns: record.key.time_ns,
                 class: record.class,
+                actor: record.receiver,
                 kind: record.kind,
                 body: record.body,
             })?;

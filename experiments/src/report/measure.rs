@@ -9,7 +9,6 @@ use crate::study::summary::values::{ValueKind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
 use farside_actors::figure::numbers::plain;
 use farside_actors::figure::scale::Scale;
-use farside_actors::figure::svg::shortened;
 
 /// All there is to say of a study.
 pub(super) struct Study<'a> {
@@ -175,7 +174,7 @@ impl Measure<'_> {
     /// The same as a vertical axis says it.
     pub(super) fn axis_label(&self, y: &Scale) -> String {
         let log = if y.is_log() { ", log scale" } else { "" };
-        shortened(&format!("{}{log}", self.shown_label()), 50)
+        format!("{}{log}", self.shown_label())
     }
 
     /// A figure and its interval in a line: `1.42 (1.36 to 1.50)`.

@@ -114,6 +114,7 @@ impl OwnTable for Beacons {
         name: "calls",
         about: "when calls were heard",
         takes: &[],
+        extras: &[],
     }];
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
