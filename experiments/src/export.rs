@@ -16,7 +16,7 @@ use thiserror::Error;
 /// What a figure is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Kind {
-    /// As it is drawn: for browsers and the web
+    /// As it is drawn: for browsers and the web.
     Svg,
     /// For papers: vectors, with the fonts in it
     Pdf,

@@ -50,8 +50,13 @@ pub(crate) struct Args {
     /// Where to write the picture; beside the log unless given. It is SVG, or what the ending says
     #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
-    /// What else it is written as, beside that
-    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    /// What else it is written as, beside that: svg, pdf for papers, png for slides
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
     format: Vec<Kind>,
     /// Print JSON
     #[arg(long)]

@@ -22,8 +22,13 @@ pub(crate) struct Args {
     /// Where to write the report, instead of into the results folder; needed with several
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// What plots are written as beside SVG, for papers and slides
-    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    /// What plots are written as beside SVG: pdf for papers, png for slides
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
     format: Vec<Kind>,
     /// Print what was written where as JSON
     #[arg(long)]

@@ -80,7 +80,8 @@ pub(super) enum Found {
     Nothing,
     /// Results of the same study.
     Same,
-    /// Results of the same study, with fewer seeds or beside other published figures.
+    /// Results of the same study, with fewer seeds, beside other published figures or
+    /// plotted otherwise.
     Earlier,
 }
 
@@ -112,10 +113,12 @@ impl Store {
         if there == *manifest {
             return Ok(Found::Same);
         }
-        // What others published decides nothing about the runs, and is often written after them.
+        // What others published and how it is plotted decide nothing about the runs, and are often
+        // written after them.
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
             published: manifest.published.clone(),
+            report: manifest.report.clone(),
             ..there.clone()
         };
         if extended == *manifest && manifest.seeds.starts_with(&there.seeds) {

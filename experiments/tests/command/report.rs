@@ -44,6 +44,7 @@ fn manifest() -> Manifest {
         block: 1,
         stop: None,
         published: Vec::new(),
+        report: Default::default(),
     }
 }
 
