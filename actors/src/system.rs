@@ -23,7 +23,7 @@ use farside::{Report, SimDuration, Simulation};
 use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 
-use crate::link::LinkConfigError;
+use crate::link::{Degrade, LinkConfigError};
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
@@ -119,7 +119,9 @@ pub trait Settings: Send + Sync {
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
 
-    /// Draws one of [`System::pictures`] from what a run recorded.
+    /// Draws one of [`System::pictures`] from what a run recorded. `setup` is what the run was built
+    /// from: what a system works out of its settings and links it works out in one place, for runs
+    /// and pictures alike.
     ///
     /// # Errors
     /// When the recording has not what the picture shows, or an option makes no sense.
@@ -128,7 +130,7 @@ pub trait Settings: Send + Sync {
         picture: &str,
         _run: &dyn Recording,
         _request: &PictureRequest,
-        _files: &mut Files,
+        _setup: &mut Setup<'_>,
     ) -> Result<crate::figure::Figure, PictureError> {
         Err(PictureError::Unknown {
             picture: picture.to_owned(),
@@ -162,6 +164,8 @@ pub struct Setup<'a> {
     /// Links follow it where `[links]` and `[[degrade]]` say nothing else: what one link has by all
     /// that is planned, [`Links::nominal`] says.
     pub contacts: Option<Arc<ContactPlan>>,
+    /// The scenario's `[[degrade]]` entries, for who shows them: links and processors have them.
+    pub degrades: Vec<Degrade>,
     links: Option<LinkBuilder>,
     remarks: Vec<String>,
 }
@@ -182,6 +186,7 @@ impl<'a> Setup<'a> {
             sim,
             files,
             contacts: links.plan().cloned(),
+            degrades: links.degrades().to_vec(),
             links: Some(links),
             remarks: Vec::new(),
         }

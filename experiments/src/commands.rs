@@ -79,6 +79,9 @@ pub(crate) enum CommandError {
         wanted: &'static str,
         advice: String,
     },
+    /// A figure that is not to be had as this kind of file.
+    #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -120,6 +123,7 @@ impl CommandError {
             | CommandError::NotDrawn { .. }
             | CommandError::InTheWay { .. }
             | CommandError::OtherKind { .. }
+            | CommandError::Export(_)
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

@@ -52,7 +52,7 @@ pub struct Report {
 /// #     question: "Does it <b>escape</b>?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
 /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1],
-/// #     block: 1, stop: None, published: vec![] };
+/// #     block: 1, stop: None, published: vec![], report: Default::default() };
 /// # let results = Results { manifest, runs: vec![] };
 /// let report = farside_experiments::report::build(&results, "runs");
 /// assert!(report.page.contains("Does it &lt;b&gt;escape&lt;/b&gt;?"));

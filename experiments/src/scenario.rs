@@ -144,6 +144,13 @@ pub struct Assembled {
     pub planned: Planned,
 }
 
+/// The links of a scenario, before hosts are known, and what was read for them.
+struct DeclaredLinks {
+    links: LinkBuilder,
+    contacts: Option<LinkContacts>,
+    notes: Vec<String>,
+}
+
 impl Scenario {
     /// Reads a built-in scenario or a file, with `--set` arguments laid over it.
     ///
@@ -305,28 +312,13 @@ impl Scenario {
         let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
         let mut sim = Simulation::new(seed);
         sim.tie_seed(self.shared.tie_seed);
-        let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
-            .map_err(|error| wrong(error.into()))?;
-        links.until(self.shared.until);
-        let radios = links.radios(&self.shared.radios);
-        radios.map_err(|error| wrong(error.into()))?;
-        for (host, [x, y, z]) in &self.shared.places {
-            links.place(host, Point3::new(x.0, y.0, z.0));
-        }
         let mut files = self.files.clone();
-        let contacts = self.shared.contacts.as_ref();
-        let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
-        let contacts = contacts.transpose().map_err(wrong)?;
-        if let Some(contacts) = &contacts {
-            links.set_plan(contacts.plan().clone());
-        }
-        let mut notes = Vec::new();
-        let traces = links.read_traces(|name| {
-            let trace = contacts::read_trace(name, &mut files)?;
-            notes.push(format!("trace {name:?}: {trace}"));
-            Ok(trace)
-        });
-        traces.map_err(|error| wrong(error.into()))?;
+        let declared = self.links(&mut files).map_err(wrong)?;
+        let DeclaredLinks {
+            links,
+            contacts,
+            mut notes,
+        } = declared;
         let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
         let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
@@ -368,6 +360,33 @@ impl Scenario {
         })
     }
 
+    /// The links as the scenario has them, before hosts are known.
+    fn links(&self, files: &mut Files) -> Result<DeclaredLinks, SetupError> {
+        let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)?;
+        links.until(self.shared.until);
+        links.radios(&self.shared.radios)?;
+        for (host, [x, y, z]) in &self.shared.places {
+            links.place(host, Point3::new(x.0, y.0, z.0));
+        }
+        let contacts = self.shared.contacts.as_ref();
+        let contacts = contacts.map(|config| LinkContacts::read(config, files));
+        let contacts = contacts.transpose()?;
+        if let Some(contacts) = &contacts {
+            links.set_plan(contacts.plan().clone());
+        }
+        let mut notes = Vec::new();
+        links.read_traces(|name| {
+            let trace = contacts::read_trace(name, files)?;
+            notes.push(format!("trace {name:?}: {trace}"));
+            Ok(trace)
+        })?;
+        Ok(DeclaredLinks {
+            links,
+            contacts,
+            notes,
+        })
+    }
+
     /// What is planned for instants of the run, but for crashes.
     fn planned(&self, sim: &Simulation, contacts: Option<&LinkContacts>) -> Planned {
         let mut planned = Planned::new(self.shared.until);
@@ -390,8 +409,11 @@ impl Scenario {
         run: &dyn Recording,
         request: &PictureRequest,
     ) -> Result<Figure, PictureError> {
-        let mut files = self.files.clone();
-        self.settings.draw(picture, run, request, &mut files)
+        let (seeds, mut files) = (run.seeds(), self.files.clone());
+        let links = self.links(&mut files)?.links;
+        let mut sim = Simulation::new(seeds.run);
+        let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
+        self.settings.draw(picture, run, request, &mut setup)
     }
 
     /// Whether a run ended because its time was over.

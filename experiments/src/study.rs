@@ -37,6 +37,18 @@
 //! ]
 //! ```
 //!
+//! # Plots
+//!
+//! Plots have the first factor of numbers along x, a curve for each value of the next factor, and a
+//! plot for each value of further ones. A study may say otherwise, by the factors' names.
+//!
+//! ```toml
+//! [report]
+//! x = "loss"
+//! series = "policy"
+//! facet = "latency"
+//! ```
+//!
 //! # Blocks
 //!
 //! Seeds may share a problem: `seeds = 30` and `block = 5` give six problems of five runs each.

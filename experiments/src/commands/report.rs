@@ -6,9 +6,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds;
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
+use crate::export::{self, Kind};
 use crate::registry::Registry;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
@@ -23,6 +24,14 @@ pub(crate) struct Args {
     /// Where to write the report, instead of into the results folder; needed with several
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// What plots are written as beside SVG: pdf for papers, png for slides
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
+    format: Vec<Kind>,
     /// Print what was written where as JSON
     #[arg(long)]
     json: bool,
@@ -65,6 +74,7 @@ struct OfCell {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let kinds = export::kinds(Kind::Svg, &args.format)?;
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -77,7 +87,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         }
     };
     for folder in &args.folders {
-        kinds::expect(Kind::Results, folder, registry)?;
+        kinds::expect(kinds::Kind::Results, folder, registry)?;
     }
     let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
     let Some(results) = Results::merge(parts?)? else {
@@ -89,7 +99,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         .iter()
         .flat_map(|folder| Results::files(folder))
         .collect();
-    let document = write(&report, out, &inputs, &results)?;
+    let document = write(&report, out, &kinds, &inputs, &results)?;
     if args.json {
         print_json(&document)?;
     } else {
@@ -101,6 +111,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 fn write(
     report: &Report,
     out: &Path,
+    kinds: &[Kind],
     inputs: &[PathBuf],
     results: &Results,
 ) -> Result<Document, CommandError> {
@@ -129,8 +140,12 @@ fn write(
         })
     });
     let figures = report.figures.iter();
-    let plots: Result<Vec<String>, CommandError> = figures
-        .map(|figure| write(plots.join(&figure.file), &figure.standalone(), Format::Svg))
+    let files = figures.flat_map(|figure| kinds.iter().map(move |kind| (figure, *kind)));
+    let plots: Result<Vec<String>, CommandError> = files
+        .map(|(figure, kind)| {
+            let path = plots.join(&figure.file).with_extension(kind.ending());
+            output::write_figure(path, figure, kind, inputs)
+        })
         .collect();
     let failed = |run: &&RunRecord| {
         matches!(

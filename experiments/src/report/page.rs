@@ -127,7 +127,10 @@ fn metric_section(
                 (tables::overall(study, measure))
                 @if measure.kind == ValueKind::Series { (series::told(study, measure)) }
                 @if !plots.figures.is_empty() {
-                    div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
+                    @let label = &measure.metric.label;
+                    div class="figures" {
+                        @for figure in &plots.figures { (placed(figure, label)) }
+                    }
                 }
                 @for note in &plots.notes { p class="note" { (note) } }
                 (notices::beside(notices))
@@ -156,7 +159,7 @@ fn losses_section(study: &Study<'_>, figure: &Figure) -> Markup {
                  all copies in the runs of a cell together; what was under way when a run ended \
                  counts as not lost."
             }
-            div class="figures" { (placed(figure)) }
+            div class="figures" { (placed(figure, &figure.title)) }
         }
     }
 }
@@ -170,17 +173,20 @@ fn capital(label: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-/// A figure in the page. What is wider than a column or higher than a screen scrolls by itself.
-fn placed(figure: &Figure) -> Markup {
+/// A figure in the page, below a heading that says what its title begins with: its caption has the
+/// rest. What is wider than a column or higher than a screen scrolls by itself.
+fn placed(figure: &Figure, heading: &str) -> Markup {
     let class = match figure {
         Figure { width, .. } if *width > plots::WIDTH + 1.0 => "wide",
         Figure { height, .. } if *height > 900.0 => "tall",
         _ => "",
     };
+    let rest = figure.title.strip_prefix(heading).unwrap_or(&figure.title);
+    let rest = rest.trim_start_matches([',', ' ']);
     html! {
         figure class=[(!class.is_empty()).then_some(class)]
             tabindex=[(!class.is_empty()).then_some("0")] {
-            figcaption { (capital(&figure.title)) }
+            figcaption { (capital(rest)) }
             (figure.inline())
         }
     }

@@ -131,6 +131,7 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
             block: 1,
             stop: None,
             published: Vec::new(),
+            report: Default::default(),
             factors,
         },
         runs,

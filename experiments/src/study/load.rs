@@ -41,7 +41,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     block: 1, stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![], report: Default::default() };
     /// let failed = || RunOutcome::Failed { error: "x".into() };
     /// let run = |seed| RunRecord { cell: 0, seed, outcome: failed() };
     /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
@@ -355,6 +355,7 @@ pub(super) fn difference(a: &Manifest, b: &Manifest) -> String {
         ("the blocks of seeds", a.block != b.block),
         ("the stopping rule", a.stop != b.stop),
         ("the published figures", a.published != b.published),
+        ("what plots put where", a.report != b.report),
     ];
     for (what, differs) in parts {
         if differs {

@@ -160,6 +160,7 @@ impl Study {
         let block = super::blocks::block(&self.file, &self.factors, seeds.len(), &blame)?;
         let baseline = self.baseline(&blame)?;
         let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
+        self.check_axes(&blame)?;
         super::blocks::check_problem(&base, block, &blame)?;
         let scenario_text = base.resolved()?;
         let Built {
@@ -183,6 +184,7 @@ impl Study {
             block,
             stop,
             published,
+            report: self.file.report,
         };
         super::load::check_names(&manifest).map_err(StudyError::Argument)?;
         Ok(StudyPlan {
@@ -303,6 +305,24 @@ impl Study {
         found
             .map(Some)
             .map_err(|message| blame.invalid("baseline", message))
+    }
+
+    /// Checks what plots are to put where: factors, each in one place.
+    fn check_axes(&self, blame: &Blame<'_>) -> Result<(), ScenarioError> {
+        let factors = self.factors.iter().map(|plan| plan.factor.name.as_str());
+        let factors: Vec<&str> = factors.collect();
+        let said: Vec<(&str, &str)> = self.file.report.said().collect();
+        for (index, (key, name)) in said.iter().enumerate() {
+            let place = format!("report.{key}");
+            if !factors.contains(name) {
+                return Err(blame.unknown(&place, name, &factors));
+            }
+            if let Some((other, _)) = said[..index].iter().find(|(_, taken)| taken == name) {
+                let message = format!("{name:?} is {other} already: expected another factor");
+                return Err(blame.invalid(&place, message));
+            }
+        }
+        Ok(())
     }
 
     /// Refuses arguments that would have no effect.

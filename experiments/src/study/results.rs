@@ -49,6 +49,42 @@ pub struct Manifest {
     /// are kept when these change.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub published: Vec<Published>,
+    /// Which factors plots put where. It says nothing about what is run: a folder's runs are kept
+    /// when it changes.
+    #[serde(default, skip_serializing_if = "PlotAxes::is_open")]
+    pub report: PlotAxes,
+}
+
+/// Which factor plots put where, each by its name; what is left open follows from the factors.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlotAxes {
+    /// Along the horizontal axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<String>,
+    /// A curve for each of its values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<String>,
+    /// A plot for each of its values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facet: Option<String>,
+}
+
+impl PlotAxes {
+    /// What is said, by key.
+    pub fn said(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let all = [
+            ("x", &self.x),
+            ("series", &self.series),
+            ("facet", &self.facet),
+        ];
+        all.into_iter()
+            .filter_map(|(key, name)| Some((key, name.as_deref()?)))
+    }
+
+    fn is_open(&self) -> bool {
+        *self == PlotAxes::default()
+    }
 }
 
 fn one() -> usize {

@@ -507,7 +507,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     block: 1, stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![], report: Default::default() };
     /// let results = Results { manifest, runs: Vec::new() }; // one cell, two seeds
     /// assert_eq!(results.missing(), 2);
     /// ```

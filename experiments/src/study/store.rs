@@ -95,7 +95,8 @@ pub(super) enum Found {
     Nothing,
     /// Results of the same study.
     Same,
-    /// Results of the same study, with fewer seeds or beside other published figures.
+    /// Results of the same study, with fewer seeds, beside other published figures or
+    /// plotted otherwise.
     Earlier,
 }
 
@@ -127,8 +128,9 @@ impl Store {
         if there == *manifest {
             return Ok(Found::Same);
         }
-        // What others published decides nothing about the runs, and is often written after them.
-        // Nor does which way a metric is better, which older versions did not write.
+        // What others published and how it is plotted decide nothing about the runs, and are often
+        // written after them. Nor does which way a metric is better, which older versions did not
+        // write.
         let mut metrics = there.metrics.clone();
         for (metric, ours) in metrics.iter_mut().zip(&manifest.metrics) {
             metric.better = ours.better;
@@ -136,6 +138,7 @@ impl Store {
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
             published: manifest.published.clone(),
+            report: manifest.report.clone(),
             metrics,
             ..there.clone()
         };

@@ -319,7 +319,7 @@ pub struct OverallSummary {
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],
 /// #     baseline: None, cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }],
-/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![] };
+/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![], report: Default::default() };
 /// # let run = |seed: u64| RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
 /// #     timed_out: false, events: 1, messages: MessageCounts::default(),

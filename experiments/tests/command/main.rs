@@ -4,6 +4,7 @@ mod cluster;
 mod common;
 mod contacts;
 mod guide;
+mod ink;
 mod layouts;
 mod logs;
 mod outputs;

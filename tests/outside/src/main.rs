@@ -103,6 +103,7 @@ impl OwnTable for Beacons {
         name: "calls",
         about: "when calls were heard",
         takes: &[],
+        extras: &[],
     }];
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
@@ -164,6 +165,7 @@ impl OwnTable for Beacons {
             width: 400.0,
             height: 200.0,
             body: maud::html! { path class="axis" d=(svg::path(points)) {} },
+            style: "",
         })
     }
 }
