@@ -171,5 +171,6 @@ impl OwnTable for Beacons {
 }
 
 fn main() -> std::process::ExitCode {
-    cli::main(Registry::empty().with(Beacons::system()))
+    let registry = Registry::empty().with(Beacons::system());
+    cli::main(registry.named("beacons", env!("CARGO_PKG_VERSION")))
 }
