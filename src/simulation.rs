@@ -401,6 +401,38 @@ impl Simulation {
         Ok(())
     }
 
+    /// What actors are to be told, in order of declaration: when, who, and the message's type as
+    /// Rust names it.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// # struct Rover;
+    /// # impl Actor for Rover { type Accepts = (Goal,); }
+    /// # impl Handler<Goal> for Rover {
+    /// #     fn handle(&mut self, _: Goal, _: &mut Context<'_, Self>) -> Outcome { Ok(()) }
+    /// # }
+    /// #[derive(serde::Serialize, serde::Deserialize)]
+    /// struct Goal;
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// let rover = sim.actor(host, "rover_01", |_| Rover);
+    /// sim.tell_at(SimTime::from_secs(60), rover, Goal);
+    /// let (at, actor, kind) = sim.tells().next().unwrap();
+    /// assert_eq!((at, actor), (SimTime::from_secs(60), "rover_01"));
+    /// assert!(kind.ends_with("Goal"));
+    /// ```
+    pub fn tells(&self) -> impl Iterator<Item = (SimTime, &str, &'static str)> {
+        self.controls.iter().filter_map(|control| {
+            let (Some(Target::Actor(actor)), Planned::Tell(kind, _)) =
+                (&control.target, &control.what)
+            else {
+                return None;
+            };
+            let name = &self.actors[*actor as usize].name;
+            Some((control.time, name.as_str(), kind.type_name))
+        })
+    }
+
     /// The actor of this name, whatever its type, as one that accepts `M`. In a handler, ask
     /// [`Context::recipient`](crate::Context::recipient).
     ///

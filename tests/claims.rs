@@ -119,6 +119,75 @@ fn every_policy_that_the_table_of_readme_has_can_be_run() {
     assert_eq!(names, policies.len(), "{known}");
 }
 
+#[test]
+fn the_roadmap_of_readme_is_one() {
+    let readme = read("README.md");
+    let text = readme.split("name = \"pass\"").nth(1).expect("the listing");
+    let text = text.split("```").next().expect("its end");
+    let file = format!("name = \"pass\" {text}");
+    let map = farside_worlds::Roadmap::from_toml(&file).expect("it is a roadmap");
+    assert_eq!((map.name(), map.len(), map.edge_count()), ("pass", 4, 3));
+}
+
+/// A figure in a sentence about a scenario is one that the scenario has: "50 rovers", "28 sensor
+/// nodes".
+#[test]
+fn figures_in_descriptions_of_scenarios_are_theirs() {
+    let registry = Registry::builtin();
+    let mut checked = 0;
+    for name in registry.scenario_names() {
+        let scenario = Scenario::open(name, &[], &registry).expect("it is built in");
+        let about = scenario.shared().description.clone();
+        let resolved: toml::Table = scenario
+            .resolved()
+            .expect("it can be written")
+            .parse()
+            .unwrap();
+        let count = |table: &str, key: &str| resolved.get(table)?.get(key)?.as_integer();
+        for (what, found) in [
+            (" rovers", count("team", "rovers")),
+            (" nodes", count("world", "nodes")),
+            (" sensor nodes", count("world", "nodes")),
+        ] {
+            for part in about
+                .split(what)
+                .collect::<Vec<_>>()
+                .split_last()
+                .expect("a part")
+                .1
+            {
+                let number = part.rsplit(' ').next().unwrap_or_default();
+                let (Ok(number), Some(found)) = (number.parse::<i64>(), found) else {
+                    continue;
+                };
+                assert_eq!(number, found, "{name}: {about}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 6, "{checked}");
+}
+
+/// Results rot; what a study says of itself may name keys, and figures of the paper, but none of a
+/// run.
+#[test]
+fn studies_of_degradation_state_no_result_in_figures() {
+    for study in Registry::builtin().studies() {
+        if !study.name.starts_with("degradation/") {
+            continue;
+        }
+        let comments = study.text.lines().filter(|line| line.starts_with('#'));
+        for line in comments {
+            let bare = line.replace("failover_after=3", "");
+            assert!(
+                !bare.contains(|c: char| c.is_ascii_digit()),
+                "{}: {line}",
+                study.name
+            );
+        }
+    }
+}
+
 /// The field's words took the place of these; the CHANGELOG alone still lists them.
 #[test]
 fn words_that_the_field_does_not_use_are_gone() {

@@ -6,6 +6,7 @@
 pub mod colours;
 pub mod numbers;
 pub mod scale;
+mod style;
 pub mod svg;
 
 pub use svg::Figure;

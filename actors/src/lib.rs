@@ -4,6 +4,7 @@
 pub mod figure;
 pub mod invariants;
 pub mod link;
+pub mod prelude;
 pub mod processor;
 pub mod radio;
 pub mod system;

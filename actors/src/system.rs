@@ -5,8 +5,10 @@
 //! What this is not: the list of systems that a program knows, which is the program's.
 
 mod builtin;
+mod documented;
 mod error;
 mod files;
+mod gathered;
 mod metric;
 mod own_table;
 mod picture;
@@ -21,12 +23,14 @@ use farside::{Report, SimDuration, Simulation};
 use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 
-use crate::link::LinkConfigError;
+use crate::link::{Degrade, LinkConfigError};
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
 pub use builtin::Builtin;
+pub use documented::{parted, with_about};
 pub use error::SetupError;
 pub use files::{Files, no_file};
+pub use gathered::Gathered;
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};
 pub use own_table::OwnTable;
 pub use picture::{
@@ -115,7 +119,9 @@ pub trait Settings: Send + Sync {
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
 
-    /// Draws one of [`System::pictures`] from what a run recorded.
+    /// Draws one of [`System::pictures`] from what a run recorded. `setup` is what the run was built
+    /// from: what a system works out of its settings and links it works out in one place, for runs
+    /// and pictures alike.
     ///
     /// # Errors
     /// When the recording has not what the picture shows, or an option makes no sense.
@@ -124,7 +130,7 @@ pub trait Settings: Send + Sync {
         picture: &str,
         _run: &dyn Recording,
         _request: &PictureRequest,
-        _files: &mut Files,
+        _setup: &mut Setup<'_>,
     ) -> Result<crate::figure::Figure, PictureError> {
         Err(PictureError::Unknown {
             picture: picture.to_owned(),
@@ -158,6 +164,8 @@ pub struct Setup<'a> {
     /// Links follow it where `[links]` and `[[degrade]]` say nothing else: what one link has by all
     /// that is planned, [`Links::nominal`] says.
     pub contacts: Option<Arc<ContactPlan>>,
+    /// The scenario's `[[degrade]]` entries, for who shows them: links and processors have them.
+    pub degrades: Vec<Degrade>,
     links: Option<LinkBuilder>,
     remarks: Vec<String>,
 }
@@ -178,6 +186,7 @@ impl<'a> Setup<'a> {
             sim,
             files,
             contacts: links.plan().cloned(),
+            degrades: links.degrades().to_vec(),
             links: Some(links),
             remarks: Vec::new(),
         }
@@ -236,6 +245,10 @@ pub struct Assembly {
     pub scene: Option<Box<dyn Scene>>,
     /// What people may want to know of the world that is built, a line at a time.
     pub notes: Vec<String>,
+    /// What begins at an instant of the run, by the key of the scenario that says so. Who reads the
+    /// results is told if the run ends before. Crashes, degradations, contacts and what actors are
+    /// told are known without.
+    pub planned: Vec<(String, SimDuration)>,
 }
 
 impl Assembly {
@@ -246,7 +259,15 @@ impl Assembly {
             goal: None,
             scene: None,
             notes: Vec::new(),
+            planned: Vec::new(),
         }
+    }
+
+    /// With something that begins at an instant of the run, and the key that says so.
+    #[must_use]
+    pub fn with_planned(mut self, key: impl Into<String>, at: SimDuration) -> Self {
+        self.planned.push((key.into(), at));
+        self
     }
 
     /// With a goal to count towards.

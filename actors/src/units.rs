@@ -62,6 +62,39 @@ pub use with::{
     duration, energy_j, fraction, length_m, power_w, signed_energy_j, speed_m_per_s, temperature_k,
 };
 
+/// What the module of that name reads, and in which units: `duration`, `length_m`. None if there is
+/// no such module.
+///
+/// ```
+/// let (expected, units) = farside_actors::units::described("power_w").unwrap();
+/// assert_eq!(expected, "a power such as \"100mW\" or \"12W\"");
+/// assert_eq!(units, ["uW", "mW", "W", "kW"]);
+/// ```
+pub fn described(module: &str) -> Option<(&'static str, Vec<&'static str>)> {
+    let quantity = match module {
+        "duration" => &DURATION,
+        "length_m" => &LENGTH,
+        "speed_m_per_s" => &SPEED,
+        "acceleration_m_per_s2" => &ACCELERATION,
+        "angle_rad" => &ANGLE,
+        "fraction" => &FRACTION,
+        "data_rate_bit_per_s" => &DATA_RATE,
+        "data_size_bytes" => &DATA_BYTES,
+        "data_size_bits" => &DATA_BITS,
+        "energy_j" | "signed_energy_j" => &ENERGY,
+        "power_w" => &POWER,
+        "temperature_k" => &TEMPERATURE,
+        "rate_per_s" => &RATE,
+        _ => return None,
+    };
+    let units = quantity.units.iter().map(|unit| unit.symbol);
+    let expected = match module {
+        "fraction" => "a fraction from 0 to 1, such as 0.3 or \"30%\"",
+        _ => quantity.expected,
+    };
+    Some((expected, units.filter(|unit| !unit.is_empty()).collect()))
+}
+
 /// A text is not the quantity that was expected.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum UnitError {

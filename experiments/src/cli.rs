@@ -1,9 +1,10 @@
 //! The command line: arguments, exit codes, and who handles what.
 
+use std::ffi::OsStr;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -82,7 +83,8 @@ enum Command {
 /// The command line of a binary that knows these systems.
 pub fn main(registry: Registry) -> ExitCode {
     // On wrong usage clap prints what is wrong and exits with 2, as we do.
-    let cli = Cli::parse();
+    let matches = command_line(&registry).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     say_on_stderr(cli.verbose);
     match dispatch(cli.command, &registry) {
         Ok(exit) => exit.into(),
@@ -91,17 +93,74 @@ pub fn main(registry: Registry) -> ExitCode {
             Exit::Done.into()
         }
         Err(error) => {
-            let red = std::io::stderr().is_terminal();
-            let label = if red {
+            let label = if in_colour() {
                 "\x1b[1;31merror\x1b[0m"
             } else {
                 "error"
             };
             let _ = write!(std::io::stderr(), "{label}: ");
-            complain(&error);
+            complain(told_of(&error.to_string(), registry.program()));
             error.exit().into()
         }
     }
+}
+
+/// The command line, under the name and with the version of the binary.
+fn command_line(registry: &Registry) -> clap::Command {
+    let command = Cli::command();
+    let name = registry.program();
+    if name == command.get_name() {
+        return command;
+    }
+    let version = registry.version();
+    // What stands behind the name.
+    let version = version.strip_prefix(name).unwrap_or(&version).trim();
+    // Clap keeps what is there for the whole program.
+    let version: &'static str = Box::leak(version.to_owned().into_boxed_str());
+    let command = command.name(name).version(version);
+    renamed(command, name)
+}
+
+/// The same with another name in place of Farside's in all that help says.
+fn renamed(command: clap::Command, name: &'static str) -> clap::Command {
+    let own = |text: &clap::builder::StyledStr| told_of(&text.to_string(), name);
+    let about = command.get_about().map(own);
+    let after = command.get_after_help().map(own);
+    let command = command
+        .mut_args(|arg| match arg.get_help().map(own) {
+            Some(help) => arg.help(help),
+            None => arg,
+        })
+        .mut_subcommands(|below| renamed(below, name));
+    let command = match about {
+        Some(about) => command.about(about),
+        None => command,
+    };
+    match after {
+        Some(after) => command.after_help(after),
+        None => command,
+    }
+}
+
+/// A text whose commands are those of the binary of this name.
+fn told_of(text: &str, name: &str) -> String {
+    text.replace("`farside ", &format!("`{name} "))
+        .replace("  farside ", &format!("  {name} "))
+}
+
+/// Whether what is said on stderr is in colour.
+fn in_colour() -> bool {
+    shows_colour(
+        std::io::stderr().is_terminal(),
+        std::env::var_os("NO_COLOR").as_deref(),
+        std::env::var_os("TERM").as_deref(),
+    )
+}
+
+/// As <https://no-color.org> has it: on a terminal that can, unless `NO_COLOR` is there and not
+/// empty.
+fn shows_colour(is_terminal: bool, no_color: Option<&OsStr>, term: Option<&OsStr>) -> bool {
+    is_terminal && no_color.is_none_or(OsStr::is_empty) && term.is_none_or(|term| term != "dumb")
 }
 
 fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError> {
@@ -110,18 +169,19 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Check(args) => check::run(&args, registry),
         Command::Scenarios(args) => builtin::scenarios(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
-        Command::Info(args) => info::run(&args),
+        Command::Info(args) => info::run(&args, registry),
         Command::Verify(args) => verify::run(&args, registry),
-        Command::Diff(args) => diff::run(&args),
+        Command::Diff(args) => diff::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),
         Command::Reproduce(args) => reproduce::run(&args, registry),
-        Command::Report(args) => report::run(&args),
-        Command::Recover(args) => recover::run(&args),
+        Command::Report(args) => report::run(&args, registry),
+        Command::Recover(args) => recover::run(&args, registry),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "farside", &mut script);
+            let name = registry.program();
+            clap_complete::generate(shell, &mut command_line(registry), name, &mut script);
             crate::commands::print_bytes(&script)?;
             Ok(Exit::Done)
         }
@@ -160,7 +220,9 @@ fn say_on_stderr(verbose: u8) {
     });
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(in_colour())
+        // Which module says it is of use to who looks for more than warnings.
+        .with_target(verbose > 0)
         .without_time();
     tracing_subscriber::registry()
         .with(layer)
@@ -175,5 +237,46 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+        let cave = Registry::builtin().named("cave", "3.1.4");
+        command_line(&cave).debug_assert();
+    }
+
+    #[test]
+    fn the_table_of_readme_has_every_command() {
+        let readme = include_str!("../../README.md");
+        let table = readme.split("| command | what it does |").nth(1);
+        let table = table.and_then(|rest| rest.split("\n\n").next()).unwrap();
+        let named: Vec<&str> = table.split('`').skip(1).step_by(2).collect();
+        for command in Cli::command().get_subcommands() {
+            let name = command.get_name();
+            let is_named = |text: &&str| text.split(' ').next() == Some(name);
+            assert!(named.iter().any(is_named), "README's table lacks {name}");
+        }
+    }
+
+    #[test]
+    fn a_binary_of_ones_own_has_its_own_name_and_version() {
+        let mut cave = command_line(&Registry::builtin().named("cave", "3.1.4"));
+        let version = cave.render_version();
+        assert!(version.starts_with("cave 3.1.4 (farside "), "{version}");
+        let help = cave.render_long_help().to_string();
+        assert!(help.contains("  cave verify run.mcap"), "{help}");
+        let mut subcommands = cave.get_subcommands_mut();
+        let run = subcommands.find(|one| one.get_name() == "run").unwrap();
+        let help = run.render_long_help().to_string();
+        assert!(
+            help.contains("`cave scenarios`") && !help.contains("farside"),
+            "{help}"
+        );
+    }
+
+    #[test]
+    fn colour_is_for_terminals_that_want_it() {
+        let some = |text: &'static str| Some(OsStr::new(text));
+        assert!(shows_colour(true, None, some("xterm")));
+        assert!(shows_colour(true, some(""), None));
+        assert!(!shows_colour(true, some("1"), some("xterm")));
+        assert!(!shows_colour(true, None, some("dumb")));
+        assert!(!shows_colour(false, None, some("xterm")));
     }
 }

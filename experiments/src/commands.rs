@@ -2,11 +2,13 @@
 
 pub(crate) mod builtin;
 pub(crate) mod check;
+mod describe;
 pub(crate) mod diff;
 pub(crate) mod draw;
 pub(crate) mod explain;
 pub(crate) mod info;
 mod interrupt;
+mod kinds;
 mod output;
 mod progress;
 pub(crate) mod recover;
@@ -69,6 +71,17 @@ pub(crate) enum CommandError {
     /// The simulation could not start.
     #[error("the run could not start: {0}")]
     Build(#[from] BuildError),
+    /// Something that another command takes.
+    #[error("{given}: is {found}, and {wanted} is expected here\n  {advice}")]
+    OtherKind {
+        given: String,
+        found: &'static str,
+        wanted: &'static str,
+        advice: String,
+    },
+    /// A figure that is not to be had as this kind of file.
+    #[error(transparent)]
+    Export(#[from] crate::export::ExportError),
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -93,9 +106,15 @@ impl CommandError {
     /// The exit code it deserves.
     pub(crate) fn exit(&self) -> Exit {
         match self {
-            CommandError::Study(StudyError::CellFails { .. } | StudyError::Workers(_))
-            | CommandError::Study(StudyError::Store(StoreError::Io { .. }))
-            | CommandError::Store(StoreError::Io { .. }) => Exit::Failed,
+            CommandError::Study(StudyError::CellFails { .. } | StudyError::Workers(_)) => {
+                Exit::Failed
+            }
+            CommandError::Study(StudyError::Store(error)) | CommandError::Store(error)
+                if error.is_of_output() =>
+            {
+                Exit::Failed
+            }
+            CommandError::Log(error) if error.is_of_output() => Exit::Failed,
             CommandError::Study(_)
             | CommandError::Store(_)
             | CommandError::Scenario(_)
@@ -103,6 +122,8 @@ impl CommandError {
             | CommandError::NotRepeatable { .. }
             | CommandError::NotDrawn { .. }
             | CommandError::InTheWay { .. }
+            | CommandError::OtherKind { .. }
+            | CommandError::Export(_)
             | CommandError::Arguments(_) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }

@@ -20,6 +20,7 @@
 
 pub mod cli;
 mod commands;
+pub mod export;
 pub mod registry;
 pub mod report;
 pub mod scenario;

@@ -5,7 +5,7 @@
 //! use farside_experiments::{cli, registry::Registry};
 //!
 //! fn main() -> std::process::ExitCode {
-//!     cli::main(Registry::builtin()) // .with(MySystem)
+//!     cli::main(Registry::builtin()) // .with(MySystem).named("mine", env!("CARGO_PKG_VERSION"))
 //! }
 //! ```
 //!
@@ -16,6 +16,8 @@ use farside_actors::system::{Builtin, Metric, System};
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;
 use thiserror::Error;
+
+use crate::version::CODE_VERSION;
 
 /// The systems that a binary knows.
 ///
@@ -29,7 +31,21 @@ use thiserror::Error;
 /// ```
 pub struct Registry {
     systems: Vec<Box<dyn System>>,
+    program: Program,
 }
+
+/// The binary that knows these systems.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Program {
+    name: &'static str,
+    version: &'static str,
+}
+
+/// Farside's own.
+const FARSIDE: Program = Program {
+    name: "farside",
+    version: CODE_VERSION,
+};
 
 /// No system has the name.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -48,6 +64,36 @@ impl Registry {
     pub fn empty() -> Self {
         Registry {
             systems: Vec::new(),
+            program: FARSIDE,
+        }
+    }
+
+    /// What the binary is called and its version, if it is not `farside` itself: in its help, its
+    /// completions, what `--version` says, and in the logs and results that it writes.
+    ///
+    /// ```
+    /// use farside_experiments::registry::Registry;
+    /// let cave = Registry::builtin().named("cave", "3.1.4");
+    /// assert_eq!(cave.program(), "cave");
+    /// assert!(cave.version().starts_with("cave 3.1.4 (farside "));
+    /// ```
+    #[must_use]
+    pub fn named(mut self, name: &'static str, version: &'static str) -> Self {
+        self.program = Program { name, version };
+        self
+    }
+
+    /// What the binary is called.
+    pub fn program(&self) -> &'static str {
+        self.program.name
+    }
+
+    /// The version that logs and results are stamped with: Farside's, and of another binary its
+    /// name and version before that.
+    pub fn version(&self) -> String {
+        match &self.program {
+            farside if *farside == FARSIDE => CODE_VERSION.to_owned(),
+            Program { name, version } => format!("{name} {version} (farside {CODE_VERSION})"),
         }
     }
 

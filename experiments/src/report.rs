@@ -33,6 +33,8 @@ pub struct Report {
     pub results_csv: String,
     /// One row for each cell and metric, see [`csv::summary_csv`].
     pub summary_csv: String,
+    /// One row for each value of lists and curves, see [`csv::values_csv`]; none if there are none.
+    pub values_csv: Option<String>,
     /// One row for each cell, curve and index, see [`csv::series_csv`]; none if there are no
     /// curves.
     pub series_csv: Option<String>,
@@ -50,7 +52,7 @@ pub struct Report {
 /// #     question: "Does it <b>escape</b>?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
 /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1],
-/// #     block: 1, stop: None, published: vec![] };
+/// #     block: 1, stop: None, published: vec![], report: Default::default() };
 /// # let results = Results { manifest, runs: vec![] };
 /// let report = farside_experiments::report::build(&results, "runs");
 /// assert!(report.page.contains("Does it &lt;b&gt;escape&lt;/b&gt;?"));
@@ -64,6 +66,7 @@ pub fn build(results: &Results, folder: &str) -> Report {
         figures,
         results_csv: csv::results_csv(results),
         summary_csv: csv::summary_csv(results, &summary),
+        values_csv: csv::values_csv(results),
         series_csv: csv::series_csv(results, &summary),
         published_csv: csv::published_csv(results, &summary),
         summary,

@@ -9,6 +9,7 @@ pub mod contacts;
 mod crash;
 mod error;
 mod location;
+mod planned;
 mod reference;
 mod seeds;
 mod source;
@@ -38,6 +39,7 @@ use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
 pub use location::SourceLocation;
+pub use planned::{Never, Planned};
 pub use reference::shared_sections;
 pub(crate) use source::Source;
 
@@ -138,6 +140,15 @@ pub struct Assembled {
     pub notes: Vec<String>,
     /// What the scenario says that has no effect or is called otherwise now, for people.
     pub remarks: Vec<String>,
+    /// What is planned for instants of the run, to ask afterwards what of it was never reached.
+    pub planned: Planned,
+}
+
+/// The links of a scenario, before hosts are known, and what was read for them.
+struct DeclaredLinks {
+    links: LinkBuilder,
+    contacts: Option<LinkContacts>,
+    notes: Vec<String>,
 }
 
 impl Scenario {
@@ -243,6 +254,11 @@ impl Scenario {
         &self.shared
     }
 
+    /// Which of its keys are called otherwise now, for people.
+    pub(crate) fn renamed_remarks(&self) -> impl Iterator<Item = String> + '_ {
+        self.source.remarks()
+    }
+
     /// Where it reads files.
     pub(crate) fn files(&self) -> &Files {
         &self.files
@@ -296,47 +312,40 @@ impl Scenario {
         let wrong = |error: SetupError| ScenarioError::from_setup(&self.source, error);
         let mut sim = Simulation::new(seed);
         sim.tie_seed(self.shared.tie_seed);
-        let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)
-            .map_err(|error| wrong(error.into()))?;
-        links.until(self.shared.until);
-        let radios = links.radios(&self.shared.radios);
-        radios.map_err(|error| wrong(error.into()))?;
-        for (host, [x, y, z]) in &self.shared.places {
-            links.place(host, Point3::new(x.0, y.0, z.0));
-        }
         let mut files = self.files.clone();
-        let contacts = self.shared.contacts.as_ref();
-        let contacts = contacts.map(|config| LinkContacts::read(config, &mut files));
-        let contacts = contacts.transpose().map_err(wrong)?;
-        if let Some(contacts) = &contacts {
-            links.set_plan(contacts.plan().clone());
-        }
-        let mut notes = Vec::new();
-        let traces = links.read_traces(|name| {
-            let trace = contacts::read_trace(name, &mut files)?;
-            notes.push(format!("trace {name:?}: {trace}"));
-            Ok(trace)
-        });
-        traces.map_err(|error| wrong(error.into()))?;
+        let declared = self.links(&mut files).map_err(wrong)?;
+        let DeclaredLinks {
+            links,
+            contacts,
+            mut notes,
+        } = declared;
         let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
         let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);
         self.check_places(&sim)?;
-        let remarks = remarks
-            .into_iter()
-            .chain(self.too_late())
-            .chain(self.source.remarks())
-            .chain(contacts.iter().flat_map(LinkContacts::remarks))
-            .collect();
+        let mut planned = self.planned(&sim, contacts.as_ref());
+        for (key, at) in std::mem::take(&mut system.planned) {
+            planned.add(key, "begins", None, vec![at]);
+        }
         if let Some(contacts) = &contacts {
             contacts.check_hosts(&sim).map_err(wrong)?;
             notes.extend(contacts.notes(&sim));
         }
         for (index, crash) in self.shared.crash.iter().enumerate() {
-            let planned = crash.plan(&mut sim, seed, index, self.shared.until);
-            planned.map_err(|mistake| self.crash_error(index, mistake))?;
+            let times = crash.plan(&mut sim, seed, index, self.shared.until);
+            let times = times.map_err(|mistake| self.crash_error(index, mistake))?;
+            let each = |what| (!crash.goes_on()).then_some(what);
+            planned.add(format!("crash.{index}"), "is", each("crashes"), times.down);
+            let key = format!("crash.{index}.restart");
+            planned.add(key, "is", each("restarts"), times.up);
         }
+        let remarks = remarks
+            .into_iter()
+            .chain(planned.behind_until())
+            .chain(self.source.remarks())
+            .chain(contacts.iter().flat_map(LinkContacts::remarks))
+            .collect();
         if let Some(until) = self.shared.until {
             sim.stop_at(SimTime::ZERO + until, &reason_of(until));
         }
@@ -347,23 +356,47 @@ impl Scenario {
             contacts,
             notes,
             remarks,
+            planned,
         })
     }
 
-    /// What is planned for when the run is over.
-    fn too_late(&self) -> impl Iterator<Item = String> {
-        let degrade = self.shared.degrade.iter().map(|entry| Some(entry.at));
-        let crash = self.shared.crash.iter().map(|entry| entry.at);
-        let degrade = (0..).zip(degrade).map(|(index, at)| ("degrade", index, at));
-        let crash = (0..).zip(crash).map(|(index, at)| ("crash", index, at));
-        let until = self.shared.until;
-        degrade
-            .chain(crash)
-            .filter_map(move |(what, index, at): (_, u32, _)| {
-                let (at, until) = (at?, until?);
-                let late = at >= until;
-                late.then(|| format!("{what}.{index}: begins at {at}, but the run ends at {until}"))
-            })
+    /// The links as the scenario has them, before hosts are known.
+    fn links(&self, files: &mut Files) -> Result<DeclaredLinks, SetupError> {
+        let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)?;
+        links.until(self.shared.until);
+        links.radios(&self.shared.radios)?;
+        for (host, [x, y, z]) in &self.shared.places {
+            links.place(host, Point3::new(x.0, y.0, z.0));
+        }
+        let contacts = self.shared.contacts.as_ref();
+        let contacts = contacts.map(|config| LinkContacts::read(config, files));
+        let contacts = contacts.transpose()?;
+        if let Some(contacts) = &contacts {
+            links.set_plan(contacts.plan().clone());
+        }
+        let mut notes = Vec::new();
+        links.read_traces(|name| {
+            let trace = contacts::read_trace(name, files)?;
+            notes.push(format!("trace {name:?}: {trace}"));
+            Ok(trace)
+        })?;
+        Ok(DeclaredLinks {
+            links,
+            contacts,
+            notes,
+        })
+    }
+
+    /// What is planned for instants of the run, but for crashes.
+    fn planned(&self, sim: &Simulation, contacts: Option<&LinkContacts>) -> Planned {
+        let mut planned = Planned::new(self.shared.until);
+        for (index, degrade) in self.shared.degrade.iter().enumerate() {
+            let key = format!("degrade.{index}");
+            planned.add(key, "begins", None, vec![degrade.at]);
+        }
+        planned.add_contacts(contacts, &self.shared.links, sim);
+        planned.add_tells(sim);
+        planned
     }
 
     /// Draws a picture that its system has, from what a run of it recorded.
@@ -376,8 +409,11 @@ impl Scenario {
         run: &dyn Recording,
         request: &PictureRequest,
     ) -> Result<Figure, PictureError> {
-        let mut files = self.files.clone();
-        self.settings.draw(picture, run, request, &mut files)
+        let (seeds, mut files) = (run.seeds(), self.files.clone());
+        let links = self.links(&mut files)?.links;
+        let mut sim = Simulation::new(seeds.run);
+        let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
+        self.settings.draw(picture, run, request, &mut setup)
     }
 
     /// Whether a run ended because its time was over.

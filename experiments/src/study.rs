@@ -37,6 +37,18 @@
 //! ]
 //! ```
 //!
+//! # Plots
+//!
+//! Plots have the first factor of numbers along x, a curve for each value of the next factor, and a
+//! plot for each value of further ones. A study may say otherwise, by the factors' names.
+//!
+//! ```toml
+//! [report]
+//! x = "loss"
+//! series = "policy"
+//! facet = "latency"
+//! ```
+//!
 //! # Blocks
 //!
 //! Seeds may share a problem: `seeds = 30` and `block = 5` give six problems of five runs each.
@@ -127,6 +139,7 @@ mod error;
 mod execute;
 mod factors;
 mod file;
+mod forecast;
 mod lengths;
 mod level;
 mod load;
@@ -144,6 +157,7 @@ pub mod summary;
 
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
+pub use forecast::{Basis, Forecast, forecast};
 pub(crate) use merge::Merged;
 pub(crate) use metrics::KERNEL as KERNEL_METRICS;
 pub use plan::{Study, StudyPlan};

@@ -50,6 +50,37 @@ pub struct Cause {
     pub ordinal: u64,
     /// What happened: `delivered`, `timer`, `start`, ...
     pub fate: String,
+    /// How many events of the same timer, one the cause of the next, come before this one in a row;
+    /// they are not listed.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub repeats: u64,
+    /// When the first of them was, in nanoseconds; 0 without any.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub since_ns: u64,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+/// How one of the two logs has a message.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Carried {
+    /// When it was sent, in nanoseconds.
+    pub sent_ns: u64,
+    /// When its fate was, in nanoseconds.
+    pub at_ns: u64,
+    /// Its fate: `delivered`, `lost`, ...
+    pub fate: String,
+    /// Why it was lost; empty if it was not.
+    pub reason: String,
+    /// How the link carried it: the parts of its delay, the attempts; empty if the link does not
+    /// say.
+    pub carriage: String,
 }
 
 /// The first difference, in causal order.
@@ -83,9 +114,20 @@ pub struct FirstDifference {
     /// How the link carried it in the first log that has it: the parts of its delay, the attempts;
     /// empty if the link does not say.
     pub carriage: String,
+    /// How the first log has it; none if it has not, or no link carried it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub carried_a: Option<Carried>,
+    /// How the second log has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub carried_b: Option<Carried>,
+    /// True for what was planned before the run and is no work of any actor: a crash, a restart, a
+    /// change of a link, something that an actor is told.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub injected: bool,
     /// What caused it, nearest first, back to a start.
     pub causes: Vec<Cause>,
-    /// How many causes are left out between the last but one and the last.
+    /// How many causes are left out between the last but one and the last, repeats of timers
+    /// besides.
     pub causes_omitted: u64,
 }
 
@@ -119,6 +161,9 @@ pub struct DiffReport {
     pub identical: bool,
     /// The first message that differs.
     pub first: Option<FirstDifference>,
+    /// If that was injected, the first difference that was not: what it led to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consequence: Option<FirstDifference>,
     /// Messages in both that differ.
     pub changed: u64,
     /// Messages that only the first log has.
@@ -204,6 +249,7 @@ pub fn diff(
         },
         topics: BTreeMap::new(),
         earliest: None,
+        earliest_own: None,
         by_field: BTreeSet::new(),
         reasons: BTreeSet::new(),
         names,
@@ -246,11 +292,21 @@ struct Comparison {
     report: DiffReport,
     topics: BTreeMap<u32, TopicDiff>,
     earliest: Option<Found>,
+    /// The earliest that nobody injected.
+    earliest_own: Option<Found>,
     /// Topics whose schemas differ: their messages are read even where their bytes are the same.
     by_field: BTreeSet<u32>,
     /// Why messages on a topic were compared by their bytes only.
     reasons: BTreeSet<(u32, String)>,
 }
+
+/// How the topics of events begin that are planned before a run.
+const INJECTED: [&str; 4] = [
+    "/event/crash",
+    "/event/restart",
+    "/event/change",
+    "/event/told",
+];
 
 /// The order in which differences are sorted: time, step, whether an actor is the source, the
 /// source, its count, whether it is the fate of a message and no event, place in the log.
@@ -318,6 +374,28 @@ impl Comparison {
         if earlier {
             self.earliest = Some(found);
         }
+        let earlier = self
+            .earliest_own
+            .is_none_or(|known| self.when(found) < self.when(known));
+        if earlier && !self.is_injected(found) {
+            self.earliest_own = Some(found);
+        }
+    }
+
+    /// Whether a difference is of an event that was planned before the run.
+    fn is_injected(&self, found: Found) -> bool {
+        let injected = |index: &Index, at: u32| {
+            let topic = self.names.name(index.entries[at as usize].topic);
+            INJECTED.iter().any(|start| topic.starts_with(start))
+        };
+        self.mode == Mode::Farside
+            && match found {
+                Found::Changed(x, y) | Found::Reordered(x, y) => {
+                    injected(&self.a, x) && injected(&self.b, y)
+                }
+                Found::OnlyInA(x) => injected(&self.a, x),
+                Found::OnlyInB(y) => injected(&self.b, y),
+            }
     }
 
     fn compare(&mut self) -> Result<(), LogError> {
@@ -456,7 +534,13 @@ impl Comparison {
         }
         self.report.identical = self.earliest.is_none() && self.report.beside.is_empty();
         if let Some(found) = self.earliest {
-            self.report.first = Some(self.describe(found)?);
+            let injected = self.is_injected(found);
+            let mut first = self.describe(found)?;
+            first.injected = injected;
+            self.report.first = Some(first);
+            let own = self.earliest_own.filter(|_| injected);
+            let own = own.map(|own| self.describe(own));
+            self.report.consequence = own.transpose()?;
         }
         for (topic, why) in std::mem::take(&mut self.reasons) {
             let topic = self.names.name(topic);
@@ -485,7 +569,9 @@ impl Comparison {
             Found::OnlyInB(y) => {
                 let entry = self.b.entries[y as usize];
                 let diff = FieldDiff::new("presence", "absent", "present");
-                detail::describe(&mut self.b, &entry, mode, names, diff)?
+                let mut first = detail::describe(&mut self.b, &entry, mode, names, diff)?;
+                first.carried_b = first.carried_a.take();
+                first
             }
             Found::Reordered(x, y) => {
                 let entry = self.a.entries[x as usize];
@@ -508,6 +594,7 @@ impl Comparison {
                 if first.link.is_empty() {
                     first.link = other.link;
                 }
+                first.carried_b = other.carried_a;
                 first
             }
         };

@@ -12,7 +12,7 @@ use farside::record::{Record, RecordClass};
 use farside::{Kind, RunInfo, SimDuration};
 use rustc_hash::FxBuildHasher;
 
-use crate::topics::{Topics, topic_of};
+use crate::topics::{Topics, topic_before_1_3, topic_of};
 use crate::wire::{
     Fields, put_bytes, put_double, put_number, put_signed, put_text, put_varint, signed, varint_len,
 };
@@ -72,6 +72,8 @@ struct FlowKey {
 pub(crate) struct Encoder {
     run: Arc<RunInfo>,
     exclude: Topics,
+    /// Whether the globs of `exclude` are of a log before format 1.3.
+    is_before_1_3: bool,
     known: hashbrown::HashMap<FlowKey, usize, FxBuildHasher>,
     pub(crate) flows: Vec<Flow>,
 }
@@ -86,8 +88,20 @@ impl Encoder {
         Encoder {
             run,
             exclude,
+            is_before_1_3: false,
             known: hashbrown::HashMap::default(),
             flows: Vec::new(),
+        }
+    }
+
+    /// Reads what is excluded as a log of this format does.
+    pub(crate) fn of_format(self, format: &str) -> Self {
+        let minor = format
+            .split_once('.')
+            .and_then(|(_, minor)| minor.parse().ok());
+        Encoder {
+            is_before_1_3: minor.is_some_and(|minor: u32| minor < 3),
+            ..self
         }
     }
 
@@ -127,7 +141,13 @@ impl Encoder {
             sender: sender.to_owned(),
             receiver: receiver.to_owned(),
             kind: record.kind.cloned(),
-            excluded: self.exclude.matches(&topic),
+            excluded: match self.is_before_1_3 {
+                true => {
+                    let topic = topic_before_1_3(record.class, sender, receiver, kind);
+                    self.exclude.matches(&topic)
+                }
+                false => self.exclude.matches(&topic),
+            },
             topic,
             channel: None,
             prefix,

@@ -41,6 +41,14 @@ pub enum LogError {
         /// What was to be read or written.
         path: PathBuf,
     },
+    /// A folder, a pipe or a device, in whose place no file can be put.
+    #[error("{path}: is {what}, in whose place no log can be put")]
+    NotWritable {
+        /// What was to be written.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
+    },
     /// A part of the file is damaged.
     #[error("{path}: damaged at byte {offset}: {what}")]
     Damaged {
@@ -130,6 +138,22 @@ pub enum LogError {
 }
 
 impl LogError {
+    /// Whether a file could not be written, which is no fault of what was read.
+    ///
+    /// ```
+    /// use farside_logs::{LogOptions, LogWriter};
+    /// let error = LogWriter::create("no/such/folder/a.mcap", LogOptions::default()).err().unwrap();
+    /// assert!(error.is_of_output());
+    /// assert!(!farside_logs::info("no/such/file.mcap").unwrap_err().is_of_output());
+    /// ```
+    pub fn is_of_output(&self) -> bool {
+        match self {
+            LogError::Io { action, .. } => !matches!(*action, "open" | "read"),
+            LogError::NotWritable { .. } => true,
+            _ => false,
+        }
+    }
+
     pub(crate) fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
         LogError::Io {
             path: path.to_owned(),

@@ -337,10 +337,9 @@ const CONTROL: &str = "@control";
 /// Whether control events may be on a topic.
 fn is_control(topic: &str) -> bool {
     let classes = ["told", "crash", "restart", "change"];
-    let event = topic
-        .strip_prefix("/event/")
-        .and_then(|rest| rest.split_once('/'));
-    event.is_some_and(|(class, _)| classes.contains(&class))
+    let event = topic.strip_prefix("/event/");
+    let class = event.and_then(|rest| rest.split('/').next());
+    class.is_some_and(|class| classes.contains(&class))
 }
 
 /// What an event said, in JSON, as far as the log's schemas tell.

@@ -10,7 +10,7 @@
 //! - [`diff`] says which messages of two logs differ, which one first, and what caused it.
 //! - [`recover`] makes a whole file of a broken one.
 //!
-//! # The format, version 1.2
+//! # The format, version 1.3
 //!
 //! One MCAP message for each record of a run, in the order in which they were committed.
 //!
@@ -21,9 +21,9 @@
 //! | `/in_flight/{sender}/{kind}` | a message was on its way when the run ended | the end | sent |
 //! | `/hand_over/{sender}/{kind}` | a message reached a shared link | reached | sent |
 //! | `/timer/{actor}/{kind}` | a timer fired | fired | set |
-//! | `/event/{start,crash,restart}/{actor}` | what happened to an actor | when | when |
-//! | `/event/change/{link}` | a link was changed | when | when |
-//! | `/event/told/{actor}` | a control event handed an actor a message | when | when |
+//! | `/event/{start,crash,restart}` | what happened to an actor, the `receiver` | when | when |
+//! | `/event/change/{kind}` | a link, the `receiver`, was changed | when | when |
+//! | `/event/told/{kind}` | a control event handed an actor a message | when | when |
 //! | `/event/stop` | the run was stopped | when | when |
 //! | `/state/{actor}/{kind}` | a state sample; never compared | when | when |
 //! | `/tf` | drawn: frames, `foxglove.FrameTransforms` | when | when |
@@ -48,8 +48,10 @@
 //! and at the end `farside.end` (digest, counts, why the run ended); a log without it is a prefix.
 //! Attachments: the resolved scenario as `scenario.toml`, and the files that it read.
 //!
-//! 1.2 added `/event/told` and a carriage's `receive_j` and `fragments`. A minor version adds fields,
-//! topics, roles or metadata; a major version changes or removes them.
+//! 1.2 added `/event/told` and a carriage's `receive_j` and `fragments`. Before 1.3 each actor and each
+//! link had a topic of its own for its events (`/event/crash/node_07`), thousands in one log. A minor
+//! version adds fields, roles or metadata, or says otherwise which topic a record is on: readers go by
+//! the record. A major version changes or removes them.
 
 mod descriptors;
 mod diff;
@@ -73,7 +75,7 @@ mod verify;
 mod wire;
 mod writer;
 
-pub use diff::{Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
+pub use diff::{Carried, Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;
 pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info};

@@ -140,8 +140,13 @@ fn may_be_written(broken: &Path, out: &Path) -> Result<(), LogError> {
     may_hold_log(out, &[broken.to_owned()])?;
     match std::fs::metadata(out) {
         // What is saved is renamed to its place, which a device or folder cannot be.
-        Ok(found) if !found.is_file() => Err(LogError::NotAFile {
+        Ok(found) if !found.is_file() => Err(LogError::NotWritable {
             path: out.to_owned(),
+            what: if found.is_dir() {
+                "a folder"
+            } else {
+                "a pipe or a device"
+            },
         }),
         _ => Ok(()),
     }

@@ -17,7 +17,8 @@ pub(crate) fn role(class: RecordClass) -> &'static str {
     }
 }
 
-/// The topic of a record.
+/// The topic of a record. What happens to actors and links is on one topic for all of them, by what
+/// it is: a topic for each actor would be thousands, and the record says whom it happened to.
 pub(crate) fn topic_of(class: RecordClass, sender: &str, receiver: &str, kind: &str) -> String {
     let kind = snake_case(kind);
     match class {
@@ -27,8 +28,23 @@ pub(crate) fn topic_of(class: RecordClass, sender: &str, receiver: &str, kind: &
         }
         RecordClass::Timer => format!("/timer/{receiver}/{kind}"),
         RecordClass::Sample => format!("/state/{sender}/{kind}"),
-        RecordClass::Stop => "/event/stop".to_owned(),
-        _ => format!("/event/{}/{receiver}", class.name()),
+        // One schema on a topic, so that viewers can show it.
+        _ if kind.is_empty() => format!("/event/{}", class.name()),
+        _ => format!("/event/{}/{kind}", class.name()),
+    }
+}
+
+/// The same in logs before format 1.3, by which their `exclude` is to be read.
+pub(crate) fn topic_before_1_3(
+    class: RecordClass,
+    sender: &str,
+    receiver: &str,
+    kind: &str,
+) -> String {
+    let topic = topic_of(class, sender, receiver, kind);
+    match topic.starts_with("/event/") && class != RecordClass::Stop {
+        true => format!("/event/{}/{receiver}", class.name()),
+        false => topic,
     }
 }
 

@@ -524,7 +524,7 @@ impl Observer for Verifier {
             ("seed", head.seed.to_string(), run.seed.to_string()),
             ("tie_seed", tie(head.tie_seed), tie(run.tie_seed)),
         ];
-        let globs = head.exclude.clone();
+        let (globs, format) = (head.exclude.clone(), head.format.clone());
         for (field, logged, rerun) in differing {
             if logged != rerun && !self.done {
                 self.different(Mismatch {
@@ -537,7 +537,8 @@ impl Observer for Verifier {
         }
         match Topics::new(&globs) {
             Ok(exclude) => {
-                self.encoder = Some(Encoder::new(run.clone(), exclude));
+                let encoder = Encoder::new(run.clone(), exclude);
+                self.encoder = Some(encoder.of_format(&format));
                 Ok(())
             }
             Err(error) => self.settle(Err(error)),

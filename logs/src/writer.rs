@@ -29,7 +29,7 @@ use viewer::Stage;
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
 pub(crate) const FORMAT_MAJOR: u32 = 1;
-pub(crate) const FORMAT_MINOR: u32 = 2;
+pub(crate) const FORMAT_MINOR: u32 = 3;
 
 /// The attachment that holds the resolved scenario.
 pub(crate) const SCENARIO_ATTACHMENT: &str = "scenario.toml";

@@ -29,8 +29,28 @@ pub(super) fn encode<T: Serialize + ?Sized>(
     value: &T,
     out: &mut Vec<u8>,
 ) -> Result<(), EncodeError> {
+    encode_as::<T, false>(flat, value, out)
+}
+
+/// As [`encode`], and notes in the schema which fields `Serialize` leaves out.
+pub(super) fn encode_noting<T: Serialize + ?Sized>(
+    flat: &FlatSchema,
+    value: &T,
+    out: &mut Vec<u8>,
+) -> Result<(), EncodeError> {
+    encode_as::<T, true>(flat, value, out)
+}
+
+/// Both ways are code of their own: a type's `Serialize` that has one caller is inlined there, and
+/// small messages are written without a call.
+#[inline]
+fn encode_as<T: Serialize + ?Sized, const NOTING: bool>(
+    flat: &FlatSchema,
+    value: &T,
+    out: &mut Vec<u8>,
+) -> Result<(), EncodeError> {
     let start = out.len();
-    let root = ValueSer {
+    let root = ValueSer::<NOTING> {
         flat,
         out,
         field: &flat.root,
@@ -62,7 +82,7 @@ enum Position {
 const NONE: usize = usize::MAX;
 
 /// Writes one value of one field.
-struct ValueSer<'a> {
+struct ValueSer<'a, const NOTING: bool> {
     flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
@@ -72,7 +92,7 @@ struct ValueSer<'a> {
     depth: u32,
 }
 
-impl<'a> ValueSer<'a> {
+impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
     /// A value of the field at `index` in a message that is open in `out`.
     #[inline(always)]
     fn inside(
@@ -80,7 +100,7 @@ impl<'a> ValueSer<'a> {
         out: &'a mut Vec<u8>,
         field: &'a Field,
         depth: u32,
-    ) -> ValueSer<'a> {
+    ) -> ValueSer<'a, NOTING> {
         ValueSer {
             flat,
             out,
@@ -170,7 +190,7 @@ impl<'a> ValueSer<'a> {
 
     /// Opens the message that this value is.
     #[inline(always)]
-    fn open(self, shape: Shape) -> Result<Compound<'a>, Fault> {
+    fn open(self, shape: Shape) -> Result<Compound<'a, NOTING>, Fault> {
         let message = match self.message() {
             Some(message) if message.shape == shape => message,
             _ => return self.mismatch(shape),
@@ -194,7 +214,7 @@ impl<'a> ValueSer<'a> {
     }
 
     /// Opens the helper that stands around an option or collection here.
-    fn open_wrapper(self, actual: &'static str) -> Result<Compound<'a>, Fault> {
+    fn open_wrapper(self, actual: &'static str) -> Result<Compound<'a, NOTING>, Fault> {
         match self.message() {
             Some(message) if message.shape == Shape::Wrapper => self.open(Shape::Wrapper),
             _ => self.mismatch(actual),
@@ -207,7 +227,7 @@ impl<'a> ValueSer<'a> {
         self,
         index: u32,
         variant: &'static str,
-    ) -> Result<(Compound<'a>, &'a Field), Fault> {
+    ) -> Result<(Compound<'a, NOTING>, &'a Field), Fault> {
         let oneof = self.open(Shape::Oneof)?;
         let fields = &oneof.message.fields;
         let found = position(fields, |field| &field.key, index, variant);
@@ -224,7 +244,7 @@ impl<'a> ValueSer<'a> {
         index: u32,
         variant: &'static str,
         shape: Shape,
-    ) -> Result<Compound<'a>, Fault> {
+    ) -> Result<Compound<'a, NOTING>, Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
         let Compound {
             flat,
@@ -233,7 +253,7 @@ impl<'a> ValueSer<'a> {
             depth,
             ..
         } = oneof;
-        let mut content = ValueSer::inside(flat, out, field, depth).open(shape)?;
+        let mut content = ValueSer::<NOTING>::inside(flat, out, field, depth).open(shape)?;
         content.outer = start;
         Ok(content)
     }
@@ -327,16 +347,16 @@ fn canonical32(value: f32) -> u32 {
     }
 }
 
-impl<'a> ser::Serializer for ValueSer<'a> {
+impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
     type Ok = ();
     type Error = Fault;
-    type SerializeSeq = SeqSer<'a>;
-    type SerializeTuple = TupleSer<'a>;
-    type SerializeTupleStruct = Compound<'a>;
-    type SerializeTupleVariant = Compound<'a>;
-    type SerializeMap = MapSer<'a>;
-    type SerializeStruct = Compound<'a>;
-    type SerializeStructVariant = Compound<'a>;
+    type SerializeSeq = SeqSer<'a, NOTING>;
+    type SerializeTuple = TupleSer<'a, NOTING>;
+    type SerializeTupleStruct = Compound<'a, NOTING>;
+    type SerializeTupleVariant = Compound<'a, NOTING>;
+    type SerializeMap = MapSer<'a, NOTING>;
+    type SerializeStruct = Compound<'a, NOTING>;
+    type SerializeStructVariant = Compound<'a, NOTING>;
 
     fn is_human_readable(&self) -> bool {
         false
@@ -441,7 +461,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
     #[inline(always)]
     fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Result<(), Fault> {
         if self.expect() == Card::Optional {
-            return value.serialize(ValueSer {
+            return value.serialize(ValueSer::<NOTING> {
                 first: self.field.kind,
                 ..self
             });
@@ -451,7 +471,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         if inner.expect() != Card::Optional {
             return inner.mismatch("an option");
         }
-        value.serialize(ValueSer {
+        value.serialize(ValueSer::<NOTING> {
             first: inner.field.kind,
             ..inner
         })?;
@@ -515,7 +535,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         value: &T,
     ) -> Result<(), Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
-        value.serialize(ValueSer::inside(
+        value.serialize(ValueSer::<NOTING>::inside(
             oneof.flat,
             &mut *oneof.out,
             field,
@@ -525,17 +545,17 @@ impl<'a> ser::Serializer for ValueSer<'a> {
     }
 
     #[inline(always)]
-    fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'a>, Fault> {
-        SeqSer::open(self, len)
+    fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'a, NOTING>, Fault> {
+        SeqSer::<NOTING>::open(self, len)
     }
 
     #[inline(always)]
-    fn serialize_tuple(self, len: usize) -> Result<TupleSer<'a>, Fault> {
+    fn serialize_tuple(self, len: usize) -> Result<TupleSer<'a, NOTING>, Fault> {
         match self.message() {
             Some(message) if message.shape == Shape::Tuple => {
                 Ok(TupleSer::Mixed(self.open(Shape::Tuple)?))
             }
-            _ => Ok(TupleSer::Alike(SeqSer::open(self, Some(len))?)),
+            _ => Ok(TupleSer::Alike(SeqSer::<NOTING>::open(self, Some(len))?)),
         }
     }
 
@@ -544,7 +564,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         self,
         _name: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a>, Fault> {
+    ) -> Result<Compound<'a, NOTING>, Fault> {
         self.open(Shape::Tuple)
     }
 
@@ -555,17 +575,21 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         index: u32,
         variant: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a>, Fault> {
+    ) -> Result<Compound<'a, NOTING>, Fault> {
         self.open_content(index, variant, Shape::Tuple)
     }
 
     #[inline]
-    fn serialize_map(self, _len: Option<usize>) -> Result<MapSer<'a>, Fault> {
-        MapSer::open(self)
+    fn serialize_map(self, _len: Option<usize>) -> Result<MapSer<'a, NOTING>, Fault> {
+        MapSer::<NOTING>::open(self)
     }
 
     #[inline(always)]
-    fn serialize_struct(self, _name: &'static str, _len: usize) -> Result<Compound<'a>, Fault> {
+    fn serialize_struct(
+        self,
+        _name: &'static str,
+        _len: usize,
+    ) -> Result<Compound<'a, NOTING>, Fault> {
         self.open(Shape::Struct)
     }
 
@@ -576,7 +600,7 @@ impl<'a> ser::Serializer for ValueSer<'a> {
         index: u32,
         variant: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a>, Fault> {
+    ) -> Result<Compound<'a, NOTING>, Fault> {
         self.open_content(index, variant, Shape::Struct)
     }
 }

@@ -1,14 +1,8 @@
 //! A system with a curve, for the seams of studies: a planner climbs, one step a second, and from
 //! its tenth step on the clever one climbs faster. It is its own `farside` command.
 
-use std::sync::{Arc, Mutex};
-
 use farside::prelude::*;
-use farside_actors::settings;
-use farside_actors::system::settings::in_unit;
-use farside_actors::system::{
-    Assembly, Better, Metric, OwnTable, Results, Series, SeriesIndex, Setup, SetupError,
-};
+use farside_actors::prelude::*;
 use farside_experiments::{cli, registry::Registry};
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +20,7 @@ settings! {
 struct Step;
 
 /// The settings, how high the hill is, and the heights so far, in metres.
-struct Climber(Climb, f64, Arc<Mutex<Vec<f64>>>);
+struct Climber(Climb, f64, Gathered<f64>);
 
 impl Actor for Climber {
     type Accepts = (Step,);
@@ -40,7 +34,6 @@ impl Actor for Climber {
 impl Handler<Step> for Climber {
     fn handle(&mut self, _: Step, ctx: &mut Context<'_, Self>) -> Outcome {
         let Climber(climb, hill_m, heights_m) = self;
-        let mut heights_m = heights_m.lock().expect("nobody panics with it");
         let after_tenth = (heights_m.len() as f64 - 10.0).max(0.0);
         let stream = if climb.gain > 0.0 { "clever" } else { "simple" };
         let chance_m = ctx.random(stream).normal(0.0, 0.2);
@@ -66,15 +59,14 @@ impl OwnTable for Climb {
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let hill = farside::random::RandomKey::new(setup.problem_seed).text("hill");
         let hill_m = hill.stream().normal(5.0, 2.0);
-        let heights_m = Arc::new(Mutex::new(Vec::new()));
+        let heights_m = Gathered::default();
         let (climb, of_actor) = (self.clone(), heights_m.clone());
         let host = setup.sim.host("hill");
         setup.sim.actor(host, "climber", move |_| {
             Climber(climb.clone(), hill_m, of_actor.clone())
         });
         Ok(Assembly::new(move |_| {
-            let heights_m = heights_m.lock().expect("the run is over").clone();
-            Results::default().metric("height", Series::counted(heights_m))
+            Results::default().metric("height", Series::counted(heights_m.take()))
         }))
     }
 }

@@ -42,7 +42,7 @@ fn both_ends_of_a_slowdown_are_recorded_and_part_of_the_digest() {
         .expect("a log");
     while let Some((record, channel)) = records.next_ref().expect("it is whole") {
         if record.class == RecordClass::Told {
-            assert_eq!(channel.topic, "/event/told/node_07");
+            assert_eq!(channel.topic, "/event/told/processor_change");
             let change: ProcessorChange = schema.decode(record.body).expect("a change");
             assert_eq!(change.processor, "node_07/planner");
             told.push((record.key.time_ns / 1_000_000_000, change.slowdown));
@@ -74,7 +74,7 @@ fn info_shows_it_at_its_time_and_diff_names_it_first() {
     let first = report.first.expect("they differ");
     assert_eq!(
         (first.topic.as_str(), first.time_s),
-        ("/event/told/node_07", 5.0)
+        ("/event/told/processor_change", 5.0)
     );
 }
 

@@ -129,41 +129,23 @@ pub fn assemble(
     missions: &Missions,
     wire: &mut Wire<'_>,
 ) -> Result<Network, NetworkError> {
-    let (config, sensors) = (parts.config, &parts.sensors);
-    config.check()?;
-    missions.check(&parts.roadmap)?;
-    parts.world.gaps.check(sensors, config.policy)?;
+    let config = parts.config;
+    let Declared {
+        roadmap,
+        refused,
+        node_names,
+        rover_names,
+        wired,
+        timing,
+    } = declare(sim, parts, missions, wire)?;
+    let sensors = &parts.sensors;
     let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all().to_vec();
-    let roadmap = parts.world.open_part(&parts.roadmap, sensors);
-    let refused = gaps::refused(&roadmap, sensors, &missions);
     let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
     let queues = match stay_at_target {
         true => BTreeMap::new(),
         false => queues(&missions, has_way),
     };
-    let node_names = names("node", sensors.len());
-    let rover_names = names("rover", missions.len());
-    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
-    let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
-    let places = places_m(&roadmap, sensors, &missions);
-    for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
-        wiring.place(name, place_m);
-    }
-    if let Some(terrain) = &parts.terrain {
-        wiring.terrain(terrain.clone());
-    }
-    let speed = match config.policy {
-        Policy::MaxPlus => config.max_plus.processor,
-        // What other policies compute takes no time.
-        _ => Speed::Unlimited,
-    };
-    for name in &node_names {
-        wiring.processor(name, PLANNER, speed);
-    }
-    let wired = wire(sim, &wiring)?;
-    let links = (wired.slowest(), wired.slowest_rate_bit_per_s());
-    let timing = timing(&roadmap, config, links)?;
     let longest_step = longest_step(&roadmap, config, &timing)?;
     let planned: Vec<_> = (0..)
         .map(RoverId)
@@ -180,7 +162,7 @@ pub fn assemble(
         backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
         schedule: schedule.map_err(NetworkError::NoPlan)?,
-        patience: config.patience(links.0, &timing),
+        patience: config.patience(wired.slowest(), &timing),
         timing,
         roadmap_from: source(config, &node_names)?,
         node_names,
@@ -200,6 +182,68 @@ pub fn assemble(
     let (monitor, score) = Monitor::new(site.clone());
     sim.observe(monitor);
     Ok(Network { site, score })
+}
+
+/// Hosts and links, before there is any actor, and the clock that follows from them.
+pub(crate) struct Declared {
+    roadmap: Arc<Roadmap>,
+    refused: Vec<Refused>,
+    node_names: Vec<String>,
+    rover_names: Vec<String>,
+    wired: Links,
+    /// How long the parts of a planning cycle last.
+    pub(crate) timing: Timing,
+}
+
+/// Declares hosts and links. Who wants to know how long a cycle is, and no more, stops here: what is
+/// planned for the whole team beforehand takes its time.
+///
+/// # Errors
+/// Those of [`assemble`].
+pub(crate) fn declare(
+    sim: &mut Simulation,
+    parts: &Parts<'_>,
+    missions: &Missions,
+    wire: &mut Wire<'_>,
+) -> Result<Declared, NetworkError> {
+    let (config, sensors) = (parts.config, &parts.sensors);
+    config.check()?;
+    missions.check(&parts.roadmap)?;
+    parts.world.gaps.check(sensors, config.policy)?;
+    let stay_at_target = matches!(missions, Missions::Standing(_));
+    let missions = missions.all();
+    let roadmap = parts.world.open_part(&parts.roadmap, sensors);
+    let refused = gaps::refused(&roadmap, sensors, missions);
+    let node_names = names("node", sensors.len());
+    let rover_names = names("rover", missions.len());
+    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
+    let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
+    let places = places_m(&roadmap, sensors, missions);
+    for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
+        wiring.place(name, place_m);
+    }
+    if let Some(terrain) = &parts.terrain {
+        wiring.terrain(terrain.clone());
+    }
+    let speed = match config.policy {
+        Policy::MaxPlus => config.max_plus.processor,
+        // What other policies compute takes no time.
+        _ => Speed::Unlimited,
+    };
+    for name in &node_names {
+        wiring.processor(name, PLANNER, speed);
+    }
+    let wired = wire(sim, &wiring)?;
+    let links = (wired.slowest(), wired.slowest_rate_bit_per_s());
+    let timing = timing(&roadmap, config, links)?;
+    Ok(Declared {
+        roadmap,
+        refused,
+        node_names,
+        rover_names,
+        wired,
+        timing,
+    })
 }
 
 /// Whether each rover that stands on the map has a path round all others' starts and goals.

@@ -14,8 +14,9 @@ mod spacetime;
 
 use farside::SimDuration;
 use farside_actors::figure::Figure;
+use farside_actors::link::Degrade;
 use farside_actors::system::{
-    Files, PictureError as Failure, PictureInfo, PictureOption, PictureRequest, Recording,
+    PictureError as Failure, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
 };
 use farside_worlds::VertexId;
 use thiserror::Error;
@@ -31,18 +32,26 @@ pub(crate) use map::coordinated;
 /// The style of pictures, beside that of all figures.
 const STYLE: &str = include_str!("picture/picture.css");
 
+/// What the map shows if asked: the coordination graph (section 3.2).
+const COORDINATION: &str = "coordination";
+
 /// The pictures that there are.
 pub(crate) const ALL: [PictureInfo; 2] = [
     PictureInfo {
         name: "map",
         about: "where rovers are at an instant, on the roadmap in the colours of its nodes",
-        takes: &[PictureOption::At],
+        takes: &[PictureOption::At, PictureOption::With],
+        extras: &[(
+            COORDINATION,
+            "lines between the rovers that max-plus coordinates",
+        )],
     },
     PictureInfo {
         name: "corridor",
         about: "who was where along a line of vertices over time: --along auto is where rovers stand \
                 in each other's way, V the corridor of a vertex, V1,V2,... the shortest ways between",
         takes: &[PictureOption::At, PictureOption::From, PictureOption::Along],
+        extras: &[],
     },
 ];
 
@@ -52,17 +61,21 @@ pub(crate) fn draw(
     picture: &str,
     run: &dyn Recording,
     request: &PictureRequest,
-    files: &mut Files,
+    setup: &mut Setup<'_>,
 ) -> Result<Figure, Failure> {
-    let site = ground::site(scenario, run.seeds().problem, files)?;
+    let site = ground::site(scenario, setup)?;
     let drawn = Drawn {
         site,
         tracks: Tracks::read(run).map_err(PictureError::from)?,
         scenario: run.scenario().to_owned(),
         seed: run.seeds().run,
+        degrades: setup.degrades.clone(),
     };
     let figure = match picture {
-        "map" => drawn.map(request.at),
+        "map" => {
+            let coordination = request.with.iter().any(|extra| extra == COORDINATION);
+            drawn.map(request.at, coordination)
+        }
         "corridor" => {
             let line = request
                 .along
@@ -97,6 +110,8 @@ pub(crate) struct Drawn {
     /// The scenario's name.
     pub(crate) scenario: String,
     pub(crate) seed: u64,
+    /// When links and processors were worse.
+    pub(crate) degrades: Vec<Degrade>,
 }
 
 /// Which line of vertices a time-space diagram is of.
@@ -124,10 +139,14 @@ impl VertexLine {
 }
 
 impl Drawn {
-    /// The map at a time; at the end of the run unless given.
-    pub(crate) fn map(&self, at: Option<SimDuration>) -> Result<Figure, PictureError> {
+    /// The map at a time, at the end of the run unless given; with the coordination graph or not.
+    pub(crate) fn map(
+        &self,
+        at: Option<SimDuration>,
+        coordination: bool,
+    ) -> Result<Figure, PictureError> {
         let at_ns = self.time_ns(at)?;
-        Ok(map::figure(self, at_ns))
+        Ok(map::figure(self, at_ns, coordination))
     }
 
     /// The time-space diagram of a line, from a time to another; of the whole run unless given.

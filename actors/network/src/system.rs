@@ -2,17 +2,19 @@
 
 use std::sync::Arc;
 
-use farside::Report;
+use farside::{Report, SimDuration};
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Files, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Renamed, Results, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording, Renamed,
+    Results, Section, Settings, Setup, SetupError, System,
 };
-use farside_worlds::SensorNetwork;
+use farside_worlds::movingai::GridWorld;
+use farside_worlds::{HeightField, Roadmap, SensorNetwork};
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::assemble::declare;
 use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
 use crate::world::{RoadmapGround, crater, ground, in_crater, place};
@@ -71,7 +73,7 @@ impl System for NetworkSystem {
     }
 
     fn metrics(&self) -> &[Metric] {
-        &metrics::ALL
+        metrics::all()
     }
 
     fn scenarios(&self) -> &[Builtin] {
@@ -107,30 +109,11 @@ impl Settings for NetworkScenario {
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
-        let RoadmapGround { roadmap, grid } = ground(&self.world, self.team.rovers, setup.files)?;
-        let roadmap = Arc::new(roadmap);
-        let sensors = Arc::new(place(&self.world, &roadmap, setup.problem_seed)?);
-        let (world, in_crater) = (&self.world, in_crater(&self.world));
-        let map = world.open_part(&roadmap, &sensors);
-        let missions = match &grid {
-            Some(grid) => Missions::Standing(grid.tasks().to_vec()),
-            None => {
-                let drawn = missions(world, &roadmap, &self.team, setup.problem_seed);
-                Missions::Queued(drawn.map_err(blame)?)
-            }
-        };
-        let terrain = match setup.has_radios() && in_crater {
-            true => Some(Arc::new(crater()?.terrain().clone())),
-            false => None,
-        };
-        let parts = Parts {
-            world,
-            roadmap,
-            sensors: sensors.clone(),
-            config: &self.network,
-            terrain,
-        };
-        let system = setup.wired(|sim, wire| assemble(sim, &parts, &missions, wire));
+        let place = Place::of(self, setup)?;
+        let (sensors, in_crater) = (place.sensors.clone(), in_crater(&self.world));
+        let map = self.world.open_part(&place.roadmap, &sensors);
+        let parts = place.parts(self);
+        let system = setup.wired(|sim, wire| assemble(sim, &parts, &place.missions, wire));
         let system = Arc::new(system.map_err(blame)?);
         let scene = NetworkScene::new(
             map,
@@ -146,7 +129,7 @@ impl Settings for NetworkScenario {
             done: Box::new(move || u64::from(watched.arrived())),
         };
         let notes = gaps(&sensors, &system);
-        let blocked = grid.map(|grid| {
+        let blocked = place.grid.map(|grid| {
             let all = grid.blocked();
             all.iter()
                 .map(|blocked| grid.explain(blocked))
@@ -170,9 +153,69 @@ impl Settings for NetworkScenario {
         picture: &str,
         run: &dyn Recording,
         request: &PictureRequest,
-        files: &mut Files,
+        setup: &mut Setup<'_>,
     ) -> Result<Figure, PictureError> {
-        picture::draw(self, picture, run, request, files)
+        picture::draw(self, picture, run, request, setup)
+    }
+}
+
+/// Where a run takes place, and who drives, before anything is declared.
+pub(crate) struct Place {
+    pub(crate) roadmap: Arc<Roadmap>,
+    pub(crate) sensors: Arc<SensorNetwork>,
+    grid: Option<GridWorld>,
+    missions: Missions,
+    terrain: Option<Arc<HeightField>>,
+}
+
+impl Place {
+    pub(crate) fn of(
+        scenario: &NetworkScenario,
+        setup: &mut Setup<'_>,
+    ) -> Result<Self, SetupError> {
+        let world = &scenario.world;
+        let RoadmapGround { roadmap, grid } = ground(world, scenario.team.rovers, setup.files)?;
+        let roadmap = Arc::new(roadmap);
+        let sensors = Arc::new(place(world, &roadmap, setup.problem_seed)?);
+        let missions = match &grid {
+            Some(grid) => Missions::Standing(grid.tasks().to_vec()),
+            None => {
+                let drawn = missions(world, &roadmap, &scenario.team, setup.problem_seed);
+                Missions::Queued(drawn.map_err(blame)?)
+            }
+        };
+        let terrain = match setup.has_radios() && in_crater(world) {
+            true => Some(Arc::new(crater()?.terrain().clone())),
+            false => None,
+        };
+        Ok(Place {
+            roadmap,
+            sensors,
+            grid,
+            missions,
+            terrain,
+        })
+    }
+
+    fn parts<'a>(&self, scenario: &'a NetworkScenario) -> Parts<'a> {
+        Parts {
+            world: &scenario.world,
+            roadmap: self.roadmap.clone(),
+            sensors: self.sensors.clone(),
+            config: &scenario.network,
+            terrain: self.terrain.clone(),
+        }
+    }
+
+    /// How long a cycle of a run here is. `"auto"` depends on the links, so they are declared.
+    pub(crate) fn cycle(
+        &self,
+        scenario: &NetworkScenario,
+        setup: &mut Setup<'_>,
+    ) -> Result<SimDuration, SetupError> {
+        let parts = self.parts(scenario);
+        let declared = setup.wired(|sim, wire| declare(sim, &parts, &self.missions, wire));
+        Ok(declared.map_err(blame)?.timing.cycle)
     }
 }
 

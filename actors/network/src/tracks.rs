@@ -27,9 +27,20 @@ pub(crate) struct Mark {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracks {
     rovers: BTreeMap<u32, Vec<Mark>>,
+    /// Who was down when.
+    pub(crate) outages: Vec<Outage>,
     pub(crate) end_ns: u64,
     /// Why the run ended, as the log has it; nothing if the log is cut.
     pub(crate) end: String,
+}
+
+/// An actor that is down, from its crash to its restart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Outage {
+    pub(crate) actor: String,
+    pub(crate) from_ns: u64,
+    /// None if it stayed down.
+    pub(crate) to_ns: Option<u64>,
 }
 
 /// Why a recorded run tells nothing of where rovers were.
@@ -102,6 +113,15 @@ impl Tracks {
         let mut tracks = Tracks::default();
         let ending = run.for_each(&mut |record| {
             tracks.end_ns = tracks.end_ns.max(record.time_ns);
+            match record.class {
+                RecordClass::Crash => tracks.outages.push(Outage {
+                    actor: record.actor.to_owned(),
+                    from_ns: record.time_ns,
+                    to_ns: None,
+                }),
+                RecordClass::Restart => tracks.back(record.actor, record.time_ns),
+                _ => {}
+            }
             if record.class != RecordClass::Sample || record.kind != "RoverState" {
                 return Ok(());
             }
@@ -118,6 +138,14 @@ impl Tracks {
             return Err(TracksError::NoStates { excluded });
         }
         Ok(tracks)
+    }
+
+    /// An actor restarts.
+    fn back(&mut self, actor: &str, time_ns: u64) {
+        let down = |outage: &&mut Outage| outage.actor == actor && outage.to_ns.is_none();
+        if let Some(outage) = self.outages.iter_mut().rev().find(down) {
+            outage.to_ns = Some(time_ns);
+        }
     }
 
     fn push(&mut self, time_ns: u64, state: &RoverState) {

@@ -1,6 +1,6 @@
 //! Where values go along an axis, and which of them are written beside it.
 
-use super::numbers::{decimal, plain};
+use super::numbers::{as_written, decimal, plain};
 
 /// How values are spaced.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,9 +49,17 @@ impl Scale {
         Scale { low, high, spacing }
     }
 
-    /// For what is measured: from 0 if that is not far away, with round ends.
+    /// For what is measured, with round ends: from 0 if that is not far away. By ratio if the
+    /// values, all above 0, span two decades or more: evenly spaced, all but the greatest would lie
+    /// on the axis.
     pub fn measured(values: impl Iterator<Item = f64>) -> Self {
-        let mut scale = Scale::over(values, Spacing::Linear);
+        let mut scale = Scale::over(values, Spacing::Log);
+        if scale.is_log() && scale.high / scale.low >= DECADES {
+            scale.low = round_below(scale.low);
+            scale.high = 1.0 / round_below(1.0 / scale.high);
+            return scale;
+        }
+        scale.spacing = Spacing::Linear;
         if scale.low > 0.0 && scale.low < 0.5 * scale.high {
             scale.low = 0.0;
         }
@@ -68,6 +76,11 @@ impl Scale {
             high,
             spacing: Spacing::Linear,
         }
+    }
+
+    /// Whether equal ratios are equally far apart.
+    pub fn is_log(&self) -> bool {
+        self.spacing == Spacing::Log
     }
 
     /// The upper end.
@@ -88,8 +101,12 @@ impl Scale {
         }
     }
 
-    /// Round numbers along a linear axis, about `count` of them.
+    /// Round numbers along the axis, about `count` of them; of a logarithmic one powers of ten, and
+    /// between few of those their double and fivefold.
     pub fn ticks(&self, count: f64) -> Vec<Tick> {
+        if self.is_log() {
+            return self.log_ticks(count);
+        }
         let step = self.step(count);
         let decimals = (0..12).find(|decimals| {
             let scaled = step * libm::pow(10.0, f64::from(*decimals));
@@ -113,6 +130,36 @@ impl Scale {
             .collect()
     }
 
+    fn log_ticks(&self, count: f64) -> Vec<Tick> {
+        let (first, last) = (libm::log10(self.low), libm::log10(self.high));
+        let decades = last - first;
+        let within: &[f64] = match decades {
+            few if few < 0.75 * count => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
+        // Of very many decades, only each so many-th.
+        let stride = libm::ceil(decades / (2.0 * count)).max(1.0);
+        let powers = libm::floor(first / stride) as i32..=libm::ceil(last / stride) as i32;
+        let values = powers.flat_map(|power| {
+            let power = f64::from(power) * stride;
+            // Ten to a negative power is not exact, one over ten to a positive one is written short.
+            let ten = move |digit: f64| match power < 0.0 {
+                true => digit / libm::pow(10.0, -power),
+                false => digit * libm::pow(10.0, power),
+            };
+            within.iter().map(move |digit| ten(*digit))
+        });
+        let on_axis = |value: &f64| {
+            let slack = 1.0 + 1e-9;
+            *value >= self.low / slack && *value <= self.high * slack
+        };
+        let tick = |value: f64| Tick {
+            at: self.place(value),
+            text: as_written(value),
+        };
+        values.filter(on_axis).map(tick).collect()
+    }
+
     /// 1, 2 or 5 times a power of ten.
     fn step(&self, count: f64) -> f64 {
         let rough = (self.high - self.low) / count;
@@ -122,6 +169,17 @@ impl Scale {
             .find(|step| step * power >= rough * 0.999);
         step.unwrap_or(10.0) * power
     }
+}
+
+/// From this ratio on, measured values are spaced by ratio.
+const DECADES: f64 = 100.0;
+
+/// The greatest of 1, 2 and 5 times a power of ten that is not above a value.
+fn round_below(value: f64) -> f64 {
+    let power = libm::pow(10.0, libm::floor(libm::log10(value)));
+    let steps = [5.0, 2.0, 1.0].map(|step| step * power);
+    let below = steps.into_iter().find(|step| *step <= value * (1.0 + 1e-9));
+    below.unwrap_or(power)
 }
 
 /// The width of a text of this size, roughly: nobody measures fonts here.
@@ -189,6 +247,25 @@ mod tests {
         assert!((scale.place(10.0) - 0.5).abs() < 1e-12);
         let scale = Scale::over([0.0, 100.0].into_iter(), Spacing::Log);
         assert_eq!(scale.place(50.0), 0.5);
+    }
+
+    #[test]
+    fn what_spans_decades_is_spaced_by_ratio() {
+        let texts = |low: f64, high: f64| -> Vec<String> {
+            let scale = Scale::measured([low, high].into_iter());
+            assert!(scale.is_log());
+            scale.ticks(5.0).into_iter().map(|tick| tick.text).collect()
+        };
+        assert_eq!(
+            texts(0.03, 7.0),
+            ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10"]
+        );
+        assert_eq!(
+            texts(3.0, 90_000.0),
+            ["10", "100", "1000", "10,000", "100,000"]
+        );
+        assert!(!Scale::measured([0.0, 7000.0].into_iter()).is_log());
+        assert!(!Scale::measured([1.0, 99.0].into_iter()).is_log());
     }
 
     #[test]

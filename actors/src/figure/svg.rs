@@ -26,6 +26,8 @@ pub struct Figure {
     pub height: f64,
     /// What is drawn.
     pub body: Markup,
+    /// Rules for classes of its own, beside [`super::STYLE`], written as those are; mostly none.
+    pub style: &'static str,
 }
 
 impl Figure {
@@ -39,20 +41,23 @@ impl Figure {
                 aria-labelledby={ (title) " " (description) } {
                 title id=(title) { (self.title) }
                 desc id=(description) { (self.description) }
+                @if !self.style.is_empty() { style { (PreEscaped(self.style)) } }
                 (self.body)
             }
         }
     }
 
-    /// The figure as a file of its own.
+    /// The figure as a file of its own, which browsers show in the reader's colours, and all other
+    /// programs in those for light paper.
     pub fn standalone(&self) -> String {
+        let css = format!("{}{}", super::STYLE, self.style);
         let markup = html! {
             svg xmlns="http://www.w3.org/2000/svg" viewBox=(self.view_box()) role="img"
                 width=(Px(self.width)) height=(Px(self.height)) class="figure" {
                 title { (self.title) }
                 desc { (self.description) }
-                style { (PreEscaped(super::STYLE)) }
-                rect class="paper" width="100%" height="100%" {}
+                style { (PreEscaped(super::style::standalone(&css))) }
+                rect class="paper" width=(Px(self.width)) height=(Px(self.height)) {}
                 (self.body)
             }
         };
@@ -118,6 +123,24 @@ impl Area {
     }
 }
 
+/// The most that a line of an axis' label is wide, in pixels.
+const LABEL: f64 = 350.0;
+
+/// A label in a line, or in two where one is too narrow; what is too long for two is cut.
+fn in_two_lines(text: &str, width: f64) -> [String; 2] {
+    // Labels are bold, and wider for it.
+    let fits = |text: &str| 1.12 * text_width(text, TEXT) <= width;
+    if fits(text) {
+        return [text.to_owned(), String::new()];
+    }
+    let spaces = text.match_indices(' ').map(|(at, _)| at);
+    let cut = spaces.filter(|at| fits(&text[..*at])).last();
+    let Some(cut) = cut else {
+        return [shortened(text, 48), String::new()];
+    };
+    [text[..cut].to_owned(), shortened(text[cut..].trim(), 48)]
+}
+
 /// What is written along the axes.
 pub struct Frame<'a> {
     /// Where the marks go.
@@ -139,7 +162,11 @@ impl Frame<'_> {
         let bottom = area.y(0.0);
         let written = thinned(&self.x_ticks, area.width, TEXT);
         html! {
-            text class="label" x="8" y=(Px(area.top - 30.0)) { (self.y_label) }
+            @let [first, second] = in_two_lines(&self.y_label, LABEL);
+            text class="label" x="8" y=(Px(area.top - 30.0)) { (first) }
+            @if !second.is_empty() {
+                text class="label" x="8" y=(Px(area.top - 14.0)) { (second) }
+            }
             @for tick in &self.y_ticks {
                 @let y = area.y(tick.at);
                 path class="grid" d=(path([(area.left, y), (area.x(1.0), y)])) {}
@@ -156,9 +183,10 @@ impl Frame<'_> {
                 text class="tick" x=(Px(area.x(tick.at))) y=(Px(bottom + 19.0))
                     text-anchor="middle" { (tick.text) }
             }
-            text class="label" x=(Px(area.x(0.5))) y=(Px(bottom + 40.0)) text-anchor="middle" {
-                (self.x_label)
-            }
+            // What is wider than the plot begins at the figure's left edge.
+            @let half = 0.56 * text_width(self.x_label, TEXT);
+            text class="label" x=(Px(area.x(0.5).max(half + 8.0))) y=(Px(bottom + 40.0))
+                text-anchor="middle" { (self.x_label) }
         }
     }
 }
@@ -179,6 +207,17 @@ pub fn widest<'a>(texts: impl Iterator<Item = &'a str>) -> f64 {
     texts.map(|text| text_width(text, TEXT)).fold(0.0, f64::max)
 }
 
+/// A text on a rim of paper, so that it can be read over lines. It is written twice, because not all
+/// programs can paint a rim behind a letter.
+pub fn over_lines(class: &str, (x, y): (f64, f64), anchor: &str, text: &str) -> Markup {
+    html! {
+        text class={ (class) " halo" } x=(Px(x)) y=(Px(y)) text-anchor=(anchor) aria-hidden="true" {
+            (text)
+        }
+        text class=(class) x=(Px(x)) y=(Px(y)) text-anchor=(anchor) { (text) }
+    }
+}
+
 /// A text at most so many letters long; what is cut is said by dots.
 pub fn shortened(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
@@ -189,10 +228,14 @@ pub fn shortened(text: &str, most: usize) -> String {
     short
 }
 
-/// A marker of a series, of its shape and colour, with what it says when pointed at.
-pub fn marker(series: usize, x: f64, y: f64, says: &str) -> Markup {
+/// A marker of a series, of its shape and colour, with what it says when pointed at; hollow where
+/// it is not of all runs.
+pub fn marker(series: usize, (x, y): (f64, f64), is_whole: bool, says: &str) -> Markup {
     let series = series % DASHES.len();
-    let class = format!("mark s{series}");
+    let class = match is_whole {
+        true => format!("mark s{series}"),
+        false => format!("mark some s{series}"),
+    };
     let around = |points: &[(f64, f64)]| {
         let mut data = path(points.iter().map(|(dx, dy)| (x + dx, y + dy)));
         data.push('Z');
@@ -216,51 +259,117 @@ pub fn marker(series: usize, x: f64, y: f64, says: &str) -> Markup {
     }
 }
 
-/// A curve's name, beside its end.
-pub struct EndLabel {
+/// A curve's name in a legend.
+pub struct CurveName {
     /// Which series it belongs to, from 0: its colour and dashes.
     pub series: usize,
-    /// Where it is, in pixels of the figure.
+    /// Where the curve ends, in pixels of the figure.
     pub y: f64,
+    /// Where it is among curves that end at one place: those of less come first.
+    pub rank: f64,
     /// What is written.
     pub text: String,
 }
 
-/// Names beside the ends of curves, moved apart where they would overlap, each with a piece of its
-/// line and, if the curve has markers, one of them.
-pub fn end_labels(mut labels: Vec<EndLabel>, area: &Area, heading: &str, markers: bool) -> Markup {
-    const APART: f64 = 17.0;
-    labels.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.series.cmp(&b.series)));
+/// How far names are apart that stand above each other.
+const APART: f64 = 18.0;
+/// The room for a piece of a curve's line before its name.
+const SAMPLE: f64 = 27.0;
+
+/// Puts names in the order in which curves end, from above; those of curves that end too near to
+/// each other to be told apart, by their rank.
+fn in_order(names: &mut [CurveName]) {
+    let ends = || names.iter().map(|name| name.y);
+    let spread = ends().fold(f64::NEG_INFINITY, f64::max) - ends().fold(f64::INFINITY, f64::min);
+    let are_apart = spread > 0.5 * APART * names.len().saturating_sub(1) as f64;
+    names.sort_by(|a, b| {
+        let by_end = a.y.total_cmp(&b.y);
+        let by_rank = a.rank.total_cmp(&b.rank);
+        let (first, second) = match are_apart {
+            true => (by_end, by_rank),
+            false => (by_rank, by_end),
+        };
+        first.then(second).then(a.series.cmp(&b.series))
+    });
+}
+
+/// A piece of a curve's line, with one of its markers if it has any, and its name.
+fn sample(name: &CurveName, x: f64, y: f64, markers: bool) -> Markup {
+    html! {
+        path class={ "line s" (name.series) } stroke-dasharray=(DASHES[name.series])
+            d=(path([(x, y), (x + 22.0, y)])) {}
+        @if markers { (marker(name.series, (x + 11.0, y), true, &name.text)) }
+        text class="name" x=(Px(x + SAMPLE)) y=(Px(y + 4.5)) { (name.text) }
+    }
+}
+
+/// Names beside the ends of curves, moved apart where they would overlap, below a heading that ends
+/// at `right`.
+pub fn names_beside(
+    mut names: Vec<CurveName>,
+    area: &Area,
+    heading: &str,
+    right: f64,
+    markers: bool,
+) -> Markup {
+    in_order(&mut names);
     let mut least = area.top + 6.0;
-    for label in &mut labels {
-        label.y = label.y.max(least);
-        least = label.y + APART;
+    for name in &mut names {
+        name.y = name.y.max(least);
+        least = name.y + APART;
     }
     // Those that were moved below the plot push the others back up.
     let mut most = area.y(0.0);
-    for label in labels.iter_mut().rev() {
-        label.y = label.y.min(most);
-        most = label.y - APART;
+    for name in names.iter_mut().rev() {
+        name.y = name.y.min(most);
+        most = name.y - APART;
     }
     let x = area.x(1.0) + 10.0;
     html! {
         @if !heading.is_empty() {
-            text class="label" x=(Px(x)) y=(Px(area.top - 10.0)) { (heading) }
+            text class="label" x=(Px(right)) y=(Px(area.top - 10.0)) text-anchor="end" { (heading) }
         }
-        @for label in &labels {
-            path class={ "line s" (label.series) } stroke-dasharray=(DASHES[label.series])
-                d=(path([(x, label.y), (x + 22.0, label.y)])) {}
-            @if markers { (marker(label.series, x + 11.0, label.y, &label.text)) }
-            text class="name" x=(Px(x + 27.0)) y=(Px(label.y + 4.5)) { (label.text) }
-        }
+        @for name in &names { (sample(name, x, name.y, markers)) }
     }
 }
 
 /// How much room names beside curves take.
-pub fn end_label_room<'a>(texts: impl Iterator<Item = &'a str>, heading: &str) -> f64 {
-    let names = widest(texts) + 27.0;
+pub fn room_beside<'a>(texts: impl Iterator<Item = &'a str>) -> f64 {
+    10.0 + SAMPLE + widest(texts) + 8.0
+}
+
+/// Names below a plot, in as many rows as they take, and how high those are. The first row begins
+/// with the heading.
+pub fn names_below(
+    mut names: Vec<CurveName>,
+    heading: &str,
+    (left, top): (f64, f64),
+    width: f64,
+    markers: bool,
+) -> (Markup, f64) {
+    in_order(&mut names);
     // Headings are bold, and wider for it.
-    10.0 + names.max(1.12 * text_width(heading, TEXT)) + 8.0
+    let after_heading = match heading {
+        "" => left,
+        heading => left + 1.12 * text_width(heading, TEXT) + 14.0,
+    };
+    let (mut x, mut y) = (after_heading, top);
+    let mut placed = Vec::new();
+    for name in &names {
+        let needed = SAMPLE + text_width(&name.text, TEXT) + 16.0;
+        if x + needed > left + width && x > left {
+            (x, y) = (left, y + APART);
+        }
+        placed.push((x, y));
+        x += needed;
+    }
+    let markup = html! {
+        @if !heading.is_empty() {
+            text class="label" x=(Px(left)) y=(Px(top + 4.5)) { (heading) }
+        }
+        @for (name, (x, y)) in names.iter().zip(&placed) { (sample(name, *x, *y, markers)) }
+    };
+    (markup, y - top + APART)
 }
 
 /// A file's name from some words: letters, digits and dashes.
@@ -274,4 +383,45 @@ pub fn slug(words: &str) -> String {
         }
     }
     slug.trim_matches(['-', '.']).chars().take(80).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(ends: &[(f64, f64)]) -> Vec<CurveName> {
+        let name = |(series, (y, rank)): (usize, &(f64, f64))| CurveName {
+            series,
+            y: *y,
+            rank: *rank,
+            text: format!("curve {series}"),
+        };
+        ends.iter().enumerate().map(name).collect()
+    }
+
+    /// Where each name stands in a markup.
+    fn order(markup: Markup) -> Vec<usize> {
+        let text = markup.into_string();
+        let parts = text.split("class=\"name\"").skip(1);
+        let series = |part: &str| part.split("curve ").nth(1)?.chars().next()?.to_digit(10);
+        parts.map(|part| series(part).unwrap() as usize).collect()
+    }
+
+    #[test]
+    fn names_are_in_the_order_of_the_curves_ends() {
+        let area = Area {
+            left: 0.0,
+            top: 0.0,
+            width: 100.0,
+            height: 200.0,
+        };
+        let apart = [(150.0, 0.0), (20.0, 1.0), (80.0, 2.0)];
+        let beside = names_beside(names(&apart), &area, "", 100.0, true);
+        assert_eq!(order(beside), [1, 2, 0]);
+        // Ends that nobody can tell apart: by rank.
+        let together = [(10.0, 2.0), (9.0, 1.0), (10.5, 0.0)];
+        let (below, height) = names_below(names(&together), "names", (0.0, 0.0), 120.0, false);
+        assert_eq!(order(below), [2, 1, 0]);
+        assert!(height > APART, "{height}");
+    }
 }

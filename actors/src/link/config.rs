@@ -10,7 +10,7 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use thiserror::Error;
 
-use super::params::{DEGRADE_KEYS, Key};
+use super::params::{DEGRADE_KEYS, Key, Seen};
 use super::{LinkOverrides, LinkParams};
 use crate::processor::Slowdown;
 use crate::units;
@@ -181,7 +181,7 @@ impl Serialize for Degrade {
 
 /// Reads a key of an entry, and refuses one that is not for what the entry degrades, at its place.
 struct EntryKey<'a> {
-    seen: &'a mut Vec<&'static str>,
+    seen: &'a mut Seen,
 }
 
 impl<'de> DeserializeSeed<'de> for EntryKey<'_> {
@@ -210,7 +210,8 @@ impl Visitor<'_> for EntryKey<'_> {
         .visit_str::<E>(name)?;
         let specific = |key: &str| !["at", "until"].contains(&key);
         let of_processors = |key: &str| OF_PROCESSORS.contains(&key);
-        let mut earlier = self.seen.iter().filter(|seen| specific(seen));
+        let earlier = self.seen.iter().map(|(seen, _)| *seen);
+        let mut earlier = earlier.filter(|seen| specific(seen));
         let other = earlier.find(|seen| of_processors(seen) != of_processors(key));
         match other.filter(|_| specific(key)) {
             None => Ok(key),

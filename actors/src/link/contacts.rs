@@ -221,6 +221,11 @@ impl Contacts {
         self.windows.is_empty()
     }
 
+    /// Whether they come again and again.
+    pub fn repeats(&self) -> bool {
+        self.every.is_some()
+    }
+
     /// The contacts, repetitions apart.
     pub fn windows(&self) -> &[Contact] {
         &self.windows

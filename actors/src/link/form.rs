@@ -8,22 +8,81 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace};
 use crate::units;
 
 /// How a value is read from a scenario, and written to one.
 pub(super) trait Form {
     type Value;
 
+    /// What may be written, for people.
+    fn said() -> Said;
+
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Self::Value, D::Error>;
 
     fn write<S: Serializer>(value: &Self::Value, to: S) -> Result<S::Ok, S::Error>;
 }
 
+/// What may be written as the value of a key: its kind, its units, and which of those values.
+#[derive(Default)]
+pub(super) struct Said {
+    pub(super) value: &'static str,
+    pub(super) units: Vec<&'static str>,
+    pub(super) expected: String,
+}
+
+impl Said {
+    fn value(value: &'static str) -> Self {
+        Said {
+            value,
+            ..Said::default()
+        }
+    }
+
+    fn which(self, expected: impl Into<String>) -> Self {
+        Said {
+            expected: expected.into(),
+            ..self
+        }
+    }
+}
+
+/// A type that says of itself what may be written.
+pub(super) trait Described {
+    fn said() -> Said;
+}
+
+macro_rules! described {
+    ($($type:ty: $value:literal $(which $expected:expr)?;)*) => {$(
+        impl Described for $type {
+            fn said() -> Said {
+                Said::value($value)$(.which($expected))?
+            }
+        }
+    )*};
+}
+
+described! {
+    bool: "true or false";
+    String: "a text";
+    JitterShape: "" which r#"one of uniform, normal, pareto, or { table = [...] }"#;
+    Preset: "" which format!("one of {}", Preset::names().collect::<Vec<_>>().join(", "));
+    Burst: "a table" which "{ loss, length }, { loss, messages, interval }, { p, r, bad_loss, \
+                            good_loss } or { p13, p31, p32, p23, p14 }, each with `slot` if wanted";
+    QueueLimit: r#"a number of messages, or a data size such as "64kB""#;
+    Trace: "a file's name, a built-in trace's, or a list of milliseconds";
+    Contacts: "a list of { start, end, rate, owlt }, or { every, windows = [...] }";
+}
+
 /// As the type itself has it.
 pub(super) struct Plain<T>(PhantomData<T>);
 
-impl<T: Serialize + for<'de> Deserialize<'de>> Form for Plain<T> {
+impl<T: Described + Serialize + for<'de> Deserialize<'de>> Form for Plain<T> {
     type Value = T;
+
+    fn said() -> Said {
+        T::said()
+    }
 
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
         T::deserialize(from)
@@ -41,6 +100,12 @@ macro_rules! quantities {
 
         impl Form for $name {
             type Value = $value;
+
+            fn said() -> Said {
+                let described = units::described(stringify!($module));
+                let (value, units) = described.unwrap_or_default();
+                Said { value, units, expected: String::new() }
+            }
 
             fn read<'de, D: Deserializer<'de>>(from: D) -> Result<$value, D::Error> {
                 units::$module::deserialize(from)
@@ -67,6 +132,10 @@ pub(super) struct DataRate;
 impl Form for DataRate {
     type Value = u64;
 
+    fn said() -> Said {
+        AnyRate::said().which("more than 0bit/s")
+    }
+
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
         match AnyRate::read(from)? {
             0 => Err(D::Error::custom(
@@ -86,6 +155,10 @@ pub(super) struct Span;
 
 impl Form for Span {
     type Value = SimDuration;
+
+    fn said() -> Said {
+        Duration::said().which("more than 0s")
+    }
 
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<SimDuration, D::Error> {
         let span = Duration::read(from)?;
@@ -108,6 +181,10 @@ const MAX_RETRIES: u32 = 1000;
 
 impl Form for Retries {
     type Value = u32;
+
+    fn said() -> Said {
+        Said::value("a whole number").which(format!("0 to {MAX_RETRIES}"))
+    }
 
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
         let retries = u32::deserialize(from)?;
@@ -133,6 +210,10 @@ const MAX_WINDOW: u32 = 1 << 24;
 impl Form for WindowSize {
     type Value = u32;
 
+    fn said() -> Said {
+        Said::value("a whole number").which(format!("1 to {MAX_WINDOW}"))
+    }
+
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
         let window = u32::deserialize(from)?;
         match window {
@@ -154,6 +235,10 @@ pub(super) struct SomeBytes;
 impl Form for SomeBytes {
     type Value = u64;
 
+    fn said() -> Said {
+        DataSize::said().which("more than 0B")
+    }
+
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
         match DataSize::read(from)? {
             0 => Err(D::Error::custom("0B: expected more than that")),
@@ -174,6 +259,15 @@ pub(super) struct OrOff<F>(PhantomData<F>);
 
 impl<F: Form> Form for OrOff<F> {
     type Value = Option<F::Value>;
+
+    fn said() -> Said {
+        let inner = F::said();
+        let expected = match inner.expected.as_str() {
+            "" => "or \"off\"".to_owned(),
+            expected => format!("{expected}; or \"off\""),
+        };
+        inner.which(expected)
+    }
 
     fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Self::Value, D::Error> {
         from.deserialize_any(OrOffVisitor::<F>(PhantomData))

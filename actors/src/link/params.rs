@@ -10,8 +10,8 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::form::{
-    DataRate, DataSize, Duration, Form, Fraction, OrOff, Plain, Power, Retries, SomeBytes, Span,
-    WindowSize,
+    DataRate, DataSize, Described, Duration, Form, Fraction, OrOff, Plain, Power, Retries,
+    SomeBytes, Span, WindowSize,
 };
 use super::{Burst, Contacts, JitterShape, Preset, QueueLimit, Trace, preset};
 
@@ -108,17 +108,20 @@ macro_rules! parameters {
         impl LinkParams {
             /// What there is to know of each key.
             pub fn keys() -> Vec<crate::system::Key> {
+                let about = &["What all parameters are replaced by, before the others here."];
                 let preset = crate::system::Key {
-                    name: "preset",
-                    about: &["What all parameters are replaced by, before the others here."],
-                    expected: String::new(),
-                    aliases: &[],
+                    expected: Preset::said().expected,
+                    ..crate::system::Key::new("preset", about)
                 };
-                let own = [$(crate::system::Key {
-                    name: $key,
-                    about: &[$($doc),*],
-                    expected: String::new(),
-                    aliases: &[$($alias),*],
+                let own = [$({
+                    let said = <$form as Form>::said();
+                    crate::system::Key {
+                        value: said.value,
+                        units: said.units,
+                        expected: said.expected,
+                        aliases: &[$($alias),*],
+                        ..crate::system::Key::new($key, &[$($doc),*])
+                    }
                 }),*];
                 std::iter::once(preset).chain(own).collect()
             }
@@ -209,6 +212,8 @@ parameters! {
     /// How far delays scatter round the latency.
     jitter: SimDuration = SimDuration::ZERO, key "jitter", as Duration, Always;
     /// How they scatter.
+    ///
+    /// Source: tc-netem(8), `distribution`; its pareto.c.
     jitter_shape: JitterShape = JitterShape::Uniform,
         key "jitter_shape" or "distribution", as Plain<JitterShape>, Always;
     /// How much the jitter of a message is like that of the one before it: the lag-one correlation
@@ -222,14 +227,20 @@ parameters! {
     /// up.
     fifo: bool = false, key "fifo" or "in_order", as Plain<bool>, IfOn;
     /// The fraction of messages that are lost, each by itself.
+    ///
+    /// Source: tc-netem(8), `loss random`.
     loss: f64 = 0.0, key "loss", as Fraction, Always;
-    /// Loss in bursts, beside that.
+    /// Loss in bursts, beside that: a channel that is good or bad, and changes in time.
+    ///
+    /// Source: Gilbert 1960, Elliott 1963; tc-netem(8), `loss gemodel` and `loss state`.
     burst: Option<Burst> = None,
         key "burst" or "gemodel" or "loss_gemodel" or "loss_state", as OrOff<Plain<Burst>>, IfOn;
     /// The fraction of messages that set out twice, each a transmission of its own.
     duplicate: f64 = 0.0, key "duplicate", as Fraction, Always;
     /// The fraction of messages that are held back on their way by `reorder_by`, so that those sent
     /// up to that much later overtake them.
+    ///
+    /// Source: tc-netem(8), `reorder`, which delays the others instead.
     reorder: f64 = 0.0, key "reorder", as Fraction, IfOn;
     /// How long those are held back; the latency unless given.
     reorder_by: Option<SimDuration> = None, key "reorder_by", as OrOff<Duration>, IfOn;
@@ -247,6 +258,8 @@ parameters! {
     queue: Option<QueueLimit> = None,
         key "queue" or "limit", as OrOff<Plain<QueueLimit>>, IfOn;
     /// Delivery opportunities in place of a rate.
+    ///
+    /// Source: mahimahi(1), mm-link; Netravali et al., USENIX ATC 2015.
     trace: Option<Trace> = None, key "trace", as OrOff<Plain<Trace>>, IfOn;
     /// When the link can transmit at all, with rates and light times.
     contacts: Option<Contacts> = None,
@@ -259,6 +272,8 @@ parameters! {
     /// The most bytes of a message that go in one transmission, headers apart: a longer one goes in
     /// fragments, each with an `overhead` of its own, each lost and repeated by itself, each in
     /// whatever is left of a contact. The message is there when all are, and lost when one is.
+    ///
+    /// Source: RFC 791, for fragments.
     mtu: Option<u64> = None, key "mtu", as OrOff<SomeBytes>, IfOn;
     /// The bytes that each fragment has beside that, and a message in one piece does not.
     fragment_header: u64 = 0, key "fragment_header", as DataSize, IfOn;
@@ -266,6 +281,8 @@ parameters! {
     retries: u32 = 0, key "retries", as Retries, IfOn;
     /// With `retries`, how many messages or fragments may be under way at once, from the first that
     /// is not acknowledged on: selective repeat. 1 is stop and wait.
+    ///
+    /// Source: CCSDS 211.0-B (Proximity-1) and RFC 5326 (LTP).
     window: u32 = 1, key "window", as WindowSize, IfOn;
     /// The size of an acknowledgement with its headers: it takes `8 ack / ack_rate` on the way
     /// back.
@@ -348,8 +365,11 @@ impl LinkParams {
 /// Reads a key: one of `keys`, or an alias of one, not seen before.
 pub(super) struct Key<'a> {
     pub(super) keys: &'static [&'static str],
-    pub(super) seen: &'a mut Vec<&'static str>,
+    pub(super) seen: &'a mut Seen,
 }
+
+/// The keys that were read before, each with the name that was used.
+pub(super) type Seen = Vec<(&'static str, String)>;
 
 impl<'de> DeserializeSeed<'de> for Key<'_> {
     type Value = &'static str;
@@ -371,10 +391,13 @@ impl Visitor<'_> for Key<'_> {
         let Some(key) = own.or_else(|| key_of(name)) else {
             return Err(E::unknown_field(name, self.keys));
         };
-        if self.seen.contains(&key) {
-            return Err(E::duplicate_field(key));
+        if let Some((_, before)) = self.seen.iter().find(|(known, _)| *known == key) {
+            return Err(E::custom(format!(
+                "{before} and {name} are names of one key, {key}: expected one of them; what \
+                 --set sets in place of what a file says has the file's name"
+            )));
         }
-        self.seen.push(key);
+        self.seen.push((key, name.to_owned()));
         Ok(key)
     }
 }

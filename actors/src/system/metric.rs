@@ -72,6 +72,8 @@ pub struct Metric {
     pub better: Better,
     /// What it is, in a sentence or two.
     pub about: &'static str,
+    /// Where it is from: a paper and its section; empty if it is Farside's own.
+    pub source: &'static str,
 }
 
 impl Metric {
@@ -90,6 +92,7 @@ impl Metric {
             kind,
             better,
             about: "",
+            source: "",
         }
     }
 
@@ -123,6 +126,13 @@ impl Metric {
     #[must_use]
     pub const fn about(mut self, about: &'static str) -> Self {
         self.about = about;
+        self
+    }
+
+    /// With where it is from.
+    #[must_use]
+    pub const fn source(mut self, source: &'static str) -> Self {
+        self.source = source;
         self
     }
 }

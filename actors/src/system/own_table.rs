@@ -8,8 +8,8 @@ use serde::de::DeserializeOwned;
 
 use super::settings::Table;
 use super::{
-    Assembly, Builtin, Files, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
+    Settings, Setup, SetupError, System,
 };
 use crate::figure::Figure;
 
@@ -148,7 +148,7 @@ impl<T: OwnTable> Settings for Alone<T> {
         picture: &str,
         run: &dyn Recording,
         request: &PictureRequest,
-        _files: &mut Files,
+        _setup: &mut Setup<'_>,
     ) -> Result<Figure, PictureError> {
         self.0.draw(picture, run, request)
     }

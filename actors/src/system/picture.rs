@@ -15,6 +15,8 @@ pub struct PictureInfo {
     pub about: &'static str,
     /// The options that it takes.
     pub takes: &'static [PictureOption],
+    /// What it shows only if asked, each by a name and in a line; for [`PictureOption::With`].
+    pub extras: &'static [(&'static str, &'static str)],
 }
 
 /// Something that a picture may be asked for.
@@ -26,6 +28,8 @@ pub enum PictureOption {
     From,
     /// Along what: a line of vertices, a timeline, a resource.
     Along,
+    /// What is shown besides, of what [`PictureInfo::extras`] names.
+    With,
 }
 
 impl PictureOption {
@@ -35,6 +39,7 @@ impl PictureOption {
             PictureOption::At => "at",
             PictureOption::From => "from",
             PictureOption::Along => "along",
+            PictureOption::With => "with",
         }
     }
 }
@@ -48,6 +53,8 @@ pub struct PictureRequest {
     pub from: Option<SimDuration>,
     /// Along what.
     pub along: Option<String>,
+    /// What is shown besides: names of [`PictureInfo::extras`], each checked.
+    pub with: Vec<String>,
 }
 
 /// A run that was recorded, as pictures read it.
@@ -78,6 +85,8 @@ pub struct Recorded<'a> {
     pub time_ns: u64,
     /// What happened.
     pub class: RecordClass,
+    /// The name of who it happened to: who gets a message, who crashed, which link changed.
+    pub actor: &'a str,
     /// The kind of the message or state sample: its serde name.
     pub kind: &'a str,
     /// The message or sample, encoded.

@@ -326,10 +326,12 @@ macro_rules! settings {
                     name: name.to_owned(),
                     about: &[$($about),+],
                     keys: vec![$($crate::system::Key {
-                        name: $crate::settings!(@key $field $($key)?),
-                        about: &[$($doc),+],
                         expected: Rule::<$type>::expected(&$crate::settings!(@rule $($rule)?)),
-                        aliases: &[],
+                        ..$crate::system::Key::new(
+                            $crate::settings!(@key $field $($key)?),
+                            &[$($doc),+],
+                        )
+                        .typed(stringify!($type), concat!($(stringify!($($serde)+))?))
                     }),+],
                     defaults: $crate::system::settings::defaults::<Self>(),
                 }];

@@ -33,7 +33,7 @@ impl Unit {
 /// A quantity: how to ask for it, and its units.
 pub(super) struct Quantity {
     pub(super) expected: &'static str,
-    units: &'static [Unit],
+    pub(super) units: &'static [Unit],
 }
 
 pub(super) const DURATION: Quantity = Quantity {

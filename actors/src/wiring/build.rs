@@ -61,6 +61,8 @@ pub struct LinkBuilder {
     mistake: Option<LinkConfigError>,
     /// When which host hears which, where a plan has any say.
     plan: Option<Arc<ContactPlan>>,
+    /// What is worse when, as it was given.
+    planned: Vec<Degrade>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<SharedTimeline>,
 }
@@ -93,6 +95,7 @@ impl LinkBuilder {
             let pattern = Pattern::new(key, text)?;
             builder.overrides.push((pattern, over.clone()));
         }
+        builder.planned = degrades.to_vec();
         for (index, degrade) in degrades.iter().enumerate() {
             let key = |last: &str| vec!["degrade".to_owned(), index.to_string(), last.to_owned()];
             if let Some(until) = degrade.until.filter(|until| *until <= degrade.at) {
@@ -128,6 +131,11 @@ impl LinkBuilder {
             });
         }
         Ok(builder)
+    }
+
+    /// What is worse when, in the order of the scenario.
+    pub fn degrades(&self) -> &[Degrade] {
+        &self.planned
     }
 
     /// Gives links the contacts of a plan over hosts' names, beneath what `[links]` says of them:

@@ -2,66 +2,77 @@
 
 mod catalogue;
 
+use std::sync::OnceLock;
+
 use farside::SimTime;
+use farside_actors::system::{Metric, with_about};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use catalogue::ALL;
+/// What runs can be measured by, each with what its field says.
+pub(crate) fn all() -> &'static [Metric] {
+    static ALL: OnceLock<Vec<Metric>> = OnceLock::new();
+    ALL.get_or_init(|| with_about(&catalogue::ALL, TrafficMetrics::about))
+}
 
 use super::monitor::{FlowTally, Tally};
 use super::route::{Flow, TrafficPlan};
 
-/// What came of all flows. Delays are from a message's source to its destination, over all hops,
-/// of the first copy that arrives.
-///
-/// ```
-/// use farside_traffic::TrafficMetrics;
-/// let metrics = TrafficMetrics { sent: 4, delivered: 3, ..TrafficMetrics::default() };
-/// assert!(metrics.delays_s.is_empty() && metrics.delay_mean_s.is_none());
-/// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TrafficMetrics {
-    /// How many flows there were.
-    pub flows: u64,
-    /// Messages sent by their sources.
-    pub sent: u64,
-    /// Messages that reached their destinations.
-    pub delivered: u64,
-    /// Messages of which nothing arrived, and nothing was on its way when the run ended.
-    pub lost: u64,
-    /// Messages of which nothing arrived, but something was on its way.
-    pub in_flight: u64,
-    /// Delivered among sent; `None` if nothing was sent.
-    pub delivery_ratio: Option<f64>,
-    /// The mean delay \[s\]; this and the next three are `None` if nothing arrived.
-    pub delay_mean_s: Option<f64>,
-    /// The delay that half of the messages did not exceed \[s\], of those in `delays_s`.
-    pub delay_p50_s: Option<f64>,
-    /// The delay that 95 % did not exceed \[s\], of those in `delays_s`.
-    pub delay_p95_s: Option<f64>,
-    /// The longest delay \[s\].
-    pub delay_max_s: Option<f64>,
-    /// The mean over flows of the time-average age of information at the receiver \[s\]: the age
-    /// at an instant is the time since the freshest message that has arrived was sent (Kaul, Yates
-    /// and Gruteser, INFOCOM 2012). Time counts from the flow's first arrival to the end of the
-    /// run, or to the last arrival if the flow had stopped by then. `None` if no flow has had two.
-    pub age_of_information_mean_s: Option<f64>,
-    /// The greatest age at any receiver in that time \[s\].
-    pub age_peak_s: Option<f64>,
-    /// The bits of delivered messages over the time from the first flow's start to the end of the
-    /// run \[bit/s\].
-    pub goodput_bit_per_s: Option<f64>,
-    /// Copies that arrived after the first of their message.
-    pub duplicates: u64,
-    /// Messages that arrived after a later one of their flow.
-    pub reordered: u64,
-    /// What transmissions took from those who sent, of messages whose fate is known \[J\]; 0 unless
-    /// links have a `tx_power`.
-    pub transmit_energy_j: f64,
-    /// The delays \[s\], sorted. Of more than 10,000 a sample in which each is as likely as any.
-    pub delays_s: Vec<f64>,
-    /// Each flow by itself.
-    #[serde(skip)]
-    pub by_flow: Vec<FlowMetrics>,
+farside_actors::documented! {
+    /// What came of all flows. Delays are from a message's source to its destination, over all
+    /// hops, of the first copy that arrives.
+    ///
+    /// ```
+    /// use farside_traffic::TrafficMetrics;
+    /// let metrics = TrafficMetrics { sent: 4, delivered: 3, ..TrafficMetrics::default() };
+    /// assert!(metrics.delays_s.is_empty() && metrics.delay_mean_s.is_none());
+    /// ```
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    pub struct TrafficMetrics {
+        /// How many flows there were.
+        pub flows: u64,
+        /// Messages sent by their sources.
+        pub sent: u64,
+        /// Messages that reached their destinations.
+        pub delivered: u64,
+        /// Messages of which nothing arrived, and nothing was on its way when the run ended.
+        pub lost: u64,
+        /// Messages of which nothing arrived, but something was on its way.
+        pub in_flight: u64,
+        /// Delivered among sent; `None` if nothing was sent.
+        pub delivery_ratio: Option<f64>,
+        /// The mean delay \[s\]; this and the next three are `None` if nothing arrived.
+        pub delay_mean_s: Option<f64>,
+        /// The delay that half of the messages did not exceed \[s\], of those in `delays_s`.
+        pub delay_p50_s: Option<f64>,
+        /// The delay that 95 % did not exceed \[s\], of those in `delays_s`.
+        pub delay_p95_s: Option<f64>,
+        /// The longest delay \[s\].
+        pub delay_max_s: Option<f64>,
+        /// The mean over flows of the time-average age of information at the receiver \[s\]: the
+        /// age at an instant is the time since the freshest message that has arrived was sent
+        /// (Kaul, Yates and Gruteser, INFOCOM 2012). Time counts from the flow's first arrival to
+        /// the end of the run, or to the last arrival if the flow had stopped by then. `None` if no
+        /// flow has had two.
+        pub age_of_information_mean_s: Option<f64>,
+        /// The greatest age at any receiver in that time \[s\].
+        pub age_peak_s: Option<f64>,
+        /// The bits of delivered messages over the time from the first flow's start to the end of
+        /// the run \[bit/s\].
+        pub goodput_bit_per_s: Option<f64>,
+        /// Copies that arrived after the first of their message.
+        pub duplicates: u64,
+        /// Messages that arrived after a later one of their flow.
+        pub reordered: u64,
+        /// What transmissions took from those who sent, of messages whose fate is known \[J\]; 0
+        /// unless links have a `tx_power`.
+        pub transmit_energy_j: f64,
+        /// The delays \[s\], sorted. Of more than 10,000 a sample in which each is as likely as
+        /// any.
+        pub delays_s: Vec<f64>,
+        /// Each flow by itself.
+        #[serde(skip)]
+        pub by_flow: Vec<FlowMetrics>,
+    }
 }
 
 /// What came of one flow; see [`TrafficMetrics`].

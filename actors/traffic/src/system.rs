@@ -35,7 +35,7 @@ impl System for TrafficSystem {
     }
 
     fn metrics(&self) -> &[Metric] {
-        &metrics::ALL
+        metrics::all()
     }
 
     fn scenarios(&self) -> &[Builtin] {
@@ -71,8 +71,11 @@ impl Settings for TrafficScenario {
         }
         let seed = setup.run_seed;
         let traffic = setup.wired(|sim, wire| assemble(sim, &self.traffic, seed, wire))?;
-        Ok(Assembly::new(move |report: &Report| {
-            results(&traffic.metrics(report.end_time))
+        let assembly =
+            Assembly::new(move |report: &Report| results(&traffic.metrics(report.end_time)));
+        let flows = self.traffic.flows.iter().enumerate();
+        Ok(flows.fold(assembly, |assembly, (index, flow)| {
+            assembly.with_planned(format!("traffic.flow.{index}"), flow.start)
         }))
     }
 }

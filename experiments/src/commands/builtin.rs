@@ -1,5 +1,6 @@
 //! `farside scenarios` and `farside studies`: what is built in.
 
+use farside::suggest::{did_you_mean, nearest};
 use farside_actors::system::Builtin;
 use serde_json::json;
 
@@ -9,8 +10,11 @@ use crate::registry::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Print the texts instead, as TOML, for copying
-    #[arg(long, conflicts_with = "json")]
+    /// Print the text of this one, as TOML, for copying
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+    /// Print the texts of all, as TOML
+    #[arg(long, conflicts_with_all = ["json", "name"])]
     text: bool,
     /// Print JSON
     #[arg(long)]
@@ -19,6 +23,8 @@ pub(crate) struct Args {
 
 /// Files that are built in.
 struct Shelf {
+    /// What one of them is.
+    what: &'static str,
     files: Vec<Builtin>,
     /// The key whose value says what a file is for.
     about: &'static str,
@@ -26,6 +32,7 @@ struct Shelf {
 
 pub(crate) fn scenarios(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
+        what: "scenario",
         files: registry.scenarios(),
         about: "description",
     };
@@ -34,6 +41,7 @@ pub(crate) fn scenarios(args: &Args, registry: &Registry) -> Result<Exit, Comman
 
 pub(crate) fn studies(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let shelf = Shelf {
+        what: "study",
         files: registry.studies(),
         about: "question",
     };
@@ -42,6 +50,9 @@ pub(crate) fn studies(args: &Args, registry: &Registry) -> Result<Exit, CommandE
 
 impl Shelf {
     fn list(&self, args: &Args) -> Result<Exit, CommandError> {
+        if let Some(name) = &args.name {
+            return self.show(name, args.json);
+        }
         let files = self.files.iter();
         if args.text {
             let texts = files.map(|file| format!("# --- {}\n{}", file.name, file.text));
@@ -56,6 +67,25 @@ impl Shelf {
         let width = files.clone().map(|file| file.name.len()).max().unwrap_or(0);
         let lines = files.map(|file| format!("{:width$}  {}", file.name, self.about(file)));
         print(lines.collect::<Vec<_>>().join("\n"))?;
+        Ok(Exit::Done)
+    }
+
+    /// Prints one, whole.
+    fn show(&self, name: &str, as_json: bool) -> Result<Exit, CommandError> {
+        let Some(file) = self.files.iter().find(|file| file.name == name) else {
+            let names = self.files.iter().map(|file| file.name);
+            let hint = did_you_mean(nearest(name, names.clone()).as_deref());
+            let (what, known) = (self.what, names.collect::<Vec<_>>().join(", "));
+            return Err(CommandError::Arguments(format!(
+                "{name}: no {what} of this name is built in{hint}\n  built in: {known}"
+            )));
+        };
+        if as_json {
+            let (name, text) = (file.name, file.text);
+            print_json(&json!({ "name": name, self.about: self.about(file), "text": text }))?;
+        } else {
+            print_document(file.text)?;
+        }
         Ok(Exit::Done)
     }
 

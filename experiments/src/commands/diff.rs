@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use farside_logs::DiffOptions;
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::{CommandError, print, print_json};
+use crate::registry::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -36,7 +38,9 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Log, &args.a, registry)?;
+    kinds::expect(Kind::Log, &args.b, registry)?;
     let options = DiffOptions {
         tolerance: args.tolerance,
         ignore: args.ignore.clone(),

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 use farside::SimDuration;
 use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
@@ -16,9 +17,11 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::Exit;
-use super::output::{self, Format};
+use super::kinds;
+use super::output;
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
+use crate::export::{self, Kind};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -31,7 +34,7 @@ pub(crate) struct Args {
     #[arg(value_name = "PICTURE")]
     picture: Option<String>,
     /// List the pictures that there are of this run, and what each takes
-    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "out"])]
+    #[arg(long, conflicts_with_all = ["picture", "at", "from", "along", "with", "out", "format"])]
     list: bool,
     /// The instant, or the end of a time span; the end of the run unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
@@ -42,9 +45,20 @@ pub(crate) struct Args {
     /// Along what it is drawn, as --list says
     #[arg(long, value_name = "WHAT")]
     along: Option<String>,
-    /// Where to write the picture; beside the log unless given
-    #[arg(long, value_name = "FILE.svg")]
+    /// What it shows besides, as --list says
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    with: Vec<String>,
+    /// Where to write the picture; beside the log unless given. It is SVG, or what the ending says
+    #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
+    /// What else it is written as, beside that: svg, pdf for papers, png for slides
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
+    format: Vec<Kind>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -54,12 +68,21 @@ pub(crate) struct Args {
 #[derive(Serialize)]
 struct Document<'a> {
     out: String,
+    /// All that were written, `out` first.
+    files: Vec<String>,
     title: &'a str,
     description: &'a str,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let by_ending = |out: &PathBuf| {
+        let ending = out.extension()?.to_str()?;
+        Kind::from_str(ending, true).ok()
+    };
+    let first = args.out.as_ref().and_then(by_ending);
+    let kinds = export::kinds(first.unwrap_or(Kind::Svg), &args.format)?;
     let path = &args.log;
+    kinds::expect(kinds::Kind::Log, path, registry)?;
     let log = Log::open(path)?;
     let summary = farside_logs::info(path)?.run.unwrap_or_default();
     let scenario = scenario_of(path, &summary, registry)?;
@@ -74,10 +97,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         path: path.clone(),
         reason: error.to_string(),
     })?;
-    write(args, &figure)
+    write(args, &figure, &kinds)
 }
 
-fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
+/// Writes the first kind where it is to be, and the others beside it.
+fn write(args: &Args, figure: &Figure, kinds: &[Kind]) -> Result<Exit, CommandError> {
     let out = args.out.clone().unwrap_or_else(|| {
         let stem = args
             .log
@@ -87,15 +111,27 @@ fn write(args: &Args, figure: &Figure) -> Result<Exit, CommandError> {
         args.log.with_file_name(name)
     });
     let inputs = std::slice::from_ref(&args.log);
-    let out = output::write(out, &figure.standalone(), Format::Svg, inputs)?;
+    let mut files = Vec::new();
+    for (index, kind) in kinds.iter().enumerate() {
+        let path = match index {
+            0 => out.clone(),
+            _ => out.with_extension(kind.ending()),
+        };
+        files.push(output::write_figure(path, figure, *kind, inputs)?);
+    }
     if args.json {
         print_json(&Document {
-            out,
+            out: files[0].clone(),
+            files,
             title: &figure.title,
             description: &figure.description,
         })?;
     } else {
-        print(format!("{out}: {}\n  {}", figure.title, figure.description))?;
+        let files = files.join(", ");
+        print(format!(
+            "{files}: {}\n  {}",
+            figure.title, figure.description
+        ))?;
     }
     Ok(Exit::Done)
 }
@@ -108,7 +144,7 @@ fn options(picture: &PictureInfo) -> Vec<String> {
 
 fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
     if args.json {
-        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture) });
+        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture), "extras": picture.extras.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect::<Vec<_>>() });
         print_json(&pictures.iter().map(entry).collect::<Vec<_>>())?;
         return Ok(Exit::Done);
     }
@@ -123,7 +159,10 @@ fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
             [] => String::new(),
             _ => format!("\n{:width$}  takes {}", "", options(picture).join(", ")),
         };
-        format!("{:width$}  {}{takes}", picture.name, picture.about)
+        let extra =
+            |(name, about): &(&str, &str)| format!("\n{:width$}  --with {name}: {about}", "");
+        let extras: String = picture.extras.iter().map(extra).collect();
+        format!("{:width$}  {}{takes}{extras}", picture.name, picture.about)
     };
     print(pictures.iter().map(line).collect::<Vec<_>>().join("\n"))?;
     Ok(Exit::Done)
@@ -159,6 +198,7 @@ fn draw(
         (PictureOption::At, args.at.is_some()),
         (PictureOption::From, args.from.is_some()),
         (PictureOption::Along, args.along.is_some()),
+        (PictureOption::With, !args.with.is_empty()),
     ];
     for (option, given) in given {
         if given && !picture.takes.contains(&option) {
@@ -170,10 +210,24 @@ fn draw(
             )));
         }
     }
+    let extras = || picture.extras.iter().map(|(name, _)| *name);
+    if let Some(wanted) = args
+        .with
+        .iter()
+        .find(|wanted| !extras().any(|name| name == *wanted))
+    {
+        let hint = did_you_mean(nearest(wanted, extras()).as_deref());
+        let known = extras().collect::<Vec<_>>().join(", ");
+        return Err(PictureError::NotDrawn(format!(
+            "--with {wanted:?}: the picture {:?} has no such extra{hint}; expected {known}",
+            picture.name
+        )));
+    }
     let request = PictureRequest {
         at: args.at,
         from: args.from,
         along: args.along.clone(),
+        with: args.with.clone(),
     };
     let seeds = scenario.seeds_of(log.seed(), None);
     scenario.draw(picture.name, &Logged { log, seeds }, &request)
@@ -208,6 +262,7 @@ impl Recording for Logged<'_> {
             visit(&Recorded {
                 time_ns: record.key.time_ns,
                 class: record.class,
+                actor: record.receiver,
                 kind: record.kind,
                 body: record.body,
             })?;

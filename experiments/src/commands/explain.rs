@@ -6,9 +6,9 @@ use farside_actors::system::{Better, Key, Metric, MetricKind, Section};
 use serde_json::{Value, json};
 
 use super::Exit;
+use super::describe::{WIDTH, facts, of_any, plain, prose, sections, wrapped};
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
-use crate::scenario::shared_sections;
 use crate::study::KERNEL_METRICS;
 
 #[derive(clap::Args)]
@@ -36,9 +36,8 @@ enum Entry<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let shared = shared_sections();
-    let own: Vec<Section> = registry.systems().flat_map(|s| s.sections()).collect();
-    let sections: Vec<&Section> = shared.iter().chain(&own).collect();
+    let sections = sections(registry);
+    let sections: Vec<&Section> = sections.iter().collect();
     let all = entries(&sections, registry);
     let Some(name) = &args.name else {
         return list(&sections, registry, &all, args.json);
@@ -70,35 +69,6 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     texts.extend(found.iter().map(|entry| entry.text()));
     print(texts.join("\n\n"))?;
     Ok(Exit::Done)
-}
-
-/// The name under which the keys of a table stand that scenarios name themselves, or number: those
-/// of `radios.uhf` are those of `radios.NAME`, those of `links.rover_*` those of `links.default`.
-fn of_any(name: &str) -> String {
-    let stands = |table: &str| match table {
-        "links" => Some("links.default"),
-        "radios" => Some("radios.NAME"),
-        _ => None,
-    };
-    let Some((table, rest)) = name.split_once('.') else {
-        return name.to_owned();
-    };
-    // Patterns and names have no dots, or stand in quotes.
-    let (own, key) = match rest.strip_prefix(['"', '\'']) {
-        Some(quoted) => quoted.split_once(['"', '\'']).unwrap_or((quoted, "")),
-        None => rest.split_once('.').unwrap_or((rest, "")),
-    };
-    let key = key.trim_start_matches('.');
-    let is_number = !own.is_empty() && own.bytes().all(|byte| byte.is_ascii_digit());
-    let table = match stands(table) {
-        Some(stands) => stands,
-        None if is_number => table,
-        None => return name.to_owned(),
-    };
-    match key {
-        "" => table.to_owned(),
-        key => format!("{table}.{key}"),
-    }
 }
 
 fn entries<'a>(sections: &[&'a Section], registry: &'a Registry) -> Vec<Entry<'a>> {
@@ -149,15 +119,9 @@ impl Entry<'_> {
         let mut text = self.name();
         match self {
             Entry::Key { section, key } => {
-                text += &format!("\n{}", prose(key.about, "  "));
-                if !key.aliases.is_empty() {
-                    text += &format!("\n  also called: {}", key.aliases.join(", "));
-                }
-                if !key.expected.is_empty() {
-                    text += &format!("\n  expected: {}", key.expected);
-                }
-                if let Some(default) = section.defaults.get(key.name).and_then(shown) {
-                    text += &format!("\n  default: {default}");
+                text += &format!("\n{}", prose(key.meaning(), "  "));
+                for (what, said) in facts(section, key) {
+                    text += &format!("\n  {what}: {said}");
                 }
             }
             Entry::Metric { system, metric } => {
@@ -166,14 +130,17 @@ impl Entry<'_> {
                     unit => format!(" [{unit}]"),
                 };
                 text += &format!("\n  metric: {}{unit}", metric.label);
-                if !metric.about.is_empty() {
-                    text += &format!("\n  {}", metric.about);
+                for line in wrapped(&plain(metric.about), WIDTH - 2) {
+                    text += &format!("\n  {line}");
                 }
                 text += &format!("\n  {}; {}", kind(metric), better(metric));
                 let whose = system.map_or("of every run".to_owned(), |name| {
                     format!("of runs of the system {name}")
                 });
                 text += &format!("\n  {whose}");
+                if !metric.source.is_empty() {
+                    text += &format!("\n  source: {}", plain(metric.source));
+                }
             }
         }
         text
@@ -183,39 +150,26 @@ impl Entry<'_> {
         match self {
             Entry::Key { section, key } => json!({
                 "key": self.name(),
-                "about": prose(key.about, ""),
+                "about": prose(key.meaning(), ""),
                 "aliases": key.aliases,
+                "value": key.value,
+                "units": key.units,
                 "expected": key.expected,
                 "default": section.defaults.get(key.name),
+                "source": plain(&key.source().join(" ")),
             }),
             Entry::Metric { system, metric } => json!({
                 "metric": metric.name,
                 "label": metric.label,
                 "unit": metric.unit,
-                "about": metric.about,
+                "about": plain(metric.about),
+                "source": plain(metric.source),
                 "kind": kind(metric),
                 "better": better(metric),
                 "system": system,
             }),
         }
     }
-}
-
-/// Lines of documentation as a paragraph of lines, without the blank before each and without
-/// examples.
-fn prose(lines: &[&str], indent: &str) -> String {
-    let lines = lines.iter().map(|line| line.trim());
-    let lines = lines.take_while(|line| !line.starts_with("```") && !line.starts_with('|'));
-    let mut lines: Vec<String> = lines.map(|line| format!("{indent}{line}")).collect();
-    while lines.last().is_some_and(|line| line.trim().is_empty()) {
-        lines.pop();
-    }
-    lines.join("\n")
-}
-
-/// A default as a scenario writes it; none of a table of its own.
-fn shown(value: &toml::Value) -> Option<String> {
-    (!value.is_table()).then(|| value.to_string())
 }
 
 fn kind(metric: &Metric) -> &'static str {
@@ -274,9 +228,9 @@ mod tests {
 
     #[test]
     fn keys_of_tables_that_scenarios_name_are_found() {
-        let shared = shared_sections();
-        let sections: Vec<&Section> = shared.iter().collect();
         let registry = Registry::builtin();
+        let sections = sections(&registry);
+        let sections: Vec<&Section> = sections.iter().collect();
         let all = entries(&sections, &registry);
         for (asked, found) in [
             ("radios.uhf.sense_delay", "radios.NAME.sense_delay"),
@@ -307,5 +261,54 @@ mod tests {
                 "{table}: {name}"
             );
         }
+    }
+
+    #[test]
+    fn every_key_of_links_says_what_it_may_be_and_its_default() {
+        let registry = Registry::builtin();
+        let sections = sections(&registry);
+        let links = sections.iter().find(|one| one.name == "links.default");
+        let links = links.unwrap();
+        for key in links.keys.iter().filter(|key| key.name != "preset") {
+            let facts: Vec<&str> = facts(links, key)
+                .into_iter()
+                .map(|(what, _)| what)
+                .collect();
+            assert!(facts.contains(&"expected"), "{}: {facts:?}", key.name);
+            assert!(facts.contains(&"default"), "{}: {facts:?}", key.name);
+        }
+    }
+
+    #[test]
+    fn a_range_that_is_told_is_the_one_that_is_held() {
+        // Of each key with a range in words "A to B": a value beyond it is refused in those words.
+        let registry = Registry::builtin();
+        let sections = sections(&registry);
+        let sections: Vec<&Section> = sections.iter().collect();
+        let all = entries(&sections, &registry);
+        for (key, beyond, told) in [
+            ("links.default.retries", "1001", "1000"),
+            ("links.default.window", "0", "1 to 16777216"),
+            ("team.rovers", "0", "1 to 10000"),
+        ] {
+            let sets = [format!("{key}={beyond}")];
+            let opened = crate::scenario::Scenario::open("network/crater-dense", &sets, &registry);
+            let refused = opened.err().unwrap().to_string();
+            assert!(refused.contains(told), "{key}: {refused}");
+            let entry = all.iter().find(|entry| entry.name() == key).unwrap();
+            assert!(entry.text().contains(told), "{}", entry.text());
+        }
+    }
+
+    #[test]
+    fn metrics_say_what_they_are_and_where_they_are_from() {
+        let registry = Registry::builtin();
+        for system in registry.systems() {
+            for metric in system.metrics() {
+                assert!(!metric.about.is_empty(), "{}", metric.name);
+            }
+        }
+        let ratio = registry.metric("network", "path_ratio").unwrap();
+        assert_eq!(ratio.source, "the network-guided paper, section 4.");
     }
 }

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::{CommandError, print, print_json};
+use crate::registry::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -18,7 +20,8 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Log, &args.log, registry)?;
     let info = farside_logs::info(&args.log)?;
     if args.json {
         print_json(&info)?;

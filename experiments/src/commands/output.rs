@@ -4,9 +4,11 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use farside_actors::figure::Figure;
 use farside_logs::refuse_input;
 
 use super::CommandError;
+use crate::export::{self, Kind};
 
 /// What a file is, by how all files of its kind that Farside writes begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,24 +19,36 @@ pub(super) enum Format {
     Page,
     /// A table with a header: one of its kind starts with the same column.
     Table,
+    /// Results of tests in XML: all are alike up to the name.
+    Junit,
+    /// A figure for papers.
+    Pdf,
+    /// A figure for slides.
+    Png,
 }
 
 impl Format {
-    /// How `text` and all others of its kind begin.
-    fn beginning(self, text: &str) -> &str {
-        let ends_with = match self {
-            Format::Svg => "viewBox=",
-            Format::Page => "<title>",
-            Format::Table => ",",
+    /// How these bytes and all others of their kind begin.
+    fn beginning(self, bytes: &[u8]) -> &[u8] {
+        let ends_with: &[u8] = match self {
+            Format::Svg => b"viewBox=",
+            Format::Page => b"<title>",
+            Format::Table => b",",
+            Format::Junit => b"name=",
+            Format::Pdf => return &bytes[..bytes.len().min(5)],
+            Format::Png => return &bytes[..bytes.len().min(8)],
         };
-        text.find(ends_with).map_or(text, |end| &text[..end])
+        let mut places = bytes.windows(ends_with.len());
+        let end = places.position(|place| place == ends_with);
+        &bytes[..end.unwrap_or(bytes.len())]
     }
 
     fn name(self) -> &'static str {
         match self {
-            Format::Svg => "figure",
+            Format::Svg | Format::Pdf | Format::Png => "figure",
             Format::Page => "report",
             Format::Table => "table of this kind",
+            Format::Junit => "JUnit file",
         }
     }
 }
@@ -50,11 +64,6 @@ pub(super) fn write(
     format: Format,
     inputs: &[PathBuf],
 ) -> Result<String, CommandError> {
-    refuse_input(&path, inputs)?;
-    if is_in_the_way(&path, format.beginning(text)) {
-        let what = format.name();
-        return Err(CommandError::InTheWay { path, what });
-    }
     let is_text = |letter: char| !letter.is_control() || matches!(letter, '\n' | '\t');
     let cleaned: String;
     let text = match format {
@@ -64,20 +73,67 @@ pub(super) fn write(
         }
         _ => text,
     };
-    match std::fs::write(&path, text) {
+    write_bytes(path, text.as_bytes(), format, inputs)
+}
+
+/// The same for what is no text.
+///
+/// # Errors
+/// Those of [`write`].
+pub(super) fn write_bytes(
+    path: PathBuf,
+    bytes: &[u8],
+    format: Format,
+    inputs: &[PathBuf],
+) -> Result<String, CommandError> {
+    refuse_input(&path, inputs)?;
+    if is_in_the_way(&path, format.beginning(bytes)) {
+        let what = format.name();
+        return Err(CommandError::InTheWay { path, what });
+    }
+    match std::fs::write(&path, bytes) {
         Ok(()) => Ok(path.display().to_string()),
         Err(source) => Err(CommandError::Write { path, source }),
     }
 }
 
+/// Writes a figure as one of the kinds that there are, and says where. What the file is lacking, as
+/// letters of which no font is at hand, is said on stderr.
+///
+/// # Errors
+/// Those of [`write`], and if the figure cannot be turned into that kind.
+pub(super) fn write_figure(
+    path: PathBuf,
+    figure: &Figure,
+    kind: Kind,
+    inputs: &[PathBuf],
+) -> Result<String, CommandError> {
+    let svg = figure.standalone();
+    let format = match kind {
+        Kind::Svg => return write(path, &svg, Format::Svg, inputs),
+        Kind::Pdf => Format::Pdf,
+        Kind::Png => Format::Png,
+    };
+    let exported = export::export(&svg, kind)?;
+    if !exported.missing.is_empty() {
+        let letters: String = exported.missing.iter().collect();
+        tracing::warn!(
+            "{}: no font on this machine has {letters:?}, which {kind} lacks: install one that has \
+             (fc-list shows which there are), or use the SVG",
+            path.display()
+        );
+    }
+    write_bytes(path, &exported.bytes, format, inputs)
+}
+
 /// True if there is a file that does not begin like this. Devices and pipes hold nothing that could
 /// be lost, nor do empty files.
-fn is_in_the_way(path: &Path, beginning: &str) -> bool {
+fn is_in_the_way(path: &Path, beginning: &[u8]) -> bool {
     let there = std::fs::metadata(path).is_ok_and(|found| found.is_file() && found.len() > 0);
     if !there {
         return false;
     }
     let mut found = vec![0; beginning.len()];
     let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut found));
-    read.is_err() || found != beginning.as_bytes()
+    read.is_err() || found != beginning
 }

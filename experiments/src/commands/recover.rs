@@ -4,7 +4,9 @@
 use std::path::PathBuf;
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::{CommandError, print, print_json};
+use crate::registry::Registry;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -19,7 +21,8 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Log, &args.broken, registry)?;
     let report = farside_logs::recover(&args.broken, &args.out)?;
     if args.json {
         print_json(&report)?;

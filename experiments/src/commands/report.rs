@@ -6,8 +6,11 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds;
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
+use crate::export::{self, Kind};
+use crate::registry::Registry;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
 use crate::study::summary::comparisons::ComparisonSummary;
@@ -21,6 +24,14 @@ pub(crate) struct Args {
     /// Where to write the report, instead of into the results folder; needed with several
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// What plots are written as beside SVG: pdf for papers, png for slides
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
+    format: Vec<Kind>,
     /// Print what was written where as JSON
     #[arg(long)]
     json: bool,
@@ -32,6 +43,8 @@ struct Document {
     page: String,
     results_csv: String,
     summary_csv: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values_csv: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     series_csv: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,7 +73,8 @@ struct OfCell {
     beside: Beside,
 }
 
-pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
+pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    let kinds = export::kinds(Kind::Svg, &args.format)?;
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -72,6 +86,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
             return Err(CommandError::Arguments(message.to_owned()));
         }
     };
+    for folder in &args.folders {
+        kinds::expect(kinds::Kind::Results, folder, registry)?;
+    }
     let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
     let Some(results) = Results::merge(parts?)? else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
@@ -82,7 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
         .iter()
         .flat_map(|folder| Results::files(folder))
         .collect();
-    let document = write(&report, out, &inputs, &results)?;
+    let document = write(&report, out, &kinds, &inputs, &results)?;
     if args.json {
         print_json(&document)?;
     } else {
@@ -94,6 +111,7 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
 fn write(
     report: &Report,
     out: &Path,
+    kinds: &[Kind],
     inputs: &[PathBuf],
     results: &Results,
 ) -> Result<Document, CommandError> {
@@ -110,6 +128,7 @@ fn write(
         Some(text) => table(name, text).map(Some),
         None => Ok(None),
     };
+    let values_csv = if_any("values.csv", &report.values_csv)?;
     let series_csv = if_any("series.csv", &report.series_csv)?;
     let published_csv = if_any("published.csv", &report.published_csv)?;
     let cells = report.summary.cells.iter();
@@ -121,8 +140,12 @@ fn write(
         })
     });
     let figures = report.figures.iter();
-    let plots: Result<Vec<String>, CommandError> = figures
-        .map(|figure| write(plots.join(&figure.file), &figure.standalone(), Format::Svg))
+    let files = figures.flat_map(|figure| kinds.iter().map(move |kind| (figure, *kind)));
+    let plots: Result<Vec<String>, CommandError> = files
+        .map(|(figure, kind)| {
+            let path = plots.join(&figure.file).with_extension(kind.ending());
+            output::write_figure(path, figure, kind, inputs)
+        })
         .collect();
     let failed = |run: &&RunRecord| {
         matches!(
@@ -133,6 +156,7 @@ fn write(
     Ok(Document {
         results_csv,
         summary_csv,
+        values_csv,
         series_csv,
         published_csv,
         plots: plots?,
@@ -163,6 +187,10 @@ fn text(document: &Document) -> String {
         0 => String::new(),
         missing => format!(" of {}, the rest are not made yet", document.runs + missing),
     };
+    let values = match &document.values_csv {
+        Some(path) => format!("  lists    {path}\n"),
+        None => String::new(),
+    };
     let series = match &document.series_csv {
         Some(path) => format!("  curves   {path}\n"),
         None => String::new(),
@@ -172,7 +200,7 @@ fn text(document: &Document) -> String {
         None => String::new(),
     };
     format!(
-        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{series}{beside}  \
+        "{} runs{missing}{failed}\n  page     {}\n  runs     {}\n  figures  {}\n{values}{series}{beside}  \
          plots    {plots}\n",
         document.runs, document.page, document.results_csv, document.summary_csv
     )

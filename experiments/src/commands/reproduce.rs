@@ -8,13 +8,13 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::run::log_options;
 use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario};
 use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
 use crate::study::{Interrupts, Reproduction, find_run, reproduce};
-use crate::version::CODE_VERSION;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -59,6 +59,7 @@ struct Difference {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Results, &args.folder, registry)?;
     let results = Results::load(&args.folder)?;
     let manifest = &results.manifest;
     let record = find_run(&results, &args.cell, args.seed)?;
@@ -73,7 +74,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         registry,
         &interrupts,
         |scenario, assembled| {
-            let observed = observe(args, scenario, assembled);
+            let observed = observe(args, scenario, assembled, registry);
             observed.map_err(|error| {
                 let text = error.to_string();
                 trouble = Some(error);
@@ -99,7 +100,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         complain(format!("error: {log}: cannot be recorded: {error}"));
         return Ok(Exit::Failed);
     }
-    let document = document(args, manifest, record, outcome, differences);
+    let document = document(args, manifest, record, outcome, differences, registry);
     let same = document.differences.is_empty();
     if args.json {
         print_json(&document)?;
@@ -115,6 +116,7 @@ fn document(
     record: &RunRecord,
     outcome: RunOutcome,
     differences: Vec<(String, String, String)>,
+    registry: &Registry,
 ) -> Document {
     let differences: Vec<Difference> = differences
         .into_iter()
@@ -137,7 +139,7 @@ fn document(
         differences,
         run: outcome,
         log: args.out.display().to_string(),
-        notes: notes(manifest),
+        notes: notes(manifest, registry),
     }
 }
 
@@ -145,8 +147,9 @@ fn observe(
     args: &Args,
     scenario: &Scenario,
     assembled: &mut Assembled,
+    registry: &Registry,
 ) -> Result<(), CommandError> {
-    let mut options = log_options(scenario, assembled, Executor::Inline)?;
+    let mut options = log_options(scenario, assembled, Executor::Inline, registry)?;
     let draws = scenario.shared().log.viewer;
     options.scene = assembled.system.scene.take().filter(|_| draws);
     assembled
@@ -158,12 +161,11 @@ fn observe(
 }
 
 /// What the reader should know beside the outcome.
-fn notes(manifest: &Manifest) -> Vec<String> {
-    let version = &manifest.code_version;
-    let note = format!(
-        "the results are from version {version}, this is {CODE_VERSION}: they need not agree"
-    );
-    if version == CODE_VERSION {
+fn notes(manifest: &Manifest, registry: &Registry) -> Vec<String> {
+    let (version, ours) = (&manifest.code_version, registry.version());
+    let note =
+        format!("the results are from version {version}, this is {ours}: they need not agree");
+    if *version == ours {
         Vec::new()
     } else {
         vec![note]

@@ -1,7 +1,7 @@
 //! `farside run`: run a scenario, log every message, say what came of it.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use farside::{Counts, End, Executor, Report, SimDuration};
@@ -11,10 +11,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::table::{self, Group};
 use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Results;
 
 use crate::registry::Registry;
@@ -99,6 +99,10 @@ struct Document<'a> {
     messages: Messages<'a>,
     metrics: &'a Map<String, Value>,
     violations: &'a [String],
+    /// What the scenario says that has no effect, or is called otherwise now.
+    remarks: &'a [String],
+    /// What is planned for later than the run's end, and was not known to be before the run.
+    never_reached: &'a [String],
     log: Option<String>,
 }
 
@@ -126,6 +130,7 @@ impl<'a> From<&'a Counts> for Messages<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Scenario, Path::new(&args.scenario), registry)?;
     let mut scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
@@ -151,7 +156,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         let mut inputs = assembled.files.paths();
         inputs.push(PathBuf::from(&args.scenario));
         may_hold_log(path, &inputs)?;
-        let mut options = log_options(&scenario, &assembled, executor)?;
+        let mut options = log_options(&scenario, &assembled, executor, registry)?;
         let draws = scenario.shared().log.viewer;
         options.scene = assembled.system.scene.take().filter(|_| draws);
         tracing::info!("logging to {}", path.display());
@@ -160,15 +165,22 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let until = scenario.shared().until;
     progress::show(&mut assembled.sim, assembled.system.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
+    let (planned, remarks) = (assembled.planned, assembled.remarks);
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;
     let results = (assembled.system.conclude)(&report);
+    let never_reached = planned.never_reached(&report);
+    for never in &never_reached {
+        tracing::warn!("{never}");
+    }
     let outcome = Outcome {
         scenario: &scenario,
         executor,
         log: log.map(|path| path.display().to_string()),
         report: &report,
         results: &results,
+        remarks: &remarks,
+        never_reached: &never_reached,
         wall_s,
     };
     // The exit code must tell of a failure even where nobody reads the output.
@@ -200,6 +212,7 @@ pub(super) fn log_options(
     scenario: &Scenario,
     assembled: &Assembled,
     executor: Executor,
+    registry: &Registry,
 ) -> Result<LogOptions, CommandError> {
     let host = [
         ("executor", executor.name().to_owned()),
@@ -219,7 +232,7 @@ pub(super) fn log_options(
     Ok(LogOptions {
         scenario: scenario.name().to_owned(),
         resolved: scenario.resolved()?,
-        code_version: CODE_VERSION.to_owned(),
+        code_version: registry.version(),
         host: host.map(|(key, value)| (key.to_owned(), value)).into(),
         attachments: attachments.collect(),
         exclude: scenario.shared().log.exclude.clone(),
@@ -234,6 +247,8 @@ struct Outcome<'a> {
     log: Option<String>,
     report: &'a Report,
     results: &'a Results,
+    remarks: &'a [String],
+    never_reached: &'a [String],
     wall_s: f64,
 }
 
@@ -264,6 +279,8 @@ impl Outcome<'_> {
             messages: (&self.report.counts).into(),
             metrics: &self.results.metrics,
             violations: &self.results.violations,
+            remarks: self.remarks,
+            never_reached: self.never_reached,
             log: self.log.clone(),
         }
     }

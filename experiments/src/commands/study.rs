@@ -1,6 +1,9 @@
 //! `farside study`: run a study, as far as its folder does not hold its runs already.
 
+mod against;
 mod array;
+mod dry_run;
+mod junit;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -9,12 +12,17 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use self::against::Before;
 use super::Exit;
+use super::kinds::{self, Kind};
+use super::output::{self, Format};
 use super::{CommandError, complain, interrupt, print, print_json};
 use crate::registry::Registry;
-use crate::report::csv::results_csv;
+use crate::report::csv::{results_csv, values_csv};
 use crate::study::results::{Manifest, Results, RunOutcome};
+use crate::study::summary::check::Check;
 use crate::study::summary::comparisons::ComparisonSummary;
+use crate::study::summary::effect::{self, SameValues};
 use crate::study::summary::published::LineSummary;
 use crate::study::summary::summarise;
 use crate::study::{
@@ -55,6 +63,16 @@ pub(crate) struct Args {
     /// Go on where a cell's first runs all fail; failed runs are then no reason to exit with 3
     #[arg(long)]
     keep_going: bool,
+    /// Compare with the results of an earlier study: a results folder, or a file in one. Exits with
+    /// 1 if a metric got worse
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["dry_run", "shard"])]
+    check: Option<PathBuf>,
+    /// Write what came of it as JUnit XML: each cell, or with --check each metric in it, is a case
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["dry_run", "shard"])]
+    junit: Option<PathBuf>,
+    /// Say how many runs there are to do, and about how long they take; write nothing
+    #[arg(long)]
+    dry_run: bool,
     /// Print the result as one JSON document
     #[arg(long)]
     json: bool,
@@ -62,7 +80,7 @@ pub(crate) struct Args {
 
 /// What `study --json` prints.
 #[derive(Serialize)]
-struct Document {
+struct Document<'a> {
     study: String,
     question: String,
     scenario: String,
@@ -76,15 +94,25 @@ struct Document {
     /// Runs in which something happened that must never happen.
     violated: usize,
     cells: Value,
+    /// Values of factors that change nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    same_values: Vec<SameValues>,
+    /// What has no effect, in sentences: values that change nothing, and what no run reached.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notices: Vec<String>,
     /// Lines through cells, for what was published to be linear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<LineSummary>,
     /// Cells against each other, for what was published to be more.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     comparisons: Vec<ComparisonSummary>,
+    /// What became of each metric since the results of `--check`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<&'a Check>,
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
+    kinds::expect(Kind::Study, Path::new(&args.study), registry)?;
     let study = Study::open(&args.study, registry)?;
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
@@ -92,8 +120,14 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if let Some(shards) = args.array {
         return array::write(args, shards, &plan, &folder);
     }
+    let before = args.check.as_deref();
+    let before = before.map(|path| against::open(path, &plan.manifest));
+    let before = before.transpose()?;
+    for remark in &plan.remarks {
+        tracing::warn!("{remark}");
+    }
     if let Some(shards) = args.merge {
-        return merge(args, shards, &plan, &folder);
+        return merge(args, shards, &plan, &folder, before.as_ref());
     }
     let mut options = RunOptions::new(folder.clone());
     options.shard = args.shard.unwrap_or(Shard::WHOLE);
@@ -104,6 +138,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let interrupts = Interrupts::default();
     let raised = interrupts.clone();
     interrupt::on_interrupt(move || raised.raise());
+    if args.dry_run {
+        return dry_run::tell(&plan, &options, &interrupts, args.json);
+    }
     let bar = bar();
     let mut last = Progress::default();
     let ended = study::run(plan, &options, &interrupts, &mut |progress| {
@@ -121,25 +158,23 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     }
     let results = Results::load(&folder)?;
     let missing = results.missing();
-    if missing == 0 {
-        let csv = results_csv(&results);
-        study::replace(&folder.join("results.csv"), csv.as_bytes())?;
-    }
-    tell(args, &results, &folder, missing)
+    conclude(args, &results, &folder, missing, before.as_ref())
 }
 
-/// Puts together what shards have done, if they have done all.
-fn merge(args: &Args, shards: u32, plan: &StudyPlan, folder: &Path) -> Result<Exit, CommandError> {
+/// Puts together what shards have done, and says which of them have not done all.
+fn merge(
+    args: &Args,
+    shards: u32,
+    plan: &StudyPlan,
+    folder: &Path,
+    before: Option<&Before>,
+) -> Result<Exit, CommandError> {
     let Merged { results, left } = Merged::load(plan, folder, shards)?;
-    let table = folder.join("results.csv");
     let missing = left.values().sum();
+    let exit = conclude(args, &results, folder, missing, before)?;
     if missing == 0 {
-        study::replace(&table, results_csv(&results).as_bytes())?;
-        return tell(args, &results, folder, 0);
+        return Ok(exit);
     }
-    // One of fewer runs would pass for the whole.
-    let _ = std::fs::remove_file(&table);
-    let exit = tell(args, &results, folder, missing)?;
     let names: Vec<String> = left.keys().map(u32::to_string).collect();
     complain(format!(
         "{missing} runs are missing, of {} of {shards} shards; submit them again: --array={}",
@@ -147,6 +182,34 @@ fn merge(args: &Args, shards: u32, plan: &StudyPlan, folder: &Path) -> Result<Ex
         names.join(",")
     ));
     Ok(exit.max(Exit::Failed))
+}
+
+/// Writes the tables of a whole study, and says what came out and what became of it since `before`.
+fn conclude(
+    args: &Args,
+    results: &Results,
+    folder: &Path,
+    missing: usize,
+    before: Option<&Before>,
+) -> Result<Exit, CommandError> {
+    let tables = [
+        ("results.csv", Some(results_csv(results))),
+        ("values.csv", values_csv(results)),
+    ];
+    for (name, text) in tables {
+        match text.filter(|_| missing == 0) {
+            Some(text) => study::replace(&folder.join(name), text.as_bytes())?,
+            // One of fewer runs would pass for the whole.
+            None if args.merge.is_some() => drop(std::fs::remove_file(folder.join(name))),
+            None => {}
+        }
+    }
+    let check = before.map(|before| before.check(results)).transpose()?;
+    if let Some(path) = &args.junit {
+        let text = junit::junit(results, check.as_ref());
+        output::write(path.clone(), &text, Format::Junit, &Results::files(folder))?;
+    }
+    tell(args, results, folder, missing, check.as_ref())
 }
 
 fn interrupted(args: &Args, progress: Progress, folder: &Path) -> String {
@@ -168,6 +231,7 @@ fn tell(
     results: &Results,
     folder: &Path,
     missing: usize,
+    check: Option<&Check>,
 ) -> Result<Exit, CommandError> {
     let manifest = &results.manifest;
     let failures = |outcome: &RunOutcome| matches!(outcome, RunOutcome::Failed { .. });
@@ -178,6 +242,7 @@ fn tell(
     );
     let violated: Vec<_> = violated.collect();
     let summary = summarise(results);
+    let notices = effect::notices(manifest, &summary);
     let cells = with_totals(serde_json::to_value(&summary.cells)?, results);
     let document = Document {
         study: manifest.study.clone(),
@@ -189,8 +254,11 @@ fn tell(
         missing,
         violated: violated.len(),
         cells,
+        same_values: summary.same_values,
+        notices,
         lines: summary.lines,
         comparisons: summary.comparisons,
+        check,
     };
     if args.json {
         print_json(&document)?;
@@ -218,7 +286,7 @@ fn tell(
     }
     Ok(if !failed.is_empty() && !args.keep_going {
         Exit::Failed
-    } else if !violated.is_empty() {
+    } else if !violated.is_empty() || check.is_some_and(Check::is_worse) {
         Exit::Different
     } else {
         Exit::Done
@@ -254,7 +322,7 @@ fn with_totals(mut cells: Value, results: &Results) -> Value {
 }
 
 /// The figures of each cell, for people.
-fn text(results: &Results, document: &Document) -> String {
+fn text(results: &Results, document: &Document<'_>) -> String {
     let manifest = &results.manifest;
     let mut rows = Vec::new();
     let factors = manifest.factors.iter().map(|factor| factor.name.clone());
@@ -283,9 +351,12 @@ fn text(results: &Results, document: &Document) -> String {
         0 => format!("{runs} runs{failed}; {out}/results.csv has each of them"),
         missing => format!("{runs} runs in {out}{failed}; {missing} are left to other shards"),
     };
+    let notices = document.notices.iter();
+    let notices: String = notices.map(|notice| format!("NOTE: {notice}\n")).collect();
     format!(
-        "{study}: {question}\n\n{}\n{curves}means, of lists the medians; {after}\n",
-        columns(&rows)
+        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians; {after}\n{}",
+        columns(&rows),
+        document.check.map(against::text).unwrap_or_default()
     )
 }
 

@@ -8,10 +8,10 @@ use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome, escaped};
 use serde::Serialize;
 
 use super::Exit;
+use super::kinds::{self, Kind};
 use super::run::{ExecutorName, FILE_PREFIX};
 use super::{CommandError, interrupt, print, print_json, progress};
 use crate::scenario::{Scenario, ScenarioError};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
@@ -55,6 +55,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         path: path.clone(),
         reason,
     };
+    kinds::expect(Kind::Log, path, registry)?;
     let info = farside_logs::info(path)?;
     let Some(summary) = info.run else {
         return Err(not_repeatable(
@@ -83,7 +84,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         )));
     }
     let outcome = handle.outcome()?;
-    let notes = notes(&summary);
+    let notes = notes(&summary, registry);
     if args.json {
         print_json(&Document {
             log: path.display().to_string(),
@@ -141,7 +142,7 @@ pub(super) fn scenario_of(
             ),
             error => error.to_string(),
         };
-        for note in notes(summary) {
+        for note in notes(summary, registry) {
             reason.push_str("\n  ");
             reason.push_str(&note);
         }
@@ -150,11 +151,12 @@ pub(super) fn scenario_of(
 }
 
 /// What the reader should know beside the outcome.
-fn notes(summary: &RunSummary) -> Vec<String> {
+fn notes(summary: &RunSummary, registry: &Registry) -> Vec<String> {
     let mut notes = Vec::new();
-    if summary.code_version != CODE_VERSION {
+    let version = registry.version();
+    if summary.code_version != version {
         notes.push(format!(
-            "the log is from version {}, this is {CODE_VERSION}: they need not agree",
+            "the log is from version {}, this is {version}: they need not agree",
             summary.code_version
         ));
     }

@@ -4,6 +4,7 @@
 //! written in full, so that reading them back gives the same numbers.
 
 mod series;
+mod values;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,8 +21,8 @@ use crate::study::summary::{
 const COUNTS: [&str; 5] = ["sent", "delivered", "lost", "duplicated", "in_flight"];
 
 /// One row for each run, in order of (cell, seed): what it varied, how it ended, what became of its
-/// messages, and each metric that is a number, a truth value or a word. Lists and curves are left
-/// out: they are in the results folder. What a run does not have is empty.
+/// messages, and each metric that is a number, a truth value or a word. Lists and curves are in a
+/// table of their own, see [`values_csv`]. What a run does not have is empty.
 pub fn results_csv(results: &Results) -> String {
     let manifest = &results.manifest;
     let reasons = reasons(results);
@@ -185,6 +186,7 @@ pub fn summary_csv(results: &Results, summary: &Summary) -> String {
 }
 
 pub use series::series_csv;
+pub use values::values_csv;
 
 const COLUMNS: [&str; 26] = [
     "runs",

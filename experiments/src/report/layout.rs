@@ -49,7 +49,43 @@ pub(super) struct Layout {
     pub(super) shape: Shape,
     /// By cell, the level on each axis.
     pub(super) places: Vec<Vec<usize>>,
+    wanted: Wanted,
     lookup: BTreeMap<Vec<usize>, usize>,
+}
+
+/// The axes that the study gives a place in plots.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wanted {
+    x: Option<usize>,
+    series: Option<usize>,
+    facet: Option<usize>,
+}
+
+impl Wanted {
+    /// Of factors that vary; others are on no plot.
+    fn new(manifest: &Manifest, axes: &[Axis]) -> Self {
+        let axis = |name: &Option<String>| {
+            let name = name.as_ref()?;
+            let named = |axis: &Axis| manifest.factors[axis.factor].name == *name;
+            axes.iter().position(named)
+        };
+        Wanted {
+            x: axis(&manifest.report.x),
+            series: axis(&manifest.report.series),
+            facet: axis(&manifest.report.facet),
+        }
+    }
+
+    /// What goes along x, and what makes curves: what the study says, or else the first axis of
+    /// numbers and the next that is left.
+    fn resolve(self, axes: &[Axis]) -> (usize, Option<usize>) {
+        let free = |axis: &usize| Some(*axis) != self.series && Some(*axis) != self.facet;
+        let all = || (0..axes.len()).filter(free);
+        let numeric = all().find(|axis| axes[*axis].numeric);
+        let x = self.x.or(numeric).or(all().next()).unwrap_or(0);
+        let next = all().find(|axis| *axis != x);
+        (x, self.series.filter(|axis| *axis != x).or(next))
+    }
 }
 
 /// Cells that go into one plot, as curves over an axis.
@@ -99,7 +135,9 @@ impl Layout {
         let lookup: BTreeMap<Vec<usize>, usize> =
             indexed.map(|(cell, place)| (place, cell)).collect();
         let shape = shape(&axes, &places, &lookup);
+        let wanted = Wanted::new(manifest, &axes);
         Layout {
+            wanted,
             axes,
             shape,
             places,
@@ -113,11 +151,10 @@ impl Layout {
     }
 
     /// Curves over the first factor of numbers (of words, if there are no others), one for each
-    /// level of the next; further factors make further plots. Only cells in a grid or a row have
-    /// any.
+    /// level of the next; further factors make further plots; or as the study says. Only cells in a
+    /// grid or a row have any.
     pub(super) fn curves(&self) -> Option<Curves> {
-        let numeric = self.axes.iter().position(|axis| axis.numeric);
-        let x = numeric.unwrap_or(0);
+        let (x, series) = self.wanted.resolve(&self.axes);
         if self.shape == Shape::Row {
             let levels = 0..self.axes[x].levels.len();
             let cells =
@@ -140,7 +177,6 @@ impl Layout {
         if self.shape != Shape::Grid {
             return None;
         }
-        let series = (0..self.axes.len()).find(|axis| *axis != x);
         let others = (0..self.axes.len()).filter(|axis| *axis != x && Some(*axis) != series);
         let others: Vec<usize> = others.collect();
         let all = self.combinations(&others);
@@ -209,7 +245,11 @@ impl Layout {
     /// The two axes of a heat map, if the cells are a grid of two factors of numbers.
     pub(super) fn map(&self) -> Option<(usize, usize)> {
         let numeric = self.axes.iter().all(|axis| axis.numeric);
-        (self.shape == Shape::Grid && self.axes.len() == 2 && numeric).then_some((1, 0))
+        let is_map = self.shape == Shape::Grid && self.axes.len() == 2 && numeric;
+        is_map.then_some(match self.wanted.x {
+            Some(0) => (0, 1),
+            _ => (1, 0),
+        })
     }
 }
 
@@ -296,6 +336,7 @@ impl Axis {
 mod tests {
     use super::*;
     use crate::study::fabricated::{bandwidth, latency, loss, planner, study};
+    use crate::study::results::PlotAxes;
 
     #[test]
     fn numbers_go_along_and_words_make_curves() {
@@ -329,6 +370,32 @@ mod tests {
             ["planner max-plus", "planner greedy", "planner priority"]
         );
         assert!(!curves.more);
+    }
+
+    #[test]
+    fn a_study_says_what_goes_where() {
+        let mut manifest = study("x", vec![latency(), loss(), planner()], 1).manifest;
+        let mut laid = |x: Option<&str>, series: Option<&str>, facet: Option<&str>| {
+            let [x, series, facet] = [x, series, facet].map(|name| name.map(str::to_owned));
+            manifest.report = PlotAxes { x, series, facet };
+            let curves = Layout::new(&manifest).curves().unwrap();
+            let first = curves.panels[0].name.clone();
+            (curves.x, curves.series, curves.panels.len(), first)
+        };
+        let planners = |x, series| (x, Some(series), 3, "planner max-plus".to_owned());
+        assert_eq!(laid(None, None, None), planners(0, 1));
+        assert_eq!(laid(Some("loss"), None, None), planners(1, 0));
+        let by_latency = (1, Some(2), 5, "one-way latency 5ms".to_owned());
+        assert_eq!(
+            laid(Some("loss"), Some("planner"), Some("latency")),
+            by_latency
+        );
+        assert_eq!(laid(None, None, Some("latency")), by_latency);
+        // A factor that does not vary is on no plot.
+        manifest = study("x", vec![planner(), loss()], 1).manifest;
+        manifest.report.facet = Some("planner".to_owned());
+        let curves = Layout::new(&manifest).curves().unwrap();
+        assert_eq!((curves.x, curves.series, curves.panels.len()), (1, None, 3));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::study::summary::series::SeriesSummary;
 use crate::study::summary::values::{ValueKind, kind_of};
 use crate::study::summary::{CellSummary, Difference, MetricSummary, Summary};
 use farside_actors::figure::numbers::plain;
+use farside_actors::figure::scale::Scale;
 
 /// All there is to say of a study.
 pub(super) struct Study<'a> {
@@ -133,6 +134,12 @@ impl Measure<'_> {
         named.map_or(0, |named| named.summary.n())
     }
 
+    /// Whether some of the cell's runs say nothing while others do: what is estimated is of the
+    /// others alone, the survivors.
+    pub(super) fn is_partial(&self, cell: &CellSummary) -> bool {
+        (1..cell.n).contains(&self.n(cell))
+    }
+
     /// What is estimated, in words.
     pub(super) fn what(&self) -> &'static str {
         match self.kind {
@@ -156,12 +163,18 @@ impl Measure<'_> {
         }
     }
 
-    /// What a plot's vertical axis says: `mean time ratio`.
-    pub(super) fn axis_label(&self) -> String {
+    /// What is shown: `mean time ratio`.
+    pub(super) fn shown_label(&self) -> String {
         match self.kind {
             ValueKind::Rate => self.label(),
             _ => format!("{} {}", self.what(), self.label()),
         }
+    }
+
+    /// The same as a vertical axis says it.
+    pub(super) fn axis_label(&self, y: &Scale) -> String {
+        let log = if y.is_log() { ", log scale" } else { "" };
+        format!("{}{log}", self.shown_label())
     }
 
     /// A figure and its interval in a line: `1.42 (1.36 to 1.50)`.
@@ -174,10 +187,14 @@ impl Measure<'_> {
     pub(super) fn tooltip(&self, study: &Study<'_>, cell: &CellSummary, at: &Estimate) -> String {
         let name = study.cell_name(cell.cell);
         format!(
-            "{name}: {} {}, {} runs",
+            "{name}: {} {}, {} runs{}",
             self.what(),
             self.told(at),
-            self.n(cell)
+            self.n(cell),
+            match self.is_partial(cell) {
+                true => format!(" of {}: the others have no value", cell.n),
+                false => String::new(),
+            }
         )
     }
 

@@ -1,10 +1,12 @@
 //! The page that people read: one file, with its figures and its style, that loads nothing.
 
 mod method;
+mod notices;
 pub(super) mod published;
 mod runs;
 mod series;
 mod tables;
+mod worst;
 
 use std::collections::BTreeSet;
 
@@ -27,6 +29,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
     make_unique(figures);
     let losses = plots::losses(study);
     let manifest = &study.results.manifest;
+    let notices = notices::of(study);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -44,6 +47,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     p class="question" { (manifest.question) }
                 }
                 (runs::what_was_run(study))
+                (notices::first(&notices))
                 (contents(study, &measures, losses.is_some()))
                 main {
                     section id="cells" {
@@ -52,7 +56,7 @@ pub(super) fn page(study: &Study<'_>, folder: &str) -> (String, Vec<Figure>) {
                     }
                     (published::section(study))
                     @for (measure, plots) in measures.iter().zip(&plotted) {
-                        (metric_section(study, measure, plots))
+                        (metric_section(study, measure, plots, (&notices, folder)))
                     }
                     @if let Some(losses) = &losses { (losses_section(study, losses)) }
                     (runs::trouble(study))
@@ -108,7 +112,12 @@ fn contents(study: &Study<'_>, measures: &[Measure<'_>], losses: bool) -> Markup
     }
 }
 
-fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Markup {
+fn metric_section(
+    study: &Study<'_>,
+    measure: &Measure<'_>,
+    plots: &Plots,
+    (notices, folder): (&[String], &str),
+) -> Markup {
     html! {
         section id=(anchor(measure)) {
             h2 { (capital(&measure.metric.label)) }
@@ -118,9 +127,13 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                 (tables::overall(study, measure))
                 @if measure.kind == ValueKind::Series { (series::told(study, measure)) }
                 @if !plots.figures.is_empty() {
-                    div class="figures" { @for figure in &plots.figures { (placed(figure)) } }
+                    @let label = &measure.metric.label;
+                    div class="figures" {
+                        @for figure in &plots.figures { (placed(figure, label)) }
+                    }
                 }
                 @for note in &plots.notes { p class="note" { (note) } }
+                (notices::beside(notices))
                 @if plots.figures.is_empty() {
                     (tables::of_metric(study, measure))
                 } @else {
@@ -129,6 +142,7 @@ fn metric_section(study: &Study<'_>, measure: &Measure<'_>, plots: &Plots) -> Ma
                         (tables::of_metric(study, measure))
                     }
                 }
+                (worst::section(study, measure, folder))
             }
         }
     }
@@ -145,7 +159,7 @@ fn losses_section(study: &Study<'_>, figure: &Figure) -> Markup {
                  all copies in the runs of a cell together; what was under way when a run ended \
                  counts as not lost."
             }
-            div class="figures" { (placed(figure)) }
+            div class="figures" { (placed(figure, &figure.title)) }
         }
     }
 }
@@ -159,17 +173,20 @@ fn capital(label: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-/// A figure in the page. What is wider than a column or higher than a screen scrolls by itself.
-fn placed(figure: &Figure) -> Markup {
+/// A figure in the page, below a heading that says what its title begins with: its caption has the
+/// rest. What is wider than a column or higher than a screen scrolls by itself.
+fn placed(figure: &Figure, heading: &str) -> Markup {
     let class = match figure {
         Figure { width, .. } if *width > plots::WIDTH + 1.0 => "wide",
         Figure { height, .. } if *height > 900.0 => "tall",
         _ => "",
     };
+    let rest = figure.title.strip_prefix(heading).unwrap_or(&figure.title);
+    let rest = rest.trim_start_matches([',', ' ']);
     html! {
         figure class=[(!class.is_empty()).then_some(class)]
             tabindex=[(!class.is_empty()).then_some("0")] {
-            figcaption { (capital(&figure.title)) }
+            figcaption { (capital(rest)) }
             (figure.inline())
         }
     }

@@ -321,6 +321,65 @@ fn published_figures_stand_beside_ours() {
     assert!(without.published_csv.is_none() && !without.page.contains("id=\"published\""));
 }
 
+/// Means of survivors alone are marked wherever they are shown.
+#[test]
+fn means_of_some_runs_are_marked() {
+    let mut results = fabricated::study("some", vec![planner(), loss()], 10);
+    let whole = build(&results, "runs");
+    assert!(!whole.page.contains('†') && !whole.page.contains("class=\"mark some"));
+    for run in results
+        .runs
+        .iter_mut()
+        .filter(|run| run.cell == 3 && run.seed < 4)
+    {
+        if let RunOutcome::Done { metrics, .. } = &mut run.outcome {
+            metrics.insert("time_ratio".to_owned(), json!(null));
+        }
+    }
+    let report = build(&results, "runs");
+    assert!(report.page.contains("† is of those runs alone"));
+    let file = "time_ratio-curves.svg";
+    let curves = report.figures.iter().find(|one| one.file == file).unwrap();
+    let svg = curves.standalone();
+    assert_eq!(svg.matches("class=\"mark some").count(), 1);
+    assert!(
+        svg.contains("7 runs of 10: the others have no value"),
+        "{svg}"
+    );
+}
+
+/// A facet says which it is: in its picture, its title and its file's name.
+#[test]
+fn a_facet_says_which_it_is() {
+    let results = fabricated::study("three", vec![latency(), loss(), planner()], 5);
+    let report = build(&results, "runs");
+    let curves = |figure: &&Figure| figure.file.starts_with("time_ratio-curves");
+    let facets: Vec<&Figure> = report.figures.iter().filter(curves).collect();
+    assert_eq!(facets.len(), 3);
+    for (facet, planner) in facets.iter().zip(["max-plus", "greedy", "priority"]) {
+        let shown = format!(">planner {planner}</text>");
+        assert!(facet.standalone().contains(&shown), "{}", facet.file);
+        assert!(
+            facet.title.ends_with(&format!(", planner {planner}")),
+            "{}",
+            facet.title
+        );
+        assert!(facet.file.contains(planner), "{}", facet.file);
+    }
+}
+
+/// Texts are no smaller than 12 pixels where the page is as narrow as a phone.
+#[test]
+fn a_phone_shows_texts_of_twelve_pixels() {
+    let narrowest_px = 390.0 - 2.0 * 16.0;
+    let smallest = farside_actors::figure::STYLE
+        .split("font-size: ")
+        .skip(1)
+        .map(|rest| rest.split("px").next().unwrap().parse::<f64>().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert!(smallest * narrowest_px / plots::WIDTH >= 12.0, "{smallest}");
+}
+
 #[test]
 fn a_large_study_stays_small() {
     let levels = |prefix: &'static str, count: u32| -> Vec<fabricated::Level> {

@@ -64,6 +64,13 @@ settings! {
     }
 }
 
+/// When the crashes and the restarts of an entry are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Times {
+    pub(super) down: Vec<SimDuration>,
+    pub(super) up: Vec<SimDuration>,
+}
+
 /// What is wrong with an entry: the key to blame, what was found and what was expected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Mistake {
@@ -165,30 +172,38 @@ impl Crash {
         self.at.unwrap_or(SimDuration::ZERO)
     }
 
-    /// Plans this entry's crashes and restarts; `index` is its place among the entries.
+    /// Plans this entry's crashes and restarts, and says when they are; `index` is its place among
+    /// the entries.
     pub(super) fn plan(
         &self,
         sim: &mut Simulation,
         seed: u64,
         index: usize,
         until: Option<SimDuration>,
-    ) -> Result<(), Mistake> {
+    ) -> Result<Times, Mistake> {
         let draws = |name: &str| {
             let key = RandomKey::new(seed).text("crash").number(index as u64);
             key.text(name)
         };
-        let mut planned = 0;
+        let mut planned = Times::default();
         for name in self.chosen(sim, &draws)? {
             for (down, up) in self.times(&draws(&name), until) {
-                planned += 2;
-                if planned > MAX_EVENTS {
+                planned.down.push(down);
+                planned.up.extend(up);
+                if planned.down.len() * 2 > MAX_EVENTS {
                     let message = format!("more than {MAX_EVENTS} crashes and restarts");
                     return Err(mistake("mtbf", message));
                 }
                 self.plan_one(sim, &name, down, up);
             }
         }
-        Ok(())
+        Ok(planned)
+    }
+
+    /// Whether it goes on and on, so that a run that ends before the last of its crashes misses
+    /// nothing that it was to show.
+    pub(super) fn goes_on(&self) -> bool {
+        self.mtbf.is_some()
     }
 
     /// Plans one crash of the actor or host called `name`, and its return.

@@ -1,6 +1,6 @@
 //! What there is to know of the keys that every system shares.
 
-use farside_actors::link::LinkParams;
+use farside_actors::link::{LinkOverrides, LinkParams};
 use farside_actors::radio::RadioConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{Key, Section};
@@ -25,7 +25,9 @@ pub fn shared_sections() -> Vec<Section> {
         name: "links.default".to_owned(),
         about: &["The parameters of all links; [links.PATTERN] has the same for some of them."],
         keys: LinkParams::keys(),
-        defaults: toml::Table::try_from(LinkParams::default()).unwrap_or_default(),
+        // A resolved scenario leaves out what is off; here it is what one wants to know.
+        defaults: toml::Table::try_from(LinkOverrides::from(LinkParams::default()))
+            .unwrap_or_default(),
     });
     all.push(Section {
         name: "degrade".to_owned(),
@@ -45,33 +47,37 @@ pub fn shared_sections() -> Vec<Section> {
 
 /// The keys of a `[[degrade]]` entry: when, which, and what of a link's.
 fn degrade_keys() -> Vec<Key> {
-    let key = |name, about| Key {
-        name,
-        about,
-        expected: String::new(),
-        aliases: &[],
-    };
+    let key = |name, about, rust| Key::new(name, about).typed(rust, "");
     let own = [
-        key("at", &["When it begins, from the start of the run."][..]),
+        key(
+            "at",
+            &["When it begins, from the start of the run."][..],
+            "SimDuration",
+        ),
         key(
             "until",
             &["When it ends; without, it lasts as long as the run."],
+            "SimDuration",
         ),
-        key("links", &["Which links: a pattern over their names."]),
+        key(
+            "links",
+            &["Which links: a pattern over their names."],
+            "String",
+        ),
         key(
             "processors",
             &[
                 "Which processors, instead of links: a pattern over their names, {host}/{processor}, \
                or over hosts.",
             ],
+            "String",
         ),
         Key {
-            name: "slowdown",
-            about: &[
-                "By how much processors are slower meanwhile: 50 is a fiftieth of their speed.",
-            ],
             expected: "a factor above 0, from 0.000001 to 1000000000".to_owned(),
-            aliases: &[],
+            ..Key::new(
+                "slowdown",
+                &["By how much processors are slower meanwhile: 50 is a fiftieth of their speed."],
+            )
         },
     ];
     own.into_iter().chain(LinkParams::keys()).collect()

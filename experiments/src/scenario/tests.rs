@@ -392,8 +392,8 @@ fn what_begins_when_the_run_is_over_is_remarked_on() {
                 [[crash]]\nactor = 'node_03'\nat = '2h'\n";
     let remarks = parse(text, &[]).unwrap().assemble().unwrap().remarks;
     let expected = [
-        "degrade.1: begins at 60s, but the run ends at 60s",
-        "crash.0: begins at 7200s, but the run ends at 60s",
+        "degrade.1 is never reached: it begins at 60s, and the run ends at 60s at the latest",
+        "crash.0 is never reached: it is at 7200s, and the run ends at 60s at the latest",
     ];
     assert_eq!(remarks, expected);
     let endless = parse(&text.replace("until = '60s'", ""), &[]).unwrap();

@@ -160,6 +160,16 @@ pub enum StoreError {
     },
 }
 
+impl StoreError {
+    /// Whether something could not be written, which is no fault of what was read.
+    pub fn is_of_output(&self) -> bool {
+        matches!(self, StoreError::Io { doing, .. } if *doing != READING)
+    }
+}
+
+/// What is done when results are read.
+pub(super) const READING: &str = "cannot read it";
+
 /// What makes of an error of the operating system one of a folder.
 pub(super) fn io(path: &Path, doing: &'static str) -> impl FnOnce(std::io::Error) -> StoreError {
     move |source| StoreError::Io {

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use farside::{Counts, End, Executor, Report};
 use serde_json::{Map, Value};
 
-use crate::scenario::{Assembled, Scenario};
+use crate::scenario::{Assembled, Never, Planned, Scenario};
 use crate::wall::timed;
 use farside_actors::system::{Results, Seeds};
 
@@ -119,6 +119,7 @@ fn run<E: std::fmt::Display>(
         return Some(Executed::failed(error.to_string()));
     }
     interrupts.watch(&assembled.sim.interrupt());
+    let planned = std::mem::take(&mut assembled.planned);
     let ((report, results), run_s) = timed(|| {
         let report = assembled.sim.run(Executor::Inline);
         let results = report
@@ -135,7 +136,7 @@ fn run<E: std::fmt::Display>(
         Err(_) => None,
     };
     let outcome = match report {
-        Ok(report) => outcome(scenario, &report, &results, metrics)?,
+        Ok(report) => outcome(scenario, &report, &results, metrics, &planned)?,
         Err(error) => RunOutcome::Failed {
             error: error.to_string(),
         },
@@ -155,6 +156,7 @@ fn outcome(
     report: &Report,
     results: &Results,
     metrics: &[Metric],
+    planned: &Planned,
 ) -> Option<RunOutcome> {
     match &report.end {
         End::Interrupted => return None,
@@ -169,6 +171,7 @@ fn outcome(
         let value = results.metrics.get(&metric.name)?;
         Some((metric.name.clone(), value.clone()))
     });
+    let never = planned.never(report).filter(Never::is_whole);
     Some(RunOutcome::Done {
         end: report.end.name().to_owned(),
         end_detail: report.end.detail(),
@@ -179,6 +182,7 @@ fn outcome(
         messages: (&report.counts).into(),
         metrics: measured.collect(),
         violations: results.violations.clone(),
+        never_reached: never.map(|never| never.key().to_owned()).collect(),
     })
 }
 

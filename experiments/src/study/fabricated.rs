@@ -131,6 +131,7 @@ pub(crate) fn study(name: &str, factors: Vec<(Factor, Vec<Level>)>, seeds: u64) 
             block: 1,
             stop: None,
             published: Vec::new(),
+            report: Default::default(),
             factors,
         },
         runs,
@@ -152,6 +153,7 @@ pub(crate) fn with_curves(mut results: Results, steps: u32) -> Results {
                 lengths_differ: false,
             }),
             kind: None,
+            better: None,
         },
     );
     let manifest = &results.manifest;
@@ -198,6 +200,7 @@ fn metrics() -> Vec<Metric> {
         unit: unit.to_owned(),
         index: None,
         kind: None,
+        better: None,
     };
     metrics.map(metric).to_vec()
 }
@@ -262,6 +265,7 @@ fn outcome(cell: usize, seed: u64, harm: f64) -> RunOutcome {
         messages: messages(&mut stream, harm),
         metrics: into_map(metrics),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     }
 }
 

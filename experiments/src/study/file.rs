@@ -6,7 +6,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::results::Scale;
+use super::results::{PlotAxes, Scale};
 
 /// A study file, as it is written.
 #[derive(Debug, Deserialize)]
@@ -31,6 +31,9 @@ pub(super) struct StudyFile {
     pub(super) stop: Option<StopFile>,
     #[serde(default)]
     pub(super) published: Vec<PublishedFile>,
+    /// The `[report]` table.
+    #[serde(default)]
+    pub(super) report: PlotAxes,
 }
 
 /// How cells are made of factors.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use farside_logs::is_hidden;
 use serde_json::Value;
 
-use super::error::{StoreError, io};
+use super::error::{READING, StoreError, io};
 use super::lengths::Lengths;
 use super::results::{Claim, FORMAT, Factor, Manifest, Metric, Results, RunOutcome, RunRecord};
 
@@ -41,7 +41,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     block: 1, stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![], report: Default::default() };
     /// let failed = || RunOutcome::Failed { error: "x".into() };
     /// let run = |seed| RunRecord { cell: 0, seed, outcome: failed() };
     /// let half = |seed| Results { manifest: manifest.clone(), runs: vec![run(seed)] };
@@ -94,7 +94,7 @@ pub(super) fn manifest(folder: &Path) -> Result<Manifest, StoreError> {
                 path: folder.to_owned(),
             });
         }
-        Err(error) => return Err(io(&path, "cannot read it")(error)),
+        Err(error) => return Err(io(&path, READING)(error)),
     };
     let corrupt = |error: serde_json::Error| StoreError::Corrupt {
         path: path.clone(),
@@ -214,7 +214,7 @@ pub(super) fn check_names(manifest: &Manifest) -> Result<(), String> {
 pub(super) fn runs(folder: &Path, manifest: &Manifest) -> Result<Vec<RunRecord>, StoreError> {
     let mut runs = Vec::new();
     for path in shards(folder)? {
-        let bytes = std::fs::read(&path).map_err(io(&path, "cannot read it"))?;
+        let bytes = std::fs::read(&path).map_err(io(&path, READING))?;
         records(&path, &bytes, manifest, &mut runs)?;
     }
     in_order(runs)
@@ -222,12 +222,22 @@ pub(super) fn runs(folder: &Path, manifest: &Manifest) -> Result<Vec<RunRecord>,
 
 /// The files of a results folder that hold records.
 fn shards(folder: &Path) -> Result<Vec<PathBuf>, StoreError> {
+    files_called(folder, "runs")
+}
+
+/// The files of a results folder, of each shard one, that hold lines of `runs` or `times`; none if
+/// there is no folder.
+pub(super) fn files_called(folder: &Path, stem: &str) -> Result<Vec<PathBuf>, StoreError> {
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let (whole, of_shard) = (format!("{stem}.jsonl"), format!("{stem}-"));
     let mut paths = Vec::new();
-    let entries = std::fs::read_dir(folder).map_err(io(folder, "cannot read it"))?;
+    let entries = std::fs::read_dir(folder).map_err(io(folder, READING))?;
     for entry in entries {
-        let entry = entry.map_err(io(folder, "cannot read it"))?;
+        let entry = entry.map_err(io(folder, READING))?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name == "runs.jsonl" || name.starts_with("runs-") && name.ends_with(".jsonl") {
+        if name == whole || name.starts_with(&of_shard) && name.ends_with(".jsonl") {
             paths.push(entry.path());
         }
     }
@@ -345,6 +355,7 @@ pub(super) fn difference(a: &Manifest, b: &Manifest) -> String {
         ("the blocks of seeds", a.block != b.block),
         ("the stopping rule", a.stop != b.stop),
         ("the published figures", a.published != b.published),
+        ("what plots put where", a.report != b.report),
     ];
     for (what, differs) in parts {
         if differs {

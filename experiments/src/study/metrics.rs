@@ -7,7 +7,7 @@ use farside_actors::system::{
 use serde_json::{Map, Value};
 
 use super::file::MetricFile;
-use super::results::{Metric, SeriesIndex};
+use super::results::{DeclaredBetter, Metric, SeriesIndex};
 
 /// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
 pub(crate) const KERNEL: [KnownMetric; 8] = [
@@ -51,6 +51,7 @@ pub(super) fn metric<'a>(
         unit: file.unit.clone().unwrap_or_else(|| unit.to_owned()),
         index: index(file, known),
         kind: known.map(|metric| metric.kind.into()),
+        better: known.and_then(|metric| DeclaredBetter::of(metric.better)),
     }
 }
 

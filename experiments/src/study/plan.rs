@@ -10,7 +10,6 @@ use serde_json::{Map, Value};
 use farside::suggest::nearest;
 
 use crate::scenario::{self, Scenario, ScenarioError, Source, SourceLocation};
-use crate::version::CODE_VERSION;
 use farside_actors::system::Files;
 
 use crate::registry::Registry;
@@ -49,7 +48,16 @@ pub struct StudyPlan {
     pub manifest: Manifest,
     /// A scenario for each cell.
     pub(super) scenarios: Vec<Scenario>,
+    /// What the scenario says in some cell that has no effect, for people.
+    pub remarks: Vec<String>,
     source: Source,
+}
+
+/// Scenarios of cells, the files that they read, and what is remarked on them.
+struct Built {
+    scenarios: Vec<Scenario>,
+    files: FilesByName,
+    remarks: Vec<String>,
 }
 
 impl Study {
@@ -152,12 +160,17 @@ impl Study {
         let block = super::blocks::block(&self.file, &self.factors, seeds.len(), &blame)?;
         let baseline = self.baseline(&blame)?;
         let published = published(&self.file, &self.factors, &self.cells, &metrics, &blame)?;
+        self.check_axes(&blame)?;
         super::blocks::check_problem(&base, block, &blame)?;
         let scenario_text = base.resolved()?;
-        let (scenarios, files) = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
+        let Built {
+            scenarios,
+            files,
+            remarks,
+        } = self.scenarios(&base, &scenario_text, seeds[0], registry)?;
         let manifest = Manifest {
             format: FORMAT,
-            code_version: CODE_VERSION.to_owned(),
+            code_version: registry.version(),
             study: self.name,
             question: self.file.question,
             scenario: base.name().to_owned(),
@@ -171,11 +184,13 @@ impl Study {
             block,
             stop,
             published,
+            report: self.file.report,
         };
         super::load::check_names(&manifest).map_err(StudyError::Argument)?;
         Ok(StudyPlan {
             manifest,
             scenarios,
+            remarks,
             source: self.source,
         })
     }
@@ -292,6 +307,24 @@ impl Study {
             .map_err(|message| blame.invalid("baseline", message))
     }
 
+    /// Checks what plots are to put where: factors, each in one place.
+    fn check_axes(&self, blame: &Blame<'_>) -> Result<(), ScenarioError> {
+        let factors = self.factors.iter().map(|plan| plan.factor.name.as_str());
+        let factors: Vec<&str> = factors.collect();
+        let said: Vec<(&str, &str)> = self.file.report.said().collect();
+        for (index, (key, name)) in said.iter().enumerate() {
+            let place = format!("report.{key}");
+            if !factors.contains(name) {
+                return Err(blame.unknown(&place, name, &factors));
+            }
+            if let Some((other, _)) = said[..index].iter().find(|(_, taken)| taken == name) {
+                let message = format!("{name:?} is {other} already: expected another factor");
+                return Err(blame.invalid(&place, message));
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses arguments that would have no effect.
     fn check_arguments(&self, sets: &[String]) -> Result<(), StudyError> {
         for set in sets {
@@ -353,17 +386,21 @@ impl Study {
         text: &str,
         seed: u64,
         registry: &Registry,
-    ) -> Result<(Vec<Scenario>, FilesByName), StudyError> {
+    ) -> Result<Built, StudyError> {
         let mut files = base.files().clone();
         let mut scenarios = Vec::new();
+        let mut remarks: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for (index, cell) in self.cells.iter().enumerate() {
             let built = of_cell(base.name(), text, cell, files.clone(), registry);
             let built = built.and_then(|scenario| {
                 let assembled = scenario.assemble_seeded(scenario.seeds_of(seed, None))?;
-                Ok((scenario, assembled.files))
+                Ok((scenario, assembled.files, assembled.remarks))
             });
-            let (scenario, read) = built.map_err(|error| self.refused(index, error))?;
+            let (scenario, read, remarked) = built.map_err(|error| self.refused(index, error))?;
             scenarios.push(scenario);
+            for remark in remarked {
+                remarks.entry(remark).or_default().push(index);
+            }
             files = read;
         }
         let all = files.all().clone();
@@ -371,7 +408,15 @@ impl Study {
             // What is on disk may change while the study runs.
             scenario.keep_files(Files::kept(all.clone()));
         }
-        Ok((scenarios, all))
+        let cells = self.cells.len();
+        let remarks = remarks
+            .into_iter()
+            .map(|(remark, within)| told_of_cells(&remark, &within, cells));
+        Ok(Built {
+            remarks: base.renamed_remarks().chain(remarks).collect(),
+            scenarios,
+            files: all,
+        })
     }
 
     /// A cell that the scenario refuses, with the value to blame.
@@ -480,6 +525,20 @@ impl StudyPlan {
             super::published::check_kind(index, table, results.get(&table.metric), &blame)?;
         }
         Ok(())
+    }
+}
+
+/// A remark, and on which of `cells` cells it is.
+fn told_of_cells(remark: &str, within: &[usize], cells: usize) -> String {
+    const SHOWN: usize = 12;
+    let mut names: Vec<String> = within.iter().take(SHOWN).map(usize::to_string).collect();
+    if within.len() > SHOWN {
+        names.push(format!("and {} more", within.len() - SHOWN));
+    }
+    match within.len() {
+        all if all == cells => format!("in each cell: {remark}"),
+        1 => format!("in cell {}: {remark}", names[0]),
+        _ => format!("in cells {}: {remark}", names.join(", ")),
     }
 }
 

@@ -136,7 +136,8 @@ fn differences(recorded: &RunOutcome, now: &RunOutcome) -> Vec<(String, String, 
     let mut names: Vec<&String> = recorded.iter().map(|(name, _)| name).collect();
     let only_now = now.iter().map(|(name, _)| name);
     let only_now: Vec<&String> = only_now.filter(|name| !names.contains(name)).collect();
-    names.extend(only_now);
+    // Results of older versions do not say what was never reached.
+    names.extend(only_now.into_iter().filter(|name| *name != "never_reached"));
     let told = |value: Option<serde_json::Value>| {
         value.map_or_else(|| "nothing".to_owned(), |value| value.to_string())
     };

@@ -49,6 +49,42 @@ pub struct Manifest {
     /// are kept when these change.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub published: Vec<Published>,
+    /// Which factors plots put where. It says nothing about what is run: a folder's runs are kept
+    /// when it changes.
+    #[serde(default, skip_serializing_if = "PlotAxes::is_open")]
+    pub report: PlotAxes,
+}
+
+/// Which factor plots put where, each by its name; what is left open follows from the factors.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlotAxes {
+    /// Along the horizontal axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<String>,
+    /// A curve for each of its values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<String>,
+    /// A plot for each of its values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facet: Option<String>,
+}
+
+impl PlotAxes {
+    /// What is said, by key.
+    pub fn said(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let all = [
+            ("x", &self.x),
+            ("series", &self.series),
+            ("facet", &self.facet),
+        ];
+        all.into_iter()
+            .filter_map(|(key, name)| Some((key, name.as_deref()?)))
+    }
+
+    fn is_open(&self) -> bool {
+        *self == PlotAxes::default()
+    }
 }
 
 fn one() -> usize {
@@ -186,6 +222,39 @@ pub struct Metric {
     /// tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<DeclaredKind>,
+    /// Which way is better, as its system declares it. None if neither way is, and of a metric that
+    /// no system declares.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub better: Option<DeclaredBetter>,
+}
+
+/// Which way a metric is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeclaredBetter {
+    /// The more the better.
+    Higher,
+    /// The less the better.
+    Lower,
+}
+
+impl DeclaredBetter {
+    /// What a system declares; none where neither way is better.
+    ///
+    /// ```
+    /// use farside_actors::system::Better;
+    /// use farside_experiments::study::results::DeclaredBetter;
+    /// assert_eq!(DeclaredBetter::of(Better::Lower), Some(DeclaredBetter::Lower));
+    /// assert_eq!(DeclaredBetter::of(Better::Neither), None);
+    /// ```
+    pub fn of(better: farside_actors::system::Better) -> Option<Self> {
+        use farside_actors::system::Better;
+        match better {
+            Better::Higher => Some(DeclaredBetter::Higher),
+            Better::Lower => Some(DeclaredBetter::Lower),
+            Better::Neither => None,
+        }
+    }
 }
 
 /// How the values of a metric are summed up over runs, as its system says.
@@ -366,6 +435,10 @@ pub enum RunOutcome {
         metrics: Map<String, Value>,
         /// What must never happen and did.
         violations: Vec<String>,
+        /// The entries of the scenario for which the run ended too soon: `degrade.0`, `crash.1`.
+        /// None at all in results of older versions.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        never_reached: Vec<String>,
     },
     /// It failed: a panic, a fault, a scenario that cannot be.
     Failed {

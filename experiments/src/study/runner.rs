@@ -170,7 +170,7 @@ pub fn run(
     }
 }
 
-fn unobserved(_: &mut Assembled) -> Result<(), Infallible> {
+pub(super) fn unobserved(_: &mut Assembled) -> Result<(), Infallible> {
     Ok(())
 }
 
@@ -507,7 +507,7 @@ impl Results {
     /// #     question: "?".into(), scenario: "x".into(), scenario_text: String::new(),
     /// #     files: Default::default(), factors: vec![], metrics: vec![], baseline: None,
     /// #     cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }], seeds: vec![1, 2],
-    /// #     block: 1, stop: None, published: vec![] };
+    /// #     block: 1, stop: None, published: vec![], report: Default::default() };
     /// let results = Results { manifest, runs: Vec::new() }; // one cell, two seeds
     /// assert_eq!(results.missing(), 2);
     /// ```
@@ -540,7 +540,7 @@ impl Results {
 }
 
 /// What a run says about the metric that decides when a cell has seeds enough.
-fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
+pub(super) fn sample(outcome: &RunOutcome, metric: &str) -> Sample {
     match value_of(outcome, metric).as_deref() {
         Some(Value::Bool(flag)) => Sample::Flag(*flag),
         Some(value) => value.as_f64().map_or(Sample::None, Sample::Number),

@@ -95,7 +95,8 @@ pub(super) enum Found {
     Nothing,
     /// Results of the same study.
     Same,
-    /// Results of the same study, with fewer seeds or beside other published figures.
+    /// Results of the same study, with fewer seeds, beside other published figures or
+    /// plotted otherwise.
     Earlier,
 }
 
@@ -131,10 +132,18 @@ impl Store {
         if there == *manifest {
             return Ok(Found::Same);
         }
-        // What others published decides nothing about the runs, and is often written after them.
+        // What others published and how it is plotted decide nothing about the runs, and are often
+        // written after them. Nor does which way a metric is better, which older versions did not
+        // write.
+        let mut metrics = there.metrics.clone();
+        for (metric, ours) in metrics.iter_mut().zip(&manifest.metrics) {
+            metric.better = ours.better;
+        }
         let extended = Manifest {
             seeds: manifest.seeds.clone(),
             published: manifest.published.clone(),
+            report: manifest.report.clone(),
+            metrics,
             ..there.clone()
         };
         if extended == *manifest && manifest.seeds.starts_with(&there.seeds) {
@@ -170,6 +179,7 @@ impl Store {
             replace(&folder.join(MANIFEST), (text + "\n").as_bytes())?;
             // The table of a study with fewer seeds would pass for this one's.
             let _ = std::fs::remove_file(folder.join("results.csv"));
+            let _ = std::fs::remove_file(folder.join("values.csv"));
         }
         let runs = folder.join(shard.file("runs", ".jsonl"));
         cut_off_half_a_line(&runs)?;
@@ -212,11 +222,11 @@ fn foreign_entry(folder: &Path) -> Result<Option<String>, StoreError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(io(folder, "cannot read it")(error)),
+        Err(error) => return Err(io(folder, "cannot keep results in it")(error)),
     };
     let mut names = Vec::new();
     for entry in entries {
-        let entry = entry.map_err(io(folder, "cannot read it"))?;
+        let entry = entry.map_err(io(folder, "cannot keep results in it"))?;
         names.push(entry.file_name().to_string_lossy().into_owned());
     }
     names.sort();
@@ -273,7 +283,7 @@ fn cut_off_half_a_line(path: &Path) -> Result<(), StoreError> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(io(path, "cannot read it")(error)),
+        Err(error) => return Err(io(path, "cannot go on with it")(error)),
     };
     let whole = bytes.iter().rposition(|byte| *byte == b'\n');
     let whole = whole.map_or(0, |at| at + 1);

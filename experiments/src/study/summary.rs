@@ -5,7 +5,9 @@
 //! seeds share problems, what varies by chance are the blocks of them. How each is
 //! computed, and after whom, is said in [`crate::stats`].
 
+pub mod check;
 pub mod comparisons;
+pub mod effect;
 mod figures;
 pub mod published;
 pub mod series;
@@ -20,6 +22,7 @@ use serde_json::{Map, Value};
 use super::results::{MessageCounts, Results, RunOutcome};
 use crate::stats::Estimate;
 use comparisons::ComparisonSummary;
+use effect::SameValues;
 use figures::{list_summary, number_summary, overall, rate_summary, text_summary};
 use published::{Beside, LineSummary};
 use series::{SeriesSummary, series_summary};
@@ -55,6 +58,9 @@ pub struct Summary {
     pub failed: usize,
     /// Each cell, in the manifest's order.
     pub cells: Vec<CellSummary>,
+    /// Values of factors that change nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub same_values: Vec<SameValues>,
     /// Numbers and rates over all cells, by metric.
     pub overall: BTreeMap<String, OverallSummary>,
     /// Lines through cells, for whatever was published to be linear.
@@ -82,6 +88,9 @@ pub struct CellSummary {
     pub violated: usize,
     /// How many ended because their time was over.
     pub timed_out: usize,
+    /// In how many runs what the scenario plans was never reached, by its entry (`degrade.0`).
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub never_reached: BTreeMap<String, usize>,
     /// What became of the messages of all its runs together.
     pub messages: MessageCounts,
     /// Each metric, in the manifest's order.
@@ -305,17 +314,17 @@ pub struct OverallSummary {
 /// # use farside_experiments::study::results::*;
 /// # use serde_json::json;
 /// # let metric = |name: &str| Metric { name: name.into(), label: name.into(), unit: "s".into(),
-/// #     index: None, kind: None };
+/// #     index: None, kind: None, better: None };
 /// # let manifest = Manifest { format: FORMAT, code_version: "1".into(), study: "doc".into(),
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric("ratio")],
 /// #     baseline: None, cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }],
-/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![] };
+/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![], report: Default::default() };
 /// # let run = |seed: u64| RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
 /// #     timed_out: false, events: 1, messages: MessageCounts::default(),
 /// #     metrics: json!({"ratio": seed as f64}).as_object().unwrap().clone(),
-/// #     violations: vec![] } };
+/// #     violations: vec![], never_reached: vec![] } };
 /// # let results = Results { manifest, runs: (0..8).map(run).collect() };
 /// use farside_experiments::study::summary::{MetricSummary, summarise};
 /// let summary = summarise(&results);
@@ -347,6 +356,7 @@ pub fn summarise(results: &Results) -> Summary {
         planned: manifest.cells.len() * manifest.seeds.len(),
         n: cells.iter().map(|cell| cell.n).sum(),
         failed: cells.iter().map(|cell| cell.failed).sum(),
+        same_values: effect::same_values(results),
         overall: overall.collect(),
         lines,
         comparisons: comparisons::compare(results, &kinds),
@@ -373,6 +383,7 @@ fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, ValueKind)])
         failed: 0,
         violated: 0,
         timed_out: 0,
+        never_reached: BTreeMap::new(),
         messages: MessageCounts::default(),
         metrics: Vec::with_capacity(kinds.len()),
         published: Vec::new(),
@@ -384,9 +395,13 @@ fn summarise_cell(results: &Results, cell: usize, kinds: &[(String, ValueKind)])
                 timed_out,
                 messages,
                 violations,
+                never_reached,
                 ..
             } => {
                 summary.n += 1;
+                for entry in never_reached {
+                    *summary.never_reached.entry(entry.clone()).or_default() += 1;
+                }
                 summary.timed_out += usize::from(*timed_out);
                 summary.violated += usize::from(!violations.is_empty());
                 add_counts(&mut summary.messages, messages);

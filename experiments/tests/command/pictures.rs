@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use farside::SimDuration;
 use farside::encoding::Schema;
 use farside_logs::Log;
+use farside_network::NetworkConfig;
 use farside_network::messages::RoverState;
 
 use crate::common::{farside, json, text};
+use crate::ink::assert_readable;
 
 const CROWD: [&str; 9] = [
     "run",
@@ -81,6 +84,8 @@ fn the_map_has_the_rovers_of_its_instant() {
     }
     let corridor = drawn(folder.path(), &["corridor", "--along", "auto"]);
     assert_well_formed(&corridor);
+    assert_readable("map", &drawn(folder.path(), &[]));
+    assert_readable("corridor", &corridor);
     assert!(corridor.contains("class=\"stand"));
     assert_eq!(
         drawn(folder.path(), &["corridor", "--along", "auto"]),
@@ -105,6 +110,76 @@ fn the_map_has_the_rovers_of_its_instant() {
         "expected auto, or vertices",
     );
     refused(&["corridor", "--along", "1,2,1"], "through vertex");
+}
+
+/// A cycle that is left to the links is as long in pictures as it was in the run.
+#[test]
+fn pictures_count_the_cycles_of_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let latency = SimDuration::from_secs(1);
+    let run = [
+        "run",
+        "--set",
+        "team.rovers=5",
+        "--set",
+        "links.default.latency=1s",
+        "--until",
+        "70s",
+        "--out",
+        "run.mcap",
+        "--json",
+    ];
+    let metrics = &json(&farside(folder.path(), &run))["metrics"];
+    let timing = NetworkConfig::default().timing(latency, None).unwrap();
+    let (cycle_s, whole) = (
+        timing.cycle.as_secs_f64(),
+        70.0 / timing.cycle.as_secs_f64(),
+    );
+    assert!(whole > 3.0 && whole < 4.0, "{cycle_s}");
+    assert_eq!(metrics["cycles"], 4, "{metrics}");
+    let map = drawn(folder.path(), &[]);
+    assert!(map.contains("Cycle 3."), "a cycle lasts {cycle_s} s");
+}
+
+/// What a picture is written as is said by the file's ending, and by --format.
+#[test]
+fn pictures_are_written_for_papers_and_slides() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = [
+        "run",
+        "--set",
+        "team.rovers=3",
+        "--until",
+        "5s",
+        "--out",
+        "run.mcap",
+    ];
+    farside(folder.path(), &run);
+    let draw = |more: &[&str]| farside(folder.path(), &[&["draw", "run.mcap"], more].concat());
+    let begins = |name: &str, with: &[u8]| {
+        std::fs::read(folder.path().join(name)).is_ok_and(|bytes| bytes.starts_with(with))
+    };
+    if cfg!(feature = "export") {
+        assert_eq!(draw(&["--out", "a.pdf"]).status.code(), Some(0));
+        assert!(begins("a.pdf", b"%PDF-") && !folder.path().join("a.svg").exists());
+        let json = json(&draw(&["--format", "pdf,png", "--json"]));
+        let files = serde_json::json!(["run-map.svg", "run-map.pdf", "run-map.png"]);
+        assert_eq!(json["files"], files);
+        assert!(begins("run-map.png", b"\x89PNG") && begins("run-map.svg", b"<?xml"));
+        // Not over what is something else.
+        std::fs::write(folder.path().join("b.pdf"), "mine").unwrap();
+        assert_eq!(draw(&["--out", "b.pdf"]).status.code(), Some(2));
+    } else {
+        for more in [["--out", "a.pdf"], ["--format", "png"]] {
+            let output = draw(&more);
+            assert_eq!(output.status.code(), Some(2));
+            let says = text(&output.stderr);
+            assert!(
+                says.contains("--features farside-experiments/export"),
+                "{says}"
+            );
+        }
+    }
 }
 
 /// The circle that a run reports and the one that its pictures name are the same.

@@ -9,6 +9,7 @@ use farside_experiments::study::results::{
 use serde_json::json;
 
 use crate::common::{farside, json, text};
+use crate::ink::assert_readable;
 
 fn manifest() -> Manifest {
     let cell = |loss: f64, text: &str| Cell {
@@ -36,6 +37,7 @@ fn manifest() -> Manifest {
             unit: String::new(),
             index: None,
             kind: None,
+            better: None,
         }],
         baseline: Some(0),
         cells: vec![cell(0.0, "0"), cell(0.3, "30%")],
@@ -43,6 +45,7 @@ fn manifest() -> Manifest {
         block: 1,
         stop: None,
         published: Vec::new(),
+        report: Default::default(),
     }
 }
 
@@ -66,6 +69,7 @@ fn record(cell: usize, seed: u64) -> RunRecord {
             .cloned()
             .unwrap_or_default(),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     };
     RunRecord {
         cell,
@@ -107,6 +111,11 @@ fn a_report_is_written_where_the_results_are() {
     let page = read("report.html");
     assert!(page.contains("Does loss slow a team down?"));
     assert!(page.contains("farside reproduce out --cell 1 --seed 4 --out cell1-seed4.mcap"));
+    for plot in std::fs::read_dir(folder.path().join("out/plots")).unwrap() {
+        let path = plot.unwrap().path();
+        let svg = std::fs::read_to_string(&path).unwrap();
+        assert_readable(&path.display().to_string(), &svg);
+    }
     let rows = read("results.csv");
     assert_eq!(rows.lines().count(), 9);
     assert!(

@@ -19,12 +19,23 @@ fn wrong_input_exits_with_2_and_writes_nothing() {
             &["run", "--set", "links.defualt.loss=1"],
             "did you mean \"default\"?",
         ),
-        (&["run", "--out", "no/such/folder/x.mcap"], "cannot create"),
         (&["run", "--until", "soon"], "expected a duration"),
         (&["run", "--threads", "0"], "1..=1024"),
         (&["run", "--seed", "-1"], "-1"),
         (&["check"], "SCENARIO"),
         (&["rnu"], "rnu"),
+        (
+            &["scenarios", "network/ruble"],
+            "did you mean \"network/rubble\"?",
+        ),
+        (
+            &["run", "degradation/loss"],
+            "is a study, and a scenario is expected here\n  `farside study degradation/loss` runs it",
+        ),
+        (
+            &["study", "network/rubble"],
+            "is a scenario, and a study is expected here",
+        ),
     ] {
         let output = farside(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

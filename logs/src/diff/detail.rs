@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use farside::MatchKey;
+use farside::record::RecordClass;
 use mcap::records::MessageHeader;
 
 use super::index::{Entry, Index, Mode, Names};
-use super::{Cause, FirstDifference};
+use super::{Carried, Cause, FirstDifference};
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::envelope::{KeyRef, RecordRef};
@@ -156,6 +157,13 @@ pub(super) fn describe(
     first.reason = record.reason.to_owned();
     let carriage = record.carriage.map(|carriage| carriage.to_string());
     first.carriage = carriage.unwrap_or_default();
+    first.carried_a = (!record.link.is_empty()).then(|| Carried {
+        sent_ns: record.sent_ns,
+        at_ns: record.key.time_ns,
+        fate: record.class.name().to_owned(),
+        reason: record.reason.to_owned(),
+        carriage: first.carriage.clone(),
+    });
     let cause = record.cause.map(|key| owned(&key));
     trace(index, names, cause, &mut first)?;
     Ok(first)
@@ -171,6 +179,12 @@ fn owned(key: &KeyRef<'_>) -> LoggedKey {
     }
 }
 
+/// Whether a cause is the same timer as the one that it led to: in a chain they say nothing new.
+fn is_same_timer(later: &Cause, cause: &Cause) -> bool {
+    let is_timer = |cause: &Cause| cause.fate == RecordClass::Timer.name();
+    is_timer(later) && is_timer(cause) && later.topic == cause.topic
+}
+
 /// Follows the causes back to a start.
 fn trace(
     index: &mut Index,
@@ -180,7 +194,8 @@ fn trace(
 ) -> Result<(), LogError> {
     let mut steps = 0;
     let mut before = usize::MAX;
-    let mut origin = None;
+    let mut omitted = 0;
+    let mut origin: Option<Cause> = None;
     while let Some(key) = next.take() {
         let key = KeyRef {
             time_ns: key.time_ns,
@@ -194,14 +209,14 @@ fn trace(
             .event(&key, names)
             .filter(|at| *at < before && steps < CHAIN_LIMIT);
         let Some(at) = found else {
-            origin = Some(Cause {
+            let unknown = Cause {
                 time_s: seconds(key.time_ns),
                 time_ns: key.time_ns,
                 sender: key.source.to_owned(),
                 fate: "not in the log".to_owned(),
                 ..Cause::default()
-            });
-            steps += 1;
+            };
+            omitted += origin.replace(unknown).map_or(0, |left| 1 + left.repeats);
             break;
         };
         before = at;
@@ -218,16 +233,21 @@ fn trace(
             receiver: record.receiver.to_owned(),
             ordinal: record.ordinal,
             fate: record.class.name().to_owned(),
+            ..Cause::default()
         };
         next = record.cause.map(|key| owned(&key));
         steps += 1;
-        if first.causes.len() < CAUSES_LISTED {
+        let last = origin.as_mut().or(first.causes.last_mut());
+        if let Some(last) = last.filter(|last| is_same_timer(last, &cause)) {
+            last.repeats += 1;
+            last.since_ns = cause.time_ns;
+        } else if first.causes.len() < CAUSES_LISTED {
             first.causes.push(cause);
         } else {
-            origin = Some(cause);
+            omitted += origin.replace(cause).map_or(0, |left| 1 + left.repeats);
         }
     }
     first.causes.extend(origin);
-    first.causes_omitted = steps - first.causes.len() as u64;
+    first.causes_omitted = omitted;
     Ok(())
 }

@@ -30,8 +30,15 @@ impl fmt::Display for DiffReport {
             writeln!(f, "{word}: {}", self.compared())?;
             return self.write_not_compared(f);
         };
-        write_first(f, first)?;
+        let names = short(Path::new(&self.file_a), Path::new(&self.file_b));
+        write!(f, "first difference at ")?;
+        write_first(f, first, &names)?;
         write_causes(f, first)?;
+        if let Some(consequence) = &self.consequence {
+            write!(f, "its first consequence at ")?;
+            write_first(f, consequence, &names)?;
+            write_causes(f, consequence)?;
+        }
         self.write_table(f)?;
         self.write_not_compared(f)
     }
@@ -157,14 +164,15 @@ impl TopicDiff {
     }
 }
 
-fn write_first(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {
-    write!(
-        f,
-        "first difference at {} s on {}",
-        Seconds(first.time_ns),
-        Shown(&first.topic)
-    )?;
-    if !first.sender.is_empty() {
+fn write_first(
+    f: &mut fmt::Formatter<'_>,
+    first: &FirstDifference,
+    names: &(String, String),
+) -> fmt::Result {
+    write!(f, "{} s on {}", Seconds(first.time_ns), Shown(&first.topic))?;
+    if first.injected {
+        write!(f, ": injected before the run")?;
+    } else if !first.sender.is_empty() {
         write!(
             f,
             ": {} to {}, message {}",
@@ -181,11 +189,40 @@ fn write_first(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Resu
     if !first.link.is_empty() {
         writeln!(f, "  on link {}", Shown(&first.link))?;
     }
-    if !first.carriage.is_empty() {
-        writeln!(f, "  carried with {}", first.carriage)?;
+    if first.carried_a.is_some() || first.carried_b.is_some() {
+        return write_carried(f, first, names);
     }
     if !first.reason.is_empty() {
         writeln!(f, "  lost for {}", Shown(&first.reason))?;
+    }
+    Ok(())
+}
+
+/// How each of the logs has the message.
+fn write_carried(
+    f: &mut fmt::Formatter<'_>,
+    first: &FirstDifference,
+    (a, b): &(String, String),
+) -> fmt::Result {
+    let width = a.chars().count().max(b.chars().count());
+    for (name, carried) in [(a, &first.carried_a), (b, &first.carried_b)] {
+        let Some(carried) = carried else {
+            continue;
+        };
+        let (sent, at) = (Seconds(carried.sent_ns), Seconds(carried.at_ns));
+        let fate = Shown(&carried.fate);
+        write!(
+            f,
+            "  in {:width$}  sent {sent} s, {fate} {at} s",
+            Shown(name).to_string()
+        )?;
+        if !carried.reason.is_empty() {
+            write!(f, " for {}", Shown(&carried.reason))?;
+        }
+        match carried.carriage.as_str() {
+            "" => writeln!(f)?,
+            carriage => writeln!(f, ": {carriage}")?,
+        }
     }
     Ok(())
 }
@@ -208,6 +245,8 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
             receiver,
             ordinal,
             fate,
+            repeats,
+            since_ns,
             ..
         } = cause;
         let (time, topic) = (Seconds(*time_ns), Shown(topic));
@@ -221,6 +260,10 @@ fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Res
             f,
             "  because {time} s {fate} {topic} ({who}, number {ordinal})"
         )?;
+        if *repeats > 0 {
+            let since = Seconds(*since_ns);
+            writeln!(f, "    and {repeats} before it in a row, from {since} s on")?;
+        }
     }
     Ok(())
 }

@@ -65,7 +65,7 @@ fn a_message_lost_in_one_and_delivered_in_the_other_differs_in_its_fate() {
     let last = first.causes.last().unwrap();
     assert_eq!(
         (last.fate.as_str(), last.topic.as_str()),
-        ("start", "/event/start/base"),
+        ("start", "/event/start"),
         "{report}"
     );
     assert!(report.changed > 0);

@@ -7,6 +7,7 @@ mod hostile;
 mod python;
 mod reading;
 mod recovering;
+mod schemas;
 mod siblings;
 mod verifying;
 mod viewing;

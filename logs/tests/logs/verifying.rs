@@ -1,15 +1,20 @@
 //! Comparing a log with a re-execution.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use farside::Executor;
-use farside::record::{Flow, Observer, ObserverError, Record};
+use farside::record::{Flow, Observer, ObserverError};
 use farside_logs::{LogOptions, LogWriter, Mismatch, Verifier, VerifyOutcome};
 
+use mcap::read::ChunkFlattener;
+use mcap::records::Record;
+
 use crate::common::{Plan, Slip, build, log_to, logged, options, run_with};
+use crate::schemas::hostile;
 
 fn verify(path: &Path, plan: &Plan) -> VerifyOutcome {
     let verifier = Verifier::open(path).unwrap();
@@ -155,7 +160,7 @@ struct Interrupter {
 }
 
 impl Observer for Interrupter {
-    fn record(&mut self, _record: &Record<'_>) -> Result<Flow, ObserverError> {
+    fn record(&mut self, _record: &farside::record::Record<'_>) -> Result<Flow, ObserverError> {
         self.left = self.left.saturating_sub(1);
         if self.left == 0 {
             self.flag.store(true, Ordering::Relaxed);
@@ -180,5 +185,62 @@ fn an_interrupted_run_is_the_same_as_far_as_it_goes() {
             VerifyOutcome::Prefix { missing, .. } => assert!(missing.contains("interrupted")),
             other => panic!("{other:?}"),
         }
+    }
+}
+
+/// Writes a log again with other schemas for its messages.
+fn with_schemas(log: &[u8], set: &[u8], out: &Path) {
+    let mut writer = mcap::Writer::new(fs::File::create(out).unwrap()).unwrap();
+    let (mut schemas, mut channels) = (BTreeMap::from([(0, 0)]), BTreeMap::new());
+    for record in ChunkFlattener::new(log).unwrap() {
+        match record.unwrap() {
+            Record::Schema { header, data } => {
+                let is_body = !header.name.starts_with("farside.");
+                let data = if is_body { set } else { &data };
+                let name = if is_body { "p.M" } else { &header.name };
+                let id = writer.add_schema(name, &header.encoding, data).unwrap();
+                schemas.insert(header.id, id);
+            }
+            Record::Channel(channel) => {
+                let encoding = &channel.message_encoding;
+                let schema = schemas[&channel.schema_id];
+                let id = writer.add_channel(schema, &channel.topic, encoding, &channel.metadata);
+                channels.insert(channel.id, id.unwrap());
+            }
+            Record::Message { mut header, data } => {
+                header.channel_id = channels[&header.channel_id];
+                writer.write_to_known_channel(&header, &data).unwrap();
+            }
+            Record::Metadata(metadata) => writer.write_metadata(&metadata).unwrap(),
+            _ => {}
+        }
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn no_schema_stops_a_verification() {
+    let (folder, path, _) = logged(&Plan::default());
+    let (log, out) = (fs::read(&path).unwrap(), folder.path().join("hostile.mcap"));
+    let slip = Slip {
+        from_cycle: 5,
+        by_m: 0.5,
+    };
+    for (name, set) in hostile() {
+        with_schemas(&log, &set, &out);
+        // What a log says of its types decides no comparison: bodies are the same bytes.
+        let same = verify(&out, &Plan::default());
+        assert!(
+            matches!(same, VerifyOutcome::Same { .. }),
+            "{name}: {same:?}"
+        );
+        let plan = Plan {
+            slip,
+            ..Plan::default()
+        };
+        let first = different(verify(&out, &plan));
+        assert!(first.topic.ends_with("/odometry"), "{name}: {first:?}");
+        assert!(first.field.starts_with("body"), "{name}: {first:?}");
+        assert_ne!(first.logged, first.rerun, "{name}: {first:?}");
     }
 }

@@ -34,7 +34,7 @@ fn the_log_tells_what_the_report_tells() {
     assert!(topic("/lost/rover_1/odometry").is_some());
     assert!(topic("/base/heard").is_some());
     assert!(topic("/state/rover_1/pose").is_some());
-    assert_eq!(topic("/event/crash/rover_1"), Some(1));
+    assert_eq!(topic("/event/crash"), Some(1));
     assert_eq!(info.attachments[0].name, "scenario.toml");
     assert_eq!(info.attachments[1].bytes, 10);
 }

@@ -10,7 +10,7 @@ use super::super::wire;
 use super::{Fault, NONE, Position, ValueSer, begin, finish, widen};
 
 /// A message whose fields are being written.
-pub(super) struct Compound<'a> {
+pub(super) struct Compound<'a, const NOTING: bool> {
     pub(super) flat: &'a FlatSchema,
     pub(super) out: &'a mut Vec<u8>,
     pub(super) message: &'a Message,
@@ -23,7 +23,7 @@ pub(super) struct Compound<'a> {
     pub(super) depth: u32,
 }
 
-impl<'a> Compound<'a> {
+impl<'a, const NOTING: bool> Compound<'a, NOTING> {
     #[inline(always)]
     pub(super) fn close(self) -> Result<(), Fault> {
         finish(self.out, self.start);
@@ -32,19 +32,21 @@ impl<'a> Compound<'a> {
     }
 
     /// The one field of a wrapper or newtype.
-    pub(super) fn inner(self) -> ValueSer<'a> {
-        ValueSer::inside(self.flat, self.out, &self.message.fields[0], self.depth)
+    pub(super) fn inner(self) -> ValueSer<'a, NOTING> {
+        ValueSer::<NOTING>::inside(self.flat, self.out, &self.message.fields[0], self.depth)
     }
 
     /// The one field of a wrapper or newtype that is closed later.
     #[inline(always)]
-    pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_> {
-        ValueSer::inside(self.flat, self.out, &self.message.fields[0], self.depth)
+    pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_, NOTING> {
+        ValueSer::<NOTING>::inside(self.flat, self.out, &self.message.fields[0], self.depth)
     }
 
     #[inline(always)]
     fn put<T: ?Sized + Serialize>(&mut self, field: &'a Field, value: &T) -> Result<(), Fault> {
-        value.serialize(ValueSer::inside(self.flat, self.out, field, self.depth))
+        value.serialize(ValueSer::<NOTING>::inside(
+            self.flat, self.out, field, self.depth,
+        ))
     }
 
     #[inline(always)]
@@ -78,6 +80,9 @@ impl<'a> Compound<'a> {
 
     /// Notes that `Serialize` leaves a field out.
     fn left_out(&self, key: &'static str) {
+        if !NOTING {
+            return;
+        }
         let field = self.message.fields.iter().find(|field| field.key.is(key));
         if let Some(field) = field
             && !field.left_out.load(Ordering::Relaxed)
@@ -104,7 +109,7 @@ impl<'a> Compound<'a> {
     }
 }
 
-impl ser::SerializeStruct for Compound<'_> {
+impl<const NOTING: bool> ser::SerializeStruct for Compound<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -128,7 +133,7 @@ impl ser::SerializeStruct for Compound<'_> {
     }
 }
 
-impl ser::SerializeStructVariant for Compound<'_> {
+impl<const NOTING: bool> ser::SerializeStructVariant for Compound<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -152,7 +157,7 @@ impl ser::SerializeStructVariant for Compound<'_> {
     }
 }
 
-impl ser::SerializeTupleStruct for Compound<'_> {
+impl<const NOTING: bool> ser::SerializeTupleStruct for Compound<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -167,7 +172,7 @@ impl ser::SerializeTupleStruct for Compound<'_> {
     }
 }
 
-impl ser::SerializeTupleVariant for Compound<'_> {
+impl<const NOTING: bool> ser::SerializeTupleVariant for Compound<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -183,7 +188,7 @@ impl ser::SerializeTupleVariant for Compound<'_> {
 }
 
 /// A repeated field whose elements are being written.
-pub(super) struct SeqSer<'a> {
+pub(super) struct SeqSer<'a, const NOTING: bool> {
     flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
@@ -199,11 +204,14 @@ pub(super) struct SeqSer<'a> {
     depth: u32,
 }
 
-impl<'a> SeqSer<'a> {
+impl<'a, const NOTING: bool> SeqSer<'a, NOTING> {
     #[inline(always)]
-    pub(super) fn open(value: ValueSer<'a>, len: Option<usize>) -> Result<SeqSer<'a>, Fault> {
+    pub(super) fn open(
+        value: ValueSer<'a, NOTING>,
+        len: Option<usize>,
+    ) -> Result<SeqSer<'a, NOTING>, Fault> {
         if value.expect() == Card::Repeated {
-            return Ok(SeqSer::begin(value, len, NONE));
+            return Ok(SeqSer::<NOTING>::begin(value, len, NONE));
         }
         let wrapper = value.open_wrapper("a sequence")?;
         let start = wrapper.start;
@@ -211,11 +219,15 @@ impl<'a> SeqSer<'a> {
         if inner.expect() != Card::Repeated {
             return inner.mismatch("a sequence");
         }
-        Ok(SeqSer::begin(inner, len, start))
+        Ok(SeqSer::<NOTING>::begin(inner, len, start))
     }
 
     #[inline(always)]
-    fn begin(value: ValueSer<'a>, len: Option<usize>, wrapper: usize) -> SeqSer<'a> {
+    fn begin(
+        value: ValueSer<'a, NOTING>,
+        len: Option<usize>,
+        wrapper: usize,
+    ) -> SeqSer<'a, NOTING> {
         let ValueSer {
             flat,
             out,
@@ -258,7 +270,7 @@ impl<'a> SeqSer<'a> {
 
     #[inline(always)]
     fn element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
-        value.serialize(ValueSer {
+        value.serialize(ValueSer::<NOTING> {
             flat: self.flat,
             out: self.out,
             field: self.field,
@@ -286,7 +298,7 @@ impl<'a> SeqSer<'a> {
     }
 }
 
-impl ser::SerializeSeq for SeqSer<'_> {
+impl<const NOTING: bool> ser::SerializeSeq for SeqSer<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -302,12 +314,12 @@ impl ser::SerializeSeq for SeqSer<'_> {
 }
 
 /// A tuple: repeated where all its elements have one type, a message otherwise.
-pub(super) enum TupleSer<'a> {
-    Alike(SeqSer<'a>),
-    Mixed(Compound<'a>),
+pub(super) enum TupleSer<'a, const NOTING: bool> {
+    Alike(SeqSer<'a, NOTING>),
+    Mixed(Compound<'a, NOTING>),
 }
 
-impl ser::SerializeTuple for TupleSer<'_> {
+impl<const NOTING: bool> ser::SerializeTuple for TupleSer<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -338,7 +350,7 @@ struct EntrySpan {
 }
 
 /// A map whose entries are being written.
-pub(super) struct MapSer<'a> {
+pub(super) struct MapSer<'a, const NOTING: bool> {
     flat: &'a FlatSchema,
     out: &'a mut Vec<u8>,
     field: &'a Field,
@@ -353,9 +365,9 @@ pub(super) struct MapSer<'a> {
     depth: u32,
 }
 
-impl<'a> MapSer<'a> {
+impl<'a, const NOTING: bool> MapSer<'a, NOTING> {
     #[inline(always)]
-    pub(super) fn open(value: ValueSer<'a>) -> Result<MapSer<'a>, Fault> {
+    pub(super) fn open(value: ValueSer<'a, NOTING>) -> Result<MapSer<'a, NOTING>, Fault> {
         let (value, wrapper) = if value.expect() == Card::Map {
             (value, NONE)
         } else {
@@ -408,7 +420,7 @@ impl<'a> MapSer<'a> {
     }
 }
 
-impl ser::SerializeMap for MapSer<'_> {
+impl<const NOTING: bool> ser::SerializeMap for MapSer<'_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -417,7 +429,12 @@ impl ser::SerializeMap for MapSer<'_> {
         self.tag = self.out.len();
         self.key = begin(self.out, self.field.tag);
         let field = &self.entry.fields[0];
-        key.serialize(ValueSer::inside(self.flat, self.out, field, self.depth + 1))?;
+        key.serialize(ValueSer::<NOTING>::inside(
+            self.flat,
+            self.out,
+            field,
+            self.depth + 1,
+        ))?;
         self.key_end = self.out.len();
         Ok(())
     }
@@ -425,7 +442,12 @@ impl ser::SerializeMap for MapSer<'_> {
     #[inline(always)]
     fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         let field = &self.entry.fields[1];
-        value.serialize(ValueSer::inside(self.flat, self.out, field, self.depth + 1))?;
+        value.serialize(ValueSer::<NOTING>::inside(
+            self.flat,
+            self.out,
+            field,
+            self.depth + 1,
+        ))?;
         let before = self.out.len();
         finish(self.out, self.key);
         let moved = self.out.len() - before;

@@ -7,20 +7,9 @@
 //!   beacon_2 ──beacon_2-lander──▶
 //! ```
 
-use std::sync::{Arc, Mutex};
-
 use farside::RunInfo;
 use farside::prelude::*;
-use farside::record::{Record, RecordClass};
-use farside::scene::{Drawing, Level, Scene};
-use farside_actors::figure::{Figure, svg};
-use farside_actors::system::settings::over;
-use farside_actors::system::{
-    Assembly, Better, Builtin, Metric, OwnTable, PictureError, PictureInfo, PictureRequest,
-    Recording, Results, Series, SeriesIndex, Setup, SetupError,
-};
-use farside_actors::wiring::Wiring;
-use farside_actors::{settings, units};
+use farside_actors::prelude::*;
 use farside_experiments::{cli, registry::Registry};
 use serde::{Deserialize, Serialize};
 
@@ -114,6 +103,7 @@ impl OwnTable for Beacons {
         name: "calls",
         about: "when calls were heard",
         takes: &[],
+        extras: &[],
     }];
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
@@ -128,17 +118,16 @@ impl OwnTable for Beacons {
         }
         setup.link(&wiring)?;
         // When calls were heard [s], from the committed records.
-        let heard = Arc::new(Mutex::new(Vec::new()));
+        let heard = Gathered::default();
         let hears = heard.clone();
         setup.sim.observe(move |record: &Record<'_>| {
             if record.class == RecordClass::Delivered {
-                let mut heard = hears.lock().expect("nobody panics with it");
-                heard.push(record.key.time.as_secs_f64());
+                hears.push(record.key.time.as_secs_f64());
             }
         });
         let settings = self.clone();
         let conclude = move |_: &Report| {
-            let times = heard.lock().expect("the run is over");
+            let times = heard.take();
             let until = |call: u32| settings.interval.as_secs_f64() * f64::from(call + 2);
             let by = |call| times.iter().filter(|time| **time < until(call)).count() as f64;
             let mut results = Results::default().metric("heard", times.len()).metric(
@@ -176,6 +165,7 @@ impl OwnTable for Beacons {
             width: 400.0,
             height: 200.0,
             body: maud::html! { path class="axis" d=(svg::path(points)) {} },
+            style: "",
         })
     }
 }

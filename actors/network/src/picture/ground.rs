@@ -2,50 +2,39 @@
 
 use std::sync::Arc;
 
-use farside::SimDuration;
-use farside_actors::system::{Files, SetupError};
+use farside_actors::system::{Setup, SetupError};
 use farside_worlds::VertexId;
 use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
 use super::{Site, Surroundings};
 use crate::Policy;
 use crate::scenario::NetworkScenario;
+use crate::system::Place;
 use crate::waits::WaitRule;
-use crate::world::{crater, grid, ground, in_crater, is_grid, place};
+use crate::world::{crater, grid, in_crater, is_grid};
 
-/// The roadmap, the nodes and the ground, as they are for a run of the problem with this seed.
-pub(super) fn site(
-    scenario: &NetworkScenario,
-    problem_seed: u64,
-    files: &mut Files,
-) -> Result<Site, SetupError> {
+/// The roadmap, the nodes, the ground and the clock, as they are for a run with these seeds.
+pub(super) fn site(scenario: &NetworkScenario, setup: &mut Setup<'_>) -> Result<Site, SetupError> {
     let (world, rovers) = (&scenario.world, scenario.team.rovers);
+    let place = Place::of(scenario, setup)?;
+    let cycle = place.cycle(scenario, setup)?;
     let stay_at_target = is_grid(world.roadmap.name());
-    let (roadmap, drawn) = if stay_at_target {
-        let (map, made) = grid(world, rovers, files)?;
-        let middles_m = walls(&map, &made, world.cell_m);
-        let cell_m = world.cell_m;
-        (
-            made.roadmap().clone(),
-            Surroundings::Walls { middles_m, cell_m },
-        )
-    } else {
-        let roadmap = ground(world, rovers, files)?.roadmap;
-        if in_crater(world) {
-            let terrain = Arc::new(crater()?.terrain().clone());
-            (roadmap, Surroundings::Heights(terrain))
-        } else {
-            (roadmap, Surroundings::Unknown)
+    let ground = if stay_at_target {
+        let (map, made) = grid(world, rovers, setup.files)?;
+        Surroundings::Walls {
+            middles_m: walls(&map, &made, world.cell_m),
+            cell_m: world.cell_m,
         }
+    } else if in_crater(world) {
+        Surroundings::Heights(Arc::new(crater()?.terrain().clone()))
+    } else {
+        Surroundings::Unknown
     };
-    let sensors = place(world, &roadmap, problem_seed)?;
     Ok(Site {
-        roadmap: world.open_part(&Arc::new(roadmap), &sensors),
-        sensors: Arc::new(sensors),
-        ground: drawn,
-        // Left to the links it is a second, or longer over slow ones, which are not looked at here:
-        // then the diagram counts seconds.
-        cycle: scenario.network.cycle.unwrap_or(SimDuration::from_secs(1)),
+        roadmap: world.open_part(&place.roadmap, &place.sensors),
+        sensors: place.sensors,
+        ground,
+        cycle,
         coordinates: scenario.network.policy == Policy::MaxPlus,
         rovers,
         wait_rule: WaitRule::of(scenario.network.policy, stay_at_target),

@@ -1,23 +1,24 @@
 //! The map at an instant: ground, roadmap in the colours of its nodes (the paper's figure 1),
 //! rovers, and who stands in whose way.
 
+mod labels;
+mod legend;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use farside::SimDuration;
 use farside_actors::invariants::Place;
-use farside_worlds::{NodeId, VertexId};
-use maud::{Markup, PreEscaped, html};
+use farside_worlds::{HeightField, NodeId, VertexId};
+use maud::{Markup, html};
 
-use super::Site;
 use super::colouring;
 use super::relief::contours;
 use super::{Drawn, Surroundings};
 use crate::tracks::Sighting;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
-use farside_actors::figure::scale::text_width;
-use farside_actors::figure::svg::{Px, path};
+use farside_actors::figure::svg::{Px, over_lines, path};
 
 /// The middle length of an edge, in pixels; a map too large for that is drawn smaller.
 const EDGE: f64 = 34.0;
@@ -42,7 +43,7 @@ struct Sheet<'a> {
     rover: f64,
 }
 
-pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
+pub(super) fn figure(run: &Drawn, at_ns: u64, coordination: bool) -> Figure {
     let rovers = run.tracks.at(at_ns);
     let waits = run.waits(&rovers);
     let sheet = Sheet::new(run);
@@ -67,28 +68,33 @@ pub(super) fn figure(run: &Drawn, at_ns: u64) -> Figure {
         let locked = counted(waits.locked.len(), "rover");
         says.push_str(&format!(" {locked} can never move again."));
     }
-    let pairs = sheet.coordination(&rovers);
+    let coordination = coordination && run.site.coordinates;
+    let pairs = coordination.then(|| sheet.coordination(&rovers));
+    let mut labels = labels::Labels::new(sheet.obstacles(&rovers));
+    let height = sheet.height.max(legend::HEIGHT);
     let body = html! {
-        style { (PreEscaped(super::STYLE)) }
         text class="title" x=(Px(SIDE)) y="28" { (title) }
         text class="tick" x=(Px(SIDE)) y="50" { (says) }
         (sheet.ground())
         (sheet.radio())
         (sheet.roads())
         (sheet.ends(&rovers))
-        path class="coordination" d=(pairs) {}
+        @if let Some(pairs) = &pairs { path class="coordination" d=(pairs) {} }
         (sheet.posts())
         (sheet.arrows(&rovers, &waits))
         @for sighting in &rovers { (sheet.rover(sighting, &waits)) }
-        (legend(SIDE + sheet.width + 24.0, TOP + 10.0, &run.site))
+        (sheet.queues(&rovers, &mut labels))
+        (sheet.names(&mut labels))
+        (legend::legend(&sheet, (SIDE + sheet.width + 24.0, TOP + 10.0), coordination))
     };
     Figure {
         file: "map.svg".to_owned(),
         title: format!("Map of {title}"),
         description: says,
         width: sheet.width + 2.0 * SIDE + LEGEND,
-        height: (sheet.height + TOP + SIDE).max(TOP + 440.0),
+        height: height + TOP + SIDE,
         body,
+        style: super::STYLE,
     }
 }
 
@@ -177,10 +183,8 @@ impl<'a> Sheet<'a> {
                 html! { path class="wall" d=(data) {} }
             }
             Surroundings::Heights(terrain) => {
-                let heights_m = terrain.heights_m().iter().copied();
-                let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
-                let high_m = heights_m.fold(f64::NEG_INFINITY, f64::max);
-                let step_m = step((high_m - low_m) / 12.0);
+                let (low_m, high_m) = heights_m(terrain);
+                let step_m = contour_step_m(terrain);
                 let first = libm::ceil(low_m / step_m);
                 let levels = libm::floor(high_m / step_m) - first;
                 // Finer than two pixels nobody sees.
@@ -256,10 +260,6 @@ impl<'a> Sheet<'a> {
     fn ends(&self, rovers: &[Sighting]) -> Markup {
         let entries: BTreeSet<VertexId> = rovers.iter().map(|sighting| sighting.entry).collect();
         let exits: BTreeSet<VertexId> = rovers.iter().map(|sighting| sighting.goal).collect();
-        let mut queues = BTreeMap::<VertexId, usize>::new();
-        for sighting in rovers.iter().filter(|sighting| sighting.is_queued()) {
-            *queues.entry(sighting.entry).or_default() += 1;
-        }
         let (from, to) = ends_of(&self.run.site.ground);
         html! {
             @for v in &entries {
@@ -270,14 +270,44 @@ impl<'a> Sheet<'a> {
                 @let at = self.at(*v);
                 path class="exit" d=(exit_mark(at)) { title { (to) " " (v.0) } }
             }
+        }
+    }
+
+    /// How many wait at each entry.
+    fn queues(&self, rovers: &[Sighting], labels: &mut labels::Labels) -> Markup {
+        let mut queues = BTreeMap::<VertexId, usize>::new();
+        for sighting in rovers.iter().filter(|sighting| sighting.is_queued()) {
+            *queues.entry(sighting.entry).or_default() += 1;
+        }
+        html! {
             @for (v, queue) in &queues {
-                @let (x, y) = self.at(*v);
-                text class="queue" x=(Px(x + 8.0)) y=(Px(y - 7.0)) {
-                    "+" (queue)
+                @let text = format!("+{queue}");
+                @let at = labels.place(self.at(*v), 8.0, &text);
+                g {
                     title { (queue) " in the queue of entry " (v.0) }
+                    (over_lines("queue", at, "middle", &text))
                 }
             }
         }
+    }
+
+    /// What names and numbers are not to lie on: rovers, entries, exits, nodes.
+    fn obstacles(&self, rovers: &[Sighting]) -> Vec<labels::Rect> {
+        let ends = rovers
+            .iter()
+            .flat_map(|sighting| [sighting.entry, sighting.goal]);
+        let ends: BTreeSet<VertexId> = ends.collect();
+        let ends = ends
+            .into_iter()
+            .map(|v| labels::Rect::around(self.at(v), 7.0));
+        let discs = rovers.iter().filter_map(|sighting| self.place(sighting));
+        let discs = discs.map(|at| labels::Rect::around(at, self.rover));
+        let sensors = &self.run.site.sensors;
+        let posts = sensors.nodes().map(|node| {
+            let at = sensors.position_m(node);
+            labels::Rect::around(self.px([at.x, at.y]), 6.5)
+        });
+        ends.chain(discs).chain(posts).collect()
     }
 
     fn posts(&self) -> Markup {
@@ -289,10 +319,20 @@ impl<'a> Sheet<'a> {
                 @let side = [(x, y - 6.5), (x + 6.5, y), (x, y + 6.5), (x - 6.5, y)];
                 g class={ "n" (self.colour(node)) } {
                     path class="post" d={ (path(side)) "Z" } {}
-                    text class="post-name" x=(Px(x)) y=(Px(y - 9.0)) text-anchor="middle" {
-                        "N" (node.0 + 1)
-                    }
                 }
+            }
+        }
+    }
+
+    /// The names of nodes, above all else and where they cover nothing that matters.
+    fn names(&self, labels: &mut labels::Labels) -> Markup {
+        let sensors = &self.run.site.sensors;
+        html! {
+            @for node in sensors.nodes() {
+                @let at = sensors.position_m(node);
+                @let name = format!("N{}", node.0 + 1);
+                @let at = labels.place(self.px([at.x, at.y]), 7.5, &name);
+                g class={ "n" (self.colour(node)) } { (over_lines("post-name", at, "middle", &name)) }
             }
         }
     }
@@ -304,9 +344,6 @@ impl<'a> Sheet<'a> {
             .filter_map(|r| Some((r, self.place(r)?)))
             .collect();
         let mut data = String::new();
-        if !self.run.site.coordinates {
-            return data;
-        }
         for (at, (a, from)) in places.iter().enumerate() {
             for (b, to) in &places[at + 1..] {
                 if let (Some(u), Some(v)) = (a.place.claim(), b.place.claim())
@@ -462,6 +499,19 @@ fn parts(line: impl Iterator<Item = (f64, f64)>, inside: impl Fn(&(f64, f64)) ->
     data
 }
 
+/// The lowest and the highest ground.
+fn heights_m(terrain: &HeightField) -> (f64, f64) {
+    let heights_m = terrain.heights_m().iter().copied();
+    let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
+    (low_m, heights_m.fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// From contour to contour.
+fn contour_step_m(terrain: &HeightField) -> f64 {
+    let (low_m, high_m) = heights_m(terrain);
+    step((high_m - low_m) / 12.0)
+}
+
 /// 1, 2 or 5 times a power of ten, at least `rough`.
 fn step(rough: f64) -> f64 {
     if rough <= 0.0 || !rough.is_finite() {
@@ -494,54 +544,5 @@ fn ends_of(ground: &Surroundings) -> (&'static str, &'static str) {
     match ground {
         Surroundings::Walls { .. } => ("start", "goal"),
         Surroundings::Heights(_) | Surroundings::Unknown => ("entry", "exit"),
-    }
-}
-
-fn legend(x: f64, y: f64, site: &Site) -> Markup {
-    let has_gaps = !site.sensors.gaps().is_empty();
-    let (from, to) = match ends_of(&site.ground) {
-        ("entry", to) => ("entry; +3: three in its queue", to),
-        ends => ends,
-    };
-    // One row is for those who are coordinated.
-    let left_out = |row: usize| usize::from(row > 5 && !site.coordinates);
-    let at = |row: usize| y + 24.0 * (row - left_out(row)) as f64;
-    let text = |row: usize, says: &str| {
-        debug_assert!(text_width(says, 13.0) < LEGEND, "{says}");
-        html! { text x=(Px(x + 34.0)) y=(Px(at(row) + 4.5)) { (says) } }
-    };
-    let disc = |row: usize, class: &str| {
-        let centre = (x + 12.0, at(row));
-        let class = format!("rover{class}");
-        html! {
-            path class=(class) d=(nose(centre, (x + 30.0, at(row)), 8.0)) {}
-            circle class=(class) cx=(Px(centre.0)) cy=(Px(centre.1)) r="8" {}
-        }
-    };
-    let line = |row: usize| path([(x, at(row)), (x + 26.0, at(row))]);
-    html! {
-        g {
-            (disc(0, "")) (text(0, "rover, and where it wants to go"))
-            (disc(1, " waits")) (text(1, "waits for one that can move"))
-            (disc(2, " circle")) (text(2, "wait for each other in a circle"))
-            (disc(3, " behind")) (text(3, "waits for one in a circle"))
-            (arrow((x - 4.0, at(4) - 4.0), (x + 34.0, at(4) - 4.0), 8.0, "")) (text(4, "waits for"))
-            @if site.coordinates {
-                path class="coordination" d=(line(5)) {} (text(5, "coordinated by max-plus"))
-            }
-            g class="n0" { path class="road" d=(path([(x, at(6)), (x + 13.0, at(6))])) {} }
-            g class="n3" { path class="road" d=(path([(x + 13.0, at(6)), (x + 26.0, at(6))])) {} }
-            (text(6, "roadmap, in its nodes' colours"))
-            g class="n0" { path class="post" d={ (path([(x + 12.0, at(7) - 6.5), (x + 18.5, at(7)), (x + 12.0, at(7) + 6.5), (x + 5.5, at(7))])) "Z" } {} }
-            (text(7, "node"))
-            path class="radio" d=(line(8)) {} (text(8, "nodes that hear each other"))
-            path class="entry" d=(entry_mark((x + 12.0, at(9)))) {}
-            (text(9, from))
-            path class="exit" d=(exit_mark((x + 12.0, at(10)))) {} (text(10, to))
-            @if has_gaps {
-                g class="n0" { circle class="vertex gap" cx=(Px(x + 12.0)) cy=(Px(at(11))) r="3.2" {} }
-                (text(11, "where no node reaches a rover"))
-            }
-        }
     }
 }

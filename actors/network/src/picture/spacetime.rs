@@ -1,18 +1,20 @@
 //! The time-space diagram: who was where along a line of vertices, and when.
 
+mod incidents;
+
 use std::collections::BTreeMap;
 
 use farside::SimDuration;
 use farside_actors::invariants::Place;
 use farside_worlds::VertexId;
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::{Drawn, PictureError, VertexLine, colouring, corridor};
 use crate::tracks::Mark;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
 use farside_actors::figure::scale::{Scale, text_width, thinned};
-use farside_actors::figure::svg::{Area, Px, path};
+use farside_actors::figure::svg::{Area, Px, over_lines, path};
 
 /// A stand longer than this many cycles is a wait: a rover that moves in each cycle stands for most
 /// of one.
@@ -138,6 +140,7 @@ struct Diagram<'a> {
     waits: &'a Waits,
     area: Area,
     cycles: Scale,
+    seconds: Scale,
     cycle_ns: f64,
     from_ns: u64,
     to_ns: u64,
@@ -170,35 +173,47 @@ pub(super) fn figure(
         width: (13.0 * (last - first)).clamp(640.0, 1400.0),
         height: row * line.len().saturating_sub(1).max(1) as f64,
     };
-    let diagram = Diagram {
+    let mut diagram = Diagram {
         run,
         line: &line,
         waits: &waits,
         area,
         cycles: Scale::between(first, last),
+        seconds: Scale::between(from_ns as f64 / 1e9, to_ns as f64 / 1e9),
         cycle_ns,
         from_ns,
         to_ns,
     };
+    let incidents = diagram.incidents(&visits);
+    diagram.area.top += diagram.incident_room(&incidents);
+    let area = diagram.area;
     let locked = locked(run, &line, &waits, to_ns);
     let (title, says) = (diagram.title(), diagram.says(&visits, locked));
     let body = html! {
-        style { (PreEscaped(super::STYLE)) }
         text class="title" x="16" y="28" { (title) }
         text class="tick" x="16" y="50" { (says) }
         (diagram.legend())
+        (diagram.shaded(&incidents))
         (diagram.frame())
         (diagram.closing(locked))
         @for visit in &visits { (diagram.visit(visit)) }
         (diagram.names(&visits))
+        (diagram.named(&incidents, &visits))
     };
     Ok(Figure {
         file: "corridor.svg".to_owned(),
         title,
         description: says,
         width: area.left + area.width + 210.0,
-        height: area.top + area.height + 66.0,
+        height: area.top
+            + area.height
+            + if diagram.counts_seconds() {
+                66.0
+            } else {
+                106.0
+            },
         body,
+        style: super::STYLE,
     })
 }
 
@@ -287,8 +302,7 @@ impl Diagram<'_> {
         let sensors = &self.run.site.sensors;
         let colours = colouring::colours(&self.run.site.roadmap, sensors);
         let (left, right, bottom) = (self.area.left, self.area.x(1.0), self.area.y(0.0));
-        let ticks = self.cycles.ticks(10.0);
-        let half = (self.area.height / self.line.len().saturating_sub(1).max(1) as f64) / 2.0;
+        let half = self.half_row();
         html! {
             @for (place, v) in self.line.iter().enumerate() {
                 @let y = self.y(place);
@@ -303,15 +317,42 @@ impl Diagram<'_> {
             }
             text class="label" x="16" y=(Px(self.area.top - 14.0)) { "vertex" }
             path class="axis" d=(path([(left, bottom), (right, bottom)])) {}
-            @for tick in thinned(&ticks, self.area.width, 13.0) {
-                @let x = self.area.x(tick.at);
-                path class="axis" d=(path([(x, bottom), (x, bottom + 5.0)])) {}
-                text class="tick" x=(Px(x)) y=(Px(bottom + 20.0)) text-anchor="middle" { (tick.text) }
-            }
-            text class="label" x=(Px(self.area.x(0.5))) y=(Px(bottom + 42.0)) text-anchor="middle" {
-                "planning cycle"
+            @if self.counts_seconds() {
+                (self.times(bottom, &self.seconds, "time (s); a planning cycle lasts 1 s"))
+            } @else {
+                (self.times(bottom, &self.cycles, ""))
+                text class="label" x=(Px(right + 12.0)) y=(Px(bottom + 20.0)) { "planning cycle" }
+                path class="axis" d=(path([(left, bottom + 40.0), (right, bottom + 40.0)])) {}
+                (self.times(bottom + 40.0, &self.seconds, ""))
+                text class="label" x=(Px(right + 12.0)) y=(Px(bottom + 60.0)) { "time (s)" }
             }
         }
+    }
+
+    /// Marks of an axis at a height, and below them what they count.
+    fn times(&self, y: f64, scale: &Scale, counted: &str) -> Markup {
+        html! {
+            @for tick in thinned(&scale.ticks(10.0), self.area.width, 13.0) {
+                @let x = self.area.x(tick.at);
+                path class="axis" d=(path([(x, y), (x, y + 5.0)])) {}
+                text class="tick" x=(Px(x)) y=(Px(y + 20.0)) text-anchor="middle" { (tick.text) }
+            }
+            @if !counted.is_empty() {
+                text class="label" x=(Px(self.area.x(0.5))) y=(Px(y + 42.0)) text-anchor="middle" {
+                    (counted)
+                }
+            }
+        }
+    }
+
+    /// Cycles last a second each: one axis is both.
+    fn counts_seconds(&self) -> bool {
+        self.run.site.cycle == SimDuration::from_secs(1)
+    }
+
+    /// Half the height between two vertices.
+    fn half_row(&self) -> f64 {
+        self.area.height / self.line.len().saturating_sub(1).max(1) as f64 / 2.0
     }
 
     /// When the circle closed.
@@ -329,7 +370,7 @@ impl Diagram<'_> {
             path class="closes" d=(path([(x, top), (x, bottom)])) {}
             text class="red" x=(Px(if late { x - 4.0 } else { x + 4.0 })) y=(Px(top - 3.0))
                 text-anchor=(if late { "end" } else { "start" }) {
-                "cycle " (cycle) ": the circle closes"
+                "cycle " (cycle) ", " (SimDuration::from_nanos(ns)) ": the circle closes"
             }
         }
     }
@@ -366,9 +407,16 @@ impl Diagram<'_> {
                 last = Some(to);
             }
         }
+        // Who only crosses the line has neither: a dot.
+        let crosses = drives.is_empty() && !pieces.iter().any(|piece| waits(piece));
+        let dot = pieces.first().filter(|_| crosses);
         html! {
             g {
                 title { "rover " (visit.rover + 1) }
+                @if let Some(piece) = dot {
+                    circle class="dot across" cx=(Px(self.x(piece.from_ns)))
+                        cy=(Px(self.y(piece.from))) r="2.5" {}
+                }
                 @for (way, points) in &drives {
                     path class={ "pass " (way.class()) } d=(path(points.iter().copied())) {}
                 }
@@ -386,47 +434,52 @@ impl Diagram<'_> {
     fn names(&self, visits: &[LineVisit]) -> Markup {
         let mut taken: Vec<[f64; 4]> = Vec::new();
         let mut names = Vec::new();
+        let mut at_end = Vec::new();
         for visit in visits {
             let (Some(first), Some(last)) = (visit.pieces.first(), visit.pieces.last()) else {
                 continue;
             };
             if last.to_ns == self.to_ns {
-                names.push((
-                    self.area.x(1.0) + 8.0,
-                    self.y(last.to) + 4.0,
-                    visit.rover,
-                    true,
-                ));
+                at_end.push((self.y(last.to) + 4.0, visit.rover));
             }
             let text = (visit.rover + 1).to_string();
-            let (width, x) = (text_width(&text, 10.5), self.x(first.from_ns));
+            let (width, x) = (1.1 * text_width(&text, 12.0), self.x(first.from_ns));
             let up = self.y(first.from) - 5.0;
-            let down = self.y(first.from) + 13.0;
-            let box_at = |y: f64| [x, y - 9.0, x + width + 2.0, y + 1.0];
+            let down = self.y(first.from) + 14.0;
+            let box_at = |y: f64| [x, y - 10.0, x + width + 3.0, y + 1.0];
             let free = |y: &&f64| {
                 let [left, top, right, bottom] = box_at(**y);
                 let apart =
                     |b: &[f64; 4]| right < b[0] || b[2] < left || bottom < b[1] || b[3] < top;
-                taken.iter().all(apart)
+                right <= self.area.x(1.0) && taken.iter().all(apart)
             };
             if let Some(y) = [up, down].iter().find(free).copied() {
                 taken.push(box_at(y));
-                names.push((x, y, visit.rover, false));
+                names.push((x, y, visit.rover));
             }
         }
+        // Several rovers may be on their way to one vertex.
+        at_end.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut least = f64::NEG_INFINITY;
+        for (y, _) in &mut at_end {
+            *y = y.max(least);
+            least = *y + 15.0;
+        }
+        let right = self.area.x(1.0) + 8.0;
         html! {
-            @for (x, y, rover, at_end) in names {
-                text class=(self.name_class(rover, at_end)) x=(Px(x)) y=(Px(y)) {
-                    (self.name(rover, at_end))
+            @for (x, y, rover) in names {
+                (over_lines("who", (x, y), "start", &self.name(rover, false)))
+            }
+            @for (y, rover) in at_end {
+                text class=(self.end_class(rover)) x=(Px(right)) y=(Px(y)) {
+                    (self.name(rover, true))
                 }
             }
         }
     }
 
-    fn name_class(&self, rover: u32, at_end: bool) -> &'static str {
-        if !at_end {
-            "who"
-        } else if self.waits.in_circle(rover) {
+    fn end_class(&self, rover: u32) -> &'static str {
+        if self.waits.in_circle(rover) {
             "at-end red"
         } else if self.waits.behind.contains(&rover) {
             "at-end amber"

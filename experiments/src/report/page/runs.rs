@@ -144,14 +144,15 @@ fn what_went_wrong(run: &RunRecord) -> Option<(&RunRecord, &'static str, String)
 
 /// The command for each run. One click selects one command.
 pub(super) fn commands(study: &Study<'_>, folder: &str) -> Markup {
-    let folder = shell_quoted(folder);
+    let quoted = shell_quoted(folder);
+    let program = program(study);
     html! {
         section id="again" {
             h2 { "Run any of it again" }
             p {
                 "Each run can be made again, bit for bit, with a log of every message: "
-                code { "farside reproduce " (folder) " --cell C --seed S --out RUN.mcap" }
-                ". Two such logs are compared with " code { "farside diff A.mcap B.mcap" } "."
+                code { (program) " reproduce " (quoted) " --cell C --seed S --out RUN.mcap" }
+                ". Two such logs are compared with " code { (program) " diff A.mcap B.mcap" } "."
             }
             details class="screen" {
                 summary { "The commands, by cell" }
@@ -162,10 +163,7 @@ pub(super) fn commands(study: &Study<'_>, folder: &str) -> Markup {
                         summary { "Cell " (cell) ": " (study.cell_name(cell)) }
                         div class="commands" tabindex="0" {
                             @for run in runs {
-                                p {
-                                    "farside reproduce " (folder) " --cell " (cell) " --seed "
-                                    (run.seed) " --out cell" (cell) "-seed" (run.seed) ".mcap"
-                                }
+                                p { (command(study, folder, run)) }
                             }
                         }
                     }
@@ -173,6 +171,23 @@ pub(super) fn commands(study: &Study<'_>, folder: &str) -> Markup {
             }
         }
     }
+}
+
+/// The command that makes a run again.
+pub(super) fn command(study: &Study<'_>, folder: &str, run: &RunRecord) -> String {
+    let (program, folder) = (program(study), shell_quoted(folder));
+    let RunRecord { cell, seed, .. } = run;
+    format!(
+        "{program} reproduce {folder} --cell {cell} --seed {seed} --out cell{cell}-seed{seed}.mcap"
+    )
+}
+
+/// The binary that made the runs: others may not know their system. Its version says so.
+fn program<'a>(study: &Study<'a>) -> &'a str {
+    let version = &study.results.manifest.code_version;
+    let own = version.split_once(" (farside ");
+    own.and_then(|(own, _)| own.split(' ').next())
+        .unwrap_or("farside")
 }
 
 /// A folder's name as one word of a shell.

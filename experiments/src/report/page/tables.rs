@@ -31,6 +31,10 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                              the last."
                         }
                     } @else { "." }
+                    @if has_partial(study, &shown) {
+                        " † is of those runs alone that have a value: what the others never came to \
+                         is in no mean."
+                    }
                 }
         div class="scroll" tabindex="0" {
             table {
@@ -62,6 +66,18 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
     }
 }
 
+/// Whether any cell's figure is of some of its runs.
+fn has_partial(study: &Study<'_>, shown: &[&Measure<'_>]) -> bool {
+    let cells = &study.summary.cells;
+    let partial = |measure: &&Measure<'_>| cells.iter().any(|cell| measure.is_partial(cell));
+    shown.iter().any(partial)
+}
+
+/// The mark of a figure that is of some of a cell's runs.
+fn dagger(measure: &Measure<'_>, cell: &CellSummary) -> &'static str {
+    if measure.is_partial(cell) { "†" } else { "" }
+}
+
 fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) -> Markup {
     if let Some(MetricSummary::Text { counts, .. }) =
         cell.metrics.get(measure.index).map(|named| &named.summary)
@@ -78,8 +94,9 @@ fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) 
     };
     html! {
         td {
-            (measure.style.value(&estimate))
+            (measure.style.value(&estimate)) (dagger(measure, cell))
             @if estimate.width() != 0.0 { small { (measure.style.interval(&estimate)) } }
+            @if measure.is_partial(cell) { small { (measure.n(cell)) " of " (cell.n) " runs" } }
             // Nothing more is to be said of what never varies.
             @if let Some(difference) = measure.difference(cell).filter(|one| one.width() != 0.0) {
                 (marked(measure.style.of_differences(), &difference, study.blocks(measure.n(cell))))
@@ -219,7 +236,10 @@ pub(super) fn of_metric(study: &Study<'_>, measure: &Measure<'_>) -> Markup {
                     @for cell in &study.summary.cells {
                         tr class=[is_baseline(study, cell)] {
                             (cell_name(study, cell))
-                            td { (measure.n(cell)) }
+                            td {
+                                (measure.n(cell)) (dagger(measure, cell))
+                                @if measure.is_partial(cell) { small { "of " (cell.n) } }
+                            }
                             (fields(measure, cell))
                         }
                     }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{BELOW, HEIGHT, TOP, WIDTH, area};
+use super::{About, CROWDED, Sheet, band, for_each, within};
 use crate::report::layout::{Axis, Curves, Panel};
 use crate::report::measure::{Measure, Study};
 use crate::report::numbers::Style;
@@ -12,8 +12,7 @@ use crate::study::results::{self, Claim};
 use farside_actors::figure::colours::DASHES;
 use farside_actors::figure::scale::{Scale, Spacing, Tick};
 use farside_actors::figure::svg::{
-    Area, EndLabel, Figure, Frame, end_label_room, end_labels, marker, measured_ticks, path,
-    shortened, slug, widest,
+    Area, CurveName, Figure, Frame, marker, measured_ticks, path, shortened, widest,
 };
 
 /// How many pieces a fitted line has.
@@ -40,6 +39,8 @@ struct Plot<'a> {
 struct Point {
     x: f64,
     estimate: Estimate,
+    /// It is of all runs that came to their end.
+    is_whole: bool,
     says: String,
 }
 
@@ -114,8 +115,12 @@ impl<'a> Plot<'a> {
     fn point(&self, cell: usize, x: f64) -> Point {
         let found = self.of_cell(cell).zip(self.study.summary.cells.get(cell));
         let Some((estimate, summary)) = found else {
-            let (estimate, says) = (Estimate::unknown(f64::NAN), String::new());
-            return Point { x, estimate, says };
+            return Point {
+                x,
+                estimate: Estimate::unknown(f64::NAN),
+                is_whole: true,
+                says: String::new(),
+            };
         };
         let says = match self.shown {
             Shown::Estimate => self.measure.tooltip(self.study, summary, &estimate),
@@ -125,7 +130,12 @@ impl<'a> Plot<'a> {
                 format!("{}: {value} ({interval})", self.study.cell_name(cell))
             }
         };
-        Point { x, estimate, says }
+        Point {
+            x,
+            estimate,
+            is_whole: !self.measure.is_partial(summary),
+            says,
+        }
     }
 
     /// What others published of the cells, in the metric's own unit; nothing beside differences.
@@ -228,18 +238,22 @@ impl<'a> Plot<'a> {
         let points: Vec<Point> = places
             .map(|(cell, place)| self.point(cell, x.place(axis, place[along])))
             .collect();
-        let area = area(self.left_room(), 24.0);
-        let body = html! {
-            (self.frame(&area, axis, &x).draw())
-            @for point in &points { (self.whisker(&area, point, 0, 0.0)) }
+        let sheet = Sheet::new(self.left_room(), 24.0, &[], "", "");
+        let area = &sheet.area;
+        let marks = html! {
+            @for point in &points { (self.whisker(area, point, 0, 0.0)) }
         };
         let (metric, name) = (&self.measure.metric.label, axis.name());
-        let file = format!("{}-over-{name}", self.measure.metric.name);
-        let description = format!(
-            "The {} of {metric} in each cell, with its 95 % interval, over {name}.",
-            self.measure.what()
-        );
-        sized(&file, format!("{metric} over {name}"), description, body)
+        let about = About {
+            file: format!("{}-over-{name}", self.measure.metric.name),
+            title: format!("{metric} over {name}"),
+            description: format!(
+                "The {} of {metric} in each cell, with its 95 % interval, over {name}.",
+                self.measure.what()
+            ),
+            has_markers: true,
+        };
+        sheet.figure(about, &self.frame(area, axis, &x), marks, Vec::new())
     }
 
     fn figure(&self, curves: &Curves, panel: &Panel) -> Figure {
@@ -247,19 +261,18 @@ impl<'a> Plot<'a> {
         let axis = &axes[curves.x];
         let x = x_axis(axis);
         let heading = curves.series.map_or("", |series| axes[series].name());
-        let heading = shortened(heading, 22);
         let series = panel.series.iter();
-        let names: Vec<String> = series.map(|one| shortened(&one.name, 18)).collect();
+        let names: Vec<String> = series.map(|one| shortened(&one.name, 30)).collect();
         let alone = curves.series.is_none();
-        let right = if alone {
-            let texts = axis.levels.iter().map(|level| level.text.as_str());
-            (widest(texts) / 2.0).clamp(16.0, 48.0)
-        } else {
-            end_label_room(names.iter().map(String::as_str), &heading)
-        };
-        let area = area(self.left_room(), right);
+        let texts = axis.levels.iter().map(|level| level.text.as_str());
+        let right = (widest(texts) / 2.0).clamp(16.0, 48.0);
+        let named = if alone { &[][..] } else { &names };
+        let sheet = Sheet::new(self.left_room(), right, named, heading, &panel.name);
+        let area = &sheet.area;
         let mut marks = Vec::new();
         let mut labels = Vec::new();
+        let crowded = panel.series.len() >= CROWDED;
+        let apart = self.apart(area, axis, &x, panel.series.len());
         for (index, series) in panel.series.iter().enumerate() {
             let level = |cell: usize| self.study.layout.places[cell][curves.x];
             let cells = series.cells.iter().copied();
@@ -268,41 +281,53 @@ impl<'a> Plot<'a> {
             let last = points
                 .iter()
                 .rfind(|point| point.estimate.value.is_finite());
-            labels.extend(last.map(|point| EndLabel {
+            labels.extend(last.map(|point| CurveName {
                 series: index,
-                y: self.at(&area, point.estimate.value),
+                y: self.at(area, point.estimate.value),
+                rank: index as f64,
                 text: names[index].clone(),
             }));
-            let aside = 11.0 * (index as f64 - (panel.series.len() - 1) as f64 / 2.0);
-            marks.push(if axis.numeric {
-                html! {
-                    (self.fitted(&area, axis, &x, &series.cells, index))
-                    (self.curve(&area, &points, index))
+            let aside = apart * (index as f64 - (panel.series.len() - 1) as f64 / 2.0);
+            let moved = if axis.numeric && !crowded { 0.0 } else { aside };
+            marks.push(match axis.numeric {
+                true => html! {
+                    (self.fitted(area, axis, &x, &series.cells, index))
+                    (self.curve(area, &points, index, crowded.then_some(moved)))
+                },
+                false => {
+                    html! { @for point in &points { (self.whisker(area, point, index, moved)) } }
                 }
-            } else {
-                html! { @for point in &points { (self.whisker(&area, point, index, aside)) } }
             });
-            let moved = if axis.numeric { 0.0 } else { aside };
             let pairs = series.cells.iter().zip(&points);
-            marks.extend(
-                pairs.map(|(cell, point)| {
-                    self.crosses(&area, *cell, area.x(point.x) + moved, index)
-                }),
-            );
+            marks
+                .extend(pairs.map(|(cell, point)| {
+                    self.crosses(area, *cell, area.x(point.x) + moved, index)
+                }));
         }
-        let body = html! {
-            (self.frame(&area, axis, &x).draw())
+        let marks = html! {
             @if self.shown == Shown::Difference {
-                @let zero = self.at(&area, 0.0);
+                @let zero = self.at(area, 0.0);
                 path class="axis" d=(path([(area.left, zero), (area.x(1.0), zero)])) {}
             }
             @for mark in &marks { (mark) }
-            @if !alone { (end_labels(labels, &area, &heading, true)) }
         };
-        self.named(axis, &panel.name, if alone { "" } else { &heading }, body)
+        let about = self.about(axis, &panel.name, if alone { "" } else { heading });
+        let labels = if alone { Vec::new() } else { labels };
+        sheet.figure(about, &self.frame(area, axis, &x), marks, labels)
     }
 
-    fn named(&self, axis: &Axis, panel: &str, heading: &str, body: Markup) -> Figure {
+    /// How far intervals of different curves at one level are drawn apart, in pixels: so far that
+    /// those of one level stay together.
+    fn apart(&self, area: &Area, axis: &Axis, x: &Along, curves: usize) -> f64 {
+        let places = (0..axis.levels.len()).map(|level| area.x(x.place(axis, level)));
+        let places: Vec<f64> = places.collect();
+        let gaps = places.windows(2).map(|pair| pair[1] - pair[0]);
+        let least = gaps.fold(f64::INFINITY, f64::min);
+        let most = if axis.numeric { 4.0 } else { 11.0 };
+        (0.7 * least / curves as f64).clamp(1.5, most)
+    }
+
+    fn about(&self, axis: &Axis, panel: &str, heading: &str) -> About {
         let (name, label) = (&self.measure.metric.name, &self.measure.metric.label);
         let (file, what, title) = match self.shown {
             Shown::Estimate => ("curves", self.measure.what(), label.clone()),
@@ -312,19 +337,15 @@ impl<'a> Plot<'a> {
                 format!("{label}, difference"),
             ),
         };
-        let within = if panel.is_empty() {
-            String::new()
-        } else {
-            format!(", {panel}")
-        };
-        let each = match heading {
-            "" => String::new(),
-            heading => format!(", a curve for each {heading}"),
-        };
-        let over = axis.name();
-        let description = format!("The {what} of {label} over {over}{each}, with 95 % intervals.");
-        let title = format!("{title} over {over}{within}");
-        sized(&format!("{name}-{file}{within}"), title, description, body)
+        let (within, each, over) = (within(panel), for_each(heading), axis.name());
+        About {
+            file: format!("{name}-{file}{within}"),
+            title: format!("{title}{within}"),
+            description: format!(
+                "The {what} of {label} over {over}{each}{within}, with 95 % intervals."
+            ),
+            has_markers: true,
+        }
     }
 
     fn frame<'b>(&self, area: &Area, axis: &'b Axis, x: &Along) -> Frame<'b> {
@@ -341,7 +362,7 @@ impl<'a> Plot<'a> {
             x_label: &axis.label,
             x_ticks: x_ticks.collect(),
             y_label: match self.shown {
-                Shown::Estimate => self.measure.axis_label(),
+                Shown::Estimate => self.measure.axis_label(&self.y),
                 Shown::Difference if self.measure.style == Style::Percent => {
                     "difference to the baseline (percentage points)".to_owned()
                 }
@@ -352,54 +373,59 @@ impl<'a> Plot<'a> {
     }
 
     /// A line through the estimates and a band over their intervals; both break where a cell has
-    /// none.
-    fn curve(&self, area: &Area, points: &[Point], series: usize) -> Markup {
-        let at = |point: &Point, value: f64| (area.x(point.x), self.at(area, value));
+    /// none. With `moved`, so far aside, the intervals are whiskers.
+    fn curve(&self, area: &Area, points: &[Point], series: usize, moved: Option<f64>) -> Markup {
+        let aside = moved.unwrap_or(0.0);
+        let at = |point: &Point, value: f64| (area.x(point.x) + aside, self.at(area, value));
         html! {
             @for part in points.split(|point| !point.estimate.value.is_finite()) {
                 @let known: Vec<&Point> = part
                     .iter()
                     .filter(|point| point.estimate.low.is_finite())
                     .collect();
-                @let upper = known.iter().map(|point| at(point, point.estimate.high));
-                @let lower = known.iter().rev().map(|point| at(point, point.estimate.low));
-                @if known.len() > 1 {
-                    path class={ "band s" (series) } d=(path(upper.chain(lower))) {}
+                @let ends = |end: &dyn Fn(&Estimate) -> f64| -> Vec<(f64, f64)> {
+                    known.iter().map(|point| at(point, end(&point.estimate))).collect()
+                };
+                @if known.len() > 1 && moved.is_none() {
+                    (band(series, false, &ends(&|one| one.high), &ends(&|one| one.low)))
                 }
                 @let line = part.iter().map(|point| at(point, point.estimate.value));
                 path class={ "line s" (series) } stroke-dasharray=(DASHES[series]) d=(path(line)) {}
             }
             @for point in points.iter().filter(|point| point.estimate.value.is_finite()) {
-                @let (x, y) = at(point, point.estimate.value);
-                (marker(series, x, y, &point.says))
+                @if moved.is_some() { (self.interval(area, point, series, aside)) }
+                (marker(series, at(point, point.estimate.value), point.is_whole, &point.says))
             }
         }
     }
 
     /// A point with its interval, moved aside by some pixels.
     fn whisker(&self, area: &Area, point: &Point, series: usize, aside: f64) -> Markup {
-        let Estimate { value, low, high } = point.estimate;
-        let x = area.x(point.x) + aside;
+        let value = point.estimate.value;
+        let at = (area.x(point.x) + aside, self.at(area, value));
         html! {
             @if value.is_finite() {
-                @if low.is_finite() {
-                    path class={ "line s" (series) }
-                        d=(path([(x, self.at(area, low)), (x, self.at(area, high))])) {}
-                }
-                (marker(series, x, self.at(area, value), &point.says))
+                (self.interval(area, point, series, aside))
+                (marker(series, at, point.is_whole, &point.says))
             }
         }
     }
-}
 
-fn sized(file: &str, title: String, description: String, body: Markup) -> Figure {
-    Figure {
-        file: format!("{}.svg", slug(file)),
-        title,
-        description,
-        width: WIDTH,
-        height: TOP + HEIGHT + BELOW,
-        body,
+    /// The interval of a point, if it is known.
+    fn interval(&self, area: &Area, point: &Point, series: usize, aside: f64) -> Markup {
+        const CAP: f64 = 2.5;
+        let Estimate { low, high, .. } = point.estimate;
+        let x = area.x(point.x) + aside;
+        let [low_y, high_y] = [low, high].map(|end| self.at(area, end));
+        html! {
+            @if low.is_finite() {
+                path class={ "whisker s" (series) } d={
+                    (path([(x, low_y), (x, high_y)]))
+                    (path([(x - CAP, low_y), (x + CAP, low_y)]))
+                    (path([(x - CAP, high_y), (x + CAP, high_y)]))
+                } {}
+            }
+        }
     }
 }
 

@@ -8,10 +8,10 @@ use crate::report::measure::{Measure, Study};
 use crate::stats::Estimate;
 use farside_actors::figure::colours::cividis;
 use farside_actors::figure::scale::text_width;
-use farside_actors::figure::svg::{Area, Figure, Px, TEXT, path, shortened, slug, widest};
+use farside_actors::figure::svg::{Area, Figure, Px, path, shortened, slug, widest};
 
 /// From this width on, the interval fits too.
-const WITH_INTERVAL: f64 = 74.0;
+const WITH_INTERVAL: f64 = 82.0;
 
 /// What the fields share.
 struct Map<'a> {
@@ -46,7 +46,10 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         .map(|one| field_text(measure, one))
         .collect();
     let least = widest(texts.iter().map(String::as_str)) + 8.0;
-    let width = ((WIDTH - left - 12.0) / columns as f64).max(least);
+    // Fields have room for their intervals; a map that is wider for it scrolls on a phone.
+    let width = ((WIDTH - left - 12.0) / columns as f64)
+        .max(least)
+        .max(WITH_INTERVAL);
     let height = if width >= WITH_INTERVAL { 44.0 } else { 30.0 };
     let area = Area {
         left,
@@ -63,7 +66,7 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         ends: ends(&estimates),
     };
     let body = html! {
-        text class="label" x="8" y=(Px(area.top - 42.0)) { (measure.axis_label()) }
+        text class="label" x="8" y=(Px(area.top - 42.0)) { (measure.shown_label()) }
         text class="label" x="8" y=(Px(area.top - 10.0)) { (shortened(y.name(), 30)) }
         (map.legend())
         @for row in 0..rows {
@@ -80,7 +83,7 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
     let metric = &measure.metric.label;
     Some(Figure {
         file: format!("{}-map.svg", slug(&measure.metric.name)),
-        title: format!("{metric} over {} and {}", x.name(), y.name()),
+        title: format!("{metric}, each cell"),
         description: format!(
             "A heat map: the {} of {metric} for each {} and {}, with its 95 % interval.",
             measure.what(),
@@ -90,6 +93,7 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         width: (area.x(1.0) + 12.0).max(WIDTH),
         height: area.y(0.0) + 52.0,
         body,
+        style: "",
     })
 }
 
@@ -159,18 +163,21 @@ impl Map<'_> {
         let (middle, centre) = (x + width / 2.0, y + height / 2.0);
         let interval = self.interval(&estimate, width);
         html! {
-            g class=(class) {
+            g {
                 rect class="field" x=(Px(x)) y=(Px(y)) width=(Px(width)) height=(Px(height))
                     fill=(colour) { title { (says) } }
-                text x=(Px(middle)) y=(Px(centre + if interval.is_some() { -2.0 } else { 4.5 }))
-                    text-anchor="middle" { (field_text(self.measure, &estimate)) }
+                text class=(class) x=(Px(middle)) y=(Px(centre + if interval.is_some() { -2.0 } else { 4.5 }))
+                    text-anchor="middle" {
+                    (field_text(self.measure, &estimate))
+                    @if self.measure.is_partial(summary) { "†" }
+                }
                 @if let Some(interval) = interval {
-                    text class="small" x=(Px(middle)) y=(Px(centre + 13.0)) text-anchor="middle" {
+                    text class={ "small " (class) } x=(Px(middle)) y=(Px(centre + 13.0)) text-anchor="middle" {
                         (interval)
                     }
                 }
                 @if is_baseline {
-                    rect class="baseline" x=(Px(x + 2.5)) y=(Px(y + 2.5))
+                    rect class={ "baseline " (class) } x=(Px(x + 2.5)) y=(Px(y + 2.5))
                         width=(Px(width - 5.0)) height=(Px(height - 5.0)) {}
                 }
             }
@@ -184,7 +191,7 @@ impl Map<'_> {
         }
         let text = self.measure.style.interval(estimate);
         let text = text.replace(" to ", "–").replace("\u{a0}%", "");
-        (text_width(&text, TEXT * 0.8) < width - 10.0).then_some(text)
+        (text_width(&text, 12.5) < width - 10.0).then_some(text)
     }
 
     /// What the colours mean, from the least to the greatest, and which field is the baseline.
@@ -207,9 +214,9 @@ impl Map<'_> {
             }
             text class="tick" x=(Px(right)) y=(Px(y + 10.5)) text-anchor="end" { (ends[1]) }
             @if self.study.summary.baseline.is_some() {
-                text class="tick" x=(Px(right)) y=(Px(self.area.y(0.0) + 42.0)) text-anchor="end" {
-                    "▢ baseline"
-                }
+                @let y = self.area.y(0.0) + 42.0;
+                rect class="baseline key" x=(Px(right - 74.0)) y=(Px(y - 10.0)) width="11" height="11" {}
+                text class="tick" x=(Px(right)) y=(Px(y)) text-anchor="end" { "baseline" }
             }
             path class="axis" d=(path([
                 (self.area.left, self.area.y(0.0)), (self.area.x(1.0), self.area.y(0.0)),

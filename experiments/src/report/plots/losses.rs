@@ -2,7 +2,6 @@
 
 use maud::{Markup, html};
 
-use super::WIDTH;
 use crate::report::csv::reasons;
 use crate::report::measure::Study;
 use crate::study::results::MessageCounts;
@@ -13,7 +12,9 @@ use farside_actors::figure::svg::{
     Area, Figure, Px, measured_ticks, path, shortened, slug, widest,
 };
 
-const ROW: f64 = 20.0;
+/// Wider than other figures, for the cells' names; on a phone it scrolls.
+const WIDTH: f64 = 560.0;
+const ROW: f64 = 22.0;
 
 /// A bar for each cell, as a share of all copies of messages. None if nothing was lost anywhere.
 pub(in crate::report) fn figure(study: &Study<'_>) -> Option<Figure> {
@@ -61,7 +62,7 @@ pub(in crate::report) fn figure(study: &Study<'_>) -> Option<Figure> {
         }
         @for (index, cell) in cells.iter().enumerate() {
             @let y = area.top + ROW * index as f64;
-            text class="tick" x=(Px(left - 8.0)) y=(Px(y + 14.5)) text-anchor="end" {
+            text class="tick" x=(Px(left - 8.0)) y=(Px(y + 15.5)) text-anchor="end" {
                 (names[index])
             }
             (bar(&area, &scale, y, &cell.messages, &reasons))
@@ -77,6 +78,7 @@ pub(in crate::report) fn figure(study: &Study<'_>) -> Option<Figure> {
         width: WIDTH,
         height: area.y(0.0) + 50.0,
         body,
+        style: "",
     })
 }
 
@@ -152,7 +154,7 @@ fn bar(
                 }
             }
         }
-        text class="small" x=(Px(area.x(scale.place(until)) + 6.0)) y=(Px(y + 14.0)) {
+        text class="small" x=(Px(area.x(scale.place(until)) + 6.0)) y=(Px(y + 15.0)) {
             (decimal(until, 1)) " %"
         }
     }

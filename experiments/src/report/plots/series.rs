@@ -4,15 +4,14 @@
 use maud::{Markup, html};
 
 use super::steps::panels;
-use super::{BELOW, HEIGHT, Plots, TOP, WIDTH, area};
+use super::{About, CROWDED, Plots, Sheet, band, for_each, within};
 use crate::report::layout::{Panel, Series};
 use crate::report::measure::{Measure, Study};
 use crate::stats::Estimate;
 use farside_actors::figure::colours::DASHES;
 use farside_actors::figure::scale::{Scale, Spacing};
 use farside_actors::figure::svg::{
-    Area, EndLabel, Figure, Frame, Px, end_label_room, end_labels, marker, measured_ticks, path,
-    shortened, slug, widest,
+    Area, CurveName, Figure, Frame, Px, marker, measured_ticks, path, shortened, widest,
 };
 
 /// With at most so many indices, each has a marker to point at.
@@ -69,7 +68,7 @@ pub(super) fn curves(study: &Study<'_>, measure: &Measure<'_>, plots: &mut Plots
         let plot = Plot {
             measure,
             shown,
-            heading: shortened(heading, 22),
+            heading: heading.to_owned(),
             x: Scale::over(points().map(|(index, _)| *index), Spacing::Linear),
             y: Scale::measured(ends.chain(zero)),
         };
@@ -123,7 +122,7 @@ fn curve(
         }
     };
     Some(Curve {
-        name: shortened(&of.name, 18),
+        name: shortened(&of.name, 30),
         series: series % DASHES.len(),
         points,
         from,
@@ -134,49 +133,46 @@ impl Plot<'_> {
     fn figure(&self, panel: &Panel, curves: &[Curve]) -> Figure {
         let y_ticks = measured_ticks(&self.y, false);
         let left = 16.0 + widest(y_ticks.iter().map(|tick| tick.text.as_str()));
-        let names = || curves.iter().map(|curve| curve.name.as_str());
-        let is_alone = names().all(str::is_empty);
-        let right = if is_alone {
-            28.0
-        } else {
-            end_label_room(names(), &self.heading)
-        };
-        let area = area(left, right);
-        let labels = curves.iter().map(|curve| {
+        let names: Vec<String> = curves.iter().map(|curve| curve.name.clone()).collect();
+        let is_alone = names.iter().all(String::is_empty);
+        let named = if is_alone { &[][..] } else { &names };
+        let sheet = Sheet::new(left, 28.0, named, &self.heading, &panel.name);
+        let area = &sheet.area;
+        let labels = curves.iter().enumerate().map(|(rank, curve)| {
             let known = curve.points.iter().rfind(|(_, one)| one.value.is_finite());
-            EndLabel {
+            CurveName {
                 series: curve.series,
-                y: self.at(&area, known.map_or(0.0, |(_, one)| one.value)),
+                y: self.at(area, known.map_or(0.0, |(_, one)| one.value)),
+                rank: rank as f64,
                 text: curve.name.clone(),
             }
         });
-        let labels: Vec<EndLabel> = labels.collect();
+        let labels = labels.filter(|_| !is_alone).collect();
         let index_label = self.measure.index_label();
         let few = curves.iter().all(|curve| curve.points.len() <= MARKED);
         let frame = Frame {
-            area,
+            area: *area,
             x_label: &index_label,
             x_ticks: self.x.ticks(5.0),
             y_label: match self.shown {
-                Shown::Mean => self.measure.axis_label(),
+                Shown::Mean => self.measure.axis_label(&self.y),
                 Shown::Difference => "difference to the baseline, same seeds".to_owned(),
             },
             y_ticks,
         };
-        let body = html! {
-            (frame.draw())
+        let crowded = curves.len() >= CROWDED;
+        let marks = html! {
             @if self.shown == Shown::Difference {
-                @let zero = self.at(&area, 0.0);
+                @let zero = self.at(area, 0.0);
                 path class="axis" d=(path([(area.left, zero), (area.x(1.0), zero)])) {}
             }
-            @for curve in curves { (self.band(&area, curve)) }
-            @for curve in curves { (self.line(&area, curve, few)) }
-            @if !is_alone { (end_labels(labels, &area, &self.heading, few)) }
+            @for curve in curves { (self.band(area, curve, crowded)) }
+            @for curve in curves { (self.line(area, curve, few)) }
         };
-        self.named(panel, body)
+        sheet.figure(self.about(panel, few), &frame, marks, labels)
     }
 
-    fn named(&self, panel: &Panel, body: Markup) -> Figure {
+    fn about(&self, panel: &Panel, has_markers: bool) -> About {
         let (name, label) = (&self.measure.metric.name, &self.measure.metric.label);
         let over = self.measure.index_label();
         let (file, what, title) = match self.shown {
@@ -187,21 +183,14 @@ impl Plot<'_> {
                 format!("{label}, difference"),
             ),
         };
-        let within = match panel.name.as_str() {
-            "" => String::new(),
-            panel => format!(", {panel}"),
-        };
-        let each = match self.heading.as_str() {
-            "" => String::new(),
-            heading => format!(", a curve for each {heading}"),
-        };
-        Figure {
-            file: format!("{}.svg", slug(&format!("{name}-{file}{within}"))),
-            title: format!("{title} over {over}{within}"),
-            description: format!("The {what} of {label} over {over}{each}, with 95 % intervals."),
-            width: WIDTH,
-            height: TOP + HEIGHT + BELOW,
-            body,
+        let (within, each) = (within(&panel.name), for_each(&self.heading));
+        About {
+            file: format!("{name}-{file}{within}"),
+            title: format!("{title}{within}"),
+            description: format!(
+                "The {what} of {label} over {over}{each}{within}, with 95 % intervals."
+            ),
+            has_markers,
         }
     }
 
@@ -211,14 +200,15 @@ impl Plot<'_> {
     }
 
     /// The intervals; they break where there are none.
-    fn band(&self, area: &Area, curve: &Curve) -> Markup {
+    fn band(&self, area: &Area, curve: &Curve, crowded: bool) -> Markup {
         let at = |index: f64, value: f64| (area.x(self.x.place(index)), self.at(area, value));
         html! {
             @for part in curve.points.split(|(_, one)| !one.is_known()) {
-                @let upper = part.iter().map(|(index, one)| at(*index, one.high));
-                @let lower = part.iter().rev().map(|(index, one)| at(*index, one.low));
+                @let ends = |end: &dyn Fn(&Estimate) -> f64| -> Vec<(f64, f64)> {
+                    part.iter().map(|(index, one)| at(*index, end(one))).collect()
+                };
                 @if part.len() > 1 {
-                    path class={ "band s" (curve.series) } d=(path(upper.chain(lower))) {}
+                    (band(curve.series, crowded, &ends(&|one| one.high), &ends(&|one| one.low)))
                 }
             }
         }
@@ -232,8 +222,7 @@ impl Plot<'_> {
             @for part in curve.points.split(|(_, one)| !one.value.is_finite()) {
                 @if let [(index, one)] = part {
                     @if !marked {
-                        @let (x, y) = at(*index, one.value);
-                        (marker(curve.series, x, y, &curve.name))
+                        (marker(curve.series, at(*index, one.value), true, &curve.name))
                     }
                 } @else if !part.is_empty() {
                     @let line = part.iter().map(|(index, one)| at(*index, one.value));
@@ -243,11 +232,10 @@ impl Plot<'_> {
             }
             @if marked {
                 @for (index, one) in curve.points.iter().filter(|(_, one)| one.value.is_finite()) {
-                    @let (x, y) = at(*index, one.value);
                     @let told = self.measure.told(one);
                     @let index_told = self.measure.index_told(*index);
                     @let says = format!("{} {index_told}: {told}", curve.name);
-                    (marker(curve.series, x, y, says.trim_start()))
+                    (marker(curve.series, at(*index, one.value), true, says.trim_start()))
                 }
             }
             @if let Some((from, says)) = &curve.from {

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::{BELOW, HEIGHT, Plots, TOP, WIDTH, area};
+use super::{About, CROWDED, Plots, Sheet, band, for_each, within};
 use crate::report::layout::{PANELS, Panel, Series, spread};
 use crate::report::measure::{Measure, Study};
 use crate::stats::distribution::Ecdf;
@@ -11,8 +11,7 @@ use crate::study::summary::values::observations;
 use farside_actors::figure::colours::{DASHES, SERIES};
 use farside_actors::figure::scale::Scale;
 use farside_actors::figure::svg::{
-    Area, EndLabel, Figure, Frame, end_label_room, end_labels, measured_ticks, path, shortened,
-    slug,
+    Area, CurveName, Figure, Frame, measured_ticks, path, shortened,
 };
 
 /// One cell's curve: from a first share on, at each x a new one with its interval.
@@ -33,10 +32,35 @@ struct Step {
 struct CurveStyle {
     /// What the file's name ends with.
     file: &'static str,
-    y_label: String,
+    y_label: &'static str,
     title: &'static str,
-    x: Scale,
+    /// All that is listed happened: what is shown is its distribution.
+    all_happened: bool,
 }
+
+impl CurveStyle {
+    /// The horizontal axis of some curves.
+    fn x<'a>(&self, curves: impl Iterator<Item = &'a Steps> + Clone) -> Scale {
+        if self.all_happened {
+            // A long tail would press all else to the left; it is cut where every curve is near 1.
+            let past = |curve: &Steps, share: f64| {
+                let step = curve.steps.iter().find(|step| step.share >= share);
+                step.map(|step| step.x)
+            };
+            let ends = curves.clone().map(|curve| past(curve, 0.99).unwrap_or(0.0));
+            let starts = curves.clone().filter_map(|curve| past(curve, 0.02));
+            Scale::measured(ends.chain(starts))
+        } else {
+            let ends = curves.filter_map(|curve| curve.steps.last());
+            Scale::measured(ends.map(|step| step.x).chain([0.0]))
+        }
+    }
+}
+
+/// If all curves of a plot end within this share of an axis that plots share, it has its own.
+const SQUASHED: f64 = 0.5;
+
+const OWN_AXES: &str = "Horizontal axes differ from plot to plot.";
 
 const DISTRIBUTION: &str = "Distributions pool the lists of all runs of a cell. They are cut at the right, where at least \
      99 % of each cell is past.";
@@ -73,32 +97,29 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
         })
         .collect();
     let all = || curves.iter().flat_map(|(_, curves)| curves);
-    let kind = if all_happened {
-        // A long tail would press all else to the left; it is cut where every curve is near 1.
-        let ends = all().map(|curve| {
-            let near = curve.steps.iter().find(|step| step.share >= 0.99);
-            near.map_or(0.0, |step| step.x)
-        });
-        let starts = all()
-            .filter_map(|curve| curve.steps.first())
-            .map(|step| step.x);
-        CurveStyle {
+    let kind = match all_happened {
+        true => CurveStyle {
             file: "ecdf",
-            y_label: "share of all values, at or below".to_owned(),
+            y_label: "share of all values, at or below",
             title: "distribution",
-            x: Scale::measured(ends.chain(starts)),
-        }
-    } else {
-        let ends = all()
-            .filter_map(|curve| curve.steps.last())
-            .map(|step| step.x);
-        CurveStyle {
+            all_happened,
+        },
+        false => CurveStyle {
             file: "survival",
-            y_label: "still outstanding".to_owned(),
+            y_label: "still outstanding",
             title: "survival",
-            x: Scale::measured(ends.chain([0.0])),
-        }
+            all_happened,
+        },
     };
+    let shared = kind.x(all());
+    let own: Vec<Scale> = curves
+        .iter()
+        .map(|(_, curves)| kind.x(curves.iter()))
+        .collect();
+    let squashed = own.iter().any(|x| x.high() < SQUASHED * shared.high());
+    if squashed {
+        plots.notes.push(OWN_AXES.to_owned());
+    }
     plots
         .notes
         .push(if all_happened { DISTRIBUTION } else { SURVIVAL }.to_owned());
@@ -107,9 +128,10 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure<'_>, plots: &mu
         let note = "There are more cells than are plotted here; an even choice is shown.";
         plots.notes.push(note.to_owned());
     }
-    let figures = curves
-        .into_iter()
-        .map(|(panel, curves)| figure(study, measure, &kind, &panel.name, series, curves));
+    let figures = curves.iter().zip(&own).map(|((panel, curves), own)| {
+        let x = if squashed { own } else { &shared };
+        figure(study, measure, &kind, x, &panel.name, series, curves)
+    });
     plots.figures.extend(figures);
 }
 
@@ -219,93 +241,73 @@ fn figure(
     study: &Study<'_>,
     measure: &Measure<'_>,
     kind: &CurveStyle,
+    x: &Scale,
     panel: &str,
     series: Option<usize>,
-    curves: Vec<Steps>,
+    curves: &[Steps],
 ) -> Figure {
     let heading = series.map_or("", |axis| study.layout.axes[axis].name());
-    let heading = shortened(heading, 22);
     let alone = curves.len() == 1 && curves[0].name.is_empty();
     let names: Vec<String> = curves
         .iter()
-        .map(|curve| shortened(&curve.name, 18))
+        .map(|curve| shortened(&curve.name, 30))
         .collect();
-    let right = if alone {
-        28.0
-    } else {
-        end_label_room(names.iter().map(String::as_str), &heading)
-    };
-    let area = area(62.0, right);
+    let named = if alone { &[][..] } else { &names };
+    let sheet = Sheet::new(58.0, 28.0, named, heading, panel);
+    let area = &sheet.area;
     let y = Scale::between(0.0, 100.0);
-    let labels = curves
-        .iter()
-        .zip(&names)
-        .enumerate()
-        .map(|(index, (curve, name))| {
-            let shown = curve.steps.iter().rfind(|step| step.x <= kind.x.high());
-            let share = shown.map_or(curve.first, |step| step.share);
-            EndLabel {
-                series: index,
-                y: area.y(share),
-                text: name.clone(),
-            }
+    let labels = curves.iter().zip(&names).enumerate();
+    let labels = labels.map(|(index, (curve, name))| {
+        let shown = curve.steps.iter().rfind(|step| step.x <= x.high());
+        let share = shown.map_or(curve.first, |step| step.share);
+        // The curve that lies above the others: of survival the latest, of distributions the
+        // earliest.
+        let half = curve.steps.iter().find(|step| match kind.all_happened {
+            true => step.share >= 0.5,
+            false => step.share <= 0.5,
         });
-    let labels = labels.collect();
-    let x_label = match measure.metric.unit.as_str() {
+        let half = half.map_or(f64::INFINITY, |step| step.x);
+        CurveName {
+            series: index,
+            y: area.y(share),
+            rank: if kind.all_happened { half } else { -half },
+            text: name.clone(),
+        }
+    });
+    let labels = labels.filter(|_| !alone).collect();
+    let mut x_label = match measure.metric.unit.as_str() {
         "" => measure.metric.label.clone(),
         unit => format!("{} ({unit})", measure.metric.label),
     };
+    if x.is_log() {
+        x_label.push_str(", log scale");
+    }
     let frame = Frame {
-        area,
+        area: *area,
         x_label: &x_label,
-        x_ticks: kind.x.ticks(4.0),
-        y_label: kind.y_label.clone(),
+        x_ticks: x.ticks(4.0),
+        y_label: kind.y_label.to_owned(),
         y_ticks: measured_ticks(&y, true),
     };
-    let body = html! {
-        (frame.draw())
-        @for (index, curve) in curves.iter().enumerate() { (drawn(&area, &kind.x, curve, index)) }
-        @if !alone { (end_labels(labels, &area, &heading, false)) }
+    let crowded = curves.len() >= CROWDED;
+    let marks = html! {
+        @for (index, curve) in curves.iter().enumerate() {
+            (drawn(area, x, curve, index, crowded))
+        }
     };
-    named(
-        measure,
-        kind,
-        panel,
-        if alone { "" } else { &heading },
-        body,
-    )
-}
-
-fn named(
-    measure: &Measure<'_>,
-    kind: &CurveStyle,
-    panel: &str,
-    heading: &str,
-    body: Markup,
-) -> Figure {
     let (metric, title) = (&measure.metric.label, kind.title);
-    let within = if panel.is_empty() {
-        String::new()
-    } else {
-        format!(", {panel}")
-    };
-    let each = match heading {
-        "" => String::new(),
-        heading => format!(", a curve for each {heading}"),
-    };
-    let file = slug(&format!("{}-{}{within}", measure.metric.name, kind.file));
-    Figure {
-        file: format!("{file}.svg"),
+    let (within, each) = (within(panel), for_each(if alone { "" } else { heading }));
+    let about = About {
+        file: format!("{}-{}{within}", measure.metric.name, kind.file),
         title: format!("{metric}, {title}{within}"),
-        description: format!("The {title} of {metric}{each}: {}.", kind.y_label),
-        width: WIDTH,
-        height: TOP + HEIGHT + BELOW,
-        body,
-    }
+        description: format!("The {title} of {metric}{each}{within}: {}.", kind.y_label),
+        has_markers: false,
+    };
+    sheet.figure(about, &frame, marks, labels)
 }
 
 /// The line in steps, over its band; of the steps within a pixel, the last is drawn.
-fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize) -> Markup {
+fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize, crowded: bool) -> Markup {
     let series = series % DASHES.len();
     let column = |step: &Step| area.x(x.place(step.x)) as usize;
     let mut kept: Vec<&Step> = Vec::new();
@@ -334,7 +336,7 @@ fn drawn(area: &Area, x: &Scale, curve: &Steps, series: usize) -> Markup {
     let banded = upper != lower;
     html! {
         @if banded {
-            path class={ "band s" (series) } d=(path(upper.into_iter().chain(lower.into_iter().rev()))) {}
+            (band(series, crowded, &upper, &lower))
         }
         path class={ "line s" (series) } stroke-dasharray=(DASHES[series])
             d=(path(corners(&|step| step.share))) { title { (curve.name) } }

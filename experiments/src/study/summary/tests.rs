@@ -44,6 +44,7 @@ fn done(metrics: Value, sim_time_s: f64, timed_out: bool) -> RunOutcome {
         messages: MessageCounts::default(),
         metrics: metrics.as_object().cloned().unwrap_or_default(),
         violations: Vec::new(),
+        never_reached: Vec::new(),
     }
 }
 

@@ -25,6 +25,34 @@ pub(super) fn check(more: &str, starts: &str, holds: &str) {
 const FACTOR: &str = "[[factor]]\nname = 'level'\nkey = 'toy.level'\n";
 
 #[test]
+fn plots_are_of_factors_each_in_one_place() {
+    let report = |keys: &str| format!("{GRID}[report]\n{keys}\n");
+    let check_report = |keys: &str, key: &str, holds: &str| {
+        let message = refused(&study(&report(keys)));
+        assert!(
+            message.starts_with("x.toml:") && message.contains(key),
+            "{message}"
+        );
+        assert!(message.contains(holds), "{holds:?} is not in {message}");
+    };
+    check_report("x = 'levle'", "report.x", "did you mean \"level\"?");
+    check_report("x = 'nothing'", "report.x", "one of level, delay");
+    check_report(
+        "x = 'delay'\nfacet = 'delay'",
+        "report.facet",
+        "is x already",
+    );
+    check_report("facets = 'delay'", "", "did you mean \"facet\"?");
+    // How results are plotted is no part of what was run.
+    let (toy, text) = (Toy::new(), study(GRID));
+    let done = run_all(&toy, &text, &options(&toy, "out", 1));
+    let text = study(&report("x = 'delay'"));
+    let again = run_all(&toy, &text, &options(&toy, "out", 1));
+    assert_eq!(again.runs, done.runs);
+    assert_eq!(again.manifest.report.x.as_deref(), Some("delay"));
+}
+
+#[test]
 fn a_mistake_in_a_factor_is_said_where_it_stands() {
     let one = |rest: &str| format!("{FACTOR}{rest}\n");
     check("", "x.toml:1:1: factor: ", "no [[factor]]");

@@ -108,8 +108,8 @@ impl<'a> Scalar<'a> {
     pub(super) fn whole(&self) -> String {
         match self {
             Scalar::Absent => "absent".to_owned(),
-            Scalar::Double(value) => value.to_string(),
-            Scalar::Float(value) => value.to_string(),
+            Scalar::Double(value) => as_written(value, &format!("{value:?}")),
+            Scalar::Float(value) => as_written(value, &format!("{value:?}")),
             Scalar::Int(value) => value.to_string(),
             Scalar::Bool(value) => value.to_string(),
             Scalar::Text(value) => (*value).to_owned(),
@@ -132,5 +132,14 @@ impl<'a> Scalar<'a> {
             Scalar::Bytes(_) => format!("{} (bytes)", self.show()),
             other => format!("{} (as declared)", other.show()),
         }
+    }
+}
+
+/// A number as JSON writes it: the fewest digits that give it back, with an exponent where there
+/// would be many zeros.
+fn as_written(number: &impl fmt::Display, exact: &str) -> String {
+    match exact.contains('e') {
+        true => exact.to_owned(),
+        false => number.to_string(),
     }
 }
