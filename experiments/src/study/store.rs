@@ -116,13 +116,17 @@ impl Store {
     pub(super) fn look(folder: &Path, manifest: &Manifest) -> Result<Found, StoreError> {
         let path = folder.join(MANIFEST);
         if !path.exists() {
-            return match foreign_entry(folder)? {
-                None => Ok(Found::Nothing),
-                Some(entry) => Err(StoreError::Foreign {
-                    path: folder.to_owned(),
-                    entry,
-                }),
-            };
+            match foreign_entry(folder)? {
+                None => return Ok(Found::Nothing),
+                // Another shard has begun since we looked.
+                Some(_) if File::open(&path).is_ok() => {}
+                Some(entry) => {
+                    return Err(StoreError::Foreign {
+                        path: folder.to_owned(),
+                        entry,
+                    });
+                }
+            }
         }
         let there = load::manifest(folder)?;
         if there == *manifest {
@@ -299,7 +303,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::fabricated;
-    use super::{Shard, replace};
+    use super::{Shard, Store, replace};
 
     proptest! {
         /// Any number of shards gets as many runs each, but for one, and none is nobody's.
@@ -321,6 +325,30 @@ mod tests {
             let least = counts.values().min();
             let most = counts.values().max();
             prop_assert!(most.zip(least).is_some_and(|(most, least)| most - least <= 1), "{counts:?}");
+        }
+    }
+
+    /// The shards of a job array all begin at one time, in a folder that is not there.
+    #[test]
+    fn shards_that_begin_together_share_a_folder() {
+        let manifest = fabricated::study("s", vec![fabricated::loss()], 1).manifest;
+        for _ in 0..40 {
+            let folder = tempfile::tempdir().unwrap();
+            let results = folder.path().join("r");
+            let open = |index| {
+                let opened = Store::open(&results, &manifest, Shard { index, of: 8 });
+                opened.map(|_| ()).map_err(|error| error.to_string())
+            };
+            let opened: Vec<_> = std::thread::scope(|scope| {
+                let threads: Vec<_> = (1..=8)
+                    .map(|index| scope.spawn(move || open(index)))
+                    .collect();
+                threads
+                    .into_iter()
+                    .map(|thread| thread.join().unwrap())
+                    .collect()
+            });
+            assert!(opened.iter().all(Result::is_ok), "{opened:?}");
         }
     }
 
