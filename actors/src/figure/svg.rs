@@ -26,6 +26,9 @@ pub struct Figure {
     pub height: f64,
     /// What is drawn.
     pub body: Markup,
+    /// What tells it from others that show the same of something else, and is written in it; mostly
+    /// empty.
+    pub facet: String,
     /// Rules for classes of its own, beside [`super::STYLE`], written as those are; mostly none.
     pub style: &'static str,
 }

@@ -93,6 +93,7 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         width: (area.x(1.0) + 12.0).max(WIDTH),
         height: area.y(0.0) + 52.0,
         body,
+        facet: String::new(),
         style: "",
     })
 }
