@@ -136,8 +136,8 @@ fn in_two_lines(text: &str, width: f64) -> [String; 2] {
     if fits(text) {
         return [text.to_owned(), String::new()];
     }
-    let spaces = text.match_indices(' ').map(|(at, _)| at);
-    let cut = spaces.filter(|at| fits(&text[..*at])).last();
+    let mut spaces = text.match_indices(' ').map(|(at, _)| at);
+    let cut = spaces.rfind(|at| fits(&text[..*at]));
     let Some(cut) = cut else {
         return [shortened(text, 48), String::new()];
     };

@@ -163,7 +163,8 @@ fn capital(label: &str) -> String {
 }
 
 /// A figure in the page, below a heading that says what its title begins with: its caption has the
-/// rest, without what is written in it. What is wider than a column or higher than a screen scrolls by itself.
+/// rest, without what is written in it. What is wider than a column or higher than a screen scrolls
+/// by itself.
 fn placed(figure: &Figure, heading: &str) -> Markup {
     let class = match figure {
         Figure { width, .. } if *width > plots::WIDTH + 1.0 => "wide",

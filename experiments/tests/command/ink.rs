@@ -6,6 +6,11 @@ use std::sync::Arc;
 use resvg::usvg::fontdb::Database;
 use resvg::{tiny_skia, usvg};
 
+const FONTS: [&[u8]; 2] = [
+    include_bytes!("../../src/export/fonts/Roboto-Regular.ttf"),
+    include_bytes!("../../src/export/fonts/Roboto-Bold.ttf"),
+];
+
 /// How a figure looks.
 #[derive(Debug)]
 pub(crate) struct Look {
@@ -23,7 +28,9 @@ pub(crate) struct Look {
 fn look(svg: &str, with_fonts: bool) -> Look {
     let mut fonts = Database::new();
     if with_fonts {
-        fonts.load_fonts_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/export/fonts"));
+        for font in FONTS {
+            fonts.load_font_data(font.to_vec());
+        }
         fonts.set_sans_serif_family("Roboto");
     }
     let options = usvg::Options {

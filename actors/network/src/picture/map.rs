@@ -328,7 +328,9 @@ impl<'a> Sheet<'a> {
                 @let at = sensors.position_m(node);
                 @let name = format!("N{}", node.0 + 1);
                 @let at = labels.place(self.px([at.x, at.y]), 7.5, &name);
-                g class={ "n" (self.colour(node)) } { (over_lines("post-name", at, "middle", &name)) }
+                g class={ "n" (self.colour(node)) } {
+                    (over_lines("post-name", at, "middle", &name))
+                }
             }
         }
     }
