@@ -165,6 +165,7 @@ impl OwnTable for Beacons {
             width: 400.0,
             height: 200.0,
             body: maud::html! { path class="axis" d=(svg::path(points)) {} },
+            facet: String::new(),
             style: "",
         })
     }
