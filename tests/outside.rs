@@ -87,9 +87,34 @@ fn every_command_speaks_of_a_system_of_somebody_elses() {
     }
     let text = said(folder, &["explain", "beacons.interval"]);
     assert!(
-        text.contains("The time between two calls.\n  expected: more than 0s"),
+        text.contains("The time between two calls.\n  expected: a duration such as"),
         "{text}"
     );
+    assert!(text.contains(", more than 0s\n  units: ns, us,"), "{text}");
+}
+
+#[test]
+fn its_binary_has_its_own_name_and_version() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let version = said(folder, &["--version"]);
+    assert!(version.starts_with("beacons 0."), "{version}");
+    assert!(version.contains(" (farside 0."), "{version}");
+    let completions = said(folder, &["completions", "bash"]);
+    assert!(
+        completions.contains("complete -F _beacons"),
+        "{completions}"
+    );
+    assert!(!completions.contains("_farside"), "{completions}");
+    // It has no crater: its first scenario is what is run.
+    assert!(said(folder, &["run"]).contains("beacons/quiet"));
+    let info = said(folder, &["info", "run.mcap"]);
+    assert!(info.contains(version.trim()), "{info}");
+    let help = said(folder, &["run", "--help"]);
+    assert!(help.contains("`beacons scenarios`"), "{help}");
+    let output = run(folder, &["report", "run.mcap"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("`beacons info run.mcap`"), "{text}");
 }
 
 #[test]

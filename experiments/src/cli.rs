@@ -107,7 +107,20 @@ pub fn main(registry: Registry) -> ExitCode {
 
 /// The command line, under the name and with the version of the binary.
 fn command_line(registry: &Registry) -> clap::Command {
-    let command = Cli::command();
+    let mut command = Cli::command();
+    if registry.scenario(run::DEFAULT_SCENARIO).is_none() {
+        // Without the system that the examples are of, they would not run.
+        command = command.after_help(EXIT_CODES);
+        let first = registry.scenario_names().first().copied();
+        command = command.mut_subcommand("run", |run| {
+            run.mut_arg("scenario", |scenario| match first {
+                Some(first) => scenario.default_value(first),
+                None => scenario
+                    .default_value(clap::builder::Resettable::Reset)
+                    .required(true),
+            })
+        });
+    }
     let name = registry.program();
     if name == command.get_name() {
         return command;

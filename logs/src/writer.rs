@@ -180,7 +180,7 @@ impl LogWriter {
     pub fn create(path: impl AsRef<Path>, options: LogOptions) -> Result<LogWriter, LogError> {
         let path = path.as_ref().to_owned();
         let exclude = Topics::new(&options.exclude)?;
-        let file = thread::create(&path, options.compression)?;
+        let file = thread::create(&path, options.compression, &options.code_version)?;
         Ok(LogWriter {
             path,
             options,

@@ -204,6 +204,12 @@ impl Drawn {
     }
 }
 
+/// `1 rover`, `2 rovers`.
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
 /// Why there is no picture.
 #[derive(Debug, Error)]
 pub(crate) enum PictureError {

@@ -26,6 +26,9 @@ pub struct Figure {
     pub height: f64,
     /// What is drawn.
     pub body: Markup,
+    /// What tells it from others that show the same of something else, and is written in it; mostly
+    /// empty.
+    pub facet: String,
     /// Rules for classes of its own, beside [`super::STYLE`], written as those are; mostly none.
     pub style: &'static str,
 }
@@ -133,8 +136,8 @@ fn in_two_lines(text: &str, width: f64) -> [String; 2] {
     if fits(text) {
         return [text.to_owned(), String::new()];
     }
-    let spaces = text.match_indices(' ').map(|(at, _)| at);
-    let cut = spaces.filter(|at| fits(&text[..*at])).last();
+    let mut spaces = text.match_indices(' ').map(|(at, _)| at);
+    let cut = spaces.rfind(|at| fits(&text[..*at]));
     let Some(cut) = cut else {
         return [shortened(text, 48), String::new()];
     };

@@ -393,8 +393,8 @@ impl Visitor<'_> for Key<'_> {
         };
         if let Some((_, before)) = self.seen.iter().find(|(known, _)| *known == key) {
             return Err(E::custom(format!(
-                "{before} and {name} are names of one key, {key}: expected one of them; what \
-                 --set sets in place of what a file says has the file's name"
+                "`{before}` and `{name}` are names of one key, `{key}`: expected one of them (what \
+                 --set puts in the place of a key goes by the name that is there)"
             )));
         }
         self.seen.push((key, name.to_owned()));

@@ -144,7 +144,16 @@ fn options(picture: &PictureInfo) -> Vec<String> {
 
 fn list(args: &Args, pictures: &[PictureInfo]) -> Result<Exit, CommandError> {
     if args.json {
-        let entry = |picture: &PictureInfo| json!({ "name": picture.name, "about": picture.about, "takes": options(picture), "extras": picture.extras.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect::<Vec<_>>() });
+        let extra = |(name, about): &(&str, &str)| json!({ "name": name, "about": about });
+        let entry = |picture: &PictureInfo| {
+            let extras: Vec<_> = picture.extras.iter().map(extra).collect();
+            json!({
+                "name": picture.name,
+                "about": picture.about,
+                "takes": options(picture),
+                "extras": extras,
+            })
+        };
         print_json(&pictures.iter().map(entry).collect::<Vec<_>>())?;
         return Ok(Exit::Done);
     }

@@ -23,10 +23,13 @@ use crate::wall::timed;
 /// Attachments that are the scenario's files have names that start with this.
 pub(super) const FILE_PREFIX: &str = "files/";
 
+/// What is run unless something else is asked for, if it is built in.
+pub(crate) const DEFAULT_SCENARIO: &str = "network/crater-dense";
+
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// A built-in scenario (see `farside scenarios`) or a TOML file
-    #[arg(default_value = "network/crater-dense")]
+    #[arg(default_value = DEFAULT_SCENARIO)]
     scenario: String,
     /// The seed that every random draw derives from, instead of the scenario's
     #[arg(long, value_name = "N", allow_negative_numbers = true,

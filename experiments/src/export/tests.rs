@@ -30,6 +30,7 @@ mod rendered {
             width: 200.0,
             height: 40.0,
             body: maud::html! { text class="label" x="10" y="20" { (text) } },
+            facet: String::new(),
             style: "",
         };
         figure.standalone()

@@ -174,7 +174,8 @@ fn capital(label: &str) -> String {
 }
 
 /// A figure in the page, below a heading that says what its title begins with: its caption has the
-/// rest. What is wider than a column or higher than a screen scrolls by itself.
+/// rest, without what is written in it. What is wider than a column or higher than a screen scrolls
+/// by itself.
 fn placed(figure: &Figure, heading: &str) -> Markup {
     let class = match figure {
         Figure { width, .. } if *width > plots::WIDTH + 1.0 => "wide",
@@ -182,7 +183,8 @@ fn placed(figure: &Figure, heading: &str) -> Markup {
         _ => "",
     };
     let rest = figure.title.strip_prefix(heading).unwrap_or(&figure.title);
-    let rest = rest.trim_start_matches([',', ' ']);
+    let rest = rest.strip_suffix(figure.facet.as_str()).unwrap_or(rest);
+    let rest = rest.trim_matches([',', ' ']);
     html! {
         figure class=[(!class.is_empty()).then_some(class)]
             tabindex=[(!class.is_empty()).then_some("0")] {

@@ -185,6 +185,7 @@ impl Sheet {
                 (marks)
                 (names)
             },
+            facet: self.facet.clone(),
             style: "",
         }
     }

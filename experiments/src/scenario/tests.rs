@@ -185,7 +185,23 @@ fn mistakes_in_links_have_a_place_and_the_nearest_name() {
         }
     }
     let twice = default("delay = '5ms'\nlatency = '6ms'");
-    check(&twice, "x.toml:4:1: ", &["duplicate field `latency`"]);
+    check(
+        &twice,
+        "x.toml:4:1: ",
+        &["`delay` and `latency` are names of one key, `latency`"],
+    );
+    // The same from two places.
+    let delay = default("delay = '5ms'");
+    let error = parse(&delay, &["links.default.latency=6ms"]).err().unwrap();
+    let told = error.to_string();
+    assert!(
+        told.starts_with("--set links.default.latency=6ms: "),
+        "{told}"
+    );
+    assert!(
+        told.contains("`delay` and `latency` are names of one key"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -11,29 +11,37 @@ use super::results::{DeclaredBetter, Metric, SeriesIndex};
 
 /// What is known of every run, whatever its system; `messages.lost.outage` and so on besides.
 pub(crate) const KERNEL: [KnownMetric; 8] = [
-    KnownMetric::number("events", "events", "events", Neither),
-    KnownMetric::number("sim_time_s", "virtual time", "s", Neither),
-    KnownMetric::number("violations", "violations", "", Lower),
-    KnownMetric::number("messages.sent", "messages sent", "messages", Neither),
+    KnownMetric::number("events", "events", "events", Neither)
+        .about("How many events were handled: messages delivered, timers, starts, crashes."),
+    KnownMetric::number("sim_time_s", "virtual time", "s", Neither)
+        .about("When the run ended, in virtual time."),
+    KnownMetric::number("violations", "violations", "", Lower)
+        .about("How often something happened that must never happen, as the system says."),
+    KnownMetric::number("messages.sent", "messages sent", "messages", Neither)
+        .about("Messages that actors sent, further copies that links made not included."),
     KnownMetric::number(
         "messages.delivered",
         "message copies delivered",
         "messages",
         Higher,
-    ),
-    KnownMetric::number("messages.lost", "message copies lost", "messages", Lower),
+    )
+    .about("Copies of messages that arrived."),
+    KnownMetric::number("messages.lost", "message copies lost", "messages", Lower)
+        .about("Copies of messages that were lost, for whatever reason; messages.lost.REASON has those for one."),
     KnownMetric::number(
         "messages.duplicated",
         "message copies duplicated",
         "messages",
         Neither,
-    ),
+    )
+    .about("Copies of messages beyond the first of each."),
     KnownMetric::number(
         "messages.in_flight",
         "message copies under way at the end",
         "messages",
         Neither,
-    ),
+    )
+    .about("Copies of messages that were on their way when the run ended."),
 ];
 
 /// A metric with what the study leaves open filled in, by what the kernel and the system know.

@@ -1,12 +1,15 @@
 //! Figures as programs draw them that are no browsers: papers, slides, file managers.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 
 use resvg::usvg::fontdb::Database;
 use resvg::{tiny_skia, usvg};
+
+const FONTS: [&[u8]; 2] = [
+    include_bytes!("../../src/export/fonts/Roboto-Regular.ttf"),
+    include_bytes!("../../src/export/fonts/Roboto-Bold.ttf"),
+];
 
 /// How a figure looks.
 #[derive(Debug)]
@@ -25,9 +28,8 @@ pub(crate) struct Look {
 fn look(svg: &str, with_fonts: bool) -> Look {
     let mut fonts = Database::new();
     if with_fonts {
-        for name in ["Roboto-Regular.ttf", "Roboto-Bold.ttf"] {
-            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/export/fonts");
-            fonts.load_font_data(fs::read(folder.join(name)).expect("it is there"));
+        for font in FONTS {
+            fonts.load_font_data(font.to_vec());
         }
         fonts.set_sans_serif_family("Roboto");
     }

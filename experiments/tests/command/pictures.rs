@@ -141,6 +141,80 @@ fn pictures_count_the_cycles_of_the_run() {
     assert!(map.contains("Cycle 3."), "a cycle lasts {cycle_s} s");
 }
 
+/// What befell a run is in its corridor's picture: who was down, and what was worse, when.
+#[test]
+fn crashes_and_degradations_are_marked() {
+    const STORM: &str = "system = 'network'\nseed = 3\nuntil = '80s'\n\
+        team.rovers = 40\nnetwork.policy = 'complete'\nnetwork.failover_after = 3\n\
+        [[degrade]]\nlinks = '*'\nat = '30s'\nuntil = '60s'\nloss = '40%'\n\
+        [[crash]]\nactor = 'rover_07'\nat = '20s'\nrestart_after = '15s'\n\
+        [[crash]]\nactor = 'node_27'\nat = '10s'\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("storm.toml"), STORM).unwrap();
+    farside(folder.path(), &["run", "storm.toml", "--out", "run.mcap"]);
+    let picture = drawn(folder.path(), &["corridor", "--along", "125,162"]);
+    for said in ["links *: loss 0.4</text>", "rover_07 is down</text>"] {
+        assert!(picture.contains(said), "{said}");
+    }
+    assert_eq!(picture.matches("<rect class=\"worse\"").count(), 1);
+    // From 30 s to 60 s of 80: three eighths of the width.
+    let (_, rest) = picture.split_once("<rect class=\"worse\"").unwrap();
+    let width = rest.split("width=\"").nth(1).unwrap();
+    let width: f64 = width.split('"').next().unwrap().parse().unwrap();
+    let axis = picture.split("width=\"").nth(1).unwrap();
+    let axis: f64 = axis.split('"').next().unwrap().parse::<f64>().unwrap() - 86.0 - 210.0;
+    let end_s = json(&farside(
+        folder.path(),
+        &["run", "storm.toml", "--no-log", "--json"],
+    ));
+    let end_s = end_s["sim_time_s"].as_f64().unwrap();
+    assert!(
+        (width / axis - 30.0 / end_s).abs() < 0.001,
+        "{width} of {axis}, {end_s} s"
+    );
+    // Before it began there is none.
+    let before = drawn(
+        folder.path(),
+        &["corridor", "--along", "125,162", "--at", "9s"],
+    );
+    assert!(!before.contains("links *: loss") && !before.contains("is down"));
+}
+
+/// The coordination graph is there if asked for, and how far a metre is always.
+#[test]
+fn a_map_shows_what_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = [
+        "run",
+        "--set",
+        "team.rovers=30",
+        "--until",
+        "10s",
+        "--out",
+        "run.mcap",
+    ];
+    farside(folder.path(), &run);
+    let (plain, with) = (
+        drawn(folder.path(), &[]),
+        drawn(folder.path(), &["--with", "coordination"]),
+    );
+    assert!(!plain.contains("class=\"coordination") && with.contains("class=\"coordination"));
+    assert!(plain.contains("class=\"scale\"") && plain.contains(" m</text>"));
+    assert!(plain.contains("contours every 5 m"));
+    let output = farside(
+        folder.path(),
+        &["draw", "run.mcap", "--with", "coordinaton"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    let says = text(&output.stderr);
+    assert!(says.contains("did you mean \"coordination\"?"), "{says}");
+    let output = farside(
+        folder.path(),
+        &["draw", "run.mcap", "corridor", "--with", "x"],
+    );
+    assert!(text(&output.stderr).contains("does not take --with"));
+}
+
 /// What a picture is written as is said by the file's ending, and by --format.
 #[test]
 fn pictures_are_written_for_papers_and_slides() {

@@ -235,7 +235,7 @@ fn a_run_is_reproduced_from_the_folder_alone() {
     assert_eq!(different["differences"][0]["part"], "metrics.arrived");
     assert_eq!(different["differences"].as_array().map(Vec::len), Some(1));
     let nowhere = again(&["--cell", "0", "--seed", "3", "--out", "no/x.mcap"]);
-    assert_eq!(nowhere.status.code(), Some(2), "{}", text(&nowhere.stderr));
+    assert_eq!(nowhere.status.code(), Some(3), "{}", text(&nowhere.stderr));
 }
 
 #[test]

@@ -23,12 +23,25 @@ const HEADER_BYTES: usize = 2 + 4 + 8 + 8 + 4;
 pub(super) type File = mcap::Writer<NoSeek<BufWriter<std::fs::File>>>;
 
 /// Creates the file and writes MCAP's own header.
-pub(super) fn create(path: &Path, compression: Compression) -> Result<Box<File>, LogError> {
+pub(super) fn create(
+    path: &Path,
+    compression: Compression,
+    code_version: &str,
+) -> Result<Box<File>, LogError> {
     let file = std::fs::File::create(path).map_err(|error| LogError::io(path, "create", error))?;
     let writer = options(compression)
+        .library(library(code_version))
         .create(NoSeek::new(BufWriter::with_capacity(256 * 1024, file)))
         .map_err(|error| LogError::mcap(path, error))?;
     Ok(Box::new(writer))
+}
+
+/// What a log says wrote it: this library, or the binary of somebody else's whose version names it.
+fn library(code_version: &str) -> String {
+    match code_version.contains(" (farside ") {
+        true => code_version.to_owned(),
+        false => concat!("farside ", env!("CARGO_PKG_VERSION")).to_owned(),
+    }
 }
 
 /// The same options on every machine: the bytes of a log depend on the run alone.

@@ -14,7 +14,7 @@ fn the_log_tells_what_the_report_tells() {
     assert_eq!(run.digest, Some(report.digest.to_string()));
     assert_eq!(run.counts, Some(report.counts.clone()));
     assert_eq!(run.end.as_deref(), Some("stopped"));
-    assert_eq!((run.seed, run.format.as_str()), (7, "1.2"));
+    assert_eq!((run.seed, run.format.as_str()), (7, "1.3"));
     let fates: u64 = info
         .topics
         .iter()

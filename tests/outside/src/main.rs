@@ -165,11 +165,13 @@ impl OwnTable for Beacons {
             width: 400.0,
             height: 200.0,
             body: maud::html! { path class="axis" d=(svg::path(points)) {} },
+            facet: String::new(),
             style: "",
         })
     }
 }
 
 fn main() -> std::process::ExitCode {
-    cli::main(Registry::empty().with(Beacons::system()))
+    let registry = Registry::empty().with(Beacons::system());
+    cli::main(registry.named("beacons", env!("CARGO_PKG_VERSION")))
 }

@@ -14,6 +14,10 @@ pub(crate) const ALL: [Metric; 43] = [
         "tasks",
         Number,
         Neither,
+    )
+    .about(
+        "Tasks whose rover has no way that passes no other rover's start or goal; only where rovers \
+         stay at their goals.",
     ),
     Metric::new(
         "busiest_share",
@@ -192,5 +196,11 @@ pub(crate) const ALL: [Metric; 43] = [
         "",
         Rate,
         Neither,
-    ),
+    )
+    .about(
+        "Whether each rover has a way that passes no other rover's start or goal; only where rovers \
+         stay at their goals.",
+    )
+    .source("Cap, Vokrinek and Kleiner, *Complete decentralized method for on-line multi-robot \
+             trajectory planning in well-formed infrastructures*, ICAPS 2015."),
 ];

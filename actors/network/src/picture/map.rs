@@ -14,7 +14,7 @@ use maud::{Markup, html};
 
 use super::colouring;
 use super::relief::contours;
-use super::{Drawn, Surroundings};
+use super::{Drawn, Surroundings, counted};
 use crate::tracks::Sighting;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
@@ -94,13 +94,9 @@ pub(super) fn figure(run: &Drawn, at_ns: u64, coordination: bool) -> Figure {
         width: sheet.width + 2.0 * SIDE + LEGEND,
         height: height + TOP + SIDE,
         body,
+        facet: String::new(),
         style: super::STYLE,
     }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
 }
 
 impl<'a> Sheet<'a> {
@@ -332,7 +328,9 @@ impl<'a> Sheet<'a> {
                 @let at = sensors.position_m(node);
                 @let name = format!("N{}", node.0 + 1);
                 @let at = labels.place(self.px([at.x, at.y]), 7.5, &name);
-                g class={ "n" (self.colour(node)) } { (over_lines("post-name", at, "middle", &name)) }
+                g class={ "n" (self.colour(node)) } {
+                    (over_lines("post-name", at, "middle", &name))
+                }
             }
         }
     }

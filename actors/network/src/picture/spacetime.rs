@@ -9,7 +9,7 @@ use farside_actors::invariants::Place;
 use farside_worlds::VertexId;
 use maud::{Markup, html};
 
-use super::{Drawn, PictureError, VertexLine, colouring, corridor};
+use super::{Drawn, PictureError, VertexLine, colouring, corridor, counted};
 use crate::tracks::Mark;
 use crate::waits::{Waits, nearer};
 use farside_actors::figure::Figure;
@@ -213,6 +213,7 @@ pub(super) fn figure(
                 106.0
             },
         body,
+        facet: String::new(),
         style: super::STYLE,
     })
 }
@@ -250,12 +251,15 @@ impl Diagram<'_> {
         let (from, to) = [self.from_ns, self.to_ns]
             .map(SimDuration::from_nanos)
             .into();
-        let mut says = format!("{} rovers on it between {from} and {to}.", rovers.len());
+        let mut says = format!(
+            "{} on it between {from} and {to}.",
+            counted(rovers.len(), "rover")
+        );
         if let Some(ns) = locked {
             let cycle = libm::floor(ns as f64 / self.cycle_ns);
+            let time = self.or_seconds(ns);
             says.push_str(&format!(
-                " From cycle {cycle} on rovers wait for each other in a circle, and nobody on it \
-                 moves."
+                " From cycle {cycle}{time} on rovers on it wait for each other in a circle."
             ));
         }
         let rovers = self.run.tracks.at(self.to_ns);
@@ -318,21 +322,21 @@ impl Diagram<'_> {
             text class="label" x="16" y=(Px(self.area.top - 14.0)) { "vertex" }
             path class="axis" d=(path([(left, bottom), (right, bottom)])) {}
             @if self.counts_seconds() {
-                (self.times(bottom, &self.seconds, "time (s); a planning cycle lasts 1 s"))
+                (self.times(bottom, &self.seconds, 10.0, "time (s); a planning cycle lasts 1 s"))
             } @else {
-                (self.times(bottom, &self.cycles, ""))
-                text class="label" x=(Px(right + 12.0)) y=(Px(bottom + 20.0)) { "planning cycle" }
+                (self.times(bottom, &self.cycles, self.whole_cycles(), ""))
+                text class="label" x=(Px(right + 28.0)) y=(Px(bottom + 20.0)) { "planning cycle" }
                 path class="axis" d=(path([(left, bottom + 40.0), (right, bottom + 40.0)])) {}
-                (self.times(bottom + 40.0, &self.seconds, ""))
-                text class="label" x=(Px(right + 12.0)) y=(Px(bottom + 60.0)) { "time (s)" }
+                (self.times(bottom + 40.0, &self.seconds, 10.0, ""))
+                text class="label" x=(Px(right + 28.0)) y=(Px(bottom + 60.0)) { "time (s)" }
             }
         }
     }
 
     /// Marks of an axis at a height, and below them what they count.
-    fn times(&self, y: f64, scale: &Scale, counted: &str) -> Markup {
+    fn times(&self, y: f64, scale: &Scale, count: f64, counted: &str) -> Markup {
         html! {
-            @for tick in thinned(&scale.ticks(10.0), self.area.width, 13.0) {
+            @for tick in thinned(&scale.ticks(count), self.area.width, 13.0) {
                 @let x = self.area.x(tick.at);
                 path class="axis" d=(path([(x, y), (x, y + 5.0)])) {}
                 text class="tick" x=(Px(x)) y=(Px(y + 20.0)) text-anchor="middle" { (tick.text) }
@@ -345,9 +349,22 @@ impl Diagram<'_> {
         }
     }
 
+    /// About how many cycles are marked: none between two.
+    fn whole_cycles(&self) -> f64 {
+        ((self.to_ns - self.from_ns) as f64 / self.cycle_ns).clamp(1.0, 10.0)
+    }
+
     /// Cycles last a second each: one axis is both.
     fn counts_seconds(&self) -> bool {
         self.run.site.cycle == SimDuration::from_secs(1)
+    }
+
+    /// The time beside a cycle, where the one does not say the other.
+    fn or_seconds(&self, ns: u64) -> String {
+        match self.counts_seconds() {
+            true => String::new(),
+            false => format!(" ({:.1} s)", ns as f64 / 1e9),
+        }
     }
 
     /// Half the height between two vertices.
@@ -370,7 +387,7 @@ impl Diagram<'_> {
             path class="closes" d=(path([(x, top), (x, bottom)])) {}
             text class="red" x=(Px(if late { x - 4.0 } else { x + 4.0 })) y=(Px(top - 3.0))
                 text-anchor=(if late { "end" } else { "start" }) {
-                "cycle " (cycle) ", " (SimDuration::from_nanos(ns)) ": the circle closes"
+                "cycle " (cycle) (self.or_seconds(ns)) ": the circle closes"
             }
         }
     }

@@ -480,7 +480,10 @@ fn what_cannot_be_is_refused() {
             "0: expected 1 to 16777216; 1 is stop and wait",
         ),
         ("mtu = '0B'", "0B: expected more than that"),
-        ("fifo = true\nin_order = true", "duplicate field"),
+        (
+            "fifo = true\nin_order = true",
+            "are names of one key, `fifo`",
+        ),
     ] {
         let error = toml::from_str::<LinkParams>(text).unwrap_err().to_string();
         assert!(error.contains(expected), "{text}: {error}");

@@ -159,6 +159,9 @@ mod tests {
         let class = failed[0].attribute("classname").unwrap();
         assert!(class.ends_with("cell 1 (<10%> & 'more')"), "{class}");
         // Without a check, each cell is a case, and what went wrong in it its failure.
+        now.runs[0].outcome = RunOutcome::Failed {
+            error: "<path> left & none".to_owned(),
+        };
         let text = junit(&now, None);
         let document = roxmltree::Document::parse(&text).unwrap();
         let cases = document.descendants();

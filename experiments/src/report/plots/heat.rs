@@ -93,6 +93,7 @@ pub(super) fn map(study: &Study<'_>, measure: &Measure<'_>) -> Option<Figure> {
         width: (area.x(1.0) + 12.0).max(WIDTH),
         height: area.y(0.0) + 52.0,
         body,
+        facet: String::new(),
         style: "",
     })
 }
@@ -166,13 +167,14 @@ impl Map<'_> {
             g {
                 rect class="field" x=(Px(x)) y=(Px(y)) width=(Px(width)) height=(Px(height))
                     fill=(colour) { title { (says) } }
-                text class=(class) x=(Px(middle)) y=(Px(centre + if interval.is_some() { -2.0 } else { 4.5 }))
-                    text-anchor="middle" {
+                text class=(class) x=(Px(middle)) text-anchor="middle"
+                    y=(Px(centre + if interval.is_some() { -2.0 } else { 4.5 })) {
                     (field_text(self.measure, &estimate))
                     @if self.measure.is_partial(summary) { "†" }
                 }
                 @if let Some(interval) = interval {
-                    text class={ "small " (class) } x=(Px(middle)) y=(Px(centre + 13.0)) text-anchor="middle" {
+                    text class={ "small " (class) } x=(Px(middle)) y=(Px(centre + 13.0))
+                        text-anchor="middle" {
                         (interval)
                     }
                 }
@@ -215,7 +217,8 @@ impl Map<'_> {
             text class="tick" x=(Px(right)) y=(Px(y + 10.5)) text-anchor="end" { (ends[1]) }
             @if self.study.summary.baseline.is_some() {
                 @let y = self.area.y(0.0) + 42.0;
-                rect class="baseline key" x=(Px(right - 74.0)) y=(Px(y - 10.0)) width="11" height="11" {}
+                rect class="baseline key" x=(Px(right - 74.0)) y=(Px(y - 10.0))
+                    width="11" height="11" {}
                 text class="tick" x=(Px(right)) y=(Px(y)) text-anchor="end" { "baseline" }
             }
             path class="axis" d=(path([

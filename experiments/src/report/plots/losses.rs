@@ -78,6 +78,7 @@ pub(in crate::report) fn figure(study: &Study<'_>) -> Option<Figure> {
         width: WIDTH,
         height: area.y(0.0) + 50.0,
         body,
+        facet: String::new(),
         style: "",
     })
 }
