@@ -50,11 +50,12 @@ pub(crate) struct Args {
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Run nothing: write scripts for Slurm beside the folder, an array of N shards and their merge
-    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "merge"])]
+    #[arg(long, value_name = "N")]
+    #[arg(conflicts_with_all = ["shard", "merge", "dry_run", "check", "junit"])]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     array: Option<u32>,
     /// Run nothing: write results.csv of what N shards did, or name those that have runs left
-    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "jobs"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["shard", "jobs", "dry_run"])]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     merge: Option<u32>,
     /// Set a key of the scenario in every cell, as in team.rovers=25; may be repeated

@@ -209,7 +209,15 @@ fn scripts_are_refused_where_they_would_do_harm() {
         said.contains("--array 7: the study has 6 runs: 6 at most"),
         "{said}"
     );
-    assert!(refused(&["--array", "2", "--shard", "1/2"]).contains("cannot be used with"));
+    for more in [
+        &["--shard", "1/2"][..],
+        &["--merge", "2"],
+        &["--dry-run"],
+        &["--check", "x"],
+    ] {
+        let said = refused(&[&["--array", "2"], more].concat());
+        assert!(said.contains("cannot be used with"), "{said}");
+    }
     assert!(refused(&["--merge", "2"]).contains("it has no manifest.json"));
     study(&place, &["--out", "r", "--array", "2"]);
     study(&place, &["--out", "r", "--array", "2"]);

@@ -23,6 +23,25 @@ fn cell(text: &str) -> String {
     words.join(" ").replace('|', "\\|").replace('<', "&lt;")
 }
 
+/// A list of names, each as code.
+fn names(list: &Value) -> String {
+    let list = list.as_array().into_iter().flatten();
+    let names = list
+        .filter_map(Value::as_str)
+        .map(|name| format!("`{name}`"));
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// Where a key or a metric is from.
+fn source(entry: &Value) -> String {
+    let source = cell(text(entry, "source"));
+    let source = source.trim_end_matches('.');
+    match source {
+        "" => String::new(),
+        source => format!("<br>Source: {source}."),
+    }
+}
+
 /// A default as scenarios write it.
 fn default(value: &Value) -> String {
     match value {
@@ -53,20 +72,20 @@ fn keys(entries: &[Value]) -> String {
             last = Some(table);
         }
         let mut about = cell(text(entry, "about"));
-        let expected = cell(text(entry, "expected"));
+        let expected = ["value", "expected"].map(|field| cell(text(entry, field)));
+        let expected: Vec<String> = expected.into_iter().filter(|one| !one.is_empty()).collect();
         if !expected.is_empty() {
-            about += &format!("<br>Expected: {expected}.");
+            about += &format!("<br>Expected: {}.", expected.join(", "));
         }
-        let aliases: Vec<String> = entry["aliases"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_str)
-            .map(|name| format!("`{name}`"))
-            .collect();
+        let units = names(&entry["units"]);
+        if !units.is_empty() {
+            about += &format!("<br>Units: {units}.");
+        }
+        let aliases = names(&entry["aliases"]);
         if !aliases.is_empty() {
-            about += &format!("<br>Also called {}.", aliases.join(", "));
+            about += &format!("<br>Also called {aliases}.");
         }
+        about += &source(entry);
         page += &format!("| `{key}` | {about} | {} |\n", default(&entry["default"]));
     }
     page
@@ -94,7 +113,7 @@ fn metrics(entries: &[Value]) -> String {
         let what = match about.is_empty() {
             true => label,
             false => format!("{label}<br>{about}"),
-        };
+        } + &source(entry);
         let better = text(entry, "better").trim_end_matches(" is better");
         let kind = text(entry, "kind").trim_end_matches(" for each run");
         page += &format!(
