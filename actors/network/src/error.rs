@@ -2,6 +2,7 @@
 
 use farside::SimDuration;
 use farside_actors::link::LinkConfigError;
+use farside_actors::system::SetupError;
 use farside_worlds::VertexId;
 
 use crate::config::ConfigError;
@@ -98,4 +99,31 @@ pub enum NetworkError {
 fn listed(vertices: &[VertexId]) -> String {
     let all: Vec<String> = vertices.iter().map(VertexId::to_string).collect();
     all.join(", ")
+}
+
+/// The error with the key to blame.
+pub(crate) fn blame(error: NetworkError) -> SetupError {
+    match error {
+        NetworkError::Links(error) => error.into(),
+        NetworkError::Config(ConfigError::Value { key, message }) => {
+            SetupError::value(&key, message)
+        }
+        error => SetupError::value(key_of(&error), error),
+    }
+}
+
+/// The key to blame.
+fn key_of(error: &NetworkError) -> &'static str {
+    match error {
+        NetworkError::NoRovers => "team.rovers",
+        NetworkError::Endpoints { .. } => "world.endpoints",
+        NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
+        NetworkError::SlowEdge { .. } => "network.speed",
+        NetworkError::Uncovered { .. }
+        | NetworkError::CannotCross
+        | NetworkError::Refused { .. } => "world.gaps",
+        NetworkError::UnknownSource { .. } => "network.roadmap_from",
+        NetworkError::Config(ConfigError::Planned { key }) => key,
+        _ => "network",
+    }
 }

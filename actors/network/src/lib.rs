@@ -117,6 +117,7 @@ mod node;
 #[cfg(test)]
 mod open_tests;
 mod picture;
+mod place;
 pub mod reservation;
 mod rover;
 mod safety;

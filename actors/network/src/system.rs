@@ -2,26 +2,25 @@
 
 use std::sync::Arc;
 
-use farside::{Report, SimDuration};
+use farside::Report;
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
     Assembly, Builtin, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording, Renamed,
     Results, Section, Settings, Setup, SetupError, System,
 };
-use farside_worlds::movingai::GridWorld;
-use farside_worlds::{HeightField, Roadmap, SensorNetwork};
+use farside_worlds::SensorNetwork;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::assemble::declare;
+use crate::error::blame;
+use crate::place::Place;
 use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
-use crate::world::{RoadmapGround, crater, ground, in_crater, place};
+use crate::world::in_crater;
 use crate::{
-    CompleteConfig, ConfigError, MaxPlusConfig, Missions, Network, NetworkConfig, NetworkError,
-    NetworkMetrics, NoProgress, Parts, TeamConfig, WorldConfig, assemble, builtin, metrics,
-    missions, picture,
+    CompleteConfig, MaxPlusConfig, Network, NetworkConfig, NetworkError, NetworkMetrics,
+    NoProgress, TeamConfig, WorldConfig, assemble, builtin, metrics, picture,
 };
 
 /// The network-guided system.
@@ -159,77 +158,6 @@ impl Settings for NetworkScenario {
     }
 }
 
-/// Where a run takes place, and who drives, before anything is declared.
-pub(crate) struct Place {
-    pub(crate) roadmap: Arc<Roadmap>,
-    pub(crate) sensors: Arc<SensorNetwork>,
-    grid: Option<GridWorld>,
-    missions: Missions,
-    terrain: Option<Arc<HeightField>>,
-}
-
-impl Place {
-    pub(crate) fn of(
-        scenario: &NetworkScenario,
-        setup: &mut Setup<'_>,
-    ) -> Result<Self, SetupError> {
-        let world = &scenario.world;
-        let RoadmapGround { roadmap, grid } = ground(world, scenario.team.rovers, setup.files)?;
-        let roadmap = Arc::new(roadmap);
-        let sensors = Arc::new(place(world, &roadmap, setup.problem_seed)?);
-        let missions = match &grid {
-            Some(grid) => Missions::Standing(grid.tasks().to_vec()),
-            None => {
-                let drawn = missions(world, &roadmap, &scenario.team, setup.problem_seed);
-                Missions::Queued(drawn.map_err(blame)?)
-            }
-        };
-        let terrain = match setup.has_radios() && in_crater(world) {
-            true => Some(Arc::new(crater()?.terrain().clone())),
-            false => None,
-        };
-        Ok(Place {
-            roadmap,
-            sensors,
-            grid,
-            missions,
-            terrain,
-        })
-    }
-
-    fn parts<'a>(&self, scenario: &'a NetworkScenario) -> Parts<'a> {
-        Parts {
-            world: &scenario.world,
-            roadmap: self.roadmap.clone(),
-            sensors: self.sensors.clone(),
-            config: &scenario.network,
-            terrain: self.terrain.clone(),
-        }
-    }
-
-    /// How long a cycle of a run here is. `"auto"` depends on the links, so they are declared.
-    pub(crate) fn cycle(
-        &self,
-        scenario: &NetworkScenario,
-        setup: &mut Setup<'_>,
-    ) -> Result<SimDuration, SetupError> {
-        let parts = self.parts(scenario);
-        let declared = setup.wired(|sim, wire| declare(sim, &parts, &self.missions, wire));
-        Ok(declared.map_err(blame)?.timing.cycle)
-    }
-}
-
-/// The error with the key to blame.
-fn blame(error: NetworkError) -> SetupError {
-    match error {
-        NetworkError::Links(error) => error.into(),
-        NetworkError::Config(ConfigError::Value { key, message }) => {
-            SetupError::value(&key, message)
-        }
-        error => SetupError::value(key_of(&error), error),
-    }
-}
-
 /// Where nobody hears a rover, and which rovers that leaves without a way.
 fn gaps(sensors: &SensorNetwork, system: &Network) -> Vec<String> {
     if sensors.gaps().is_empty() {
@@ -262,22 +190,6 @@ fn guarantee(results: &mut Results, blocked: &[String]) {
         [first, rest @ ..] => format!("not well-formed: {first}; and {} more", rest.len()),
     };
     results.summary.push(("instance".to_owned(), text));
-}
-
-/// The key to blame.
-fn key_of(error: &NetworkError) -> &'static str {
-    match error {
-        NetworkError::NoRovers => "team.rovers",
-        NetworkError::Endpoints { .. } => "world.endpoints",
-        NetworkError::Config(ConfigError::Schedule { .. }) => "network.cycle",
-        NetworkError::SlowEdge { .. } => "network.speed",
-        NetworkError::Uncovered { .. }
-        | NetworkError::CannotCross
-        | NetworkError::Refused { .. } => "world.gaps",
-        NetworkError::UnknownSource { .. } => "network.roadmap_from",
-        NetworkError::Config(ConfigError::Planned { key }) => key,
-        _ => "network",
-    }
 }
 
 /// The most collisions that are named where a run is called wrong.

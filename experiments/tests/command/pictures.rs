@@ -144,20 +144,23 @@ fn pictures_count_the_cycles_of_the_run() {
 /// What befell a run is in its corridor's picture: who was down, and what was worse, when.
 #[test]
 fn crashes_and_degradations_are_marked() {
-    const STORM: &str = "system = 'network'\nseed = 3\nuntil = '80s'\n\
+    const STORM: &str = "system = 'network'\nseed = 3\nuntil = '160s'\n\
         team.rovers = 40\nnetwork.policy = 'complete'\nnetwork.failover_after = 3\n\
+        links.default.loss = 0.02\n\
         [[degrade]]\nlinks = '*'\nat = '30s'\nuntil = '60s'\nloss = '40%'\n\
+        [[degrade]]\nlinks = 'node_*-rover_*'\nat = '50s'\nuntil = '75s'\nlatency = '800ms'\n\
+        [[crash]]\nactor = 'node_05'\nat = '40s'\nrestart_after = '20s'\n\
         [[crash]]\nactor = 'rover_07'\nat = '20s'\nrestart_after = '15s'\n\
-        [[crash]]\nactor = 'node_27'\nat = '10s'\n";
+        [[crash]]\nactor = 'rover_12'\nat = '45s'\nrestart_after = '10s'\n";
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("storm.toml"), STORM).unwrap();
     farside(folder.path(), &["run", "storm.toml", "--out", "run.mcap"]);
-    let picture = drawn(folder.path(), &["corridor", "--along", "125,162"]);
+    let picture = drawn(folder.path(), &["corridor"]);
     for said in ["links *: loss 0.4</text>", "rover_07 is down</text>"] {
         assert!(picture.contains(said), "{said}");
     }
-    assert_eq!(picture.matches("<rect class=\"worse\"").count(), 1);
-    // From 30 s to 60 s of 80: three eighths of the width.
+    assert_eq!(picture.matches("<rect class=\"worse\"").count(), 2);
+    // The first is as wide as 30 s of the run are.
     let (_, rest) = picture.split_once("<rect class=\"worse\"").unwrap();
     let width = rest.split("width=\"").nth(1).unwrap();
     let width: f64 = width.split('"').next().unwrap().parse().unwrap();
@@ -173,10 +176,7 @@ fn crashes_and_degradations_are_marked() {
         "{width} of {axis}, {end_s} s"
     );
     // Before it began there is none.
-    let before = drawn(
-        folder.path(),
-        &["corridor", "--along", "125,162", "--at", "9s"],
-    );
+    let before = drawn(folder.path(), &["corridor", "--at", "9s"]);
     assert!(!before.contains("links *: loss") && !before.contains("is down"));
 }
 

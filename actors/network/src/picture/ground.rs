@@ -8,8 +8,8 @@ use farside_worlds::movingai::{Cell, GridMap, GridWorld};
 
 use super::{Site, Surroundings};
 use crate::Policy;
+use crate::place::Place;
 use crate::scenario::NetworkScenario;
-use crate::system::Place;
 use crate::waits::WaitRule;
 use crate::world::{crater, grid, in_crater, is_grid};
 
