@@ -19,7 +19,7 @@
 /// }
 /// let (about, source) = Counted::about("heard").unwrap();
 /// assert_eq!(about, "How many were heard, copies not counted.");
-/// assert_eq!((source, Counted::default().heard), ("a paper, section 2.", 0));
+/// assert_eq!((source.as_str(), Counted::default().heard), ("a paper, section 2.", 0));
 /// assert_eq!(Counted::about("herd"), None);
 /// ```
 #[macro_export]

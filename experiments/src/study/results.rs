@@ -413,6 +413,10 @@ pub struct RunRecord {
 /// What came of one run: figures, or why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "status", deny_unknown_fields)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all runs come to their end: a box for each would save nothing"
+)]
 pub enum RunOutcome {
     /// It came to its end.
     Done {

@@ -171,7 +171,10 @@ fn write_first(
 ) -> fmt::Result {
     write!(f, "{} s on {}", Seconds(first.time_ns), Shown(&first.topic))?;
     if first.injected {
-        write!(f, ": injected before the run")?;
+        // With a class before 1.3's topics as well: `/event/crash/node_07`.
+        let class = first.topic.split('/').nth(2).unwrap_or_default();
+        let whom = Shown(&first.receiver);
+        write!(f, ": {} of {whom}, injected before the run", Shown(class))?;
     } else if !first.sender.is_empty() {
         write!(
             f,
