@@ -1,6 +1,8 @@
-//! The event queue: small keys here, payloads elsewhere. The earliest events stand sorted, the
-//! others in a quaternary heap; the events of the present instant pass through a FIFO and touch
-//! neither.
+//! The event queue: small keys here, payloads elsewhere. The earliest events stand sorted, the next
+//! in a quaternary heap, and where very many wait, the later ones in buckets; the events of the
+//! present instant pass through a FIFO and touch none of these.
+
+mod far;
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;
@@ -10,6 +12,8 @@ use dary_heap::QuaternaryHeap;
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
 use crate::time::SimTime;
+
+use far::Far;
 
 /// An event's key and the slot of its payload: half a cache line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,19 +110,42 @@ impl PartialOrd for Entry {
 /// few costs less than a way through a heap.
 const NEAR: usize = 48;
 
+/// So many are sorted at most: a bucket of later events is taken whole.
+const SORTED: usize = 512;
+
+/// A heap of more than this is spread over buckets. A smaller one lies in the first cache.
+const HEAP: usize = 512;
+
 /// Events yet to be handled, by key.
-#[derive(Default)]
 pub(crate) struct Queue {
     /// The earliest of the events in time, latest first.
     near: Vec<Entry>,
-    /// The others: none has a lesser key than any in `near`.
-    far: QuaternaryHeap<Entry>,
+    /// None has a lesser key than any in `near`.
+    heap: QuaternaryHeap<Entry>,
+    /// At its horizon or later; the others in time come before it.
+    far: Far,
+    /// The size at which the heap is spread.
+    spread_at: usize,
     /// The rest of the present step, in key order.
     present: VecDeque<Entry>,
     /// The next step of the present instant, in order of arrival.
     next: Vec<Entry>,
     /// Time and step of the last event taken.
     now: Option<Bound>,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Queue {
+            near: Vec::new(),
+            heap: QuaternaryHeap::default(),
+            far: Far::default(),
+            spread_at: HEAP,
+            present: VecDeque::new(),
+            next: Vec::new(),
+            now: None,
+        }
+    }
 }
 
 impl Queue {
@@ -144,37 +171,81 @@ impl Queue {
 
     #[inline]
     fn push_timed(&mut self, entry: Entry) {
-        let is_far = match self.near.first() {
-            Some(latest) => {
-                latest.before(&entry) && (self.near.len() >= NEAR || !self.far.is_empty())
-            }
-            None => !self.far.is_empty(),
-        };
-        if is_far {
+        if entry.time.as_nanos() >= self.far.horizon_ns() {
             self.far.push(entry);
             return;
         }
-        // Among so few, walking from the earliest is faster than halving.
+        let is_later = match self.near.first() {
+            Some(latest) => {
+                latest.before(&entry) && (self.near.len() >= NEAR || !self.heap.is_empty())
+            }
+            None => !self.heap.is_empty(),
+        };
+        if is_later {
+            self.heap.push(entry);
+            if self.heap.len() > self.spread_at {
+                self.spread_heap();
+            }
+            return;
+        }
+        // Mostly among the earliest, where walking is faster than halving.
         let mut at = self.near.len();
-        while at > 0 && self.near[at - 1].before(&entry) {
+        let walked = at.saturating_sub(NEAR);
+        while at > walked && self.near[at - 1].before(&entry) {
             at -= 1;
         }
-        self.near.insert(at, entry);
-        if self.near.len() > NEAR {
-            self.far.push(self.near.remove(0));
+        if at == walked {
+            at = self.near[..walked].partition_point(|other| entry.before(other));
         }
+        self.near.insert(at, entry);
+        if self.near.len() > NEAR && self.heap.is_empty() && self.far.is_empty() {
+            self.heap.push(self.near.remove(0));
+        } else if self.near.len() > SORTED {
+            self.heap.extend(self.near.drain(..SORTED / 2));
+        }
+    }
+
+    /// Moves what comes later than `near` from the heap to buckets.
+    #[cold]
+    fn spread_heap(&mut self) {
+        let after = self.near.first().map(|latest| latest.time.as_nanos());
+        if let Some(horizon_ns) = after.and_then(|time_ns| time_ns.checked_add(1))
+            && self.far.is_empty()
+        {
+            self.far.begin(horizon_ns);
+            for entry in std::mem::take(&mut self.heap) {
+                if entry.time.as_nanos() >= horizon_ns {
+                    self.far.push(entry);
+                } else {
+                    self.heap.push(entry);
+                }
+            }
+            self.far.end_if_empty();
+        }
+        // Where so many come at one time, this is not to be tried at each.
+        self.spread_at = HEAP.max(2 * self.heap.len());
     }
 
     /// The earliest event that is not of the present instant's later steps.
     #[inline]
     fn timed(&mut self) -> Option<&Entry> {
-        if self.near.is_empty() && !self.far.is_empty() {
-            // From the heap they come in order: the earliest first, which belongs at the end.
-            self.near
-                .extend((0..NEAR / 2).map_while(|_| self.far.pop()));
-            self.near.reverse();
+        if self.near.is_empty() {
+            self.refill();
         }
         self.near.last()
+    }
+
+    fn refill(&mut self) {
+        if !self.heap.is_empty() {
+            // From the heap they come in order: the earliest first, which belongs at the end.
+            self.near
+                .extend((0..NEAR / 2).map_while(|_| self.heap.pop()));
+            self.near.reverse();
+        } else if !self.far.is_empty() {
+            self.far.take_next(&mut self.near);
+            // Greatest entry first is least key first, which belongs at the end.
+            self.near.sort_unstable();
+        }
     }
 
     /// Time and step of the next event.
@@ -222,14 +293,15 @@ impl Queue {
     /// Keeps the entries that `keep` accepts; for shedding cancelled timers.
     pub(crate) fn retain(&mut self, mut keep: impl FnMut(&Entry) -> bool) {
         self.near.retain(|entry| keep(entry));
-        self.far.retain(|entry| keep(entry));
+        self.heap.retain(|entry| keep(entry));
+        self.far.retain(&mut keep);
         self.present.retain(|entry| keep(entry));
         self.next.retain(|entry| keep(entry));
     }
 
     /// Everything left, in key order.
     pub(crate) fn drain_sorted(&mut self) -> Vec<Entry> {
-        let mut rest: Vec<Entry> = self.far.drain().collect();
+        let mut rest: Vec<Entry> = self.far.drain().chain(self.heap.drain()).collect();
         rest.append(&mut self.near);
         rest.extend(self.present.drain(..));
         rest.append(&mut self.next);
@@ -239,60 +311,4 @@ impl Queue {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    fn entry(time: u64, step: u32, source: u32, count: u64) -> Entry {
-        let key = EventKey {
-            time: SimTime::from_nanos(time),
-            step,
-            tie: 0,
-            source: EntityId(source),
-            count,
-        };
-        Entry::new(key, 0)
-    }
-
-    proptest! {
-        /// Whatever handlers push, at this instant or later, and wherever a window ends, events
-        /// come out in key order and none is lost.
-        #[test]
-        fn pops_in_key_order(
-            start in prop::collection::vec((0u64..4, 0u32..5), 1..120),
-            pushes in prop::collection::vec((0u64..90, 0u32..5), 0..400),
-            windows in any::<bool>(),
-        ) {
-            let mut queue = Queue::default();
-            let mut count = 0;
-            for (time, source) in start {
-                count += 1;
-                queue.push(entry(time, 0, source, count));
-            }
-            let mut pushes = pushes.into_iter();
-            let mut last: Option<EventKey> = None;
-            let mut taken = 0;
-            while let Some(head) = queue.peek() {
-                let bound = match windows {
-                    true => Bound { time: head.time, step: head.step + 1 },
-                    false => Bound::NEVER,
-                };
-                while let Some(popped) = queue.pop_before(bound) {
-                    prop_assert!(popped.bound() < bound);
-                    prop_assert!(last.is_none_or(|last| last < popped.key()));
-                    last = Some(popped.key());
-                    taken += 1;
-                    if let Some((delay, source)) = pushes.next() {
-                        // One in three at once, the others near and far.
-                        let delay = delay.saturating_sub(30);
-                        count += 1;
-                        let step = if delay == 0 { popped.bound().step + 1 } else { 0 };
-                        queue.push(entry(popped.bound().time.as_nanos() + delay, step, source, count));
-                    }
-                }
-            }
-            prop_assert_eq!(taken, count);
-        }
-    }
-}
+mod tests;
