@@ -15,7 +15,7 @@ use thiserror::Error;
 
 /// What a figure is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Kind {
+pub enum FigureFormat {
     /// As it is drawn: for browsers and the web.
     Svg,
     /// For papers: vectors, with the fonts in it
@@ -24,18 +24,18 @@ pub enum Kind {
     Png,
 }
 
-impl Kind {
+impl FigureFormat {
     /// The ending of files of this kind.
     pub fn ending(self) -> &'static str {
         match self {
-            Kind::Svg => "svg",
-            Kind::Pdf => "pdf",
-            Kind::Png => "png",
+            FigureFormat::Svg => "svg",
+            FigureFormat::Pdf => "pdf",
+            FigureFormat::Png => "png",
         }
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for FigureFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.ending().to_uppercase())
     }
@@ -51,12 +51,12 @@ pub enum ExportError {
          `rsvg-convert --format {ending} FIGURE.svg --output FIGURE.{ending}` does",
         ending = .0.ending()
     )]
-    NotBuiltIn(Kind),
+    NotBuiltIn(FigureFormat),
     /// The renderer does not take it.
     #[error("the figure cannot be turned into {kind}: {message}")]
     NotDrawn {
         /// Into what.
-        kind: Kind,
+        kind: FigureFormat,
         /// What the renderer says.
         message: String,
     },
@@ -75,9 +75,11 @@ pub struct Exported {
 ///
 /// # Errors
 /// If the feature `export` is off, and the kind is not SVG.
-pub fn check(kind: Kind) -> Result<(), ExportError> {
+pub fn check(kind: FigureFormat) -> Result<(), ExportError> {
     match kind {
-        Kind::Pdf | Kind::Png if !cfg!(feature = "export") => Err(ExportError::NotBuiltIn(kind)),
+        FigureFormat::Pdf | FigureFormat::Png if !cfg!(feature = "export") => {
+            Err(ExportError::NotBuiltIn(kind))
+        }
         _ => Ok(()),
     }
 }
@@ -86,7 +88,7 @@ pub fn check(kind: Kind) -> Result<(), ExportError> {
 ///
 /// # Errors
 /// Those of [`check`].
-pub fn kinds(first: Kind, more: &[Kind]) -> Result<Vec<Kind>, ExportError> {
+pub fn kinds(first: FigureFormat, more: &[FigureFormat]) -> Result<Vec<FigureFormat>, ExportError> {
     let mut kinds = vec![first];
     for kind in more {
         if !kinds.contains(kind) {
@@ -102,7 +104,7 @@ pub fn kinds(first: Kind, more: &[Kind]) -> Result<Vec<Kind>, ExportError> {
 /// # Errors
 /// For all other kinds.
 #[cfg(not(feature = "export"))]
-pub fn export(svg: &str, kind: Kind) -> Result<Exported, ExportError> {
+pub fn export(svg: &str, kind: FigureFormat) -> Result<Exported, ExportError> {
     check(kind)?;
     let bytes = svg.as_bytes().to_vec();
     let missing = Vec::new();
@@ -114,7 +116,7 @@ pub use renderers::export;
 
 #[cfg(feature = "export")]
 mod renderers {
-    use super::{ExportError, Exported, Kind, fonts};
+    use super::{ExportError, Exported, FigureFormat, fonts};
     use resvg::{tiny_skia, usvg};
 
     /// How many pixels of a PNG there are for one of the figure.
@@ -125,9 +127,9 @@ mod renderers {
     ///
     /// # Errors
     /// If the renderer does not take it.
-    pub fn export(svg: &str, kind: Kind) -> Result<Exported, ExportError> {
+    pub fn export(svg: &str, kind: FigureFormat) -> Result<Exported, ExportError> {
         let drawn = |message: String| ExportError::NotDrawn { kind, message };
-        if kind == Kind::Svg {
+        if kind == FigureFormat::Svg {
             let bytes = svg.as_bytes().to_vec();
             let missing = Vec::new();
             return Ok(Exported { bytes, missing });
@@ -135,12 +137,12 @@ mod renderers {
         let (options, missing) = fonts::options(svg);
         let tree = usvg::Tree::from_str(svg, &options).map_err(|error| drawn(error.to_string()))?;
         let bytes = match kind {
-            Kind::Pdf => {
+            FigureFormat::Pdf => {
                 let page = svg2pdf::PageOptions::default();
                 svg2pdf::to_pdf(&tree, svg2pdf::ConversionOptions::default(), page)
                     .map_err(|error| drawn(error.to_string()))?
             }
-            Kind::Svg | Kind::Png => {
+            FigureFormat::Svg | FigureFormat::Png => {
                 let size = tree.size().to_int_size();
                 let side = |pixels: u32| (pixels as f32 * PNG_SCALE) as u32;
                 let mut pixels = tiny_skia::Pixmap::new(side(size.width()), side(size.height()))

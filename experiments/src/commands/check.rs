@@ -2,7 +2,7 @@
 
 use super::Exit;
 use super::describe::commented;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::{CommandError, print_document};
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Scenario, Path::new(&args.scenario), registry)?;
+    kinds::expect(FileKind::Scenario, Path::new(&args.scenario), registry)?;
     let scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     // Much of what can be wrong shows only in the world that is built.
     let assembled = scenario.assemble()?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use farside_logs::DiffOptions;
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
 
@@ -39,8 +39,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Log, &args.a, registry)?;
-    kinds::expect(Kind::Log, &args.b, registry)?;
+    kinds::expect(FileKind::Log, &args.a, registry)?;
+    kinds::expect(FileKind::Log, &args.b, registry)?;
     let options = DiffOptions {
         tolerance: args.tolerance,
         ignore: args.ignore.clone(),

@@ -21,7 +21,7 @@ use super::kinds;
 use super::output;
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
-use crate::export::{self, Kind};
+use crate::export::{self, FigureFormat};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -58,7 +58,7 @@ pub(crate) struct Args {
         value_delimiter = ',',
         hide_possible_values = true
     )]
-    format: Vec<Kind>,
+    format: Vec<FigureFormat>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -77,12 +77,12 @@ struct Document<'a> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let by_ending = |out: &PathBuf| {
         let ending = out.extension()?.to_str()?;
-        Kind::from_str(ending, true).ok()
+        FigureFormat::from_str(ending, true).ok()
     };
     let first = args.out.as_ref().and_then(by_ending);
-    let kinds = export::kinds(first.unwrap_or(Kind::Svg), &args.format)?;
+    let kinds = export::kinds(first.unwrap_or(FigureFormat::Svg), &args.format)?;
     let path = &args.log;
-    kinds::expect(kinds::Kind::Log, path, registry)?;
+    kinds::expect(kinds::FileKind::Log, path, registry)?;
     let log = Log::open(path)?;
     let summary = farside_logs::info(path)?.run.unwrap_or_default();
     let scenario = scenario_of(path, &summary, registry)?;
@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 }
 
 /// Writes the first kind where it is to be, and the others beside it.
-fn write(args: &Args, figure: &Figure, kinds: &[Kind]) -> Result<Exit, CommandError> {
+fn write(args: &Args, figure: &Figure, kinds: &[FigureFormat]) -> Result<Exit, CommandError> {
     let out = args.out.clone().unwrap_or_else(|| {
         let stem = args
             .log

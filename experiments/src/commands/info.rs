@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
 
@@ -21,7 +21,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Log, &args.log, registry)?;
+    kinds::expect(FileKind::Log, &args.log, registry)?;
     let info = farside_logs::info(&args.log)?;
     if args.json {
         print_json(&info)?;

@@ -16,20 +16,20 @@ const MAX_BYTES: u64 = 4 << 20;
 
 /// What commands take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FileKind {
     Scenario,
     Study,
     Log,
     Results,
 }
 
-impl Kind {
+impl FileKind {
     fn name(self) -> &'static str {
         match self {
-            Kind::Scenario => "a scenario",
-            Kind::Study => "a study",
-            Kind::Log => "a log",
-            Kind::Results => "a results folder",
+            FileKind::Scenario => "a scenario",
+            FileKind::Study => "a study",
+            FileKind::Log => "a log",
+            FileKind::Results => "a results folder",
         }
     }
 
@@ -37,13 +37,15 @@ impl Kind {
     fn commands(self, given: &str, program: &str) -> String {
         let command = |verb: &str| format!("`{program} {verb} {given}`");
         match self {
-            Kind::Scenario => format!("{} runs it, {} prints it", command("run"), command("check")),
-            Kind::Study => format!("{} runs it", command("study")),
-            Kind::Log => {
+            FileKind::Scenario => {
+                format!("{} runs it, {} prints it", command("run"), command("check"))
+            }
+            FileKind::Study => format!("{} runs it", command("study")),
+            FileKind::Log => {
                 let (info, verify) = (command("info"), command("verify"));
                 format!("{info} says what is in it, {verify} runs it again")
             }
-            Kind::Results => format!("{} writes it up", command("report")),
+            FileKind::Results => format!("{} writes it up", command("report")),
         }
     }
 }
@@ -53,7 +55,11 @@ impl Kind {
 ///
 /// # Errors
 /// [`CommandError::OtherKind`].
-pub(super) fn expect(wanted: Kind, given: &Path, registry: &Registry) -> Result<(), CommandError> {
+pub(super) fn expect(
+    wanted: FileKind,
+    given: &Path,
+    registry: &Registry,
+) -> Result<(), CommandError> {
     match kind_of(given, registry) {
         Some(found) if found != wanted => {
             let given = given.display().to_string();
@@ -70,25 +76,25 @@ pub(super) fn expect(wanted: Kind, given: &Path, registry: &Registry) -> Result<
 }
 
 /// What a name or a file is, if that is plain.
-fn kind_of(given: &Path, registry: &Registry) -> Option<Kind> {
+fn kind_of(given: &Path, registry: &Registry) -> Option<FileKind> {
     let name = given.to_string_lossy();
     if registry.scenario(&name).is_some() {
-        return Some(Kind::Scenario);
+        return Some(FileKind::Scenario);
     }
     if registry.study(&name).is_some() {
-        return Some(Kind::Study);
+        return Some(FileKind::Study);
     }
     let found = std::fs::metadata(given).ok()?;
     if found.is_dir() {
         let has_manifest = given.join("manifest.json").is_file();
-        return has_manifest.then_some(Kind::Results);
+        return has_manifest.then_some(FileKind::Results);
     }
     // A pipe that nobody writes to would be waited for without end.
     if !found.is_file() || found.len() > MAX_BYTES && !starts_as_log(given) {
         return None;
     }
     if starts_as_log(given) {
-        return Some(Kind::Log);
+        return Some(FileKind::Log);
     }
     let mut text = String::new();
     let file = File::open(given).ok()?;
@@ -96,8 +102,8 @@ fn kind_of(given: &Path, registry: &Registry) -> Option<Kind> {
     let table = text.parse::<toml::Table>().ok()?;
     let has = |key: &str| table.contains_key(key);
     match (has("system"), has("scenario") || has("factor")) {
-        (true, false) => Some(Kind::Scenario),
-        (false, true) => Some(Kind::Study),
+        (true, false) => Some(FileKind::Scenario),
+        (false, true) => Some(FileKind::Study),
         _ => None,
     }
 }
@@ -124,15 +130,15 @@ mod tests {
         std::fs::write(path("results/manifest.json"), "{}").unwrap();
         let registry = Registry::builtin();
         let kind = |name: &str| kind_of(&path(name), &registry);
-        assert_eq!(kind("log"), Some(Kind::Log));
-        assert_eq!(kind("scenario"), Some(Kind::Scenario));
-        assert_eq!(kind("study"), Some(Kind::Study));
-        assert_eq!(kind("results"), Some(Kind::Results));
+        assert_eq!(kind("log"), Some(FileKind::Log));
+        assert_eq!(kind("scenario"), Some(FileKind::Scenario));
+        assert_eq!(kind("study"), Some(FileKind::Study));
+        assert_eq!(kind("results"), Some(FileKind::Results));
         assert_eq!(kind("else"), None);
         assert_eq!(kind("nothing"), None);
         assert_eq!(kind_of(folder.path(), &registry), None);
         assert_eq!(kind_of(Path::new("/dev/zero"), &registry), None);
         let study = kind_of(Path::new("degradation/loss"), &registry);
-        assert_eq!(study, Some(Kind::Study));
+        assert_eq!(study, Some(FileKind::Study));
     }
 }

@@ -8,7 +8,7 @@ use farside_actors::figure::Figure;
 use farside_logs::refuse_input;
 
 use super::CommandError;
-use crate::export::{self, Kind};
+use crate::export::{self, FigureFormat};
 
 /// What a file is, by how all files of its kind that Farside writes begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,14 +105,14 @@ pub(super) fn write_bytes(
 pub(super) fn write_figure(
     path: PathBuf,
     figure: &Figure,
-    kind: Kind,
+    kind: FigureFormat,
     inputs: &[PathBuf],
 ) -> Result<String, CommandError> {
     let svg = figure.standalone();
     let format = match kind {
-        Kind::Svg => return write(path, &svg, Format::Svg, inputs),
-        Kind::Pdf => Format::Pdf,
-        Kind::Png => Format::Png,
+        FigureFormat::Svg => return write(path, &svg, Format::Svg, inputs),
+        FigureFormat::Pdf => Format::Pdf,
+        FigureFormat::Png => Format::Png,
     };
     let exported = export::export(&svg, kind)?;
     if !exported.missing.is_empty() {

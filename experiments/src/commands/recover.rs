@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
 
@@ -22,7 +22,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Log, &args.broken, registry)?;
+    kinds::expect(FileKind::Log, &args.broken, registry)?;
     let report = farside_logs::recover(&args.broken, &args.out)?;
     if args.json {
         print_json(&report)?;

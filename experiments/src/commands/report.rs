@@ -9,7 +9,7 @@ use super::Exit;
 use super::kinds;
 use super::output::{self, Format};
 use super::{CommandError, print, print_json};
-use crate::export::{self, Kind};
+use crate::export::{self, FigureFormat};
 use crate::registry::Registry;
 use crate::report::{self, Report};
 use crate::study::results::{Results, RunRecord};
@@ -31,7 +31,7 @@ pub(crate) struct Args {
         value_delimiter = ',',
         hide_possible_values = true
     )]
-    format: Vec<Kind>,
+    format: Vec<FigureFormat>,
     /// Print what was written where as JSON
     #[arg(long)]
     json: bool,
@@ -74,7 +74,7 @@ struct OfCell {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let kinds = export::kinds(Kind::Svg, &args.format)?;
+    let kinds = export::kinds(FigureFormat::Svg, &args.format)?;
     let [first, others @ ..] = args.folders.as_slice() else {
         return Err(CommandError::Arguments("which results folder?".to_owned()));
     };
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         }
     };
     for folder in &args.folders {
-        kinds::expect(kinds::Kind::Results, folder, registry)?;
+        kinds::expect(kinds::FileKind::Results, folder, registry)?;
     }
     let parts: Result<Vec<Results>, _> = args.folders.iter().map(|f| Results::load(f)).collect();
     let Some(results) = Results::merge(parts?)? else {
@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 fn write(
     report: &Report,
     out: &Path,
-    kinds: &[Kind],
+    kinds: &[FigureFormat],
     inputs: &[PathBuf],
     results: &Results,
 ) -> Result<Document, CommandError> {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::run::log_options;
 use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::registry::Registry;
@@ -59,7 +59,7 @@ struct Difference {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Results, &args.folder, registry)?;
+    kinds::expect(FileKind::Results, &args.folder, registry)?;
     let results = Results::load(&args.folder)?;
     let manifest = &results.manifest;
     let record = find_run(&results, &args.cell, args.seed)?;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::table::{self, Group};
 use super::{CommandError, complain, interrupt, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
@@ -133,7 +133,7 @@ impl<'a> From<&'a Counts> for Messages<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Scenario, Path::new(&args.scenario), registry)?;
+    kinds::expect(FileKind::Scenario, Path::new(&args.scenario), registry)?;
     let mut scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);

@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use self::against::Before;
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::output::{self, Format};
 use super::{CommandError, complain, interrupt, print, print_json};
 use crate::registry::Registry;
@@ -113,7 +113,7 @@ struct Document<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(Kind::Study, Path::new(&args.study), registry)?;
+    kinds::expect(FileKind::Study, Path::new(&args.study), registry)?;
     let study = Study::open(&args.study, registry)?;
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);

@@ -8,7 +8,7 @@ use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome, escaped};
 use serde::Serialize;
 
 use super::Exit;
-use super::kinds::{self, Kind};
+use super::kinds::{self, FileKind};
 use super::run::{ExecutorName, FILE_PREFIX};
 use super::{CommandError, interrupt, print, print_json, progress};
 use crate::scenario::{Scenario, ScenarioError};
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         path: path.clone(),
         reason,
     };
-    kinds::expect(Kind::Log, path, registry)?;
+    kinds::expect(FileKind::Log, path, registry)?;
     let info = farside_logs::info(path)?;
     let Some(summary) = info.run else {
         return Err(not_repeatable(

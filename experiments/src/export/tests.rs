@@ -5,9 +5,12 @@ use super::*;
 #[cfg(not(feature = "export"))]
 #[test]
 fn without_renderers_it_is_said_what_to_do() {
-    assert!(check(Kind::Svg).is_ok());
-    assert_eq!(export("<svg/>", Kind::Svg).unwrap().bytes, b"<svg/>");
-    for kind in [Kind::Pdf, Kind::Png] {
+    assert!(check(FigureFormat::Svg).is_ok());
+    assert_eq!(
+        export("<svg/>", FigureFormat::Svg).unwrap().bytes,
+        b"<svg/>"
+    );
+    for kind in [FigureFormat::Pdf, FigureFormat::Png] {
         let error = export("<svg/>", kind).unwrap_err().to_string();
         assert!(
             error.contains("--features farside-experiments/export"),
@@ -39,22 +42,22 @@ mod rendered {
     #[test]
     fn a_pdf_holds_its_fonts_and_a_png_its_pixels() {
         let svg = figure("rate (%) ≥ 0.3 − ½ Δ");
-        let pdf = export(&svg, Kind::Pdf).unwrap();
+        let pdf = export(&svg, FigureFormat::Pdf).unwrap();
         assert!(pdf.bytes.starts_with(b"%PDF-"));
         let names_font = pdf.bytes.windows(6).any(|part| part == b"Roboto");
         assert!(names_font, "the fonts are not in it");
         assert!(pdf.missing.is_empty(), "{:?}", pdf.missing);
-        let png = export(&svg, Kind::Png).unwrap().bytes;
+        let png = export(&svg, FigureFormat::Png).unwrap().bytes;
         // Width and height follow the signature and the first chunk's head.
         assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
         assert_eq!(png[16..24], [0, 0, 2, 88, 0, 0, 0, 120]);
-        assert_eq!(png, export(&svg, Kind::Png).unwrap().bytes);
+        assert_eq!(png, export(&svg, FigureFormat::Png).unwrap().bytes);
     }
 
     #[test]
     fn letters_that_no_font_has_are_named() {
         // Of a private area, for which no font is likely to have anything.
-        let exported = export(&figure("a \u{f0f00} b"), Kind::Png).unwrap();
+        let exported = export(&figure("a \u{f0f00} b"), FigureFormat::Png).unwrap();
         assert_eq!(exported.missing, ['\u{f0f00}']);
     }
 }

@@ -91,7 +91,7 @@ impl Check {
 /// #     question: "?".into(), scenario: "s".into(), scenario_text: "".into(),
 /// #     files: Default::default(), factors: vec![], metrics: vec![metric],
 /// #     baseline: None, cells: vec![Cell { values: vec![], texts: vec![], sets: vec![] }],
-/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![] };
+/// #     seeds: (0..8).collect(), block: 1, stop: None, published: vec![], report: Default::default() };
 /// # let study = |more: f64| Results { manifest: manifest.clone(), runs: (0..8).map(|seed: u64|
 /// #     RunRecord { cell: 0, seed, outcome: RunOutcome::Done {
 /// #     end: "completed".into(), end_detail: "".into(), digest: "".into(), sim_time_s: 9.0,
@@ -102,7 +102,8 @@ impl Check {
 /// use farside_experiments::study::summary::check::{Verdict, check};
 /// // The metric is better the lower it is, and 0.5 more with each seed.
 /// let check = check(&now, &before)?;
-/// assert_eq!((check.checked[0].verdict, check.checked[0].difference.mean), (Verdict::Worse, 0.5));
+/// let ratio = check.checked.iter().find(|one| one.metric == "ratio").expect("it is compared");
+/// assert_eq!((ratio.verdict, ratio.difference.mean), (Verdict::Worse, 0.5));
 /// # Ok::<(), String>(())
 /// ```
 ///
