@@ -90,6 +90,8 @@ settings! {
         pub exchange: Option<SimDuration> [with = "auto"],
             if_set(over(SimDuration::ZERO));
         /// The cycle's time for max-plus (the paper: 500 ms).
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 4.
         pub optimisation: Option<SimDuration> [with = "auto"];
         /// How long a node waits for its neighbours' vectors before it goes on with the last it
         /// has.
@@ -99,6 +101,9 @@ settings! {
         pub traverse: SimDuration [with = "units::duration"] = SimDuration::from_millis(200),
             over(SimDuration::ZERO);
         /// Whether an edge takes time by its length.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (ii).
         pub motion: Motion,
             one_of(&["cycles", "continuous"]);
         /// The highest speed of continuous motion \[m/s\], in (0, 1000]. By default 4 m/s, what the
@@ -116,6 +121,9 @@ settings! {
         /// when it is off it by `location_clearance`, though its estimate were three times this
         /// wrong; and that it has come to one only when a fix of its position was good enough, for
         /// which it stops.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (ii).
         pub location_sigma_m as "location_sigma": f64 [with = "units::length_m"],
             in_unit("m", 0.0..=100.0);
         /// How far from a vertex a rover is off it \[m\], in [0.1, 100]; and how wrong a fix may be
@@ -130,6 +138,9 @@ settings! {
         /// The node, such as `node_01`, that alone knows the roadmap at the start and gives it to
         /// the others over the network, in parts. Nodes plan and admit only once they know all of
         /// it. Absent, all do.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (i).
         pub roadmap_from: Option<String> [skip_serializing_if = "Option::is_none"];
         /// `complete`: how many cycles before its planned time a vertex may be granted. In
         /// continuous motion, how many times what the longest edge takes, if that is more.
@@ -139,6 +150,9 @@ settings! {
         /// `max-plus`, `complete`: a node that was not heard for so many cycles, at least 1, is
         /// replaced by a neighbour, for the rest of the run. Without it (the default) its vertices
         /// stay closed until it is back.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (iv).
         pub failover_after: Option<u32> [skip_serializing_if = "Option::is_none"],
             if_set(1..);
         /// A run ends when no rover has moved or entered for so many cycles: as a deadlock if that

@@ -54,6 +54,8 @@ settings! {
         /// The most iterations of max-plus in a cycle, each a round of messages between all
         /// neighbours (the paper says 100, and its tables come nearest with 5: see the study
         /// `network/readings`).
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 4.
         pub max_iterations: u32 = 100;
         /// How fast each node computes: pairs of candidate paths a second, `"paper"` or
         /// `"unlimited"`. The optimisation uses what is ready in its time.
@@ -63,11 +65,17 @@ settings! {
         /// bring the messages of all pairs from process to process, and to wait for the slowest.
         /// The paper's 500 ms end the optimisation, or 100 iterations; it does not say how many
         /// there were.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 4,
+        /// "100 iterations of the message passing protocol, or 500ms".
         pub iteration_time: SimDuration [with = "units::duration"];
         /// Damped max-plus: the share of the old vector in a new one, in [0, 1); the rest is as
         /// computed. 0 is the paper's. Cohen, Galiki and Zivan (*Governing convergence of Max-sum
         /// on DCOPs through damping and splitting*, 2020) find 0.7 to 0.9 good where max-plus
         /// oscillates.
+        ///
+        /// Source: Cohen, Galiki and Zivan, *Governing convergence of Max-sum on DCOPs through
+        /// damping and splitting*, 2020.
         pub damping: f64,
             0.0..1.0;
         /// Anytime max-plus: a node whose optimisation has not converged when its time is over
@@ -75,14 +83,23 @@ settings! {
         /// knows: its own rovers' payoffs, alone, with each other, and with the paths that its
         /// neighbours announce beside their vectors. After Vlassis, Elhorst and Kok (2004), who
         /// judge along a spanning tree of the whole network.
+        ///
+        /// Source: Vlassis, Elhorst and Kok, *Anytime algorithms for multiagent decision making
+        /// using coordination graphs*, 2004.
         pub anytime: bool;
         /// Outsourcing: a node with more to compute than its processor can do in the time has radio
         /// neighbours with less of it compute for it: they make max-plus vectors to their own
         /// rovers from what it sends instead of them. Does nothing where processors take no time.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (iii).
         pub outsourcing: bool;
         /// Congestion in payoffs: how many edges of a detour a rover takes rather than a path that
         /// leads into a node's part of the roadmap with one rover more on each vertex; in [0, 1e9],
         /// 0 is the paper's.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 5
+        /// (iii).
         pub congestion_weight: f64,
             WEIGHTS;
         /// How far ahead crowds are known: the share in [0, 1) that a node's neighbours have in
@@ -91,12 +108,18 @@ settings! {
         pub congestion_spread: f64,
             0.0..1.0;
         /// C, the estimate of the longest path, in diameters of the roadmap.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub longest_path_factor: f64 = 20.0,
             WEIGHTS;
         /// Which paths lead back.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub backtrack: Backtrack,
             one_of(&["first_step", "direction", "each_step_away"]);
         /// What a path loses that leads back; with `each_step_away` for each such step.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub backtrack_penalty: f64 = 40.0,
             WEIGHTS;
         /// What a path gains that leads to where the rover's path of the cycle before led: how much
@@ -104,6 +127,8 @@ settings! {
         pub keep_bonus: f64,
             WEIGHTS;
         /// The payoff of the zero path; 0 is the paper's.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub zero_payoff: f64,
             -1e9..=1e9;
         /// Whether a path to a leaf holds the leaf after its end, as the zero path holds its
@@ -117,20 +142,30 @@ settings! {
         pub leaf_wait_penalty: f64 = 45.0,
             WEIGHTS;
         /// The payoff of a collision in the cycle to come is minus this many C.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub collision_penalty_factor: f64 = 10.0,
             WEIGHTS;
         /// Payoffs get noise from [0, this), new in each cycle.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.4.
         pub noise: f64 = 0.1,
             WEIGHTS;
         /// Max-plus has converged when no value changes by more than this.
         pub convergence: f64 = 1e-3,
             WEIGHTS;
         /// Who wins a vertex.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.5.
         pub priority: Priority,
             one_of(&["longest_wait", "lowest_id"]);
         /// Whether a rover may follow one that leaves, in the same cycle (section 3.5).
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.5.
         pub acceleration: bool = true;
         /// Whether it may follow one that itself follows. The paper's implementation ignores this.
+        ///
+        /// Source: Luna, Oyama and Bekris, *Network-Guided Multi-Robot Path Planning*, section 3.5.
         pub acceleration_chains: bool;
         /// Entry gates: an entry's owner lets a rover in only while its neighbourhood is not too
         /// full.
