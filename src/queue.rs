@@ -198,7 +198,7 @@ impl Queue {
             at = self.near[..walked].partition_point(|other| entry.before(other));
         }
         self.near.insert(at, entry);
-        if self.near.len() > NEAR && self.heap.is_empty() && self.far.is_empty() {
+        if self.near.len() > NEAR && self.far.is_empty() {
             self.heap.push(self.near.remove(0));
         } else if self.near.len() > SORTED {
             self.heap.extend(self.near.drain(..SORTED / 2));

@@ -207,6 +207,7 @@ impl Far {
             bucket.retain(&mut keep);
             self.len -= before - bucket.len();
         }
+        self.end_if_empty();
     }
 
     /// Everything, in no order.

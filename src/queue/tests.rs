@@ -125,3 +125,26 @@ fn everything_left_is_drained_in_key_order() {
     assert_eq!(taken + rest.len(), 20_000);
     assert!(rest.is_sorted_by(|a, b| a.key() < b.key()));
 }
+
+/// Cancelled timers may empty the buckets while events before their horizon go on waiting.
+#[test]
+fn buckets_that_were_emptied_begin_anew() {
+    let mut queue = Queue::default();
+    for count in 0..5_000 {
+        queue.push(entry(1_000 + count * 1_000, 0, 0, count));
+    }
+    for _ in 0..60 {
+        queue.pop_before(Bound::NEVER);
+    }
+    queue.retain(|_| false);
+    for count in 5_000..9_000 {
+        let time = 70_000 + (count * 7_919) % 4_001;
+        queue.push(entry(time, 0, 0, count));
+    }
+    let mut popped = Vec::new();
+    while let Some(entry) = queue.pop_before(Bound::NEVER) {
+        popped.push(entry.key());
+    }
+    assert_eq!(popped.len(), 4_000);
+    assert!(popped.is_sorted());
+}
