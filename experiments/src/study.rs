@@ -49,6 +49,9 @@
 //! facet = "latency"
 //! ```
 //!
+//! Numbers above 0 that span two decades or more are spaced by ratio; a factor's `scale`, `linear`
+//! or `log`, says otherwise.
+//!
 //! # Blocks
 //!
 //! Seeds may share a problem: `seeds = 30` and `block = 5` give six problems of five runs each.
@@ -157,6 +160,7 @@ pub mod summary;
 
 pub use error::{StoreError, StudyError};
 pub use execute::Interrupts;
+pub(crate) use file::sections;
 pub use forecast::{Basis, Forecast, forecast};
 pub(crate) use merge::Merged;
 pub(crate) use metrics::KERNEL as KERNEL_METRICS;

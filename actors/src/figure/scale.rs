@@ -53,8 +53,9 @@ impl Scale {
     /// values, all above 0, span two decades or more: evenly spaced, all but the greatest would lie
     /// on the axis.
     pub fn measured(values: impl Iterator<Item = f64>) -> Self {
-        let mut scale = Scale::over(values, Spacing::Log);
-        if scale.is_log() && scale.high / scale.low >= DECADES {
+        let values: Vec<f64> = values.collect();
+        let mut scale = Scale::over(values.iter().copied(), Spacing::Log);
+        if spans_decades(values.into_iter()) {
             scale.low = round_below(scale.low);
             scale.high = 1.0 / round_below(1.0 / scale.high);
             return scale;
@@ -171,8 +172,18 @@ impl Scale {
     }
 }
 
-/// From this ratio on, measured values are spaced by ratio.
+/// From this ratio on, values are spaced by ratio.
 const DECADES: f64 = 100.0;
+
+/// Whether values, all above 0, span two decades or more. Evenly spaced, all but the greatest would
+/// lie at the end of the axis. What is not finite does not count.
+pub fn spans_decades(values: impl Iterator<Item = f64>) -> bool {
+    let finite = values.filter(|value| value.is_finite());
+    let ends = finite.fold((f64::INFINITY, 0.0_f64), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    ends.0 > 0.0 && ends.1 / ends.0 >= DECADES
+}
 
 /// The greatest of 1, 2 and 5 times a power of ten that is not above a value.
 fn round_below(value: f64) -> f64 {

@@ -2,8 +2,9 @@
 //! `farside explain`.
 
 /// Declares a struct of results whose fields' documentation is there when the program runs too:
-/// `about(field)` gives it, for [`Metric::about`](crate::system::Metric::about). A part from
-/// `Source:` on says where a field is from.
+/// `about(field)` gives it, for [`Metric::about`](crate::system::Metric::about), and `keys()` the
+/// fields as [`Key`](crate::system::Key)s of a file. A part from `Source:` on says where a field is
+/// from.
 ///
 /// ```
 /// farside_actors::documented! {
@@ -21,6 +22,7 @@
 /// assert_eq!(about, "How many were heard, copies not counted.");
 /// assert_eq!((source.as_str(), Counted::default().heard), ("a paper, section 2.", 0));
 /// assert_eq!(Counted::about("herd"), None);
+/// assert_eq!((Counted::keys()[0].name, Counted::keys()[0].value), ("heard", "a whole number"));
 /// ```
 #[macro_export]
 macro_rules! documented {
@@ -46,11 +48,21 @@ macro_rules! documented {
         impl $name {
             /// What a field is, and where it is from (empty if nowhere); none if there is no such
             /// field.
+            #[allow(dead_code, reason = "some structs are results, others are files")]
             $vis fn about(field: &str) -> Option<(String, String)> {
                 match field {
                     $(stringify!($field) => Some($crate::system::parted(&[$($doc),+])),)+
                     _ => None,
                 }
+            }
+
+            /// What each field is, in their order.
+            #[allow(dead_code, reason = "some structs are results, others are files")]
+            $vis fn keys() -> Vec<$crate::system::Key> {
+                vec![$(
+                    $crate::system::Key::new(stringify!($field), &[$($doc),+])
+                        .typed(stringify!($type), ""),
+                )+]
             }
         }
     };

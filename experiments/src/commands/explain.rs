@@ -1,4 +1,4 @@
-//! `farside explain`: what there is to know of each key of scenarios and each metric, from the
+//! `farside explain`: what there is to know of each key of scenarios and studies and each metric, from the
 //! declarations that they are read and reported by.
 
 use farside::suggest::{did_you_mean, nearest};
@@ -9,12 +9,12 @@ use super::Exit;
 use super::describe::{WIDTH, facts, of_any, plain, prose, sections, wrapped};
 use super::{CommandError, print, print_json};
 use crate::registry::Registry;
-use crate::study::KERNEL_METRICS;
+use crate::study::{self, KERNEL_METRICS};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// A key (links.default.loss, loss), a table (links.default) or a metric (arrived); all of them
-    /// are listed unless given
+    /// A key (links.default.loss, loss; of a study: study.report.x), a table (links.default) or a
+    /// metric (arrived); all of them are listed unless given
     #[arg(value_name = "KEY|METRIC")]
     name: Option<String>,
     /// Print JSON
@@ -36,7 +36,10 @@ enum Entry<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let sections = sections(registry);
+    let sections: Vec<Section> = sections(registry)
+        .into_iter()
+        .chain(study::sections())
+        .collect();
     let sections: Vec<&Section> = sections.iter().collect();
     let all = entries(&sections, registry);
     let Some(name) = &args.name else {

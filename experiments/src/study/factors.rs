@@ -1,6 +1,7 @@
 //! Factors: what a study varies, read from its file and checked.
 
 use farside::suggest::nearest;
+use farside_actors::figure::scale;
 
 use crate::scenario::{ScenarioError, Source};
 
@@ -146,7 +147,7 @@ fn plan_of(
             name: file.name.clone(),
             label: file.label.clone().unwrap_or_else(|| file.name.clone()),
             unit,
-            scale: file.scale,
+            scale: file.scale.unwrap_or_else(|| plotted(&levels)),
         },
         keys,
         levels,
@@ -236,10 +237,10 @@ fn variants(
         levels.push(level);
     }
     // Names of which only some can be read as quantities are words.
-    if check_values(&levels, file.scale).is_err() {
+    if check_values(&levels, file.scale.unwrap_or_default()).is_err() {
         levels = levels.into_iter().map(Level::into_word).collect();
     }
-    match check_values(&levels, file.scale) {
+    match check_values(&levels, file.scale.unwrap_or_default()) {
         Ok(dimension) => Ok((keys, (Levels::Values(levels), dimension))),
         Err(message) => Err(blame.invalid(&format!("{at}.variants"), message)),
     }
@@ -280,13 +281,13 @@ fn levels(
                 return wrong("steps", "only a range has steps".into());
             }
             let levels: Vec<Level> = values.iter().map(Level::new).collect();
-            match check_values(&levels, file.scale) {
+            match check_values(&levels, file.scale.unwrap_or_default()) {
                 Ok(dimension) => Ok((Levels::Values(levels), dimension)),
                 Err(message) => wrong("values", message),
             }
         }
         (None, Some([low, high])) => {
-            let range = match Range::new(low, high, file.scale) {
+            let range = match Range::new(low, high, file.scale.unwrap_or_default()) {
                 Ok(range) => range,
                 Err(message) => return wrong("range", message),
             };
@@ -303,13 +304,27 @@ fn levels(
                 }
                 (_, Some(steps)) => {
                     let levels = range.steps(steps);
-                    match check_values(&levels, file.scale) {
+                    match check_values(&levels, file.scale.unwrap_or_default()) {
                         Ok(_) => Ok((Levels::Values(levels), dimension)),
                         Err(message) => wrong("steps", message),
                     }
                 }
             }
         }
+    }
+}
+
+/// How plots space values of which the study does not say it: by ratio if they are numbers above 0
+/// that span two decades or more. Evenly spaced, all but the greatest would lie in a corner.
+fn plotted(levels: &Levels) -> Scale {
+    let Levels::Values(levels) = levels else {
+        return Scale::Linear;
+    };
+    // A word among them counts as 0: then they are not spaced by ratio.
+    let values = levels.iter().map(|level| level.number().unwrap_or(0.0));
+    match scale::spans_decades(values) {
+        true => Scale::Log,
+        false => Scale::Linear,
     }
 }
 

@@ -55,19 +55,21 @@ pub struct Manifest {
     pub report: PlotAxes,
 }
 
-/// Which factor plots put where, each by its name; what is left open follows from the factors.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlotAxes {
-    /// Along the horizontal axis.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub x: Option<String>,
-    /// A curve for each of its values.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub series: Option<String>,
-    /// A plot for each of its values.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub facet: Option<String>,
+farside_actors::documented! {
+    /// Which factors plots put where, each by its name; what is left open follows from the factors.
+    #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct PlotAxes {
+        /// The factor along the horizontal axis; the first of numbers unless given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub x: Option<String>,
+        /// The factor with a curve for each of its values; the next one unless given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub series: Option<String>,
+        /// The factor with a plot for each of its values; any further one unless given.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub facet: Option<String>,
+    }
 }
 
 impl PlotAxes {

@@ -53,19 +53,37 @@ fn default(value: &Value) -> String {
 const MADE: &str = "<!-- Made by the tests of `farside-experiments` from what `farside explain` \
     says: change the declarations, and renew it with FARSIDE_RENEW=1. -->\n";
 
-fn keys(entries: &[Value]) -> String {
-    let mut page = format!(
+/// Whether an entry is a key of study files, which `explain` puts below `study`.
+fn is_of_studies(entry: &Value) -> bool {
+    text(entry, "key").starts_with("study.")
+}
+
+fn scenario_keys(entries: &[Value]) -> String {
+    let about = format!(
         "# Keys of scenarios\n\n{MADE}\nEvery table that a scenario may have, with each of its keys. \
          `farside explain KEY` says the same on the command line. `links.default` holds for all \
          links, and `[links.PATTERN]` has the same keys for some of them.\n"
     );
+    keys(about, entries.iter().filter(|entry| !is_of_studies(entry)))
+}
+
+fn study_keys(entries: &[Value]) -> String {
+    let about = format!(
+        "# Keys of studies\n\n{MADE}\nEvery table that a study may have, with each of its keys. \
+         `farside explain study.KEY` says the same on the command line: what stands at the top of a \
+         study is below `study` there, and the `[report]` table is `study.report`.\n"
+    );
+    keys(about, entries.iter().filter(|entry| is_of_studies(entry)))
+}
+
+fn keys<'a>(mut page: String, entries: impl Iterator<Item = &'a Value>) -> String {
     let mut last = None;
-    for entry in entries.iter().filter(|entry| entry["key"].is_string()) {
+    for entry in entries.filter(|entry| entry["key"].is_string()) {
         let name = text(entry, "key");
         let (table, key) = name.rsplit_once('.').unwrap_or(("", name));
         if last != Some(table) {
             let heading = match table {
-                "" => "At the top".to_owned(),
+                "" | "study" => "At the top".to_owned(),
                 table => format!("`{table}`"),
             };
             page += &format!("\n## {heading}\n\n| key | what it is | default |\n|---|---|---|\n");
@@ -129,7 +147,8 @@ fn metrics(entries: &[Value]) -> String {
 fn the_reference_is_what_explain_says() {
     let entries = entries();
     let pages = [
-        ("reference/keys.md", keys(&entries)),
+        ("reference/keys.md", scenario_keys(&entries)),
+        ("reference/study_keys.md", study_keys(&entries)),
         ("reference/metrics.md", metrics(&entries)),
     ];
     for (name, page) in pages {
