@@ -65,16 +65,20 @@ pub enum Drawing {
         /// The poses.
         poses: Vec<Pose>,
     },
-    /// A thing with shapes, in place of what had its `id`: `foxglove.SceneUpdate` on `/scene`.
+    /// A thing with shapes, in place of what had its `id`: `foxglove.SceneUpdate` on the topic of
+    /// its layer. Each message has all that is on its layer then, so that viewers that jump to a
+    /// time see all of it.
     Entity {
-        /// What it is called as long as it is there.
+        /// What it is called as long as it is there. What stands before the last `/` is its layer,
+        /// which viewers show or hide: `rovers/rover_01` is drawn on `/scene/rovers`, `mast` on
+        /// `/scene`.
         id: String,
         /// The frame that its shapes are placed in; if that moves, they move with it.
         frame: String,
         /// What it looks like.
         shapes: Vec<Shape>,
     },
-    /// The entity is gone: a deletion on `/scene`.
+    /// The entity is gone: a deletion on the topic of its layer.
     Remove {
         /// Which.
         id: String,

@@ -28,7 +28,7 @@ def rgba(colours):
 
 
 def draw(entity):
-    """Draws what Foxglove would of an entity of `/scene`."""
+    """Draws what Foxglove would of an entity below `/scene`."""
     path = f"{SCENE}/{entity.id}"
     rr.log(path, rr.CoordinateFrame(entity.frame_id))
     strips, colours, radii = [], [], []
@@ -93,12 +93,18 @@ def main():
         # What is not drawn yet stands in Rerun's own frame: say how that and the map's are one.
         rr.log("map", rr.Transform3D(parent_frame="tf#/", child_frame="map"), static=True)
         rr.log_file_from_path(given.log)
-        for _, _, message, update in reader.iter_decoded_messages(topics=[SCENE]):
+        layers = [topic for topic in topics if topic.startswith(SCENE)]
+        drawn = {}
+        for _, _, message, update in reader.iter_decoded_messages(topics=layers):
             rr.set_time(TIMELINE, timestamp=np.datetime64(message.log_time, "ns"))
             for gone in update.deletions:
                 rr.log(f"{SCENE}/{gone.id}", rr.Clear(recursive=True))
+                drawn.pop(gone.id, None)
+            # A message has all of its layer: draw what is new in it.
             for entity in update.entities:
-                draw(entity)
+                if drawn.get(entity.id) != entity:
+                    drawn[entity.id] = entity
+                    draw(entity)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ use crate::world::crater;
 /// The frame that everything is placed in.
 const MAP: &str = "map";
 
-/// The entity of the coordination graph.
+/// What the coordination graph is called.
 const COORDINATION: &str = "coordination";
 const COORDINATED: [f64; 4] = [0.9, 0.9, 0.9, 0.25];
 const GROUND: [f64; 4] = [0.6, 0.5, 0.4, 0.35];
@@ -130,7 +130,7 @@ impl NetworkScene {
             shape(lines, [0.0; 3], *colour)
         };
         Drawing::Entity {
-            id: "roadmap".to_owned(),
+            id: layered("map", "roadmap"),
             frame: MAP.to_owned(),
             shapes: parts.map(part).collect(),
         }
@@ -172,7 +172,7 @@ impl NetworkScene {
             thickness_m: 0.02 * self.scale_m,
         };
         let net = Drawing::Entity {
-            id: "crater".to_owned(),
+            id: layered("map", "crater"),
             frame: MAP.to_owned(),
             shapes: vec![shape(lines, [0.0; 3], GROUND)],
         };
@@ -218,7 +218,7 @@ impl NetworkScene {
             Pose::at([0, 1, 2].map(|axis| 0.5 * (from[axis] + to[axis])))
         };
         out.push(poses(COORDINATION, ends.map(middle).collect()));
-        let id = COORDINATION.to_owned();
+        let id = layered(COORDINATION, "graph");
         out.push(if indices.is_empty() {
             Drawing::Remove { id }
         } else {
@@ -257,7 +257,7 @@ impl NetworkScene {
             self.colours[node.0 as usize],
         );
         Drawing::Entity {
-            id: name.to_owned(),
+            id: layered("nodes", name),
             frame: MAP.to_owned(),
             shapes: vec![ball, self.label(name, [x, y, z + diameter_m])],
         }
@@ -266,7 +266,7 @@ impl NetworkScene {
     fn label(&self, name: &str, position_m: [f64; 3]) -> Shape {
         let label = Form::Label {
             text: name.to_owned(),
-            height_m: 0.25 * self.scale_m,
+            height_m: 0.5 * self.scale_m,
         };
         shape(label, position_m, NAMES)
     }
@@ -276,7 +276,7 @@ impl NetworkScene {
         let size_m = [0.5, 0.35, 0.25].map(|part| part * self.scale_m);
         let above = |height: f64| [0.0, 0.0, height * self.scale_m];
         Drawing::Entity {
-            id: name.to_owned(),
+            id: layered("rovers", name),
             frame: base_link(name),
             shapes: vec![
                 shape(Form::Cube { size_m }, above(0.125), ROVERS),
@@ -299,7 +299,7 @@ impl NetworkScene {
             if drawn.on_the_map {
                 drawn.on_the_map = false;
                 out.push(Drawing::Remove {
-                    id: name.to_owned(),
+                    id: layered("rovers", name),
                 });
                 out.push(poses(name, Vec::new()));
                 out.push(text(Level::Info, name, "arrived and left"));
@@ -389,6 +389,12 @@ impl Scene for NetworkScene {
             _ => {}
         }
     }
+}
+
+/// An entity's id on one of the layers map, nodes, rovers and coordination, which viewers show or
+/// hide.
+fn layered(layer: &str, name: &str) -> String {
+    format!("{layer}/{name}")
 }
 
 fn base_link(name: &str) -> String {
@@ -511,7 +517,7 @@ mod tests {
     #[test]
     fn each_rover_is_drawn_once_and_removed_once() {
         let (drawings, _) = drawn(3, Sabotage::None);
-        let rover = |id: &str| id.starts_with("rover_");
+        let rover = |id: &str| id.starts_with("rovers/rover_");
         let come = count(
             &drawings,
             |d| matches!(d, Drawing::Entity { id, .. } if rover(id)),
@@ -526,7 +532,7 @@ mod tests {
             _ => None,
         };
         let first: Vec<String> = drawings.iter().filter_map(entity).take(2).collect();
-        assert_eq!(first, ["crater", "roadmap"]);
+        assert_eq!(first, ["map/crater", "map/roadmap"]);
         let moves = count(&drawings, |d| matches!(d, Drawing::Transform { .. }));
         assert!(moves > 6, "{moves}");
     }

@@ -1,6 +1,9 @@
 //! Drawings as messages of Foxglove's published schemas: the fields of them that are ever filled.
 
+use std::collections::BTreeMap;
+
 use prost::Message;
+use prost::encoding::{WireType, encode_key, encode_varint};
 use prost_reflect::prost_types::Timestamp;
 
 use crate::descriptors::SchemaOf;
@@ -40,11 +43,67 @@ pub(super) struct Encoded {
     pub(super) body: Vec<u8>,
 }
 
-impl Encoded {
+/// What is drawn now, by layer: a viewer that jumps to a time is shown each topic's last message
+/// before it, and no other, so each message has the whole layer.
+#[derive(Debug, Default)]
+pub(super) struct Layers {
+    layers: BTreeMap<String, Layer>,
+}
+
+#[derive(Debug, Default)]
+struct Layer {
+    /// Each entity as its bytes, by its id.
+    entities: BTreeMap<String, Vec<u8>>,
+    /// Gone since the last message.
+    deletions: Vec<SceneEntityDeletion>,
+    /// Whether it is another than the last message told.
+    changed: bool,
+}
+
+impl Layers {
+    /// The layer of an entity, which its id names.
+    fn of(&mut self, id: &str) -> &mut Layer {
+        let name = id.rsplit_once('/').map_or("", |(layer, _)| layer);
+        if !self.layers.contains_key(name) {
+            self.layers.insert(name.to_owned(), Layer::default());
+        }
+        let layer = self.layers.get_mut(name).expect("it is there by now");
+        layer.changed = true;
+        layer
+    }
+
+    /// A message for each layer that changed.
+    fn told(&mut self) -> impl Iterator<Item = Encoded> {
+        let changed = self.layers.iter_mut().filter(|(_, layer)| layer.changed);
+        changed.map(|(name, layer)| {
+            layer.changed = false;
+            let deletions = std::mem::take(&mut layer.deletions);
+            let update = SceneUpdate {
+                deletions,
+                entities: Vec::new(),
+            };
+            let mut body = update.encode_to_vec();
+            for entity in layer.entities.values() {
+                encode_key(ENTITIES, WireType::LengthDelimited, &mut body);
+                encode_varint(entity.len() as u64, &mut body);
+                body.extend_from_slice(entity);
+            }
+            Encoded {
+                topic: if name.is_empty() {
+                    "/scene".to_owned()
+                } else {
+                    format!("/scene/{name}")
+                },
+                schema: Published::SceneUpdate,
+                body,
+            }
+        })
+    }
+
     /// The messages that draw all of this at one time: transforms first, because shapes are placed
     /// in frames.
-    pub(super) fn all(drawings: &[Drawing], time_ns: u64) -> Vec<Encoded> {
-        let (mut tf, mut scene) = (FrameTransforms::default(), SceneUpdate::default());
+    pub(super) fn draw(&mut self, drawings: &[Drawing], time_ns: u64) -> Vec<Encoded> {
+        let mut tf = FrameTransforms::default();
         let mut others = Vec::new();
         let timestamp = Some(stamp(time_ns));
         for drawing in drawings {
@@ -65,12 +124,17 @@ impl Encoded {
                     entity.timestamp = timestamp;
                     entity.frame_id.clone_from(frame);
                     entity.id.clone_from(id);
-                    scene.entities.push(entity);
+                    let layer = self.of(id);
+                    layer.entities.insert(id.clone(), entity.encode_to_vec());
                 }
-                Drawing::Remove { id } => scene.deletions.push(SceneEntityDeletion {
-                    timestamp,
-                    id: id.clone(),
-                }),
+                Drawing::Remove { id } => {
+                    let layer = self.of(id);
+                    layer.entities.remove(id);
+                    layer.deletions.push(SceneEntityDeletion {
+                        timestamp,
+                        id: id.clone(),
+                    });
+                }
                 Drawing::Poses {
                     topic,
                     frame,
@@ -100,13 +164,15 @@ impl Encoded {
             }
         }
         let tf = Encoded::new("/tf", Published::FrameTransforms, &tf);
-        let scene = Encoded::new("/scene", Published::SceneUpdate, &scene);
-        let mut all: Vec<Encoded> = [tf, scene].into();
+        let mut all: Vec<Encoded> = [tf].into();
         all.retain(|message| !message.body.is_empty());
+        all.extend(self.told());
         all.append(&mut others);
         all
     }
+}
 
+impl Encoded {
     fn new(topic: &str, schema: Published, message: &impl Message) -> Encoded {
         Encoded {
             topic: topic.to_owned(),
@@ -286,6 +352,9 @@ struct Log {
     name: String,
 }
 
+/// The field of `foxglove.SceneUpdate` that has the entities.
+const ENTITIES: u32 = 2;
+
 #[derive(Clone, PartialEq, Message)]
 struct SceneUpdate {
     #[prost(message, repeated, tag = "1")]
@@ -413,6 +482,62 @@ mod tests {
 
     use super::*;
 
+    /// A viewer that jumps to a time is shown the last message of each topic before it.
+    #[test]
+    fn the_last_message_of_a_layer_has_all_of_it() {
+        let entity = |id: &str, height_m: f64| Drawing::Entity {
+            id: id.to_owned(),
+            frame: "map".to_owned(),
+            shapes: vec![Shape {
+                form: Form::Cube {
+                    size_m: [1.0, 1.0, height_m],
+                },
+                position_m: [0.0; 3],
+                colour: [1.0; 4],
+            }],
+        };
+        let gone = |id: &str| Drawing::Remove { id: id.to_owned() };
+        let steps = [
+            vec![entity("mast", 1.0), entity("rovers/a", 1.0)],
+            vec![entity("rovers/b", 1.0)],
+            vec![entity("rovers/a", 2.0), gone("mast")],
+            vec![gone("rovers/a"), entity("deep/er/c", 1.0)],
+        ];
+        let mut layers = Layers::default();
+        let mut last = BTreeMap::new();
+        let shown: Vec<String> = (0..)
+            .zip(&steps)
+            .map(|(time_ns, step)| {
+                for message in layers.draw(step, time_ns) {
+                    assert_eq!(message.schema, Published::SceneUpdate);
+                    let update = SceneUpdate::decode(&*message.body).unwrap();
+                    last.insert(message.topic, update);
+                }
+                let one = |(topic, update): (&String, &SceneUpdate)| {
+                    let height = |entity: &SceneEntity| entity.cubes[0].size.unwrap().z;
+                    let all = update
+                        .entities
+                        .iter()
+                        .map(|one| format!("{} {}", one.id, height(one)));
+                    let all: Vec<String> = all.collect();
+                    let gone: Vec<&str> = update.deletions.iter().map(|one| &*one.id).collect();
+                    format!("{topic}: {} - {}", all.join(", "), gone.join(", "))
+                };
+                last.iter().map(one).collect::<Vec<_>>().join("; ")
+            })
+            .collect();
+        assert_eq!(
+            shown,
+            [
+                "/scene: mast 1 - ; /scene/rovers: rovers/a 1 - ",
+                "/scene: mast 1 - ; /scene/rovers: rovers/a 1, rovers/b 1 - ",
+                "/scene:  - mast; /scene/rovers: rovers/a 2, rovers/b 1 - ",
+                "/scene:  - mast; /scene/deep/er: deep/er/c 1 - ; /scene/rovers: rovers/b 1 - rovers/a",
+            ]
+        );
+        assert!(layers.draw(&[], 9).is_empty());
+    }
+
     #[test]
     fn headings_become_turns_about_the_vertical() {
         let half = 0.5f64.sqrt();
@@ -512,7 +637,7 @@ mod tests {
                 message: text("hit"),
             },
         ];
-        let all = Encoded::all(&drawings, 1_500_000_000);
+        let all = Layers::default().draw(&drawings, 1_500_000_000);
         let topics: Vec<&str> = all.iter().map(|encoded| &*encoded.topic).collect();
         assert_eq!(topics, ["/tf", "/scene", "/poses/rover", "/log"]);
         let time = "1970-01-01T00:00:01.500Z";

@@ -7,7 +7,7 @@ use farside::RunInfo;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Scene};
 
-use super::foxglove::Encoded;
+use super::foxglove::Layers;
 use super::thread::{Batch, Header};
 use super::{Channels, Live};
 use crate::LogError;
@@ -21,6 +21,7 @@ pub(super) struct Stage {
     run: Arc<RunInfo>,
     /// Kept for its memory: most records change nothing that is seen.
     drawings: Vec<Drawing>,
+    layers: Layers,
     topics: BTreeMap<String, Topic>,
 }
 
@@ -38,6 +39,7 @@ impl Stage {
             scene,
             run,
             drawings: Vec::new(),
+            layers: Layers::default(),
             topics: BTreeMap::new(),
         }
     }
@@ -49,7 +51,7 @@ impl Stage {
         batch: &mut Batch,
         excluded: impl Fn(&str) -> bool,
     ) -> Result<(), LogError> {
-        for drawn in Encoded::all(&self.drawings, time_ns) {
+        for drawn in self.layers.draw(&self.drawings, time_ns) {
             if !self.topics.contains_key(&drawn.topic) {
                 let schema = || drawn.schema.schema();
                 let channel = if excluded(&drawn.topic) {
