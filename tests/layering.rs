@@ -24,6 +24,8 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 8] = [
         ],
         &[],
     ),
+    // Usable without a simulator.
+    ("farside-planning", &[], &[]),
     (
         "farside-traffic",
         &["farside", "farside-worlds", "farside-actors"],
