@@ -366,3 +366,6 @@ impl<W: Write> McapFile<W> {
 fn spanned(known: Option<(u64, u64)>, more: (u64, u64)) -> (u64, u64) {
     known.map_or(more, |known| (known.0.min(more.0), known.1.max(more.1)))
 }
+
+#[cfg(test)]
+mod tests;
