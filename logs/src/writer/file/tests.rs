@@ -222,7 +222,8 @@ proptest! {
         // The crate refuses to read the index of a chunk that has no messages.
         for chunk in summary.chunk_indexes.iter().filter(|chunk| chunk.message_index_length > 0) {
             let times = chunk.message_start_time..=chunk.message_end_time;
-            for (channel, entries) in summary.read_message_indexes(&file, chunk).unwrap() {
+            let indexes = summary.read_message_indexes(&file, chunk).unwrap();
+            for (channel, entries) in Vec::from_iter(indexes) {
                 for entry in entries {
                     let message = summary.seek_message(&file, chunk, &entry).unwrap();
                     prop_assert_eq!(message.channel.id, channel.id);
