@@ -6,6 +6,8 @@
 
 #[path = "shared/clock.rs"]
 mod clock;
+#[path = "shared/rovers.rs"]
+mod rovers;
 
 use std::io::BufWriter;
 use std::path::Path;
@@ -16,70 +18,10 @@ use farside::prelude::*;
 use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, Wants};
 use farside::{Kind, RunInfo};
 use farside_logs::{Log, LogOptions, LogWriter};
-use serde::{Deserialize, Serialize};
+use rovers::simulate;
 
 /// How often each of the two writes everything.
 const PAIRS: usize = 9;
-
-#[derive(Serialize, Deserialize)]
-struct Pose {
-    number: u32,
-    x_m: f64,
-    y_m: f64,
-    heading_rad: f64,
-    battery: f32,
-    goal: Option<(f64, f64)>,
-    status: String,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Due;
-
-struct Base;
-
-impl Actor for Base {
-    type Accepts = (Pose,);
-}
-
-impl Handler<Pose> for Base {
-    fn handle(&mut self, _pose: Pose, _ctx: &mut Context<'_, Self>) -> Outcome {
-        Ok(())
-    }
-}
-
-struct Rover {
-    base: Address<Base>,
-    number: u32,
-}
-
-impl Actor for Rover {
-    type Accepts = (Due,);
-
-    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        ctx.timer(SimDuration::from_millis(20), Due);
-        Ok(())
-    }
-}
-
-impl Handler<Due> for Rover {
-    fn handle(&mut self, _due: Due, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.number += 1;
-        let number = self.number;
-        let noise = ctx.random("noise");
-        let pose = Pose {
-            number,
-            x_m: f64::from(number) * 0.02 + noise.normal(0.0, 0.1),
-            y_m: noise.normal(0.0, 0.1),
-            heading_rad: noise.normal(0.0, 1.0),
-            battery: 1.0 / (1.0 + number as f32 * 1e-5),
-            goal: Some((10.0, 20.0)),
-            status: "driving to the next waypoint".to_owned(),
-        };
-        ctx.send(self.base, pose);
-        ctx.timer(SimDuration::from_millis(20), Due);
-        Ok(())
-    }
-}
 
 /// A record, kept.
 struct Kept {
@@ -140,27 +82,6 @@ impl Observer for Keeper {
         self.0.lock().unwrap().told.push(told);
         Ok(())
     }
-}
-
-fn simulate(observer: impl Observer + 'static, seconds: u64) -> Report {
-    let mut sim = Simulation::new(1);
-    let earth = sim.host("earth");
-    let base = sim.actor(earth, "base", |_| Base);
-    for rover in 0..20 {
-        let host = sim.host(&format!("host_{rover:02}"));
-        sim.actor(host, &format!("rover_{rover:02}"), move |_| Rover {
-            base,
-            number: 0,
-        });
-        let delay = FixedDelay::new(SimDuration::from_millis(5 + rover));
-        sim.link(host, earth, &format!("radio_{rover:02}"), delay);
-    }
-    sim.stop_at(
-        SimTime::ZERO + SimDuration::from_secs(seconds),
-        "long enough",
-    );
-    sim.observe(observer);
-    sim.run(Executor::Inline).unwrap()
 }
 
 fn write_log(path: &Path, tape: &Tape, report: &Report) {
@@ -236,7 +157,7 @@ fn main() {
         folder.path().join("bare.mcap"),
     );
     let tape = Arc::new(Mutex::new(Tape::default()));
-    let report = simulate(Keeper(tape.clone()), 200);
+    let report = simulate([Keeper(tape.clone())], 200);
     let tape = tape.lock().unwrap();
     write_log(&ours, &tape, &report);
     assert!(
