@@ -382,3 +382,55 @@ fn repeats_that_overtake_each_other_are_paired_by_their_ordinals() {
     assert_eq!(found, expected);
     assert_eq!(usage.agreed, [0, 0]);
 }
+
+/// A topic's second channel, declared when all messages of the first have been read, and with other
+/// fields in the two logs: then all on the topic are read by field, also what agreed by its bytes.
+#[test]
+fn what_agreed_is_read_by_field_where_a_later_schema_differs() {
+    // Descriptor sets of one message `M` with one number `x`, in its first or its second field.
+    let schema = |number: u8| {
+        let field = [&b"\x0a\x01x\x18"[..], &[number], b"\x20\x01\x28\x05"].concat();
+        let message = [&b"\x0a\x01M\x12"[..], &[field.len() as u8], &field].concat();
+        let file = [
+            &b"\x0a\x01f\x22"[..],
+            &[message.len() as u8],
+            &message,
+            b"\x62\x06proto3",
+        ];
+        let file = file.concat();
+        [&b"\x0a"[..], &[file.len() as u8], &file].concat()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let [a, b] = [1, 2].map(|number| {
+        let path = folder.path().join(format!("{number}.mcap"));
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer = mcap::Writer::new(file).unwrap();
+        for (name, second) in [("", 1), ("second", number)] {
+            let schema = writer.add_schema("M", "protobuf", &schema(second)).unwrap();
+            let channel = [("channel".to_owned(), name.to_owned())].into();
+            let channel = writer
+                .add_channel(schema, "/x", "protobuf", &channel)
+                .unwrap();
+            for time in 0..if name.is_empty() { 5 } else { 0 } {
+                let header = MessageHeader {
+                    channel_id: channel,
+                    sequence: 0,
+                    log_time: time,
+                    publish_time: time,
+                };
+                writer.write_to_known_channel(&header, &[8, 1]).unwrap();
+            }
+        }
+        writer.finish().unwrap();
+        path
+    });
+    let compare = |limits| comparison::compare(&a, &b, &DiffOptions::default(), limits).unwrap();
+    let (expected, _) = compare(ways()[0]);
+    let (found, usage) = compare(Limits::default());
+    assert_eq!(found, expected);
+    assert!(
+        found.notes[0].contains("the schema of /x differs"),
+        "{found}"
+    );
+    assert_eq!(usage.agreed, [0, 0]);
+}
