@@ -157,7 +157,7 @@ fn main() {
         folder.path().join("bare.mcap"),
     );
     let tape = Arc::new(Mutex::new(Tape::default()));
-    let report = simulate([Keeper(tape.clone())], 200);
+    let report = simulate([Keeper(tape.clone())], 1, 200);
     let tape = tape.lock().unwrap();
     write_log(&ours, &tape, &report);
     assert!(

@@ -240,8 +240,9 @@ impl LogWriter {
             };
             file.attachment(head, &attachment.bytes).map_err(refused)?;
         }
-        // Whoever opens the log while the run goes on sees what it is of.
-        file.flush().map_err(refused)?;
+        // Whoever opens the log while the run goes on sees what it is of. A disk that is full says
+        // so again when the first chunk is written, and that ends the run as any later time.
+        let _ = file.flush();
         let worker = Worker::spawn(self.path.clone(), file)?;
         let mut chunk = Chunk::default();
         let mut channels = Channels::default();

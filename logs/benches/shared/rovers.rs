@@ -64,12 +64,13 @@ impl Handler<Due> for Rover {
     }
 }
 
-/// Simulates so many seconds, and tells the observers.
+/// Simulates so many seconds with a seed, and tells the observers.
 pub(crate) fn simulate<O: Observer + 'static>(
     observers: impl IntoIterator<Item = O>,
+    seed: u64,
     seconds: u64,
 ) -> Report {
-    let mut sim = Simulation::new(1);
+    let mut sim = Simulation::new(seed);
     let earth = sim.host("earth");
     let base = sim.actor(earth, "base", |_| Base);
     for rover in 0..20 {
