@@ -7,6 +7,7 @@
 mod chunk;
 mod file;
 mod foxglove;
+mod records;
 mod thread;
 mod viewer;
 

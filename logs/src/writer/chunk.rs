@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use mcap::records::{Channel, MessageHeader, SchemaHeader, op};
 
-use super::file::put_record;
+use super::records::put_record;
 use crate::descriptors::SchemaOf;
 use crate::frames::{HEAD_BYTES, record_head};
 use crate::parse::MESSAGE_HEADER_BYTES;
@@ -99,41 +99,4 @@ impl Chunk {
             rest = rest.get_mut(next..).unwrap_or_default();
         }
     }
-}
-
-/// A record of a chunk.
-pub(super) struct ChunkRecord<'a> {
-    pub(super) opcode: u8,
-    /// Where in the chunk it starts.
-    pub(super) offset: u64,
-    /// All of it, its head included.
-    pub(super) bytes: &'a [u8],
-}
-
-impl ChunkRecord<'_> {
-    /// The channel and the time of a message.
-    pub(super) fn channel_and_log_time(&self) -> (u16, u64) {
-        let word = |at: usize| {
-            let bytes = self.bytes.get(at..).and_then(<[u8]>::first_chunk::<8>);
-            bytes.map_or(0, |bytes| u64::from_le_bytes(*bytes))
-        };
-        (word(9) as u16, word(15))
-    }
-}
-
-/// The records of a chunk.
-pub(super) fn records(chunk: &[u8]) -> impl Iterator<Item = ChunkRecord<'_>> {
-    let mut offset = 0;
-    std::iter::from_fn(move || {
-        let rest = &chunk[offset..];
-        let (opcode, length) = record_head(rest)?;
-        let bytes = &rest[..(HEAD_BYTES + length) as usize];
-        let record = ChunkRecord {
-            opcode,
-            offset: offset as u64,
-            bytes,
-        };
-        offset += bytes.len();
-        Some(record)
-    })
 }

@@ -6,9 +6,8 @@
 //! own record types; the crate reads it back in the tests.
 
 use std::collections::BTreeMap;
-use std::io::{self, Cursor, Write};
+use std::io::{self, Write};
 
-use binrw::BinWrite;
 use mcap::MAGIC;
 use mcap::records::{
     AttachmentHeader, AttachmentIndex, ChunkHeader, ChunkIndex, DataEnd, Footer, Header, Metadata,
@@ -16,7 +15,7 @@ use mcap::records::{
 };
 
 use super::Compression;
-use super::chunk::records;
+use super::records::{put_record, records};
 
 /// A message in an index: its log time, its offset.
 const ENTRY_BYTES: usize = 16;
@@ -57,27 +56,6 @@ struct Groups {
     chunk_indexes: Vec<u8>,
     attachment_indexes: Vec<u8>,
     metadata_indexes: Vec<u8>,
-}
-
-/// Appends a record: one of `mcap`'s, and behind it what `rest` appends.
-pub(super) fn put_record<R>(
-    out: &mut Vec<u8>,
-    opcode: u8,
-    record: &R,
-    rest: impl FnOnce(&mut Vec<u8>),
-) where
-    R: for<'a> BinWrite<Args<'a> = ()>,
-{
-    // By itself: a list inside a record is written by seeking to the end of the buffer.
-    let mut content = Cursor::new(Vec::new());
-    // Only a writer fails, and memory is none that does.
-    let written = record.write_le(&mut content);
-    debug_assert!(written.is_ok(), "{written:?}");
-    let mut content = content.into_inner();
-    rest(&mut content);
-    out.push(opcode);
-    out.extend_from_slice(&(content.len() as u64).to_le_bytes());
-    out.extend_from_slice(&content);
 }
 
 impl<W: Write> McapFile<W> {
