@@ -25,6 +25,19 @@ pub enum LogError {
         /// What the system said.
         source: io::Error,
     },
+    /// What does not fit into memory could not be put into a temporary file.
+    #[error(
+        "{path}: cannot {action} a temporary file for what the comparison keeps: {source} (TMPDIR \
+         names another folder)"
+    )]
+    Temporary {
+        /// The folder for temporary files.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The file does not start like an MCAP file.
     #[error("{path}: not an MCAP file: it {actual}; expected {expected} at its start")]
     NotMcap {
@@ -149,7 +162,7 @@ impl LogError {
     pub fn is_of_output(&self) -> bool {
         match self {
             LogError::Io { action, .. } => !matches!(*action, "open" | "read"),
-            LogError::NotWritable { .. } => true,
+            LogError::NotWritable { .. } | LogError::Temporary { .. } => true,
             _ => false,
         }
     }

@@ -399,7 +399,18 @@ pub struct LoggedKey {
 }
 
 impl LoggedKey {
-    fn of(key: &KeyRef<'_>) -> Self {
+    /// The key, to be compared with others.
+    pub(crate) fn to_ref(&self) -> KeyRef<'_> {
+        KeyRef {
+            time_ns: self.time_ns,
+            step: self.step,
+            tie: self.tie,
+            source: &self.source,
+            count: self.count,
+        }
+    }
+
+    pub(crate) fn of(key: &KeyRef<'_>) -> Self {
         LoggedKey {
             time_ns: key.time_ns,
             step: key.step,

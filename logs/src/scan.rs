@@ -303,6 +303,20 @@ impl Scanner {
         self.frames.offset()
     }
 
+    /// Goes back to a frame that was read before. For a scanner that has read the file once, and so
+    /// knows its channels.
+    pub(crate) fn rewind(&mut self, frame: u64) {
+        self.frames.seek(frame);
+        // What is opened again does not count again.
+        self.unpacked = 0;
+        self.pending.clear();
+        self.chunk.clear();
+        self.next_inner = 0;
+        self.data_ended = false;
+        self.over = false;
+        self.last = None;
+    }
+
     /// Opens the frame at `position` again, and gives the message there, which is on the channel
     /// with this serial number. For a scanner that has read the file once, and so knows its
     /// channels.

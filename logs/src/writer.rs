@@ -1,10 +1,13 @@
-//! Writing a log while a run goes on: records are encoded where they are committed, and handed in
-//! batches to a thread that compresses and writes them.
+//! Writing a log while a run goes on: records are encoded where they are committed, chunk by chunk,
+//! and a thread compresses and writes each whole chunk.
 //!
 //! What this is not: a way to slow a run down or to change it. The writer sees committed records
 //! only; when the disk cannot keep up, a bounded queue makes the run wait, and nothing else.
 
+mod chunk;
+mod file;
 mod foxglove;
+mod records;
 mod thread;
 mod viewer;
 
@@ -16,6 +19,7 @@ use farside::key::EventKey;
 use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::scene::Scene;
 use farside::{Kind, Report, RunInfo};
+use mcap::records::{AttachmentHeader, MessageHeader};
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::LogError;
@@ -23,8 +27,8 @@ use crate::descriptors::{self, SchemaOf};
 use crate::envelope::{Encoder, put_key};
 use crate::topics::{self, CHECKPOINT, Topics};
 use crate::wire::{put_bytes, put_number, put_text};
-pub(crate) use thread::options as mcap_options;
-use thread::{Batch, Declaration, File, Header, Worker};
+use chunk::Chunk;
+use thread::{File, Worker};
 use viewer::Stage;
 
 /// The version of the format: a reader reads every minor version of the majors it knows.
@@ -33,9 +37,6 @@ pub(crate) const FORMAT_MINOR: u32 = 3;
 
 /// The attachment that holds the resolved scenario.
 pub(crate) const SCENARIO_ATTACHMENT: &str = "scenario.toml";
-
-/// Batches are handed over when they have this many bytes.
-const BATCH_BYTES: usize = 256 * 1024;
 
 /// A file that the run read, or that explains it, kept in the log whole.
 ///
@@ -144,7 +145,7 @@ pub struct LogWriter {
     path: PathBuf,
     options: LogOptions,
     exclude: Option<Topics>,
-    file: Option<Box<File>>,
+    file: Option<File>,
     live: Option<Live>,
 }
 
@@ -153,9 +154,9 @@ struct Live {
     encoder: Encoder,
     channels: Channels,
     worker: Worker,
-    batch: Batch,
+    chunk: Chunk,
     /// From the first message in flight on: their `log_time` is the end, which is not known yet.
-    at_end: Batch,
+    at_end: Vec<Chunk>,
     checkpoint_channel: u16,
     /// None if nothing is drawn.
     stage: Option<Stage>,
@@ -215,39 +216,39 @@ impl LogWriter {
         };
         let mut file = self.file.take().ok_or_else(finished)?;
         let exclude = self.exclude.take().ok_or_else(finished)?;
-        let mut metadata = |name: &str, metadata: BTreeMap<String, String>| {
-            let metadata = mcap::records::Metadata {
-                name: name.to_owned(),
-                metadata,
-            };
-            let written = file.write_metadata(&metadata);
-            written.map_err(|error| LogError::mcap(&self.path, error))
-        };
-        metadata("farside", self.head(run))?;
-        metadata("farside.run", std::mem::take(&mut self.options.run))?;
-        metadata("farside.host", std::mem::take(&mut self.options.host))?;
-        let mut attachments = vec![Attachment {
+        let head = self.head(run);
+        let refused = |error| LogError::io(&self.path, "write", error);
+        let options = &mut self.options;
+        for (name, metadata) in [
+            ("farside", head),
+            ("farside.run", std::mem::take(&mut options.run)),
+            ("farside.host", std::mem::take(&mut options.host)),
+        ] {
+            file.metadata(name, metadata).map_err(refused)?;
+        }
+        let scenario = Attachment {
             name: SCENARIO_ATTACHMENT.to_owned(),
             media_type: "application/toml".to_owned(),
-            bytes: std::mem::take(&mut self.options.resolved).into_bytes(),
-        }];
-        attachments.append(&mut self.options.attachments);
-        for attachment in attachments {
-            let attachment = mcap::Attachment {
-                log_time: self.options.epoch_ns,
-                create_time: self.options.epoch_ns,
+            bytes: std::mem::take(&mut options.resolved).into_bytes(),
+        };
+        let attachments = std::mem::take(&mut options.attachments);
+        for attachment in std::iter::once(scenario).chain(attachments) {
+            let head = AttachmentHeader {
+                log_time: options.epoch_ns,
+                create_time: options.epoch_ns,
                 name: attachment.name,
                 media_type: attachment.media_type,
-                data: attachment.bytes.into(),
             };
-            let written = file.attach(&attachment);
-            written.map_err(|error| LogError::mcap(&self.path, error))?;
+            file.attachment(head, &attachment.bytes).map_err(refused)?;
         }
+        // Whoever opens the log while the run goes on sees what it is of. A disk that is full says
+        // so again when the first chunk is written, and that ends the run as any later time.
+        let _ = file.flush();
         let worker = Worker::spawn(self.path.clone(), file)?;
-        let mut batch = Batch::default();
+        let mut chunk = Chunk::default();
         let mut channels = Channels::default();
         let checkpoint_channel = channels.get(
-            &mut batch,
+            &mut chunk,
             CHECKPOINT,
             "checkpoint",
             "",
@@ -258,8 +259,8 @@ impl LogWriter {
             encoder: Encoder::new(run.clone(), exclude),
             channels,
             worker,
-            batch,
-            at_end: Batch::default(),
+            chunk,
+            at_end: Vec::new(),
             checkpoint_channel,
             stage: scene.map(|scene| Stage::new(scene, run.clone())),
             epoch_ns: self.options.epoch_ns,
@@ -276,7 +277,7 @@ impl Channels {
     /// The channel of `topic` in this role, declared if it is new.
     fn get(
         &mut self,
-        batch: &mut Batch,
+        chunk: &mut Chunk,
         topic: &str,
         role: &'static str,
         kind: &str,
@@ -289,7 +290,7 @@ impl Channels {
                 // At most one schema for each channel: they run out after the channels.
                 let id = u16::try_from(self.schemas.len() + 1).map_err(|_| too_many(topic))?;
                 self.schemas.insert(schema.name.clone(), id);
-                batch.declare(Declaration::Schema { id, schema });
+                chunk.schema(id, schema);
                 id
             }
         };
@@ -303,12 +304,7 @@ impl Channels {
         if !kind.is_empty() {
             metadata.insert("kind".to_owned(), kind.to_owned());
         }
-        batch.declare(Declaration::Channel {
-            id,
-            schema_id,
-            topic: topic.to_owned(),
-            metadata,
-        });
+        chunk.channel(id, schema_id, topic, metadata);
         Ok(id)
     }
 }
@@ -328,6 +324,15 @@ fn schema_of(class: RecordClass, kind: Option<&Arc<Kind>>) -> SchemaOf {
     }
 }
 
+/// The last chunk, or a new one if that is full.
+fn open_chunk(chunks: &mut Vec<Chunk>) -> &mut Chunk {
+    if chunks.last().is_none_or(Chunk::is_full) {
+        chunks.push(Chunk::default());
+    }
+    let last = chunks.len() - 1;
+    &mut chunks[last]
+}
+
 impl Live {
     fn record(&mut self, record: &Record<'_>) -> Result<(), LogError> {
         let index = self.encoder.flow(record);
@@ -345,7 +350,7 @@ impl Live {
                 // Declarations precede everything that is still to be written.
                 let channel =
                     self.channels
-                        .get(&mut self.batch, &flow.topic, role, name, || {
+                        .get(&mut self.chunk, &flow.topic, role, name, || {
                             schema_of(flow.class, kind)
                         })?;
                 flow.channel = Some(channel);
@@ -354,22 +359,21 @@ impl Live {
         };
         let at_end = record.class == RecordClass::InFlight || !self.at_end.is_empty();
         self.last_ns = self.last_ns.max(self.log_time(record.class, &record.key));
-        let header = Header {
-            channel,
+        let header = MessageHeader {
+            channel_id: channel,
             sequence: record.ordinal as u32,
             log_time: self.epoch_ns.saturating_add(self.last_ns),
             publish_time: self.epoch_ns.saturating_add(record.sent.as_nanos()),
         };
-        let batch = if at_end {
-            &mut self.at_end
-        } else {
-            &mut self.batch
+        let chunk = match at_end {
+            true => open_chunk(&mut self.at_end),
+            false => &mut self.chunk,
         };
         if record.class == RecordClass::Sample {
-            batch.message(header, |out| out.extend_from_slice(record.body));
+            chunk.message(header, |out| out.extend_from_slice(record.body));
         } else {
             let encoder = &self.encoder;
-            batch.message(header, |out| encoder.encode(index, record, out));
+            chunk.message(header, |out| encoder.encode(index, record, out));
         }
         self.written += 1;
         self.draw(record)?;
@@ -385,21 +389,24 @@ impl Live {
     }
 
     fn hand_over_if_full(&mut self) -> Result<(), LogError> {
-        if self.batch.len() >= BATCH_BYTES {
-            self.hand_over()?;
+        match self.chunk.is_full() {
+            true => self.hand_over(),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     fn hand_over(&mut self) -> Result<(), LogError> {
+        if self.chunk.is_empty() {
+            return Ok(());
+        }
         let next = self.worker.spare();
-        let full = std::mem::replace(&mut self.batch, next);
+        let full = std::mem::replace(&mut self.chunk, next);
         self.worker.send(full)
     }
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint<'_>) -> Result<(), LogError> {
-        let header = Header {
-            channel: self.checkpoint_channel,
+        let header = MessageHeader {
+            channel_id: self.checkpoint_channel,
             sequence: self.checkpoints,
             log_time: self.epoch_ns.saturating_add(self.last_ns),
             publish_time: self.epoch_ns.saturating_add(self.last_ns),
@@ -418,21 +425,21 @@ impl Live {
             put_bytes(out, 4, &hashes);
         };
         if !self.at_end.is_empty() {
-            self.at_end.message(header, encode);
+            open_chunk(&mut self.at_end).message(header, encode);
             return Ok(());
         }
-        self.batch.message(header, encode);
+        self.chunk.message(header, encode);
         // A chunk ends here, so that a log cut later is whole up to a checkpoint.
-        self.batch.end_chunk();
         self.hand_over()
     }
 
     fn end(mut self, report: &Report) -> Result<(), LogError> {
         let end_ns = report.end_time.as_nanos().max(self.last_ns);
-        let mut at_end = std::mem::take(&mut self.at_end);
-        at_end.set_log_times(self.epoch_ns.saturating_add(end_ns));
         self.hand_over()?;
-        self.worker.send(at_end)?;
+        for mut chunk in std::mem::take(&mut self.at_end) {
+            chunk.set_log_times(self.epoch_ns.saturating_add(end_ns));
+            self.worker.send(chunk)?;
+        }
         let mut end = BTreeMap::new();
         let mut put = |key: &str, value: String| end.insert(key.to_owned(), value);
         put("digest", report.digest.to_string());
@@ -444,10 +451,7 @@ impl Live {
         // Maps of strings to numbers always become JSON.
         let counts = serde_json::to_string(&report.counts).unwrap_or_default();
         put("counts", counts);
-        self.worker.finish(mcap::records::Metadata {
-            name: "farside.end".to_owned(),
-            metadata: end,
-        })
+        self.worker.finish("farside.end", end)
     }
 }
 

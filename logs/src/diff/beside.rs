@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::DiffReport;
-use super::index::{Index, Mode, Names};
+use super::entry::{Mode, Names};
+use super::index::{Beside, Index};
 use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::shown::{apart, escaped};
 use crate::source::{Attached, Sum};
@@ -13,21 +14,26 @@ use crate::writer::SCENARIO_ATTACHMENT;
 /// Notes of one kind that are written out.
 const NOTES_SHOWN: usize = 20;
 
-/// Compares what is beside the messages. Gives the topics whose messages are to be read by field
+/// Compares what is beside the messages; channels in the order of their topics. Gives the topics whose messages are to be read by field
 /// even if their bytes are the same, since their schemas read them differently.
 pub(super) fn compare(
-    (a, b): (&Index, &Index),
+    (a, b): (&Index<'_>, &Index<'_>),
     (file_a, file_b): (&str, &str),
     mode: Mode,
-    names: &Names,
+    (names, order): (&mut Names, &[u32]),
     report: &mut DiffReport,
 ) -> BTreeSet<u32> {
     let mut by_field = BTreeSet::new();
-    let topics: BTreeSet<&u32> = a.channels.keys().chain(b.channels.keys()).collect();
+    let (channels_a, channels_b) = (a.channels(names), b.channels(names));
+    let mut told = BTreeSet::new();
     let mut notes = Vec::new();
-    for topic in topics {
+    for topic in order {
+        let declared = channels_a.contains_key(topic) || channels_b.contains_key(topic);
+        if !declared || !told.insert(topic) {
+            continue;
+        }
         let name = escaped(names.name(*topic));
-        match (a.channels.get(topic), b.channels.get(topic)) {
+        match (channels_a.get(topic), channels_b.get(topic)) {
             (Some(x), Some(y)) => {
                 let mut found = Channels::default();
                 found.compare(&name, x, y);
@@ -43,7 +49,7 @@ pub(super) fn compare(
                 } else {
                     (b, file_b)
                 };
-                if !index.entries.iter().any(|entry| entry.topic == *topic) {
+                if !index.has_records(*topic) {
                     notes.push(format!(
                         "{name} has no messages, and is declared in {file} only"
                     ));
@@ -59,6 +65,7 @@ pub(super) fn compare(
             .notes
             .push(format!("and {more} more such notes on channels"));
     }
+    let (a, b) = (&a.beside, &b.beside);
     metadata(a, b, mode, report);
     attachments(a, b, mode, report);
     if mode == Mode::Any && a.header != b.header {
@@ -74,8 +81,8 @@ pub(super) fn compare(
             }
         }
     }
-    for (file, index) in [(file_a, a), (file_b, b)] {
-        for other in &index.others {
+    for (file, beside) in [(file_a, a), (file_b, b)] {
+        for other in &beside.others {
             report
                 .notes
                 .push(format!("{file} has {other}: not compared"));
@@ -176,12 +183,12 @@ fn two(what: &str, x: Option<&String>, y: Option<&String>) -> String {
 
 /// Compares metadata records: the n-th of a name with the n-th. What Farside writes of a run and
 /// its machine is told elsewhere, or is not to be compared.
-fn metadata(a: &Index, b: &Index, mode: Mode, report: &mut DiffReport) {
+fn metadata(a: &Beside, b: &Beside, mode: Mode, report: &mut DiffReport) {
     type Records<'a> = BTreeMap<(&'a str, usize), [Option<&'a BTreeMap<String, String>>; 2]>;
     let mut records: Records<'_> = BTreeMap::new();
-    for (side, index) in [a, b].into_iter().enumerate() {
+    for (side, beside) in [a, b].into_iter().enumerate() {
         let mut times: BTreeMap<&str, usize> = BTreeMap::new();
-        for (name, entries) in &index.metadata {
+        for (name, entries) in &beside.metadata {
             let own = name == "farside" || name.starts_with("farside.");
             if mode == Mode::Farside && own {
                 continue;
@@ -217,11 +224,11 @@ fn metadata(a: &Index, b: &Index, mode: Mode, report: &mut DiffReport) {
     }
 }
 
-fn attachments(a: &Index, b: &Index, mode: Mode, report: &mut DiffReport) {
+fn attachments(a: &Beside, b: &Beside, mode: Mode, report: &mut DiffReport) {
     let mut found: BTreeMap<(&str, usize), [Option<&Attached>; 2]> = BTreeMap::new();
-    for (side, index) in [a, b].into_iter().enumerate() {
+    for (side, beside) in [a, b].into_iter().enumerate() {
         let mut times: BTreeMap<&str, usize> = BTreeMap::new();
-        for attached in &index.attachments {
+        for attached in &beside.attachments {
             if mode == Mode::Farside && attached.name == SCENARIO_ATTACHMENT {
                 continue;
             }

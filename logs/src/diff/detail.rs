@@ -6,11 +6,11 @@ use farside::MatchKey;
 use farside::record::RecordClass;
 use mcap::records::MessageHeader;
 
-use super::index::{Entry, Index, Mode, Names};
+use super::entry::{Entry, Mode, Names};
+use super::index::Index;
 use super::{Carried, Cause, FirstDifference};
 use crate::LogError;
-use crate::envelope::seconds;
-use crate::envelope::{KeyRef, RecordRef};
+use crate::envelope::{RecordRef, seconds};
 use crate::fields::{self, Encoded, FieldDiff, bodies, protobuf};
 use crate::log::LoggedKey;
 use crate::scan::{ChannelInfo, ScannedMessage};
@@ -31,8 +31,7 @@ pub(super) struct Held {
 
 impl Held {
     /// Fetches the message of an entry.
-    pub(super) fn fetch(index: &mut Index, at: u32) -> Result<Held, LogError> {
-        let entry = index.entries[at as usize];
+    pub(super) fn fetch(index: &mut Index<'_>, entry: &Entry) -> Result<Held, LogError> {
         let message = index.scanner.message_at(entry.position, entry.channel)?;
         Ok(Held {
             channel: message.channel.clone(),
@@ -48,12 +47,11 @@ impl Held {
     /// The first field in which it differs from the message of an entry by more than the tolerance.
     pub(super) fn against(
         &self,
-        index: &mut Index,
-        at: u32,
+        index: &mut Index<'_>,
+        entry: &Entry,
         mode: Mode,
         tolerance: f64,
     ) -> Result<Option<FieldDiff>, LogError> {
-        let entry = index.entries[at as usize];
         let message = index.scanner.message_at(entry.position, entry.channel)?;
         let held = ScannedMessage {
             channel: &self.channel,
@@ -127,10 +125,10 @@ fn times(field: &str, a_ns: u64, b_ns: u64, tolerance: f64) -> Option<FieldDiff>
 
 /// Describes a record as a difference, and traces back what caused it.
 pub(super) fn describe(
-    index: &mut Index,
+    index: &mut Index<'_>,
     entry: &Entry,
     mode: Mode,
-    names: &Names,
+    names: &mut Names,
     diff: FieldDiff,
 ) -> Result<FirstDifference, LogError> {
     let message = index.scanner.message_at(entry.position, entry.channel)?;
@@ -164,19 +162,9 @@ pub(super) fn describe(
         reason: record.reason.to_owned(),
         carriage: first.carriage.clone(),
     });
-    let cause = record.cause.map(|key| owned(&key));
+    let cause = record.cause.map(|key| LoggedKey::of(&key));
     trace(index, names, cause, &mut first)?;
     Ok(first)
-}
-
-fn owned(key: &KeyRef<'_>) -> LoggedKey {
-    LoggedKey {
-        time_ns: key.time_ns,
-        step: key.step,
-        tie: key.tie,
-        source: key.source.to_owned(),
-        count: key.count,
-    }
 }
 
 /// Whether a cause is the same timer as the one that it led to: in a chain they say nothing new.
@@ -187,40 +175,31 @@ fn is_same_timer(later: &Cause, cause: &Cause) -> bool {
 
 /// Follows the causes back to a start.
 fn trace(
-    index: &mut Index,
-    names: &Names,
+    index: &mut Index<'_>,
+    names: &mut Names,
     mut next: Option<LoggedKey>,
     first: &mut FirstDifference,
 ) -> Result<(), LogError> {
     let mut steps = 0;
-    let mut before = usize::MAX;
+    let mut before = u32::MAX;
     let mut omitted = 0;
     let mut origin: Option<Cause> = None;
     while let Some(key) = next.take() {
-        let key = KeyRef {
-            time_ns: key.time_ns,
-            step: key.step,
-            tie: key.tie,
-            source: &key.source,
-            count: key.count,
-        };
         // A cause comes before its effect: a log that says otherwise is damaged.
-        let found = index
-            .event(&key, names)
-            .filter(|at| *at < before && steps < CHAIN_LIMIT);
-        let Some(at) = found else {
+        let found = index.event(&key.to_ref(), names)?;
+        let found = found.filter(|entry| entry.at < before && steps < CHAIN_LIMIT);
+        let Some(entry) = found else {
             let unknown = Cause {
                 time_s: seconds(key.time_ns),
                 time_ns: key.time_ns,
-                sender: key.source.to_owned(),
+                sender: key.source,
                 fate: "not in the log".to_owned(),
                 ..Cause::default()
             };
             omitted += origin.replace(unknown).map_or(0, |left| 1 + left.repeats);
             break;
         };
-        before = at;
-        let entry = index.entries[at];
+        before = entry.at;
         let message = index.scanner.message_at(entry.position, entry.channel)?;
         let Some(record) = RecordRef::read(message.data) else {
             break;
@@ -235,7 +214,7 @@ fn trace(
             fate: record.class.name().to_owned(),
             ..Cause::default()
         };
-        next = record.cause.map(|key| owned(&key));
+        next = record.cause.map(|key| LoggedKey::of(&key));
         steps += 1;
         let last = origin.as_mut().or(first.causes.last_mut());
         if let Some(last) = last.filter(|last| is_same_timer(last, &cause)) {

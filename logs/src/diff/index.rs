@@ -1,97 +1,29 @@
-//! A compact index of one log: for each record who it is, what it says as a hash, when it was and
-//! where in the file. Bodies stay in the file.
+//! One log as it is compared: read from front to back once, of its records only those kept that are
+//! to be paired, and a sparse index of the others, by which the causes of a difference are found.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use farside::record::RecordClass;
-use xxhash_rust::xxh3::xxh3_64;
+use hashbrown::HashMap;
+use rustc_hash::FxBuildHasher;
 
+use super::entry::{Builder, Entry, Mode, Names};
+use super::spill::Buckets;
 use crate::LogError;
 use crate::envelope::{KeyRef, RecordRef};
 use crate::frames::Care;
-use crate::log::Log;
-use crate::scan::{ChannelInfo, Item, Position, ScannedMessage, Scanner};
+use crate::log::{Log, LoggedKey};
+use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
 use crate::source::Attached;
 use crate::topics::Topics;
 use crate::writer::SCENARIO_ATTACHMENT;
 
-/// Names of sources and topics, numbered: both logs share the numbers.
-#[derive(Default)]
-pub(super) struct Names {
-    numbers: BTreeMap<String, u32>,
-    pub(super) names: Vec<String>,
-}
+/// A row of the sparse index has at least so many records, if they are not in one chunk.
+const ROW_RECORDS: u32 = 512;
 
-impl Names {
-    fn number(&mut self, name: &str) -> u32 {
-        if let Some(number) = self.numbers.get(name) {
-            return *number;
-        }
-        let number = self.names.len() as u32;
-        self.numbers.insert(name.to_owned(), number);
-        self.names.push(name.to_owned());
-        number
-    }
-
-    pub(super) fn name(&self, number: u32) -> &str {
-        self.names.get(number as usize).map_or("", String::as_str)
-    }
-}
-
-/// One record, in 88 bytes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Entry {
-    /// Hash of the identity, without the place in the flow where a match key stands for it; in
-    /// other files than Farside's, of the message without its times.
-    pub(super) identity: u64,
-    /// The place among records of one identity.
-    pub(super) ordinal: u64,
-    /// Hash of everything that is compared.
-    pub(super) content: u64,
-    pub(super) time_ns: u64,
-    pub(super) count: u64,
-    pub(super) position: Position,
-    pub(super) step: u32,
-    pub(super) tie: u32,
-    pub(super) source: u32,
-    pub(super) topic: u32,
-    /// The serial number of the channel.
-    pub(super) channel: u32,
-    /// The number that the publisher gave the message.
-    pub(super) sequence: u32,
-    /// False for the loss of a message and for one in flight: no event has their key.
-    pub(super) event: bool,
-    pub(super) ignored: bool,
-}
-
-/// The records of a log, in log order, and the open file to fetch them from.
-pub(super) struct Index {
-    pub(super) scanner: Scanner,
-    pub(super) entries: Vec<Entry>,
-    pub(super) end: Option<BTreeMap<String, String>>,
-    pub(super) cut: Option<(u64, String)>,
-    /// What wrote the file: profile and library.
-    pub(super) header: (String, String),
-    pub(super) metadata: Vec<(String, BTreeMap<String, String>)>,
-    pub(super) attachments: Vec<Attached>,
-    /// The channels of each topic, whether they have messages or not.
-    pub(super) channels: BTreeMap<u32, Vec<Arc<ChannelInfo>>>,
-    /// How many messages were left out, by what their channels are for.
-    pub(super) left_out: BTreeMap<String, u64>,
-    /// What else there is that is not compared.
-    pub(super) others: Vec<String>,
-}
-
-/// How records are told apart.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mode {
-    /// By sender, receiver, kind and match key or ordinal.
-    Farside,
-    /// By topic, and on a topic by what they say, when they were, and their place.
-    Any,
-}
+/// Rows whose records are kept: a chain of causes stays near where it was.
+const ROWS_KEPT: usize = 4;
 
 /// What a Farside log says at its start; none for any other file.
 pub(super) fn start(path: &Path) -> Result<Option<Log>, LogError> {
@@ -102,91 +34,372 @@ pub(super) fn start(path: &Path) -> Result<Option<Log>, LogError> {
     }
 }
 
-impl Index {
-    pub(super) fn build(
+/// Where in the file some records begin that follow each other.
+struct Row {
+    /// The key of the first of them.
+    key: LoggedKey,
+    frame: u64,
+    /// Its place among the log's records.
+    at: u32,
+}
+
+/// A log, and as much of it as has been read.
+pub(super) struct Index<'a> {
+    pub(super) scanner: Scanner,
+    builder: Builder<'a>,
+    pub(super) beside: Beside,
+    /// The records that are to be paired.
+    pub(super) entries: Buckets<Entry>,
+    /// How many records there were, those on topics that are left out included.
+    pub(super) records: u32,
+    /// Of these, how many are on topics that are left out.
+    pub(super) ignored: u64,
+    /// How many are to be compared, by the number of their topic.
+    by_topic: Vec<u64>,
+    /// How many messages were left out, by what their channels are for.
+    pub(super) left_out: BTreeMap<String, u64>,
+    /// How many records at the front agree with those of the other log.
+    agreed: u32,
+    /// How many those were and the one behind them, by the number of their topic.
+    agreed_by_topic: Vec<u64>,
+    /// The greatest ordinal of a record with a match key among them, by its flow.
+    agreed_keys: HashMap<u64, u64, FxBuildHasher>,
+    /// Records with a match key behind them that have a lesser one: by their identity, the least.
+    pub(super) late: BTreeMap<u64, u64>,
+    rows: Vec<Row>,
+    last_frame: u64,
+    /// The topic of the message that was advanced to.
+    topic: u32,
+    /// Rows that were read again, the latest last.
+    read_again: Vec<(usize, Vec<Entry>)>,
+}
+
+impl<'a> Index<'a> {
+    /// Opens a log, of which at most so many entries are to be in memory.
+    pub(super) fn open(
         path: &Path,
         mode: Mode,
-        ignore: &Topics,
-        names: &mut Names,
-    ) -> Result<Index, LogError> {
-        let mut scanner = Scanner::careful(path, Care::Attachments)?;
-        let mut builder = Builder {
-            mode,
-            ignore,
-            names,
-            channels: Vec::new(),
-            places: BTreeMap::new(),
-            scratch: Vec::new(),
-            entries: Vec::new(),
-            left_out: BTreeMap::new(),
-        };
-        let mut beside = Beside::default();
-        while let Some(item) = scanner.next()? {
-            match item {
-                Item::Message(message) => {
-                    if !builder.add(&message) {
-                        let topic = &message.channel.topic;
-                        let what = format!("a message on {topic} that is malformed");
-                        return Err(LogError::damaged(path, message.position.frame, what));
-                    }
-                }
-                Item::Damage { offset, what, .. } => {
-                    return Err(LogError::damaged(path, offset, what));
-                }
-                item => beside.add(item),
-            }
-        }
-        let (entries, left_out) = (builder.entries, builder.left_out);
-        let mut channels: BTreeMap<u32, Vec<Arc<ChannelInfo>>> = BTreeMap::new();
-        for channel in scanner.channels() {
-            let topic = names.number(&channel.topic);
-            if !ignore.matches(&channel.topic) {
-                channels.entry(topic).or_default().push(channel.clone());
-            }
-        }
-        let ends = |(name, _): &&(String, _)| mode == Mode::Farside && name == "farside.end";
-        let end = beside.metadata.iter().rfind(ends);
+        ignore: &'a Topics,
+        most_entries: usize,
+    ) -> Result<Index<'a>, LogError> {
         Ok(Index {
-            end: end.map(|(_, entries)| entries.clone()),
-            scanner,
-            entries,
-            cut: beside.cut,
-            header: beside.header,
-            metadata: beside.metadata,
-            attachments: beside.attachments,
-            channels,
-            left_out,
-            others: beside.others,
+            scanner: Scanner::careful(path, Care::Attachments)?,
+            builder: Builder::new(mode, ignore),
+            beside: Beside::default(),
+            entries: Buckets::new(most_entries),
+            records: 0,
+            ignored: 0,
+            by_topic: Vec::new(),
+            left_out: BTreeMap::new(),
+            agreed: 0,
+            agreed_by_topic: Vec::new(),
+            agreed_keys: HashMap::default(),
+            late: BTreeMap::new(),
+            rows: Vec::new(),
+            last_frame: 0,
+            topic: 0,
+            read_again: Vec::new(),
         })
     }
 
-    /// The order of the run's events: the entry of the event with this key.
-    pub(super) fn event(&self, key: &KeyRef<'_>, names: &Names) -> Option<usize> {
-        let key_of = |entry: &Entry| KeyRef {
-            time_ns: entry.time_ns,
-            step: entry.step,
-            tie: entry.tie,
-            source: names.name(entry.source),
-            count: entry.count,
+    /// Goes to the next message that is to be compared; false if there is none.
+    pub(super) fn advance(&mut self, names: &mut Names) -> Result<bool, LogError> {
+        loop {
+            let message = match self.scanner.next()? {
+                Some(Item::Message(message)) => message,
+                Some(Item::Damage { offset, what, .. }) => {
+                    return Err(LogError::damaged(self.scanner.path(), offset, what));
+                }
+                Some(item) => {
+                    self.beside.add(item);
+                    continue;
+                }
+                None => return Ok(false),
+            };
+            let channel = self.builder.channel(&message, names);
+            if !channel.compared {
+                let role = message.channel.role();
+                match self.left_out.get_mut(role) {
+                    Some(count) => *count += 1,
+                    None => drop(self.left_out.insert(role.to_owned(), 1)),
+                }
+                continue;
+            }
+            let frame = message.position.frame;
+            let apart = |row: &Row| self.records - row.at >= ROW_RECORDS;
+            let starts_row = self.builder.mode == Mode::Farside
+                && frame != self.last_frame
+                && self.rows.last().is_none_or(apart);
+            self.last_frame = frame;
+            if starts_row || (channel.ignored && self.builder.mode == Mode::Farside) {
+                let Some(record) = RecordRef::read(message.data) else {
+                    return Err(self.malformed());
+                };
+                if starts_row {
+                    let (key, at) = (LoggedKey::of(&record.key), self.records);
+                    self.rows.push(Row { key, frame, at });
+                }
+            }
+            self.records += 1;
+            if channel.ignored {
+                self.ignored += 1;
+                continue;
+            }
+            let topic = channel.topic as usize;
+            if self.by_topic.len() <= topic {
+                self.by_topic.resize(topic + 1, 0);
+            }
+            self.by_topic[topic] += 1;
+            self.topic = channel.topic;
+            return Ok(true);
+        }
+    }
+
+    /// The message that was advanced to.
+    pub(super) fn current(&self) -> Option<ScannedMessage<'_>> {
+        self.scanner.current()
+    }
+
+    /// The number of its topic.
+    pub(super) fn topic(&self) -> u32 {
+        self.topic
+    }
+
+    /// The entry of the message that was advanced to.
+    pub(super) fn entry(&mut self, names: &mut Names) -> Result<Entry, LogError> {
+        let at = self.records - 1;
+        let message = self.scanner.current();
+        let entry = message.and_then(|message| self.builder.entry(&message, at, names));
+        entry.ok_or_else(|| self.malformed())
+    }
+
+    /// Passes over a message that agrees with the other log's. Says whether it was counted, by
+    /// which later records are told apart.
+    pub(super) fn pass(&mut self) -> Result<bool, LogError> {
+        let Some(message) = self.scanner.current() else {
+            return Ok(false);
         };
-        let from = self.entries.partition_point(|entry| key_of(entry) < *key);
-        let same = self.entries[from..]
-            .iter()
-            .take_while(|entry| key_of(entry) == *key);
-        same.enumerate()
-            .find(|(_, entry)| entry.event)
-            .map(|(at, _)| from + at)
+        if self.builder.mode == Mode::Any {
+            self.builder.pass_topic(self.topic);
+            return Ok(true);
+        }
+        match RecordRef::read(message.data) {
+            Some(record) => {
+                let counted = self.builder.pass(&record);
+                self.note_key();
+                Ok(counted)
+            }
+            None => Err(self.malformed()),
+        }
+    }
+
+    /// Notes the match key of a record that agrees with the other log's.
+    pub(super) fn note_key(&mut self) {
+        if let Some((flow, ordinal)) = self.builder.keyed {
+            let greatest = self.agreed_keys.entry(flow).or_insert(ordinal);
+            *greatest = (*greatest).max(ordinal);
+        }
+    }
+
+    pub(super) fn malformed(&self) -> LogError {
+        let (topic, frame) = match self.scanner.current() {
+            Some(message) => (message.channel.topic.as_str(), message.position.frame),
+            None => ("", 0),
+        };
+        let what = format!("a message on {topic} that is malformed");
+        LogError::damaged(self.scanner.path(), frame, what)
+    }
+
+    /// So many records at the front agree with those of the other log: they are not kept.
+    pub(super) fn agrees_until(&mut self, records: u32) {
+        self.agreed_by_topic.clone_from(&self.by_topic);
+        self.agreed = records;
+    }
+
+    /// Takes over which match keys agreed: the same in both logs.
+    pub(super) fn keys_agree_with(&mut self, other: &Index<'_>) {
+        self.agreed_keys.clone_from(&other.agreed_keys);
+    }
+
+    /// How many records at the front agree with those of the other log.
+    pub(super) fn agreed(&self) -> u32 {
+        self.agreed
+    }
+
+    /// Keeps the entry that was just made, to be paired.
+    pub(super) fn keep(&mut self, entry: Entry) -> Result<(), LogError> {
+        if let Some((flow, ordinal)) = self.builder.keyed
+            && self
+                .agreed_keys
+                .get(&flow)
+                .is_some_and(|greatest| *greatest > ordinal)
+        {
+            let least = self.late.entry(entry.identity).or_insert(ordinal);
+            *least = (*least).min(ordinal);
+        }
+        self.entries.push(entry.bucket(self.builder.mode), entry)
+    }
+
+    /// Keeps all that has not been read yet.
+    pub(super) fn keep_rest(&mut self, names: &mut Names) -> Result<(), LogError> {
+        while self.advance(names)? {
+            let entry = self.entry(names)?;
+            self.keep(entry)?;
+        }
+        Ok(())
+    }
+
+    /// Whether records on this topic agreed.
+    pub(super) fn agrees_on(&self, topic: u32) -> bool {
+        let agreed = self.agreed_by_topic.get(topic as usize);
+        self.agreed > 0 && agreed.is_some_and(|agreed| *agreed > 0)
+    }
+
+    /// The topics in the order in which they have their first message, then those that have none.
+    pub(super) fn topic_order(&self, names: &mut Names) -> Vec<u32> {
+        let declared = self.scanner.channels().iter();
+        let declared: Vec<u32> = declared
+            .map(|channel| names.number(&channel.topic))
+            .collect();
+        let mut order = self.builder.topics.clone();
+        order.extend(declared);
+        order
+    }
+
+    /// How many records are to be compared on each topic that has any.
+    pub(super) fn topics(&self) -> impl Iterator<Item = (u32, u64)> {
+        let topics = self.by_topic.iter().enumerate();
+        topics
+            .filter(|(_, count)| **count > 0)
+            .map(|(topic, count)| (topic as u32, *count))
+    }
+
+    /// Whether there are records to be compared on a topic.
+    pub(super) fn has_records(&self, topic: u32) -> bool {
+        self.by_topic
+            .get(topic as usize)
+            .is_some_and(|count| *count > 0)
+    }
+
+    /// The channels of each topic that is not left out, whether they have messages or not.
+    pub(super) fn channels(&self, names: &mut Names) -> BTreeMap<u32, Vec<Arc<ChannelInfo>>> {
+        let mut channels: BTreeMap<u32, Vec<Arc<ChannelInfo>>> = BTreeMap::new();
+        for channel in self.scanner.channels() {
+            if !self.builder.leaves_out(&channel.topic) {
+                let topic = names.number(&channel.topic);
+                channels.entry(topic).or_default().push(channel.clone());
+            }
+        }
+        channels
+    }
+
+    /// Whether a record that agreed with the other log's has a match key that one behind it repeats
+    /// with a lesser ordinal, `late`: they are paired by their ordinals.
+    pub(super) fn is_overtaken(
+        &mut self,
+        late: &BTreeMap<u64, u64>,
+        names: &mut Names,
+    ) -> Result<bool, LogError> {
+        let mut overtaken = false;
+        self.read_again(0, self.agreed, names, |builder, message, _, _| {
+            let record = RecordRef::read(message.data);
+            if let Some(record) = record.filter(|record| record.match_key.is_some()) {
+                let (identity, ordinal) = builder.identity(&record);
+                overtaken |= late.get(&identity).is_some_and(|late| *late < ordinal);
+            }
+        })?;
+        Ok(overtaken)
+    }
+
+    /// Reads the records from a row on again, up to one at a place.
+    fn read_again(
+        &mut self,
+        row: usize,
+        to: u32,
+        names: &mut Names,
+        mut each: impl FnMut(&mut Builder<'_>, &ScannedMessage<'_>, u32, &mut Names),
+    ) -> Result<(), LogError> {
+        let Some(Row { frame, at, .. }) = self.rows.get(row) else {
+            return Ok(());
+        };
+        let mut at = *at;
+        self.scanner.rewind(*frame);
+        while at < to
+            && let Some(item) = self.scanner.next()?
+        {
+            if let Item::Message(message) = item
+                && self.builder.channel(&message, names).compared
+            {
+                each(&mut self.builder, &message, at, names);
+                at += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// The entries of a row.
+    fn row(&mut self, row: usize, names: &mut Names) -> Result<&[Entry], LogError> {
+        let known = self.read_again.iter().position(|(known, _)| *known == row);
+        let entries = match known {
+            Some(known) => self.read_again.remove(known).1,
+            None => {
+                let to = self.rows.get(row + 1).map_or(self.records, |next| next.at);
+                let mut entries = Vec::new();
+                self.read_again(row, to, names, |builder, message, at, names| {
+                    entries.extend(builder.entry(message, at, names));
+                })?;
+                entries
+            }
+        };
+        if self.read_again.len() >= ROWS_KEPT {
+            self.read_again.remove(0);
+        }
+        self.read_again.push((row, entries));
+        Ok(self.read_again.last().map_or(&[], |(_, entries)| entries))
+    }
+
+    /// The order of the run's events: the entry of the event with this key. For a log that has been
+    /// read to its end.
+    pub(super) fn event(
+        &mut self,
+        key: &KeyRef<'_>,
+        names: &mut Names,
+    ) -> Result<Option<Entry>, LogError> {
+        let mut row = self
+            .rows
+            .partition_point(|row| row.key.to_ref() < *key)
+            .saturating_sub(1);
+        while self
+            .rows
+            .get(row)
+            .is_some_and(|row| row.key.to_ref() <= *key)
+        {
+            let entries = self.row(row, names)?;
+            let from = entries.partition_point(|entry| entry.key(names) < *key);
+            for entry in &entries[from..] {
+                if entry.key(names) != *key {
+                    return Ok(None);
+                }
+                if entry.event {
+                    return Ok(Some(*entry));
+                }
+            }
+            row += 1;
+        }
+        Ok(None)
     }
 }
 
 /// What a file holds beside its messages.
 #[derive(Default)]
-struct Beside {
-    header: (String, String),
-    metadata: Vec<(String, BTreeMap<String, String>)>,
-    attachments: Vec<Attached>,
-    cut: Option<(u64, String)>,
-    others: Vec<String>,
+pub(super) struct Beside {
+    /// What wrote the file: profile and library.
+    pub(super) header: (String, String),
+    pub(super) metadata: Vec<(String, BTreeMap<String, String>)>,
+    pub(super) attachments: Vec<Attached>,
+    pub(super) cut: Option<(u64, String)>,
+    /// What else there is that is not compared.
+    pub(super) others: Vec<String>,
 }
 
 impl Beside {
@@ -211,176 +424,9 @@ impl Beside {
             _ => {}
         }
     }
-}
 
-/// What is the same for all messages of a channel.
-#[derive(Clone, Copy)]
-struct ChannelEntry {
-    topic: u32,
-    ignored: bool,
-    compared: bool,
-}
-
-struct Builder<'a> {
-    mode: Mode,
-    ignore: &'a Topics,
-    names: &'a mut Names,
-    channels: Vec<Option<ChannelEntry>>,
-    /// How many records there were on a topic, or of an identity that has no ordinal of its own.
-    places: BTreeMap<u64, u64>,
-    scratch: Vec<u8>,
-    entries: Vec<Entry>,
-    left_out: BTreeMap<String, u64>,
-}
-
-impl Builder<'_> {
-    fn channel(&mut self, message: &ScannedMessage<'_>) -> ChannelEntry {
-        let serial = message.channel.serial as usize;
-        if self.channels.len() <= serial {
-            self.channels.resize(serial + 1, None);
-        }
-        if let Some(known) = self.channels[serial] {
-            return known;
-        }
-        let topic = &message.channel.topic;
-        let compared = match self.mode {
-            Mode::Farside => matches!(message.channel.role(), "message" | "event"),
-            Mode::Any => true,
-        };
-        let entry = ChannelEntry {
-            topic: self.names.number(topic),
-            ignored: self.ignore.matches(topic),
-            compared,
-        };
-        self.channels[serial] = Some(entry);
-        entry
-    }
-
-    /// Adds a message; false if it is malformed.
-    fn add(&mut self, message: &ScannedMessage<'_>) -> bool {
-        let channel = self.channel(message);
-        if !channel.compared {
-            let role = message.channel.role();
-            match self.left_out.get_mut(role) {
-                Some(count) => *count += 1,
-                None => drop(self.left_out.insert(role.to_owned(), 1)),
-            }
-            return true;
-        }
-        let entry = match self.mode {
-            Mode::Farside => match RecordRef::read(message.data) {
-                Some(record) => self.farside(&record, message, channel),
-                None => return false,
-            },
-            Mode::Any => self.any(message, channel),
-        };
-        self.entries.push(entry);
-        true
-    }
-
-    fn place(&mut self, identity: u64) -> u64 {
-        let place = self.places.entry(identity).or_default();
-        *place += 1;
-        *place - 1
-    }
-
-    fn any(&mut self, message: &ScannedMessage<'_>, channel: ChannelEntry) -> Entry {
-        let ordinal = self.place(u64::from(channel.topic));
-        let identity = xxh3_64(message.data);
-        let mut content = [0; 24];
-        content[..8].copy_from_slice(&message.head.log_time.to_le_bytes());
-        content[8..16].copy_from_slice(&message.head.publish_time.to_le_bytes());
-        content[16..].copy_from_slice(&identity.to_le_bytes());
-        Entry {
-            identity,
-            ordinal,
-            content: xxh3_64(&content),
-            time_ns: message.head.log_time,
-            count: ordinal,
-            position: message.position,
-            step: 0,
-            tie: 0,
-            source: channel.topic,
-            topic: channel.topic,
-            channel: message.channel.serial,
-            sequence: message.head.sequence,
-            event: false,
-            ignored: channel.ignored,
-        }
-    }
-
-    fn farside(
-        &mut self,
-        record: &RecordRef<'_>,
-        message: &ScannedMessage<'_>,
-        channel: ChannelEntry,
-    ) -> Entry {
-        let (identity, ordinal) = self.identity(record);
-        let key = &record.key;
-        let content = {
-            let out = &mut self.scratch;
-            out.clear();
-            for text in [record.class.name(), record.link, record.reason, record.note] {
-                out.extend_from_slice(text.as_bytes());
-                out.push(0);
-            }
-            out.extend_from_slice(&key.time_ns.to_le_bytes());
-            out.extend_from_slice(&record.sent_ns.to_le_bytes());
-            out.extend_from_slice(record.body);
-            xxh3_64(out)
-        };
-        Entry {
-            identity,
-            ordinal,
-            content,
-            time_ns: key.time_ns,
-            count: key.count,
-            position: message.position,
-            step: key.step,
-            tie: key.tie,
-            source: self.names.number(key.source),
-            topic: channel.topic,
-            channel: message.channel.serial,
-            sequence: 0,
-            event: !matches!(record.class, RecordClass::Lost | RecordClass::InFlight),
-            ignored: channel.ignored,
-        }
-    }
-
-    /// Who a record is, and its place among those who are the same.
-    fn identity(&mut self, record: &RecordRef<'_>) -> (u64, u64) {
-        let out = &mut self.scratch;
-        out.clear();
-        for text in [record.sender, record.receiver, record.kind] {
-            out.extend_from_slice(text.as_bytes());
-            out.push(0);
-        }
-        // Whatever becomes of a message, it is the same message.
-        let class = if record.class.is_fate() {
-            RecordClass::Delivered
-        } else {
-            record.class
-        };
-        out.push(class as u8);
-        out.extend_from_slice(&record.copy.to_le_bytes());
-        let counted = class == RecordClass::Delivered
-            || matches!(class, RecordClass::Timer | RecordClass::HandOver);
-        match record.match_key {
-            // The n-th repeat of a key: by their order in the flow.
-            Some(key) => {
-                out.push(1);
-                out.extend_from_slice(&key.to_le_bytes());
-                (xxh3_64(out), record.ordinal)
-            }
-            None if counted => {
-                out.push(2);
-                out.extend_from_slice(&record.ordinal.to_le_bytes());
-                (xxh3_64(out), record.ordinal)
-            }
-            None => {
-                let identity = xxh3_64(out);
-                (identity, self.place(identity))
-            }
-        }
+    /// Whether a run ended in the log.
+    pub(super) fn has_end(&self) -> bool {
+        self.metadata.iter().any(|(name, _)| name == "farside.end")
     }
 }

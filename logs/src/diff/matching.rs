@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::index::{Entry, Index};
+use super::entry::Entry;
 
-/// Which records of two logs are the same ones.
+/// Which of the entries of two logs are the same records.
 #[derive(Default)]
 pub(super) struct Matching {
-    /// Records that both have, as places in the two logs.
+    /// Records that both have, as places among the entries.
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) only_in_a: Vec<u32>,
     pub(super) only_in_b: Vec<u32>,
@@ -15,7 +15,6 @@ pub(super) struct Matching {
 
 fn by_identity(entries: &[Entry]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..entries.len() as u32).collect();
-    order.retain(|at| !entries[*at as usize].ignored);
     order.sort_unstable_by_key(|at| {
         let entry = &entries[*at as usize];
         (entry.identity, entry.ordinal, *at)
@@ -24,10 +23,10 @@ fn by_identity(entries: &[Entry]) -> Vec<u32> {
 }
 
 /// Pairs the n-th record of each identity in one log with the n-th in the other.
-pub(super) fn matching(a: &Index, b: &Index) -> Matching {
-    let (order_a, order_b) = (by_identity(&a.entries), by_identity(&b.entries));
-    let identity_a = |at: usize| a.entries[order_a[at] as usize].identity;
-    let identity_b = |at: usize| b.entries[order_b[at] as usize].identity;
+pub(super) fn matching(a: &[Entry], b: &[Entry]) -> Matching {
+    let (order_a, order_b) = (by_identity(a), by_identity(b));
+    let identity_a = |at: usize| a[order_a[at] as usize].identity;
+    let identity_b = |at: usize| b[order_b[at] as usize].identity;
     let mut found = Matching::default();
     let (mut i, mut j) = (0, 0);
     while i < order_a.len() && j < order_b.len() {
@@ -56,18 +55,16 @@ pub(super) fn matching(a: &Index, b: &Index) -> Matching {
 /// Pairs the messages of each topic: what is the same in both, and between these what says the
 /// same, what was at the same time, and at last by place. So a message that one log lacks is one
 /// message, and not the difference of all that follow it.
-pub(super) fn aligned(a: &Index, b: &Index) -> Matching {
+pub(super) fn aligned(a: &[Entry], b: &[Entry]) -> Matching {
     let mut topics: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
-    for (side, index) in [a, b].into_iter().enumerate() {
-        for (at, entry) in index.entries.iter().enumerate() {
-            if !entry.ignored {
-                topics.entry(entry.topic).or_default()[side].push(at as u32);
-            }
+    for (side, entries) in [a, b].into_iter().enumerate() {
+        for (at, entry) in entries.iter().enumerate() {
+            topics.entry(entry.topic).or_default()[side].push(at as u32);
         }
     }
     let mut found = Matching::default();
     for [xs, ys] in topics.values() {
-        align((&a.entries, xs), (&b.entries, ys), &LEVELS, &mut found);
+        align((a, xs), (b, ys), &LEVELS, &mut found);
     }
     found.pairs.sort_unstable();
     found
@@ -202,25 +199,54 @@ fn increasing(values: &[u32]) -> Vec<usize> {
     kept
 }
 
-/// Of records in the order of one log, given by their places in the other: how many would have to
-/// move, and the first that comes too early there.
-pub(super) fn out_of_order(places: &[u32]) -> (u64, Option<usize>) {
-    // The longest increasing subsequence, by its best last element for each length.
-    let mut tails: Vec<u32> = Vec::new();
-    for place in places {
-        let at = tails.partition_point(|tail| tail < place);
-        match tails.get_mut(at) {
-            Some(tail) => *tail = *place,
-            None => tails.push(*place),
+/// Records in the order of one log, given by their places in the other: how many would have to
+/// move.
+#[derive(Default)]
+pub(super) struct Sequence {
+    /// The longest increasing subsequence, by its best last element for each length.
+    tails: Vec<u32>,
+    count: u64,
+    last: u32,
+}
+
+impl Sequence {
+    /// Adds the next one; true if it comes too early in the other log.
+    pub(super) fn add(&mut self, place: u32) -> bool {
+        let at = self.tails.partition_point(|tail| *tail < place);
+        match self.tails.get_mut(at) {
+            Some(tail) => *tail = place,
+            None => self.tails.push(place),
         }
+        let early = self.count > 0 && self.last > place;
+        self.count += 1;
+        self.last = place;
+        early
     }
-    let first = places.windows(2).position(|two| two[0] > two[1]);
-    ((places.len() - tails.len()) as u64, first.map(|at| at + 1))
+
+    /// How many would have to move.
+    pub(super) fn out_of_order(&self) -> u64 {
+        self.count - self.tails.len() as u64
+    }
+
+    /// How many bytes it holds.
+    pub(super) fn held_bytes(&self) -> usize {
+        4 * self.tails.len()
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{increasing, out_of_order};
+    use super::{Sequence, increasing};
+
+    /// How many are out of order, and the first of them.
+    fn out_of_order(places: &[u32]) -> (u64, Option<usize>) {
+        let mut sequence = Sequence::default();
+        let early: Vec<bool> = places.iter().map(|place| sequence.add(*place)).collect();
+        (
+            sequence.out_of_order(),
+            early.iter().position(|early| *early),
+        )
+    }
 
     #[test]
     fn as_few_as_possible_are_out_of_order() {

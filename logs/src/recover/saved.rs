@@ -12,7 +12,6 @@ use crate::LogError;
 use crate::parse::{ChannelRecord, SchemaRecord};
 use crate::salvage::Part;
 use crate::source::{Attached, Source, Sum};
-use crate::writer::{Compression, mcap_options};
 
 /// A schema or a channel, owned.
 #[derive(Clone, PartialEq)]
@@ -113,8 +112,9 @@ impl<'a> Saved<'a> {
                 true => library,
                 false => format!("{library} (recovered)"),
             };
-            let writer = mcap_options(Compression::Zstd)
-                .disable_seeking(false)
+            let writer = mcap::WriteOptions::new()
+                // Its default follows the machine, and changes the bytes.
+                .compression_threads(0)
                 .profile(profile)
                 .library(recovered)
                 .create(BufWriter::new(file))

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use farside::RunInfo;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Scene};
+use mcap::records::MessageHeader;
 
+use super::chunk::Chunk;
 use super::foxglove::Layers;
-use super::thread::{Batch, Header};
 use super::{Channels, Live};
 use crate::LogError;
 
@@ -48,7 +49,7 @@ impl Stage {
         &mut self,
         time_ns: u64,
         channels: &mut Channels,
-        batch: &mut Batch,
+        chunk: &mut Chunk,
         excluded: impl Fn(&str) -> bool,
     ) -> Result<(), LogError> {
         for drawn in self.layers.draw(&self.drawings, time_ns) {
@@ -57,7 +58,7 @@ impl Stage {
                 let channel = if excluded(&drawn.topic) {
                     None
                 } else {
-                    Some(channels.get(batch, &drawn.topic, ROLE, "", schema)?)
+                    Some(channels.get(chunk, &drawn.topic, ROLE, "", schema)?)
                 };
                 let topic = Topic {
                     channel,
@@ -68,14 +69,14 @@ impl Stage {
             if let Some(topic) = self.topics.get_mut(&drawn.topic)
                 && let Some(channel) = topic.channel
             {
-                let header = Header {
-                    channel,
+                let header = MessageHeader {
+                    channel_id: channel,
                     sequence: topic.messages,
                     log_time: time_ns,
                     publish_time: time_ns,
                 };
                 topic.messages += 1;
-                batch.message(header, |out| out.extend_from_slice(&drawn.body));
+                chunk.message(header, |out| out.extend_from_slice(&drawn.body));
             }
         }
         self.drawings.clear();
@@ -91,7 +92,7 @@ impl Live {
         };
         stage.scene.begin(&stage.run, &mut stage.drawings);
         let excluded = |topic: &str| self.encoder.excludes(topic);
-        stage.write(self.epoch_ns, &mut self.channels, &mut self.batch, excluded)
+        stage.write(self.epoch_ns, &mut self.channels, &mut self.chunk, excluded)
     }
 
     /// Draws what `record`, just written, changes.
@@ -109,6 +110,6 @@ impl Live {
         }
         let time_ns = self.epoch_ns.saturating_add(self.last_ns);
         let excluded = |topic: &str| self.encoder.excludes(topic);
-        stage.write(time_ns, &mut self.channels, &mut self.batch, excluded)
+        stage.write(time_ns, &mut self.channels, &mut self.chunk, excluded)
     }
 }

@@ -7,10 +7,10 @@ use crate::common::{Plan, logged};
 
 const SCRIPT: &str = r#"
 import sys
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 with open(sys.argv[1], "rb") as f:
-    reader = make_reader(f, decoder_factories=[DecoderFactory()])
+    reader = make_reader(f, validate_crcs=True, decoder_factories=[DecoderFactory()])
     n, bodies, lost, start = 0, 0, 0, 0
     for schema, channel, message, m in reader.iter_decoded_messages():
         n += 1
@@ -33,6 +33,8 @@ with open(sys.argv[1], "rb") as f:
         elif m.fate == "start":
             start += 1
     assert reader.get_summary().statistics.message_count == n
+    f.seek(0)
+    assert sum(1 for _ in NonSeekingReader(f, validate_crcs=True).iter_messages()) == n
     names = [md.name for md in reader.iter_metadata()]
     assert names == ["farside", "farside.run", "farside.host", "farside.end"], names
     assert [a.name for a in reader.iter_attachments()] == ["scenario.toml", "map.txt"]

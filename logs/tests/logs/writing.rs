@@ -1,6 +1,9 @@
 //! What a writer leaves: the whole run, the same bytes each time, errors that are told.
 
-use farside::Executor;
+use std::sync::Arc;
+
+use farside::record::{Flow, Observer, ObserverError, Record};
+use farside::{Executor, RunInfo};
 use farside_logs::{LogOptions, LogWriter, info};
 
 use crate::common::{Plan, build, log_to, logged, options};
@@ -55,6 +58,37 @@ fn the_same_run_gives_the_same_bytes() {
         std::fs::read(first).unwrap(),
         std::fs::read(second).unwrap()
     );
+}
+
+/// Looks at a log as soon as its run has begun.
+struct Onlooker(std::path::PathBuf);
+
+impl Observer for Onlooker {
+    fn begin(&mut self, _run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        let info = info(&self.0).unwrap();
+        let run = info.run.as_ref().unwrap();
+        assert_eq!(
+            (run.scenario.as_str(), run.seed),
+            ("tests/base_and_rovers", 7)
+        );
+        assert_eq!(info.attachments.len(), 2, "{info}");
+        Ok(())
+    }
+
+    fn record(&mut self, _record: &Record<'_>) -> Result<Flow, ObserverError> {
+        Ok(Flow::Continue)
+    }
+}
+
+#[test]
+fn what_a_log_is_of_is_in_the_file_as_soon_as_the_run_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sim = build(&Plan::default());
+    sim.observe(LogWriter::create(&path, options()).unwrap());
+    sim.observe(Onlooker(path));
+    let report = sim.run(Executor::Inline).unwrap();
+    assert_eq!(report.end.name(), "stopped");
 }
 
 #[test]
