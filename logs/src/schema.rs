@@ -9,8 +9,8 @@
 use std::collections::BTreeMap;
 
 use prost::Message;
-use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
-use prost_reflect::prost_types::{
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
 };
 

@@ -1,7 +1,7 @@
 //! Drawings as messages of Foxglove's published schemas: the fields of them that are ever filled.
 
 use prost::Message;
-use prost_reflect::prost_types::Timestamp;
+use prost_types::Timestamp;
 
 use crate::descriptors::SchemaOf;
 use farside::scene::{self, Drawing, Facing, Form, Shape};

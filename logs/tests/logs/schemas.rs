@@ -2,8 +2,8 @@
 //! survive.
 
 use prost::Message as _;
-use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
-use prost_reflect::prost_types::{
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
 };
 
