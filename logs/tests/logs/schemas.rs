@@ -3,9 +3,7 @@
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{
-    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
-};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 pub(crate) fn field(name: &str, number: i32, kind: Type, type_name: &str) -> FieldDescriptorProto {
     FieldDescriptorProto {
