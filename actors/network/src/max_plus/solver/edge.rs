@@ -71,13 +71,13 @@ impl Edge {
             }
             for ((row, path), cycles) in block.iter_mut().zip(&*a.list).zip(cycles) {
                 *row = worth.map(|worth| path.payoff + worth);
-                if *cycles == [0; LANES] {
-                    continue;
-                }
-                for (sum, &cycle) in row.iter_mut().zip(cycles) {
-                    if cycle > 0 {
-                        *sum = payoffs.pairwise(*sum, Some(u32::from(cycle)));
-                    }
+                // Eight cycles as one number: only those that are not 0 are looked at.
+                let mut left = u64::from_le_bytes(*cycles);
+                while left > 0 {
+                    let lane = left.trailing_zeros() as usize / LANES;
+                    let cycle = u32::from(cycles[lane]);
+                    row[lane] = payoffs.pairwise(row[lane], Some(cycle));
+                    left &= !(0xff << (LANES * lane));
                 }
             }
         }

@@ -57,6 +57,8 @@ struct Steps {
     /// Lists of steps by the upper bits of their keys.
     table: Vec<u32>,
     shift: u32,
+    /// A bit for each key in the table: what has none there is not looked for.
+    keys: [u64; 8],
     /// A hash of all vertices that steps lead to: sets whose hashes share no bit share no vertex.
     reached: [u64; 4],
 }
@@ -64,6 +66,11 @@ struct Steps {
 /// Where in a table a step is that ends at `vertex` in `cycle`.
 fn key(vertex: u32, cycle: u32) -> u32 {
     (vertex.wrapping_mul(0x85eb_ca6b) ^ cycle.wrapping_mul(0xc2b2_ae35)).wrapping_mul(0x9e37_79b1)
+}
+
+/// The bit of a key.
+fn key_bit(key: u32) -> (usize, u64) {
+    ((key >> 29) as usize, 1 << (key >> 23 & 63))
 }
 
 fn bit(vertex: u32) -> (usize, u64) {
@@ -109,8 +116,10 @@ impl Steps {
         }
         let size = (2 * steps.len()).next_power_of_two().max(2);
         let shift = 32 - size.trailing_zeros();
-        let mut table = vec![NONE; size];
+        let (mut table, mut keys) = (vec![NONE; size], [0; 8]);
         for (at, step) in steps.iter_mut().enumerate() {
+            let (word, bit) = key_bit(step.key);
+            keys[word] |= bit;
             let head = &mut table[(step.key >> shift) as usize];
             step.next = std::mem::replace(head, at as u32);
         }
@@ -129,6 +138,7 @@ impl Steps {
             steps,
             table,
             shift,
+            keys,
             reached,
         }
     }
@@ -136,7 +146,11 @@ impl Steps {
     /// The steps that end in that cycle where the key says, and some others.
     fn at(&self, key: u32) -> impl Iterator<Item = &Step> {
         let step = |at: u32| self.steps.get(at as usize);
-        let first = step(self.table[(key >> self.shift) as usize]);
+        let (word, bit) = key_bit(key);
+        let first = match self.keys[word] & bit {
+            0 => None,
+            _ => step(self.table[(key >> self.shift) as usize]),
+        };
         std::iter::successors(first, move |before| step(before.next))
     }
 
