@@ -118,6 +118,7 @@ impl Stream {
     }
 
     /// Uniform in [low, high).
+    #[inline]
     pub fn uniform_in(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
@@ -126,6 +127,7 @@ impl Stream {
     ///
     /// # Panics
     /// When `n` is zero: there is nothing to draw from.
+    #[inline]
     pub fn below(&mut self, n: u64) -> u64 {
         assert!(n > 0, "a draw below zero has no values");
         loop {
@@ -139,12 +141,14 @@ impl Stream {
     }
 
     /// True with the given probability; 0 never, 1 always.
+    #[inline]
     pub fn chance(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }
 
     /// Exponential with the given mean (the ziggurat of Marsaglia and Tsang, *The Ziggurat Method
     /// for Generating Random Variables*, 2000: one draw and no logarithm in 98.9 % of the calls).
+    #[inline]
     pub fn exponential(&mut self, mean: f64) -> f64 {
         mean * ziggurat::exponential(self)
     }

@@ -2,8 +2,8 @@
 
 use farside::Kind;
 use prost::Message;
-use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
-use prost_reflect::prost_types::{
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
     OneofDescriptorProto,
 };

@@ -1,7 +1,7 @@
 //! Topic names, what each is for, and globs over them.
 
+use farside::Pattern;
 use farside::record::RecordClass;
-use globset::{GlobBuilder, GlobSet, GlobSetBuilder};
 
 use crate::LogError;
 
@@ -74,28 +74,23 @@ pub(crate) fn snake_case(name: &str) -> String {
 
 /// A set of topic globs.
 pub(crate) struct Topics {
-    globs: GlobSet,
+    globs: Vec<Pattern>,
 }
 
 impl Topics {
     pub(crate) fn new(globs: &[String]) -> Result<Self, LogError> {
-        let refuse = |glob: &str, error: globset::Error| LogError::Glob {
-            glob: glob.to_owned(),
-            reason: error.kind().to_string(),
+        let read = |glob: &String| {
+            Pattern::over_topics(glob).map_err(|error| LogError::Glob {
+                glob: glob.to_owned(),
+                reason: error.to_string(),
+            })
         };
-        let mut set = GlobSetBuilder::new();
-        for glob in globs {
-            let built = GlobBuilder::new(glob).literal_separator(true).build();
-            set.add(built.map_err(|error| refuse(glob, error))?);
-        }
-        let globs = set
-            .build()
-            .map_err(|error| refuse(&globs.join(", "), error))?;
+        let globs = globs.iter().map(read).collect::<Result<_, _>>()?;
         Ok(Topics { globs })
     }
 
     pub(crate) fn matches(&self, topic: &str) -> bool {
-        self.globs.is_match(topic)
+        self.globs.iter().any(|glob| glob.matches(topic))
     }
 }
 

@@ -80,8 +80,15 @@ fn config(policy: Policy, processor: Speed, cycle_limit: Option<u32>) -> Network
     }
 }
 
-/// Runs with `SEEDS` seeds, and prints a line.
-fn row(nodes: u32, policy: Policy, processor: Speed, cycle_limit: Option<u32>) {
+/// Runs with `SEEDS` seeds, and prints a line. Returns the mean time of a cycle [ms], beside
+/// `peer_ms` of another policy.
+fn row(
+    nodes: u32,
+    policy: Policy,
+    processor: Speed,
+    cycle_limit: Option<u32>,
+    peer_ms: Option<f64>,
+) -> f64 {
     let network = config(policy, processor, cycle_limit);
     let runs: Vec<Cost> = (1..=SEEDS).map(|seed| run(nodes, &network, seed)).collect();
     let per_cycle = runs
@@ -90,16 +97,19 @@ fn row(nodes: u32, policy: Policy, processor: Speed, cycle_limit: Option<u32>) {
     let worst_ms = per_cycle.fold(0.0, f64::max);
     let sum = |of: fn(&Cost) -> f64| runs.iter().map(of).sum::<f64>();
     let (wall_s, cycles) = (sum(|run| run.wall_s), sum(|run| f64::from(run.cycles)));
+    let mean_ms = 1e3 * wall_s / cycles;
     println!(
-        "{:<8}  {nodes:5}  {:>9}  {:14.2}  {worst_ms:9.2}  {:11.2}  {:10.0}  {:14.0}  {:7.1}",
+        "{:<8}  {nodes:5}  {:>9}  {mean_ms:14.2}  {:9.2}  {worst_ms:9.2}  {:11.2}  {:10.0}  \
+         {:14.0}  {:7.1}",
         format!("{policy:?}").to_lowercase(),
         processor.to_string(),
-        1e3 * wall_s / cycles,
+        mean_ms / peer_ms.unwrap_or(mean_ms),
         wall_s / SEEDS as f64,
         cycles / SEEDS as f64,
         sum(|run| run.messages) / cycles,
         sum(|run| f64::from(run.arrived)) / SEEDS as f64,
     );
+    mean_ms
 }
 
 /// `max-plus 28 unlimited 1`: one run, for a profiler.
@@ -130,18 +140,19 @@ fn main() {
         return;
     }
     println!(
-        "policy    nodes  processor  ms/cycle, mean  worst run  s/run, mean  cycles/run  \
+        "policy    nodes  processor  ms/cycle, mean  of peer's  worst run  s/run, mean  cycles/run  \
          messages/cycle  arrived"
     );
+    println!("the peer, which reserves paths through time, whole runs:");
+    let peer_ms = Some(row(28, Policy::Complete, Speed::Unlimited, None, None));
     println!("at most {CYCLES} cycles:");
     for nodes in [14, 21, 28] {
         for processor in [Speed::Unlimited, PAPER_SPEED] {
-            row(nodes, Policy::MaxPlus, processor, Some(CYCLES));
+            row(nodes, Policy::MaxPlus, processor, Some(CYCLES), peer_ms);
         }
     }
     println!("whole runs:");
     for processor in [Speed::Unlimited, PAPER_SPEED] {
-        row(28, Policy::MaxPlus, processor, None);
+        row(28, Policy::MaxPlus, processor, None, peer_ms);
     }
-    row(28, Policy::Complete, Speed::Unlimited, None);
 }

@@ -350,7 +350,7 @@ impl LinkBuilder {
             .overrides
             .iter()
             .rev()
-            .find(|(pattern, over)| over.radio.is_some() && pattern.glob.is_match(link));
+            .find(|(pattern, over)| over.radio.is_some() && pattern.names.matches(link));
         let place = setter.map_or("default", |(pattern, _)| pattern.text.as_str());
         let key = ["links", place, "radio"].map(str::to_owned).to_vec();
         self.mistake.get_or_insert(LinkConfigError::Value {

@@ -1,6 +1,6 @@
 //! Patterns of a scenario over names of links or processors, each of which has to match something.
 
-use globset::{Glob, GlobMatcher};
+use farside::Pattern as Names;
 
 use crate::link::LinkConfigError;
 
@@ -8,30 +8,30 @@ use crate::link::LinkConfigError;
 pub(super) struct Pattern {
     pub(super) key: Vec<String>,
     pub(super) text: String,
-    pub(super) glob: GlobMatcher,
+    pub(super) names: Names,
     pub(super) used: bool,
 }
 
 impl Pattern {
     pub(super) fn new(key: Vec<String>, text: &str) -> Result<Self, LinkConfigError> {
-        match Glob::new(text) {
-            Ok(glob) => Ok(Pattern {
+        match Names::over_names(text) {
+            Ok(names) => Ok(Pattern {
                 key,
                 text: text.to_owned(),
-                glob: glob.compile_matcher(),
+                names,
                 used: false,
             }),
             Err(error) => Err(LinkConfigError::BadPattern {
                 key,
                 pattern: text.to_owned(),
-                error: error.kind().to_string(),
+                error: error.to_string(),
             }),
         }
     }
 
     /// Whether it matches this name, and from then on has matched something.
     pub(super) fn matches(&mut self, name: &str) -> bool {
-        let yes = self.glob.is_match(name);
+        let yes = self.names.matches(name);
         self.used |= yes;
         yes
     }

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use farside::Pattern;
 use farside::random::name_hash;
 use farside::suggest::{closest, did_you_mean};
-use globset::{Glob, GlobMatcher};
 
 use super::config::{FlowConfig, TrafficConfig, TrafficError};
 
@@ -202,15 +202,15 @@ fn hosts(config: &TrafficConfig) -> Result<Vec<String>, TrafficError> {
 
 /// The hosts that a name or glob means.
 fn matching(hosts: &[String], pattern: &str, key: String) -> Result<Vec<usize>, TrafficError> {
-    let glob: GlobMatcher = match Glob::new(pattern) {
-        Ok(glob) => glob.compile_matcher(),
+    let names = match Pattern::over_names(pattern) {
+        Ok(names) => names,
         Err(error) => {
-            let message = format!("{pattern:?} is no pattern over hosts: {}", error.kind());
+            let message = format!("{pattern:?} is no pattern over hosts: {error}");
             return Err(TrafficError::new(key, message));
         }
     };
     let found: Vec<usize> = (0..hosts.len())
-        .filter(|at| glob.is_match(&hosts[*at]))
+        .filter(|at| names.matches(&hosts[*at]))
         .collect();
     if found.is_empty() {
         return Err(unknown(hosts, pattern, "matches no host", key));

@@ -2,9 +2,8 @@
 //! by chance: a fraction of a group, or each with a mean time between failures.
 
 use farside::random::RandomKey;
-use farside::{SimDuration, SimTime, Simulation};
+use farside::{Pattern, SimDuration, SimTime, Simulation};
 use farside_actors::{settings, units};
-use globset::Glob;
 
 use farside::suggest::nearest;
 
@@ -238,16 +237,13 @@ impl Crash {
         draws: &dyn Fn(&str) -> RandomKey,
     ) -> Result<Vec<String>, Mistake> {
         let (key, found) = self.target()?;
-        let glob = Glob::new(found).map_err(|error| {
-            let why = error.kind();
-            mistake(key, format!("{found:?} is no pattern over names: {why}"))
-        })?;
-        let glob = glob.compile_matcher();
+        let pattern = Pattern::over_names(found)
+            .map_err(|why| mistake(key, format!("{found:?} is no pattern over names: {why}")))?;
         let known: Vec<&str> = match key {
             "host" => sim.host_names().collect(),
             _ => sim.actor_names().collect(),
         };
-        let names = known.iter().filter(|name| glob.is_match(name));
+        let names = known.iter().filter(|name| pattern.matches(name));
         let mut names: Vec<String> = names.map(|name| (*name).to_owned()).collect();
         if names.is_empty() {
             let hint = nearest(found, known.iter().copied());

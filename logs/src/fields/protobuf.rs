@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use prost_reflect::prost_types::field_descriptor_proto::Type;
+use prost_types::field_descriptor_proto::Type;
 
 use super::{DEPTH, FieldDiff, Path, near, raw};
 use crate::scan::SchemaInfo;

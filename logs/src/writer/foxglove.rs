@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use prost::Message;
 use prost::encoding::{WireType, encode_key, encode_varint};
-use prost_reflect::prost_types::Timestamp;
+use prost_types::Timestamp;
 
 use crate::descriptors::SchemaOf;
 use farside::scene::{self, Drawing, Facing, Form, Shape};

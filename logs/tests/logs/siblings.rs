@@ -5,7 +5,7 @@ use std::fs;
 
 use farside_logs::{DiffOptions, DiffReport, LogError, RecoverReport, diff, info, recover};
 use mcap::records::op;
-use prost_reflect::prost_types::field_descriptor_proto::Type;
+use prost_types::field_descriptor_proto::Type;
 
 fn compared(a: &File, b: &File, tolerance: f64) -> DiffReport {
     let folder = tempfile::tempdir().unwrap();

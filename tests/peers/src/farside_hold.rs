@@ -1,5 +1,7 @@
 //! The hold model in Farside: typed actors, 24-byte messages, no log.
 
+use std::sync::{Arc, OnceLock};
+
 use farside::carrier::NoChange;
 use farside::prelude::*;
 use farside::random::Stream;
@@ -19,7 +21,8 @@ struct Job {
 struct Holder {
     at: u32,
     actors: u32,
-    others: Vec<Address<Holder>>,
+    /// All of them, the same list for all: looked up by who starts first.
+    others: Arc<OnceLock<Vec<Address<Holder>>>>,
     population: u32,
     /// Hosts of their own, joined by links that make the delay, or one host and delayed sends.
     by_link: bool,
@@ -29,10 +32,20 @@ impl Actor for Holder {
     type Accepts = (Job,);
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        let all = (0..self.actors).map(|at| ctx.lookup(&name(at)));
-        self.others = all.collect::<Result<_, _>>()?;
+        if self.others.get().is_none() {
+            let all = (0..self.actors).map(|at| ctx.lookup(&name(at)));
+            let all = all.collect::<Result<_, _>>()?;
+            self.others.get_or_init(|| all);
+        }
         for id in 0..u64::from(self.population) {
-            self.pass(Job { id, hops: 0, payload: 0 }, ctx);
+            self.pass(
+                Job {
+                    id,
+                    hops: 0,
+                    payload: 0,
+                },
+                ctx,
+            );
         }
         Ok(())
     }
@@ -40,9 +53,12 @@ impl Actor for Holder {
 
 impl Holder {
     fn pass(&mut self, job: Job, ctx: &mut Context<'_, Self>) {
+        let Some(others) = self.others.get() else {
+            return;
+        };
         let stream = ctx.random("hold");
-        let at = stream.below(self.others.len() as u64) as u32;
-        let to = self.others[at as usize];
+        let at = stream.below(others.len() as u64) as u32;
+        let to = others[at as usize];
         if self.by_link && at != self.at {
             ctx.send(to, job);
         } else {
@@ -54,7 +70,13 @@ impl Holder {
 
 impl Handler<Job> for Holder {
     fn handle(&mut self, job: Job, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.pass(Job { hops: job.hops + 1, ..job }, ctx);
+        self.pass(
+            Job {
+                hops: job.hops + 1,
+                ..job
+            },
+            ctx,
+        );
         Ok(())
     }
 }
@@ -87,13 +109,21 @@ impl Carrier for Hold {
 fn build(size: Size, by_link: bool) -> Simulation {
     let mut sim = Simulation::new(1);
     let one_host = sim.host("all");
+    let others = Arc::new(OnceLock::new());
     for at in 0..size.actors {
-        let host = if by_link { sim.host(&format!("host_{at}")) } else { one_host };
-        let Size { actors, population, .. } = size;
+        let others = others.clone();
+        let host = if by_link {
+            sim.host(&format!("host_{at}"))
+        } else {
+            one_host
+        };
+        let Size {
+            actors, population, ..
+        } = size;
         sim.actor(host, &name(at), move |_| Holder {
             at,
             actors,
-            others: Vec::new(),
+            others: others.clone(),
             population,
             by_link,
         });
@@ -114,7 +144,10 @@ pub fn inline(size: Size, digest: bool) -> u64 {
     if !digest {
         sim.without_digest();
     }
-    sim.run(Executor::Inline).expect("the model can start").counts.events
+    sim.run(Executor::Inline)
+        .expect("the model can start")
+        .counts
+        .events
 }
 
 /// A host for each actor, joined by links, through kameo; no digest, as in the other.
@@ -122,5 +155,8 @@ pub fn kameo(size: Size) -> u64 {
     let mut sim = build(size, true);
     sim.without_digest();
     let executor = Executor::Kameo { threads: 1 };
-    sim.run(executor).expect("the model can start").counts.events
+    sim.run(executor)
+        .expect("the model can start")
+        .counts
+        .events
 }

@@ -1,19 +1,28 @@
-//! PHOLD, the hold model, through Farside's public API and through NeXosim's, one thread each, in
-//! one run: N actors, each event schedules one to a random actor after a look-ahead plus an
-//! exponential delay. Prints events per second, as the best of several interleaved rounds, and the
-//! ratios between them.
+//! PHOLD, the hold model, in Farside and in other simulators, one thread each, in one run: N actors,
+//! each event schedules one to a random actor after a look-ahead plus an exponential delay. Prints
+//! how long an event takes, as the median of rounds in which all take turns, and the ratios between
+//! them beside what they should be.
 //!
-//! `cargo run --release` here; it is no part of the workspace, so that it costs a user nothing.
+//! `cargo run --release` here takes some minutes, with a number of rounds as its argument less or
+//! more of them. ns-3 takes part where its library and a C++ compiler are (`libns3-dev` of Debian),
+//! SimPy where python3 can install it. This is no part of the workspace, so that it costs a user
+//! nothing.
 
 mod farside_hold;
 mod nexosim_hold;
+mod outside;
+mod ratios;
 
 use std::time::Instant;
+
+use outside::Program;
 
 /// The look-ahead: no event is scheduled sooner [ns].
 const LOOK_AHEAD_NS: u64 = 100_000_000;
 /// The mean of the exponential part [ns].
 const MEAN_NS: f64 = 900_000_000.0;
+/// Rounds, unless told otherwise.
+const ROUNDS: usize = 5;
 
 /// One size of the benchmark.
 #[derive(Clone, Copy)]
@@ -21,74 +30,142 @@ struct Size {
     actors: u32,
     /// Events on their way for each actor, all the time.
     population: u32,
-    /// How many events to handle.
+    /// How many events to handle; what is measured are about three times as many.
     events: u64,
 }
 
-/// Events per second of `hold`, without its assembly: two runs, one four times as long as the
+impl Size {
+    fn name(self) -> String {
+        format!("{}x{}", self.actors, self.population)
+    }
+}
+
+const SIZES: [Size; 5] = [
+    Size {
+        actors: 16,
+        population: 1,
+        events: 400_000,
+    },
+    Size {
+        actors: 128,
+        population: 4,
+        events: 300_000,
+    },
+    Size {
+        actors: 1024,
+        population: 16,
+        events: 200_000,
+    },
+    Size {
+        actors: 10_000,
+        population: 4,
+        events: 200_000,
+    },
+    Size {
+        actors: 100_000,
+        population: 4,
+        events: 400_000,
+    },
+];
+
+/// The columns of the table.
+const NAMES: [&str; 6] = ["NeXosim", "SimPy", "ns-3", "inline", "digest", "kameo"];
+
+/// NeXosim joins each actor with each other by a port, and kameo has a host for each actor: with
+/// more actors than this neither fits the time and the memory of this run.
+const MOST_JOINED: u32 = 2_000;
+/// SimPy handles so many times fewer events than the others.
+const SIMPY_SHARE: u64 = 10;
+
+/// How long an event takes [ns], without the assembly: two runs, one four times as long as the
 /// other, and what lies between them.
-fn rate(size: Size, hold: impl Fn(Size) -> u64) -> f64 {
+fn event_ns(size: Size, hold: impl Fn(Size) -> u64) -> f64 {
     let timed = |size| {
         let start = Instant::now();
         let events = hold(size);
         (events as f64, start.elapsed().as_secs_f64())
     };
     let (short_events, short_s) = timed(size);
-    let (long_events, long_s) = timed(Size { events: 4 * size.events, ..size });
-    (long_events - short_events) / (long_s - short_s)
+    let (long_events, long_s) = timed(Size {
+        events: 4 * size.events,
+        ..size
+    });
+    (long_s - short_s) * 1e9 / (long_events - short_events)
+}
+
+/// One round: how long an event takes in each of [`NAMES`] [ns], none where that takes no part.
+fn round(size: Size, ns_3: Option<&Program>, simpy: Option<&Program>) -> [Option<f64>; 6] {
+    let joined = size.actors <= MOST_JOINED;
+    let events = 4 * size.events;
+    [
+        joined.then(|| event_ns(size, nexosim_hold::run)),
+        simpy.and_then(|simpy| {
+            simpy.event_ns(Size {
+                events: events / SIMPY_SHARE,
+                ..size
+            })
+        }),
+        ns_3.and_then(|ns_3| ns_3.event_ns(Size { events, ..size })),
+        Some(event_ns(size, |size| farside_hold::inline(size, false))),
+        Some(event_ns(size, |size| farside_hold::inline(size, true))),
+        joined.then(|| event_ns(size, farside_hold::kameo)),
+    ]
+}
+
+/// The median of each column of some rounds.
+fn medians(rounds: &[[Option<f64>; 6]]) -> [Option<f64>; 6] {
+    std::array::from_fn(|column| {
+        let mut all: Vec<f64> = rounds.iter().filter_map(|round| round[column]).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied()
+    })
+}
+
+fn row(name: &str, cells: [String; 6]) -> String {
+    cells.iter().fold(format!("{name:>10}"), |row, cell| {
+        format!("{row} {cell:>9}")
+    })
 }
 
 /// `profile SIZE-INDEX EVENTS`: one run of Farside alone, for a profiler.
-fn profile(size: Size) {
-    farside_hold::inline(size, false);
+fn profile(mut arguments: impl Iterator<Item = String>) {
+    let mut number = || arguments.next().and_then(|at| at.parse::<u64>().ok());
+    let size = SIZES[number().unwrap_or(0) as usize];
+    let events = number().unwrap_or(size.events);
+    farside_hold::inline(Size { events, ..size }, false);
 }
-
-const SIZES: [Size; 3] = [
-    Size { actors: 16, population: 1, events: 500_000 },
-    Size { actors: 128, population: 4, events: 400_000 },
-    Size { actors: 1024, population: 16, events: 300_000 },
-];
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    if arguments.next().as_deref() == Some("profile") {
-        let mut number = |default| arguments.next().and_then(|at| at.parse().ok()).unwrap_or(default);
-        let index = number(0);
-        let size = SIZES[index];
-        let events = number(size.events as usize) as u64;
-        return profile(Size { events, ..size });
+    let first = arguments.next();
+    if first.as_deref() == Some("profile") {
+        return profile(arguments);
     }
-    let rounds: usize = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(5);
-    println!("PHOLD, million events/s, best of {rounds} rounds");
-    println!(
-        "{:>9} {:>9} {:>9} {:>9} {:>9} | {:>8} {:>8} {:>8} {:>10}",
-        "size", "nexosim", "inline", "+digest", "kameo", "inline/n", "digest/n", "kameo/n", "digest ns"
-    );
-    for size in SIZES {
-        let mut best = [0.0f64; 4];
-        for _ in 0..rounds {
-            let rates = [
-                rate(size, nexosim_hold::run),
-                rate(size, |size| farside_hold::inline(size, false)),
-                rate(size, |size| farside_hold::inline(size, true)),
-                rate(size, farside_hold::kameo),
-            ];
-            for (best, rate) in best.iter_mut().zip(rates) {
-                *best = best.max(rate);
-            }
+    let rounds = first
+        .and_then(|rounds| rounds.parse().ok())
+        .unwrap_or(ROUNDS)
+        .max(1);
+    let said = |name: &str, made: Result<Program, String>| match made {
+        Ok(program) => Some(program),
+        Err(why) => {
+            println!("{name} takes no part: {why}");
+            None
         }
-        let [nexosim, inline, digest, kameo] = best;
-        println!(
-            "{:>9} {:>9.2} {:>9.2} {:>9.2} {:>9.2} | {:>8.1} {:>8.1} {:>8.1} {:>10.0}",
-            format!("{}x{}", size.actors, size.population),
-            nexosim / 1e6,
-            inline / 1e6,
-            digest / 1e6,
-            kameo / 1e6,
-            inline / nexosim,
-            digest / nexosim,
-            kameo / nexosim,
-            1e9 / digest - 1e9 / inline,
-        );
+    };
+    let ns_3 = said("ns-3", outside::ns_3());
+    let simpy = said("SimPy", outside::simpy());
+    println!("PHOLD, nanoseconds an event, medians of {rounds} rounds in which all take turns");
+    println!("{}", row("size", NAMES.map(str::to_owned)));
+    let mut table = Vec::new();
+    for size in SIZES {
+        let all: Vec<_> = (0..rounds)
+            .map(|_| round(size, ns_3.as_ref(), simpy.as_ref()))
+            .collect();
+        let medians = medians(&all);
+        let cells = medians.map(|ns| ns.map_or("-".to_owned(), |ns| format!("{ns:.0}")));
+        println!("{}", row(&size.name(), cells));
+        table.push((size, medians));
     }
+    println!();
+    ratios::print(&table);
 }

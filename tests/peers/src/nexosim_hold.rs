@@ -39,7 +39,9 @@ impl Holder {
     }
 
     fn pass(&mut self, job: Job, cx: &Context<Self>) {
-        let Some(stream) = &mut self.stream else { return };
+        let Some(stream) = &mut self.stream else {
+            return;
+        };
         let to = stream.below(self.outputs.len() as u64);
         let delay = Duration::from_nanos(LOOK_AHEAD_NS + stream.exponential(MEAN_NS) as u64);
         cx.schedule_event(delay, schedulable!(Self::emit), Job { to, ..job })
@@ -54,7 +56,13 @@ impl Holder {
 
     async fn receive(&mut self, job: Job, cx: &Context<Self>) {
         self.handled += 1;
-        self.pass(Job { hops: job.hops + 1, ..job }, cx);
+        self.pass(
+            Job {
+                hops: job.hops + 1,
+                ..job
+            },
+            cx,
+        );
     }
 }
 
@@ -80,10 +88,14 @@ pub fn run(size: Size) -> u64 {
     for (at, (holder, mailbox)) in holders.into_iter().zip(mailboxes).enumerate() {
         bench = bench.add_model(holder, mailbox, &format!("holder_{at}"));
     }
-    let mut simulation = bench.init(MonotonicTime::EPOCH).expect("the bench can start");
+    let mut simulation = bench
+        .init(MonotonicTime::EPOCH)
+        .expect("the bench can start");
     let in_flight = f64::from(size.actors) * f64::from(size.population);
     let until_ns = size.events as f64 / in_flight * (LOOK_AHEAD_NS as f64 + MEAN_NS);
     let until = MonotonicTime::EPOCH + Duration::from_nanos(until_ns as u64);
-    simulation.step_until(until).expect("the model does not fail");
+    simulation
+        .step_until(until)
+        .expect("the model does not fail");
     size.events
 }

@@ -1,6 +1,8 @@
 //! What nodes say to each other in a planning cycle of the policy `max-plus`, and what they record
 //! of it.
 
+use std::sync::Arc;
+
 use farside_worlds::NodeId;
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +37,7 @@ pub struct RoverPaths {
     /// The rover.
     pub rover: RoverId,
     /// Its candidates; a max-plus vector has one value for each, in this order.
-    pub paths: Vec<CandidatePath>,
+    pub paths: Arc<[CandidatePath]>,
 }
 
 /// Step 4, node to neighbour: the max-plus vectors that changed in one iteration.

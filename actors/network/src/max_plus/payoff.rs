@@ -123,14 +123,15 @@ pub(crate) fn divisor(t: u32) -> f64 {
     libm::exp((10.0 - f64::from(t)).max(1.0))
 }
 
-/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge; where
-/// it is known that they do not before cycle `first`, at least 1. A path of length 0 (the zero
-/// path, and the wait on a leaf) holds its vertex for ever, and with `leaf_paths_hold` any path to
-/// a leaf its end; any other claims nothing after its end.
-pub(crate) fn collision_from(
+/// The first cycle in which two paths collide: both at one vertex, or swapping along an edge. A path
+/// of length 0 (the zero path, and the wait on a leaf) holds its vertex for ever, and with
+/// `leaf_paths_hold` any path to a leaf its end; any other claims nothing after its end.
+///
+/// The definition, which the solver's tables are held against.
+#[cfg(test)]
+pub(crate) fn collision(
     a: &CandidatePath,
     b: &CandidatePath,
-    first: u32,
     leaf_paths_hold: bool,
 ) -> Option<u32> {
     let stays = |path: &CandidatePath| {
@@ -147,24 +148,11 @@ pub(crate) fn collision_from(
         let at = (t as usize).min(path.vertices.len() - 1);
         path.vertices[at]
     };
-    if first > cycles {
-        return None;
-    }
-    let (mut from_a, mut from_b) = (place(a, first - 1), place(b, first - 1));
-    for t in first..=cycles {
+    (1..=cycles).find(|&t| {
+        let (from_a, from_b) = (place(a, t - 1), place(b, t - 1));
         let (to_a, to_b) = (place(a, t), place(b, t));
-        if to_a == to_b || (to_a == from_b && to_b == from_a) {
-            return Some(t);
-        }
-        (from_a, from_b) = (to_a, to_b);
-    }
-    None
-}
-
-/// The first cycle of all in which two paths collide.
-#[cfg(test)]
-pub(crate) fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
-    collision_from(a, b, 1, false)
+        to_a == to_b || (to_a == from_b && to_b == from_a)
+    })
 }
 
 #[cfg(test)]
@@ -172,6 +160,10 @@ mod tests {
     use super::*;
     use crate::testing::{grid, v};
     use std::f64::consts::E;
+
+    fn collision(a: &CandidatePath, b: &CandidatePath) -> Option<u32> {
+        super::collision(a, b, false)
+    }
 
     fn path(destination: Destination, vertices: &[u32]) -> CandidatePath {
         CandidatePath {
@@ -228,7 +220,7 @@ mod tests {
             Some(1)
         );
         assert_eq!(collision(&path(Stay, &[0]), &path(Stay, &[1])), None);
-        let held = |a, b| collision_from(a, b, 1, true);
+        let held = |a, b| super::collision(a, b, true);
         let (east, west) = (path(Leaf, &[0, 1, 2]), path(Leaf, &[5, 4, 3, 2]));
         assert_eq!(collision(&east, &west), None);
         assert_eq!((held(&east, &west), held(&west, &east)), (Some(3), Some(3)));

@@ -10,6 +10,7 @@ mod meetings;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use farside_worlds::NodeId;
 
@@ -18,8 +19,8 @@ use crate::max_plus::candidates::CandidatePath;
 use crate::max_plus::messages::{Choice, Vector};
 use crate::max_plus::payoff::Payoffs;
 use anytime::Anytime;
-use edge::Edge;
-use meetings::Paths;
+use edge::{Edge, Spare};
+use meetings::{Known, Meetings, Paths};
 
 /// A rover of the coordination graph, as one node sees it.
 #[derive(Debug)]
@@ -69,11 +70,13 @@ pub(crate) struct Solver {
     room: Room,
 }
 
-/// Room to work in, so that nothing is allocated for each edge.
+/// Room to work in, so that nothing is allocated for each edge, and what is kept from cycle to
+/// cycle.
 #[derive(Debug, Default)]
-struct Room {
-    /// When paths collide.
-    cycles: Vec<u32>,
+pub(crate) struct Room {
+    known: Known,
+    spare: Vec<Spare>,
+    meetings: Meetings,
     /// What an own rover's paths are worth by all messages, and by all but one.
     total: Vec<f32>,
     base: Vec<f32>,
@@ -87,11 +90,13 @@ fn place_of(i: usize, j: usize) -> usize {
 }
 
 impl Solver {
-    /// The problem of a node with its own `rovers`, whose paths have their unary payoffs.
+    /// The problem of a node with its own `rovers`, whose paths have their unary payoffs, made in
+    /// what is left of the one before.
     pub(crate) fn new(
         payoffs: Payoffs,
         rules: Rules,
-        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
+        room: Room,
+        rovers: Vec<(RoverId, Arc<[CandidatePath]>)>,
     ) -> Self {
         let own = rovers.len();
         let mut problem = Solver {
@@ -105,7 +110,7 @@ impl Solver {
             moved: vec![true; own],
             anytime: None,
             compared: 0,
-            room: Room::default(),
+            room,
         };
         for (rover, paths) in rovers {
             problem.push(rover, paths);
@@ -114,7 +119,10 @@ impl Solver {
             for j in (0..own).filter(|&j| j != i) {
                 // What a pair is worth does not depend on who asks.
                 let edge = if j < i {
-                    problem.edges[j][place_of(j, i)].transposed()
+                    {
+                        let spare = problem.room.spare.pop().unwrap_or_default();
+                        problem.edges[j][place_of(j, i)].transposed(spare)
+                    }
                 } else {
                     problem.edge(i, j)
                 };
@@ -128,9 +136,17 @@ impl Solver {
         problem
     }
 
-    fn push(&mut self, rover: RoverId, paths: Vec<CandidatePath>) {
+    /// What the next problem can be made in.
+    pub(crate) fn into_room(self) -> Room {
+        let mut room = self.room;
+        let edges = self.edges.into_iter().flatten();
+        room.spare.extend(edges.map(Edge::into_spare));
+        room
+    }
+
+    fn push(&mut self, rover: RoverId, paths: Arc<[CandidatePath]>) {
         self.places.insert(rover, self.agents.len());
-        let paths = Paths::new(paths);
+        let paths = self.room.known.paths(paths, self.payoffs.leaf_paths_hold);
         self.agents.push(Agent { rover, paths });
     }
 
@@ -139,7 +155,7 @@ impl Solver {
     pub(crate) fn add(
         &mut self,
         node: NodeId,
-        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
+        rovers: Vec<(RoverId, Arc<[CandidatePath]>)>,
         mut handed: u64,
     ) {
         let first = self.agents.len();
@@ -178,7 +194,9 @@ impl Solver {
 
     fn edge_for_free(&mut self, i: usize, j: usize) -> Edge {
         let (a, b) = (&self.agents[i], &self.agents[j]);
-        Edge::between(&a.paths, &b.paths, &self.payoffs, &mut self.room.cycles)
+        let (room, payoffs) = (&mut self.room, &self.payoffs);
+        let spare = room.spare.pop().unwrap_or_default();
+        Edge::between(&a.paths, &b.paths, payoffs, &mut room.meetings, spare)
     }
 
     fn handed_edge(&mut self, i: usize, j: usize) -> Edge {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use prost_reflect::prost_types::field_descriptor_proto::Type;
+use prost_types::field_descriptor_proto::Type;
 
 use super::content;
 use crate::fields::{FieldDiff, raw};

@@ -1,8 +1,8 @@
 //! Messages and schemas that are written here byte by byte.
 
 use prost::Message;
-use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
-use prost_reflect::prost_types::{
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, MessageOptions,
 };
 

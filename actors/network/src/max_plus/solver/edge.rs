@@ -1,12 +1,12 @@
 //! An edge of the coordination graph: what two rovers' paths are worth together, and the messages
 //! along it. Nearly all the time that planning takes is spent here.
 
-use super::meetings::Paths;
+use super::meetings::{Meetings, Paths};
 use super::{Room, Rules};
 use crate::max_plus::payoff::Payoffs;
 
 /// How many columns of payoffs are worked on at once.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// Payoffs of one path of i with the next few of j.
 type Lanes = [f32; LANES];
@@ -33,6 +33,14 @@ pub(super) struct Edge {
     taken: Option<Taken>,
 }
 
+/// What edges of the cycle before were made in, so that nothing is allocated for those of this one.
+#[derive(Debug, Default)]
+pub(super) struct Spare {
+    payoffs: Vec<Lanes>,
+    incoming: Vec<f32>,
+    outgoing: Vec<f32>,
+}
+
 /// What j's node sent to have its message made here.
 #[derive(Debug)]
 struct Taken {
@@ -43,37 +51,70 @@ struct Taken {
 }
 
 impl Edge {
-    /// The edge between two rovers with these paths. `cycles` is room to work in.
-    pub(super) fn between(a: &Paths, b: &Paths, payoffs: &Payoffs, cycles: &mut Vec<u32>) -> Edge {
-        let size = (a.list.len(), b.list.len());
-        let sum = |at_a: usize, at_b: usize| a.list[at_a].payoff + b.list[at_b].payoff;
-        if !a.meet(b, payoffs.leaf_paths_hold, cycles) {
-            return Edge::new(size, |at_a, at_b| payoffs.pairwise(sum(at_a, at_b), None));
-        }
-        Edge::new(size, |at_a, at_b| {
-            let cycle = Some(cycles[at_a * size.1 + at_b]).filter(|cycle| *cycle > 0);
-            payoffs.pairwise(sum(at_a, at_b), cycle)
-        })
-    }
-
-    fn new(size: (usize, usize), worth: impl Fn(usize, usize) -> f32) -> Edge {
-        let mut payoffs = vec![[f32::NEG_INFINITY; LANES]; size.0 * size.1.div_ceil(LANES)];
-        for (block, rows) in payoffs.chunks_exact_mut(size.0.max(1)).enumerate() {
-            let first = block * LANES;
-            for (a, row) in rows.iter_mut().enumerate() {
-                for (b, payoff) in (first..size.1).zip(row) {
-                    *payoff = worth(a, b);
+    /// The edge between two rovers with these paths, made in what `spare` has.
+    pub(super) fn between(
+        a: &Paths,
+        b: &Paths,
+        payoffs: &Payoffs,
+        meetings: &mut Meetings,
+        spare: Spare,
+    ) -> Edge {
+        let mut edge = Edge::blank((a.list.len(), b.list.len()), spare);
+        a.meet(b, meetings);
+        let rows = edge.size.0.max(1);
+        let blocks = edge.payoffs.chunks_exact_mut(rows);
+        let cycles = meetings.cycles.chunks_exact(rows);
+        for ((block, cycles), columns) in blocks.zip(cycles).zip(b.list.chunks(LANES)) {
+            let mut worth = [f32::NEG_INFINITY; LANES];
+            for (worth, path) in worth.iter_mut().zip(columns) {
+                *worth = path.payoff;
+            }
+            for ((row, path), cycles) in block.iter_mut().zip(&*a.list).zip(cycles) {
+                *row = worth.map(|worth| path.payoff + worth);
+                // Eight cycles as one number: only those that are not 0 are looked at.
+                let mut left = u64::from_le_bytes(*cycles);
+                while left > 0 {
+                    let lane = left.trailing_zeros() as usize / LANES;
+                    let cycle = u32::from(cycles[lane]);
+                    row[lane] = payoffs.pairwise(row[lane], Some(cycle));
+                    left &= !(0xff << (LANES * lane));
                 }
             }
         }
+        edge
+    }
+
+    /// An edge with no messages yet, and columns that are all worth minus infinity.
+    fn blank(size: (usize, usize), spare: Spare) -> Edge {
+        let Spare {
+            mut payoffs,
+            mut incoming,
+            mut outgoing,
+        } = spare;
+        let blank = [f32::NEG_INFINITY; LANES];
+        payoffs.clear();
+        payoffs.resize(size.0 * size.1.div_ceil(LANES), blank);
+        incoming.clear();
+        incoming.resize(size.0, 0.0);
+        outgoing.clear();
+        outgoing.resize(size.1, 0.0);
         Edge {
             size,
             payoffs,
-            incoming: vec![0.0; size.0],
-            outgoing: vec![0.0; size.1],
+            incoming,
+            outgoing,
             changed: false,
             handed: false,
             taken: None,
+        }
+    }
+
+    /// What the next edge can be made in.
+    pub(super) fn into_spare(self) -> Spare {
+        Spare {
+            payoffs: self.payoffs,
+            incoming: self.incoming,
+            outgoing: self.outgoing,
         }
     }
 
@@ -98,8 +139,18 @@ impl Edge {
     }
 
     /// The same edge as j sees it, with no messages yet.
-    pub(super) fn transposed(&self) -> Edge {
-        Edge::new((self.size.1, self.size.0), |a, b| self.payoff(b, a))
+    pub(super) fn transposed(&self, spare: Spare) -> Edge {
+        let size = (self.size.1, self.size.0);
+        let mut edge = Edge::blank(size, spare);
+        let blocks = edge.payoffs.chunks_exact_mut(size.0.max(1));
+        for (first, rows) in (0..).step_by(LANES).zip(blocks) {
+            for (a, row) in rows.iter_mut().enumerate() {
+                for (b, payoff) in (first..size.1).zip(row) {
+                    *payoff = self.payoff(b, a);
+                }
+            }
+        }
+        edge
     }
 
     /// What path `a` of i and path `b` of j are worth together.

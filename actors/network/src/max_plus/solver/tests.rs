@@ -24,7 +24,7 @@ fn payoffs() -> Payoffs {
 }
 
 /// Random paths on 6 vertices; whether they make sense on a roadmap does not matter here.
-fn random_paths(stream: &mut Stream) -> Vec<CandidatePath> {
+fn random_paths(stream: &mut Stream) -> Arc<[CandidatePath]> {
     // More than a block of payoffs holds, now and then.
     let most = if stream.chance(0.2) { 12 } else { 3 };
     let count = 2 + stream.below(most);
@@ -42,7 +42,7 @@ fn random_paths(stream: &mut Stream) -> Vec<CandidatePath> {
         .collect()
 }
 
-type Team = Vec<Vec<CandidatePath>>;
+type Team = Vec<Arc<[CandidatePath]>>;
 
 fn team(stream: &mut Stream, size: usize) -> Team {
     (0..size).map(|_| random_paths(stream)).collect()
@@ -56,7 +56,7 @@ fn utility(rovers: &Team, pairs: &[(usize, usize)], choice: &[usize]) -> f64 {
         .map(|(&c, r)| f64::from(r[c].payoff));
     let worth = |&(i, j): &(usize, usize)| {
         let (a, b) = (&rovers[i][choice[i]], &rovers[j][choice[j]]);
-        f64::from(payoffs().pairwise(a.payoff + b.payoff, collision(a, b)))
+        f64::from(payoffs().pairwise(a.payoff + b.payoff, collision(a, b, false)))
     };
     alone.sum::<f64>() + pairs.iter().map(worth).sum::<f64>()
 }
@@ -78,9 +78,9 @@ fn exhaustive(rovers: &Team, pairs: &[(usize, usize)]) -> Vec<usize> {
     }
 }
 
-fn problem(rules: Rules, first: u32, rovers: &[Vec<CandidatePath>]) -> Solver {
+fn problem(rules: Rules, first: u32, rovers: &[Arc<[CandidatePath]>]) -> Solver {
     let rovers = (first..).map(RoverId).zip(rovers.iter().cloned());
-    Solver::new(payoffs(), rules, rovers.collect())
+    Solver::new(payoffs(), rules, Room::default(), rovers.collect())
 }
 
 fn iterate(problem: &mut Solver) -> bool {
@@ -274,7 +274,7 @@ fn messages_agree_with_the_definition() {
                 }
                 let worth = |a: usize, b: usize| {
                     let (a, b) = (&rovers[i][a], &rovers[j][b]);
-                    payoffs().pairwise(a.payoff + b.payoff, collision(a, b))
+                    payoffs().pairwise(a.payoff + b.payoff, collision(a, b, false))
                 };
                 let base = |a: usize| {
                     let others = (0..n).filter(|&k| k != i);
@@ -332,7 +332,7 @@ fn vectors_that_fit_no_edge_are_refused() {
     assert!(one.is_trivial());
     one.add(
         NodeId(1),
-        vec![(RoverId(1), rovers[1].clone()), (RoverId(1), vec![])],
+        vec![(RoverId(1), rovers[1].clone()), (RoverId(1), [].into())],
         0,
     );
     assert!(!one.is_trivial());
@@ -357,7 +357,7 @@ fn three_nodes(rules: Rules, rovers: &Team, quotas: [u64; 3]) -> Vec<Solver> {
     let of =
         |node: usize| (node * 2..node * 2 + 2).map(|at| (RoverId(at as u32), rovers[at].clone()));
     let mut nodes: Vec<_> = (0..3)
-        .map(|node| Solver::new(payoffs(), rules, of(node).collect()))
+        .map(|node| Solver::new(payoffs(), rules, Room::default(), of(node).collect()))
         .collect();
     for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
         let quota = if b == (a + 1) % 3 { quotas[a] } else { 0 };

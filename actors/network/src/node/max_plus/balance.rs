@@ -15,6 +15,8 @@
 //! its own node did, by the same two numbers at both, and a vector is never passed on twice: so
 //! nothing goes to and fro.
 
+use std::sync::Arc;
+
 use farside::prelude::*;
 use farside_worlds::{NodeId, VertexId};
 
@@ -101,7 +103,7 @@ impl MaxPlusPolicy {
         &self,
         base: &Base,
         now: SimTime,
-        rovers: &[(RoverId, Vec<CandidatePath>)],
+        rovers: &[(RoverId, Arc<[CandidatePath]>)],
     ) -> Vec<(NodeId, u64)> {
         let limit = self
             .pairs_limit(base, now)

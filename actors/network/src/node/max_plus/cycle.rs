@@ -1,6 +1,8 @@
 //! The steps of a planning cycle (*network-guided*, section 3.2) other than max-plus and admission:
 //! entries, candidate paths, assignments.
 
+use std::sync::Arc;
+
 use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::VertexId;
@@ -49,13 +51,13 @@ impl MaxPlusPolicy {
     pub(super) fn propose(&mut self, base: &Base, ctx: &mut Context<'_, Node>) {
         self.survey(base);
         self.probe(base, ctx);
-        let rovers: Vec<_> = self
-            .movable(base, ctx)
-            .into_iter()
-            .map(|(here, held, goal)| (held.rover, self.candidates(base, ctx, here, &held, goal)))
-            .collect();
+        let mut rovers: Vec<(_, Arc<[_]>)> = Vec::new();
+        for (here, held, goal) in self.movable(base, ctx) {
+            let paths = self.candidates(base, ctx, here, &held, goal);
+            rovers.push((held.rover, paths.into()));
+        }
         if !rovers.is_empty() {
-            let paths = |(rover, paths): &(RoverId, Vec<CandidatePath>)| RoverPaths {
+            let paths = |(rover, paths): &(RoverId, Arc<[CandidatePath]>)| RoverPaths {
                 rover: *rover,
                 paths: paths.clone(),
             };

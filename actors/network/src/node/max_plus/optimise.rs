@@ -12,6 +12,8 @@
 //! is there as it begins, and its messages go out when it is done. What is not done when the
 //! optimisation is over was in vain. A node may have neighbours make vectors for it: see `balance`.
 
+use std::sync::Arc;
+
 use farside::MatchKey;
 use farside::prelude::*;
 use farside_worlds::NodeId;
@@ -21,7 +23,7 @@ use crate::ids::RoverId;
 use crate::max_plus::candidates::CandidatePath;
 use crate::max_plus::messages::{CandidatePaths, Choice, MaxPlus};
 use crate::max_plus::payoff::Payoffs;
-use crate::max_plus::solver::{Rules, Solver};
+use crate::max_plus::solver::{Room, Rules, Solver};
 use crate::node::Node;
 use crate::node::base::Base;
 use crate::node::policy::Phase;
@@ -30,6 +32,8 @@ use crate::node::policy::Phase;
 #[derive(Default)]
 pub(super) struct Optimiser {
     solver: Option<Solver>,
+    /// What is left of the cycle before, until this one's problem is made.
+    room: Room,
     /// The last iteration made.
     pub(super) iteration: u32,
     running: bool,
@@ -77,7 +81,11 @@ struct Peer {
 
 impl Optimiser {
     pub(super) fn reset(&mut self) {
-        *self = Optimiser::default();
+        let room = self.solver.take().map(Solver::into_room);
+        *self = Optimiser {
+            room: room.unwrap_or_default(),
+            ..Optimiser::default()
+        };
     }
 
     /// How many rovers the node plans for.
@@ -127,7 +135,7 @@ impl MaxPlusPolicy {
         &mut self,
         base: &Base,
         ctx: &Context<'_, Node>,
-        rovers: Vec<(RoverId, Vec<CandidatePath>)>,
+        rovers: Vec<(RoverId, Arc<[CandidatePath]>)>,
     ) {
         let config = &base.site.config;
         let rules = Rules {
@@ -136,8 +144,9 @@ impl MaxPlusPolicy {
             anytime: config.max_plus.anytime,
         };
         let payoffs: Payoffs = base.site.payoffs;
+        let room = std::mem::take(&mut self.optimiser.room);
         self.optimiser.quotas = self.quotas(base, ctx.now(), &rovers);
-        self.optimiser.solver = Some(Solver::new(payoffs, rules, rovers));
+        self.optimiser.solver = Some(Solver::new(payoffs, rules, room, rovers));
         self.charge_payoffs(ctx);
     }
 
