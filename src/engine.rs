@@ -5,6 +5,7 @@
 
 mod erased;
 mod event;
+mod flows;
 mod parts;
 mod remains;
 mod store;
@@ -25,6 +26,8 @@ use crate::time::SimTime;
 use crate::topology::{FixedMap, Topology};
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
+use flows::Flows;
+
 pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
@@ -65,9 +68,7 @@ pub(crate) struct CellState {
     pub(crate) durable: Vec<Box<dyn Any + Send>>,
     /// What links have charged this actor. Spent energy outlives a crash.
     pub(crate) charged_j: f64,
-    /// The next ordinal by receiver and kind; a timer's receiver is `u32::MAX`. One word for each,
-    /// since a team in which everyone talks to everyone has very many.
-    ordinals: FixedMap<u64, u64>,
+    flows: Flows,
     keyed_flows: FixedMap<u64, KeyedFlow>,
 }
 
@@ -80,34 +81,42 @@ impl CellState {
             streams: Vec::new(),
             durable: Vec::new(),
             charged_j: 0.0,
-            ordinals: FixedMap::default(),
+            flows: Flows::default(),
             keyed_flows: FixedMap::default(),
         }
     }
 
     /// The ordinal of the next message in a flow, and how many right before it had the same key.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn next_in_flow(
         &mut self,
-        receiver: u32,
+        receiver: EntityId,
         kind: KindIndex,
         match_key: Option<MatchKey>,
     ) -> (u64, u32) {
-        let flow = u64::from(receiver) << 32 | u64::from(kind);
-        let next = self.ordinals.entry(flow).or_insert(0);
-        let ordinal = *next;
-        *next += 1;
-        if match_key.is_none() {
-            return (ordinal, 0);
-        }
+        let ordinal = self.flows.next(receiver, kind);
+        let repeat = match_key.map_or(0, |key| self.repeats(receiver, kind, key));
+        (ordinal, repeat)
+    }
+
+    /// The ordinal of the next timer of this kind.
+    #[inline(always)]
+    pub(crate) fn next_timer(&mut self, kind: KindIndex) -> u64 {
+        self.flows.next_timer(kind)
+    }
+
+    /// How many messages right before had this key too.
+    #[inline(never)]
+    fn repeats(&mut self, receiver: EntityId, kind: KindIndex, key: MatchKey) -> u32 {
+        let flow = u64::from(receiver.0) << 32 | u64::from(kind);
         let keyed = self.keyed_flows.entry(flow).or_default();
-        keyed.repeat = if keyed.last_key == match_key {
+        keyed.repeat = if keyed.last_key == Some(key) {
             keyed.repeat + 1
         } else {
             0
         };
-        keyed.last_key = match_key;
-        (ordinal, keyed.repeat)
+        keyed.last_key = Some(key);
+        keyed.repeat
     }
 }
 
@@ -444,7 +453,7 @@ impl Engine {
         let local = self.parts.topology.place(head.receiver).local as usize;
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
-        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL.0, kind, None);
+        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL, kind, None);
         let head = Head {
             kind: Some(kind),
             ordinal,

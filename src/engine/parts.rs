@@ -222,7 +222,7 @@ impl Parts {
             match_key,
             delay,
         } = outbound;
-        let (ordinal, repeat) = state.next_in_flow(receiver.0, kind, match_key);
+        let (ordinal, repeat) = state.next_in_flow(receiver, kind, match_key);
         let head = Head {
             receiver,
             kind: Some(kind),
@@ -351,7 +351,7 @@ impl Parts {
         letter: Sealed,
         delay: SimDuration,
     ) -> TimerId {
-        let (ordinal, _) = state.next_in_flow(u32::MAX, kind, None);
+        let ordinal = state.next_timer(kind);
         let head = Head {
             kind: Some(kind),
             ordinal,

@@ -194,7 +194,7 @@ impl Parts {
             });
         }
         let kind = self.topology.links.get(&link).map(|link| link.change_kind);
-        let flow = state.next_in_flow(link.0, kind.unwrap_or(KindIndex::MAX), None);
+        let flow = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX), None);
         let head = Head {
             receiver: link,
             kind,
