@@ -6,6 +6,7 @@
 mod erased;
 mod event;
 mod flows;
+mod hash;
 mod parts;
 mod remains;
 mod store;
@@ -21,30 +22,21 @@ use crate::ids::{EntityId, KindIndex, MatchKey};
 use crate::key::{Bound, EventKey};
 use crate::queue::Entry;
 use crate::random::Stream;
-use crate::record::{Record, RecordClass, record_hash};
+use crate::record::RecordClass;
 use crate::time::SimTime;
 use crate::topology::{FixedMap, Topology};
 
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 use flows::Flows;
 
-pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
+pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
 pub(crate) use remains::Remains;
 
 /// Where an engine commits what happened, in key order.
 pub(crate) trait Sink {
-    fn commit(&mut self, record: &Record<'_>, hash: u128);
-    /// Commits an event of which nobody wants a record: it is only counted.
-    fn count_event(
-        &mut self,
-        class: RecordClass,
-        key: EventKey,
-        head: &Head,
-        reason: &'static str,
-        sends: u32,
-    );
+    fn commit(&mut self, happened: &Happened<'_>);
     /// A type of samples was used for the first time in one engine, in the event just committed.
     fn first_sample(&mut self, sample: FirstSample);
     /// True once the run must not go on without its driver having a look.
@@ -185,8 +177,8 @@ impl Engine {
                 .topology
                 .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
             cell.state.count += 1;
-            let head = Head::of_entity(cell.entity);
-            engine.parts.insert(key, Class::Start, head, None);
+            let head = Head::of_entity(Class::Start, cell.entity);
+            engine.parts.insert(key, head, None);
         }
         engine
     }
@@ -207,45 +199,70 @@ impl Engine {
         Ok(())
     }
 
+    /// The way of nearly all events: a message or a timer for an actor that is there, of which
+    /// nothing more is to be known.
+    #[inline(always)]
     fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
-        let Pending {
-            class,
-            head,
-            letter,
-            side,
-        } = self.parts.take(entry.slot);
+        let (head, letter) = self.parts.store.take(entry.slot);
         let key = entry.key();
+        let record = match head.class {
+            Class::Message if !head.has_side => RecordClass::Delivered,
+            Class::Timer if head.life() == self.cell(head.receiver).state.incarnation => {
+                RecordClass::Timer
+            }
+            _ => return self.handle_other(key, head, letter, entry.slot, sink),
+        };
+        if self.is_crashed(head.receiver) || key.step > self.parts.topology.step_limit {
+            return self.handle_other(key, head, letter, entry.slot, sink);
+        }
+        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
+            self.parts.note_unfinished(key, head);
+            return Err(fault);
+        }
+        self.run_handler(record, key, &head, letter, sink)
+    }
+
+    /// The way of every event, whatever it is.
+    #[inline(never)]
+    fn handle_other(
+        &mut self,
+        key: EventKey,
+        head: Head,
+        letter: Option<Sealed>,
+        slot: u32,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let side = self.parts.store.side(slot, &head);
         self.parts.side = side;
-        if class == Class::Void {
+        if head.class == Class::Void {
             return Ok(());
         }
-        if self.died_with_its_incarnation(class, &head) {
-            return self.discard(key, class, head, letter);
+        if self.died_with_its_incarnation(&head) {
+            return self.discard(key, head, letter);
         }
-        if let Err(fault) = self.parts.begin(key, letter.as_ref(), head.kind) {
-            self.parts.note_unfinished(key, class, head);
+        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
+            self.parts.note_unfinished(key, head);
             return Err(fault);
         }
         if key.step > self.parts.topology.step_limit {
-            return Err(self.step_limit_fault(key, class, &head));
+            return Err(self.step_limit_fault(key, &head));
         }
-        if class == Class::Message && head.has_side {
+        if head.class == Class::Message && head.has_side {
             self.charge_receiver(head.receiver, side);
         }
-        let record = match class {
+        let record = match head.class {
             Class::Void => return Ok(()),
             Class::Start => RecordClass::Start,
             Class::Timer => RecordClass::Timer,
             Class::Message if self.is_crashed(head.receiver) => {
-                self.discard(key, class, head, letter)?;
-                let reason = self.parts.topology.intern("crashed");
-                self.commit(RecordClass::Lost, key, &Head { reason, ..head }, sink);
+                self.discard(key, head, letter)?;
+                let mut head = head;
+                head.reason = self.parts.topology.intern("crashed");
+                self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
             }
             Class::Message => RecordClass::Delivered,
-            Class::HandOver | Class::Held => {
-                return self.hand_over(class, key, head, letter, sink);
-            }
+            Class::HandOver | Class::Held => return self.hand_over(key, head, letter, sink),
             Class::Tell => return self.tell(key, &head, letter, sink),
             Class::Charge => {
                 let charge = side.and_then(|side| side.carriage);
@@ -259,24 +276,23 @@ impl Engine {
                 return Ok(());
             }
             Class::LateLoss => {
-                self.discard(key, class, head, letter)?;
+                self.discard(key, head, letter)?;
                 self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
             }
         };
-        self.run_handler(class, record, key, &head, letter, sink)
+        self.run_handler(record, key, &head, letter, sink)
     }
 
     /// Drops a message or timer that nobody handles.
     fn discard(
         &mut self,
         key: EventKey,
-        class: Class,
         head: Head,
         letter: Option<Sealed>,
     ) -> Result<(), Box<Fault>> {
         dropped(letter).map_err(|cause| {
-            self.parts.note_unfinished(key, class, head);
+            self.parts.note_unfinished(key, head);
             let message = head.message(&self.parts.topology);
             self.parts.fault_at(key, head.receiver, message, *cause)
         })
@@ -303,19 +319,18 @@ impl Engine {
     }
 
     /// True for a start or a timer whose actor has crashed or was restarted since.
-    fn died_with_its_incarnation(&self, class: Class, head: &Head) -> bool {
-        if !matches!(class, Class::Start | Class::Timer) {
+    fn died_with_its_incarnation(&self, head: &Head) -> bool {
+        if !matches!(head.class, Class::Start | Class::Timer) {
             return false;
         }
         let cell = self.cell(head.receiver);
-        cell.actor.is_none() || head.incarnation != cell.state.incarnation
+        cell.actor.is_none() || head.life() != cell.state.incarnation
     }
 
     /// Runs one handler, and commits the event if it did not fail.
     #[inline(always)]
     fn run_handler(
         &mut self,
-        class: Class,
         record: RecordClass,
         key: EventKey,
         head: &Head,
@@ -325,7 +340,7 @@ impl Engine {
         let cell = &mut self.actors[self.parts.topology.place(head.receiver).local as usize];
         let result = invoke(cell, &mut self.parts, key, letter);
         if result.is_err() || self.parts.fault.is_some() {
-            return Err(self.handler_fault(class, key, head, result));
+            return Err(self.handler_fault(key, head, result));
         }
         self.commit(record, key, head, sink);
         Ok(())
@@ -334,7 +349,6 @@ impl Engine {
     #[cold]
     fn handler_fault(
         &mut self,
-        class: Class,
         key: EventKey,
         head: &Head,
         result: Result<(), Box<FaultCause>>,
@@ -344,23 +358,22 @@ impl Engine {
             unreachable!("called with a fault at hand");
         };
         let message = head.message(&self.parts.topology);
-        self.parts.note_unfinished(key, class, *head);
+        self.parts.note_unfinished(key, *head);
         let blamed = self.parts.carrying.unwrap_or(head.receiver);
         self.parts.fault_at(key, blamed, message, *cause)
     }
 
     fn hand_over(
         &mut self,
-        class: Class,
         key: EventKey,
         head: Head,
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let (Some(link), Some(letter)) = (head.link, letter) else {
+        let (Some(link), Some(letter)) = (head.link(), letter) else {
             unreachable!("a message is handed over with its letter, to a link");
         };
-        let held = self.parts.side.filter(|_| class == Class::Held);
+        let held = self.parts.side.filter(|_| head.class == Class::Held);
         let parts = &mut self.parts;
         let carried = guarded(|| parts.carry(link, head, letter, held));
         let result = carried.and_then(|charge_j| match self.parts.fault.take() {
@@ -368,7 +381,7 @@ impl Engine {
             None => Ok(charge_j),
         });
         if let Err(cause) = result {
-            self.parts.note_unfinished(key, class, head);
+            self.parts.note_unfinished(key, head);
             let message = format!("a message from {}", self.parts.topology.name(head.sender));
             return Err(self.parts.fault_at(key, link, Some(message), *cause));
         }
@@ -402,10 +415,10 @@ impl Engine {
         action: Action,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let mut head = Head::of_entity(entity);
+        let mut head = Head::of_entity(Class::Tell, entity);
         head.sender = EntityId::CONTROL;
         let local = self.parts.topology.place(entity).local as usize;
-        self.parts.begin(key, None, None)?;
+        self.parts.begin(key, None, &head)?;
         match action {
             Action::Crash => {
                 dropped(self.actors[local].actor.take())
@@ -422,17 +435,13 @@ impl Engine {
                 let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
                 cell.actor =
                     Some(built.map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?);
-                self.run_handler(Class::Start, RecordClass::Restart, key, &head, None, sink)
+                self.run_handler(RecordClass::Restart, key, &head, None, sink)
             }
             Action::Change(change) => {
-                head.kind = self
-                    .parts
-                    .topology
-                    .links
-                    .get(&entity)
-                    .map(|link| link.change_kind);
+                let links = &self.parts.topology.links;
+                head = head.of_kind(links.get(&entity).map(|link| link.change_kind));
                 let parts = &mut self.parts;
-                guarded(|| parts.apply_change(local, key, head.kind, change))
+                guarded(|| parts.apply_change(local, key, head.kind(), change))
                     .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
@@ -454,40 +463,36 @@ impl Engine {
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
         let (ordinal, _) = state.next_in_flow(EntityId::CONTROL, kind, None);
-        let head = Head {
-            kind: Some(kind),
-            ordinal,
-            ..head
-        };
-        self.parts.begin(key, Some(&letter), head.kind)?;
+        let mut head = head.of_kind(Some(kind));
+        head.ordinal = ordinal;
+        self.parts.begin(key, Some(&letter), &head)?;
         if self.is_crashed(head.receiver) {
-            self.discard(key, Class::Tell, head, Some(letter))?;
+            self.discard(key, head, Some(letter))?;
             self.commit(RecordClass::Told, key, &head, sink);
             return Ok(());
         }
-        self.run_handler(
-            Class::Tell,
-            RecordClass::Told,
-            key,
-            &head,
-            Some(letter),
-            sink,
-        )
+        self.run_handler(RecordClass::Told, key, &head, Some(letter), sink)
     }
 
     /// Commits the event just handled, then what happened in it.
-    #[inline]
+    #[inline(always)]
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
-        if parts.topology.recording() {
-            let side = parts.side.as_ref().filter(|_| head.has_side);
-            let mut record = head.record(&parts.topology, class, key, &parts.body, side);
-            record.sends = parts.sends;
-            sink.commit(&record, hash_if_wanted(&parts.topology, &record));
+        let side = if head.has_side {
+            parts.side.as_ref()
         } else {
-            let reason = parts.topology.reason(head.reason);
-            sink.count_event(class, key, head, reason, parts.sends);
-        }
+            None
+        };
+        sink.commit(&Happened {
+            class,
+            key,
+            head,
+            side,
+            sample: None,
+            body: &parts.body,
+            sends: parts.sends,
+            hash: head.hash_if_wanted(&parts.topology, class, key, &parts.body),
+        });
         if !parts.effects.is_empty() {
             parts.commit_effects(head, sink);
         }
@@ -506,11 +511,13 @@ impl Engine {
         self.parts.drop_carriers(remains);
     }
 
-    fn step_limit_fault(&mut self, key: EventKey, class: Class, head: &Head) -> Box<Fault> {
+    fn step_limit_fault(&mut self, key: EventKey, head: &Head) -> Box<Fault> {
         // The hops that follow would show the same loop: name the ones still waiting here.
         let topology = self.parts.topology.clone();
         let hop = |head: &Head| {
-            let kind = head.kind.map_or("start", |kind| topology.kind(kind).name());
+            let kind = head
+                .kind()
+                .map_or("start", |kind| topology.kind(kind).name());
             format!(
                 "{} -> {} ({kind})",
                 topology.name(head.sender),
@@ -520,25 +527,18 @@ impl Engine {
         let mut chain = vec![hop(head)];
         for entry in self.parts.queue.drain_sorted() {
             let (waiting, at) = (self.parts.take(entry.slot), entry.key());
-            if at.time == key.time && waiting.class != Class::Void && chain.len() < 8 {
+            let void = waiting.head.class == Class::Void;
+            if at.time == key.time && !void && chain.len() < 8 {
                 chain.push(hop(&waiting.head));
             }
             self.parts.insert_pending(at, waiting);
         }
-        self.parts.note_unfinished(key, class, *head);
+        self.parts.note_unfinished(key, *head);
         let cause = FaultCause::StepLimit {
             limit: topology.step_limit,
             chain,
         };
         self.parts.fault_at(key, head.receiver, None, cause)
-    }
-}
-
-pub(crate) fn hash_if_wanted(topology: &Topology, record: &Record<'_>) -> u128 {
-    if topology.digest {
-        record_hash(topology, record)
-    } else {
-        0
     }
 }
 

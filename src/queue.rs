@@ -114,7 +114,7 @@ const NEAR: usize = 48;
 const SORTED: usize = 512;
 
 /// A heap of more than this is spread over buckets. A smaller one lies in the first cache.
-const HEAP: usize = 512;
+const HEAP: usize = 96;
 
 /// Events yet to be handled, by key.
 pub(crate) struct Queue {

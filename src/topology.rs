@@ -319,15 +319,6 @@ impl Topology {
             .or(routes.uplink)
     }
 
-    pub(crate) fn kind_index(&self, kind: &Arc<Kind>) -> Option<KindIndex> {
-        let at = self
-            .info
-            .kinds
-            .iter()
-            .position(|known| Arc::ptr_eq(known, kind));
-        at.and_then(|at| KindIndex::try_from(at).ok())
-    }
-
     /// The number in the address of the actor called `name`, and the actor's type.
     pub(crate) fn actor(&self, name: &str) -> Result<(u32, &ActorType), LookupError> {
         let entity = self.info.entity(name);

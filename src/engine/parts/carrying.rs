@@ -27,7 +27,7 @@ impl Parts {
     ) -> f64 {
         self.carrying = Some(link);
         let topology = self.topology.clone();
-        let Some(kind) = head.kind.map(|kind| topology.kind(kind)) else {
+        let Some(kind) = head.kind().map(|kind| topology.kind(kind)) else {
             return 0.0;
         };
         let parcel = Parcel {
@@ -39,10 +39,10 @@ impl Parts {
             receiver: head.receiver,
             kind,
             ordinal: head.ordinal,
-            repeat: head.repeat,
-            copy: head.copy,
+            repeat: head.repeat(),
+            copy: head.copy(),
             token: held.map(|held| held.token),
-            match_key: head.match_key,
+            match_key: head.match_key(),
             letter: &*letter.0,
             size: Cell::new(None),
         };
@@ -102,13 +102,8 @@ impl Parts {
                 parked.slot
             }
             Some(_) => {
-                let Pending {
-                    class,
-                    head,
-                    letter,
-                    side,
-                } = self.store.take_ahead(parked.slot);
-                let slot = self.insert(key, class, head, letter);
+                let (head, letter, side) = self.store.take_ahead(parked.slot);
+                let slot = self.insert(key, head, letter);
                 self.store.set_side(slot, side.unwrap_or_default());
                 slot
             }
@@ -128,11 +123,9 @@ impl Parts {
         latest: Option<SimDuration>,
         (head, letter, side): (Head, Sealed, Side),
     ) {
-        let head = Head {
-            has_side: true,
-            ..head
-        };
-        let slot = self.store.insert(Class::Held, head, Some(letter));
+        let mut head = head;
+        (head.class, head.has_side) = (Class::Held, true);
+        let slot = self.store.insert(head, Some(letter));
         self.store.set_side(slot, side);
         if let Some(after) = latest {
             let key = self.later_key(link, count, after);
@@ -147,7 +140,7 @@ impl Parts {
         );
     }
 
-    fn is_shared(&self, link: EntityId) -> bool {
+    pub(super) fn is_shared(&self, link: EntityId) -> bool {
         self.topology
             .links
             .get(&link)
@@ -162,8 +155,7 @@ impl Parts {
         let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
         self.links[topology.place(link).local as usize].count = count;
         let pending = Pending {
-            class: Class::Charge,
-            head: Head::of_entity(whom),
+            head: Head::of_entity(Class::Charge, whom),
             letter: None,
             side: Some(Side {
                 carriage: Some(charge),
@@ -195,15 +187,11 @@ impl Parts {
         }
         let kind = self.topology.links.get(&link).map(|link| link.change_kind);
         let flow = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX), None);
-        let head = Head {
-            receiver: link,
-            kind,
-            ordinal: flow.0,
-            cause: Some(self.key),
-            ..Head::of_entity(me)
-        };
+        let mut head = Head::of_entity(Class::Tell, me);
+        head.receiver = link;
+        let head = head.caused(self.key, KindIndex::MAX, flow.0).of_kind(kind);
         let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
-        self.schedule(its.engine, key, Class::Tell, head, Some(letter));
+        self.schedule(its.engine, key, head, Some(letter));
     }
 
     /// Gives a link a change.
@@ -226,7 +214,7 @@ impl Parts {
         // Of the messages that a link decides about, only those that it held have a side.
         let held = head.has_side;
         // Only a hand-over is an event of its own between the cause and this, unless it was held.
-        let handed_over = head.cause.filter(|cause| *cause != self.key && !held);
+        let handed_over = head.cause().filter(|cause| *cause != self.key && !held);
         let handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
         let scheduled_by = held.then_some(self.key);
         for (copy, verdict) in verdicts.list.iter().enumerate() {
@@ -238,11 +226,8 @@ impl Parts {
             }) else {
                 return;
             };
-            let head = Head {
-                copy: head.copy + copy as u32,
-                handed_over,
-                ..head
-            };
+            let mut head = head.as_copy(head.copy() + copy as u32);
+            head.handed_over = handed_over;
             if let Err(cause) = self.obey(link, count, *verdict, (head, own, kind), scheduled_by) {
                 return self.raise(cause);
             }
@@ -292,7 +277,7 @@ impl Parts {
                 token,
                 copy,
             } => {
-                head.copy = copy.unwrap_or(head.copy);
+                head = head.as_copy(copy.unwrap_or(head.copy()));
                 let side = Side {
                     scheduled_by,
                     token,
@@ -316,8 +301,8 @@ impl Parts {
             }
         };
         let key = self.later_key(link, count, after);
+        head.class = class;
         let pending = Pending {
-            class,
             head,
             letter: Some(letter),
             side,
