@@ -39,13 +39,7 @@ impl Head {
     /// far as the hash function's fast path goes. When the message was sent is not among them: it
     /// is the cause's time.
     #[inline(never)]
-    fn hash(
-        &self,
-        topology: &Topology,
-        class: RecordClass,
-        key: EventKey,
-        body: &[u8],
-    ) -> u128 {
+    fn hash(&self, topology: &Topology, class: RecordClass, key: EventKey, body: &[u8]) -> u128 {
         let cause = self.cause().unwrap_or(NO_CAUSE);
         let match_key = self.match_key();
         let shape =
