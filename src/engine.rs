@@ -3,6 +3,7 @@
 //! An engine knows nothing of threads. What leaves its hosts for another engine's waits in
 //! `outgoing` for the executor to carry over.
 
+mod cell;
 mod erased;
 mod event;
 mod flows;
@@ -11,24 +12,21 @@ mod parts;
 mod remains;
 mod store;
 
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::carrier::{AnyCarrier, SealedChange};
 use crate::fault::{Fault, FaultCause, Outcome};
 use crate::guard::{dropped, guarded};
-use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::ids::{EntityId, KindIndex};
 use crate::key::{Bound, EventKey};
 use crate::queue::Entry;
-use crate::random::Stream;
 use crate::record::RecordClass;
 use crate::time::SimTime;
-use crate::topology::{FixedMap, Topology};
+use crate::topology::Topology;
 
+pub(crate) use cell::{ActorCell, CellState};
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
-use flows::Flows;
-
 pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
@@ -41,84 +39,6 @@ pub(crate) trait Sink {
     fn first_sample(&mut self, sample: FirstSample);
     /// True once the run must not go on without its driver having a look.
     fn paused(&self) -> bool;
-}
-
-/// What a sender keeps of a flow (receiver, kind) in which it gives messages match keys.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct KeyedFlow {
-    last_key: Option<MatchKey>,
-    repeat: u32,
-}
-
-/// What the kernel keeps for an actor, crashed or not.
-pub(crate) struct CellState {
-    pub(crate) declared: u32,
-    pub(crate) incarnation: u32,
-    /// The next of the keys that this actor assigns.
-    pub(crate) count: u64,
-    pub(crate) streams: Vec<(&'static str, Stream)>,
-    pub(crate) durable: Vec<Box<dyn Any + Send>>,
-    /// What links have charged this actor. Spent energy outlives a crash.
-    pub(crate) charged_j: f64,
-    flows: Flows,
-    keyed_flows: FixedMap<u64, KeyedFlow>,
-}
-
-impl CellState {
-    pub(crate) fn new(declared: u32) -> Self {
-        CellState {
-            declared,
-            incarnation: 0,
-            count: 0,
-            streams: Vec::new(),
-            durable: Vec::new(),
-            charged_j: 0.0,
-            flows: Flows::default(),
-            keyed_flows: FixedMap::default(),
-        }
-    }
-
-    /// The ordinal of the next message in a flow, and how many right before it had the same key.
-    #[inline(always)]
-    pub(crate) fn next_in_flow(
-        &mut self,
-        receiver: EntityId,
-        kind: KindIndex,
-        match_key: Option<MatchKey>,
-    ) -> (u64, u32) {
-        let ordinal = self.flows.next(receiver, kind);
-        let repeat = match_key.map_or(0, |key| self.repeats(receiver, kind, key));
-        (ordinal, repeat)
-    }
-
-    /// The ordinal of the next timer of this kind.
-    #[inline(always)]
-    pub(crate) fn next_timer(&mut self, kind: KindIndex) -> u64 {
-        self.flows.next_timer(kind)
-    }
-
-    /// How many messages right before had this key too.
-    #[inline(never)]
-    fn repeats(&mut self, receiver: EntityId, kind: KindIndex, key: MatchKey) -> u32 {
-        let flow = u64::from(receiver.0) << 32 | u64::from(kind);
-        let keyed = self.keyed_flows.entry(flow).or_default();
-        keyed.repeat = if keyed.last_key == Some(key) {
-            keyed.repeat + 1
-        } else {
-            0
-        };
-        keyed.last_key = Some(key);
-        keyed.repeat
-    }
-}
-
-/// An actor, with what outlives it.
-pub(crate) struct ActorCell {
-    pub(crate) entity: EntityId,
-    /// `None` while crashed.
-    pub(crate) actor: Option<Box<dyn AnyActor>>,
-    pub(crate) factory: Factory,
-    pub(crate) state: CellState,
 }
 
 /// A link, with its key counter.
@@ -172,12 +92,13 @@ impl Engine {
             parts: Parts::new(topology, index, links),
         };
         for cell in &mut engine.actors {
-            let key = engine
-                .parts
-                .topology
-                .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
+            let key =
+                engine
+                    .parts
+                    .topology
+                    .key(SimTime::ZERO, 0, cell.state.entity, cell.state.count);
             cell.state.count += 1;
-            let head = Head::of_entity(Class::Start, cell.entity);
+            let head = Head::of_entity(Class::Start, cell.state.entity);
             engine.parts.insert(key, head, None);
         }
         engine
@@ -194,9 +115,33 @@ impl Engine {
             let Some(entry) = self.parts.queue.pop_before(bound) else {
                 break;
             };
+            if self.parts.queue.has_new_batch() && self.parts.store.is_large() {
+                self.read_ahead();
+            }
             self.handle(entry, sink)?;
         }
         Ok(())
+    }
+
+    /// Reads what the next few events will need. They lie anywhere in memory; read one after the
+    /// other, when each is handled, every miss of the cache would be waited for. Read here, where no
+    /// read depends on the one before, a processor waits for many of them at once.
+    #[inline(never)]
+    fn read_ahead(&self) {
+        let mut read = 0;
+        for entry in self.parts.queue.batch() {
+            read ^= self.parts.store.receiver(entry.slot).0;
+        }
+        let mut counts = u64::from(read);
+        for entry in self.parts.queue.batch() {
+            let receiver = self.parts.store.receiver(entry.slot);
+            let local = self.parts.topology.place(receiver).local as usize;
+            // Not every event is an actor's.
+            if let Some(cell) = self.actors.get(local) {
+                counts ^= cell.read_ahead();
+            }
+        }
+        std::hint::black_box(counts);
     }
 
     /// The way of nearly all events: a message or a timer for an actor that is there, of which
@@ -268,7 +213,7 @@ impl Engine {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.topology.place(head.receiver).local as usize;
                 let charge = charge.unwrap_or_default();
-                self.actors[local].state.charged_j += charge.energy_j;
+                self.actors[local].state.rest.charged_j += charge.energy_j;
                 let host = self.parts.topology.place(head.receiver).host;
                 let energy = self.parts.energy(host);
                 energy.transmit_j += charge.energy_j;
@@ -429,8 +374,8 @@ impl Engine {
             Action::Restart => {
                 let cell = &mut self.actors[local];
                 cell.state.incarnation += 1;
-                cell.state.streams.clear();
-                let (topology, factory) = (&self.parts.topology, &cell.factory);
+                cell.state.clear_streams();
+                let (topology, factory) = (&self.parts.topology, &cell.state.rest.factory);
                 let old = dropped(cell.actor.take());
                 let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
                 cell.actor =
@@ -501,12 +446,13 @@ impl Engine {
     /// Takes apart what is left once the run is over; see [`Remains`].
     pub(crate) fn dissolve(&mut self, until: Option<EventKey>, remains: &mut Remains) {
         self.parts.take_in_flight(until, remains);
-        for cell in std::mem::take(&mut self.actors) {
-            remains.drop_of(&self.parts.topology, cell.entity, cell.actor);
-            for kept in cell.state.durable {
-                remains.drop_of(&self.parts.topology, cell.entity, kept);
+        for ActorCell { actor, state } in std::mem::take(&mut self.actors) {
+            let (entity, rest) = (state.entity, *state.rest);
+            remains.drop_of(&self.parts.topology, entity, actor);
+            for kept in rest.durable {
+                remains.drop_of(&self.parts.topology, entity, kept);
             }
-            remains.drop_of(&self.parts.topology, cell.entity, cell.factory);
+            remains.drop_of(&self.parts.topology, entity, rest.factory);
         }
         self.parts.drop_carriers(remains);
     }
@@ -554,8 +500,8 @@ fn invoke(
     };
     let mut core = Core {
         parts,
+        me: cell.state.entity,
         state: &mut cell.state,
-        me: cell.entity,
         key,
     };
     let outcome: Result<Outcome, _> = guarded(|| match letter {

@@ -32,9 +32,9 @@ struct Short {
 #[derive(Default)]
 pub(crate) struct Flows {
     /// None, or a power of two of places, at most three quarters of them taken.
-    places: Vec<Short>,
+    places: Box<[Short]>,
     taken: u32,
-    long: FixedMap<(u32, KindIndex), u64>,
+    long: Option<Box<FixedMap<(u32, KindIndex), u64>>>,
 }
 
 impl Flows {
@@ -63,6 +63,14 @@ impl Flows {
         }
     }
 
+    /// Reads a part of the table, for [`Engine::read_ahead`].
+    ///
+    /// [`Engine::read_ahead`]: super::Engine::read_ahead
+    #[inline(always)]
+    pub(crate) fn read_ahead(&self) -> u64 {
+        self.places.first().map_or(0, |place| place.count.into())
+    }
+
     #[inline(always)]
     fn next_short(&mut self, receiver: u32, kind: KindIndex) -> u32 {
         let flow = kind << RECEIVER_BITS | receiver;
@@ -87,7 +95,7 @@ impl Flows {
     #[inline(never)]
     fn add(&mut self, flow: u32) {
         if (self.taken as usize + 1) * 4 > self.places.len() * 3 {
-            let more = vec![Short::default(); (self.places.len() * 2).max(4)];
+            let more = vec![Short::default(); (self.places.len() * 2).max(4)].into();
             let all = std::mem::replace(&mut self.places, more);
             for place in all.into_iter().filter(|place| place.count > 0) {
                 self.put(place);
@@ -109,7 +117,8 @@ impl Flows {
     /// Goes on with a flow that is not short, or starts with its message number `first`.
     #[cold]
     fn next_long(&mut self, receiver: u32, kind: KindIndex, first: u32) -> u64 {
-        let count = self.long.entry((receiver, kind)).or_insert(first.into());
+        let long = self.long.get_or_insert_default();
+        let count = long.entry((receiver, kind)).or_insert(first.into());
         *count += 1;
         *count - 1
     }

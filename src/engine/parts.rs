@@ -273,7 +273,7 @@ impl Parts {
         }
         let charge_j = self.carry(link, head, letter, None);
         if charge_j != 0.0 {
-            state.charged_j += charge_j;
+            state.rest.charged_j += charge_j;
             self.energy(from).transmit_j += charge_j;
         }
     }

@@ -1,6 +1,7 @@
 //! Where events wait, by slot. Slots are reused, last freed first, while they are still in the cache.
 
 use super::{Class, Head, Sealed, Side};
+use crate::ids::EntityId;
 
 /// An event that waits: what is known of a message and the message itself, in two lines of cache.
 #[repr(align(64))]
@@ -63,6 +64,19 @@ impl Store {
     #[inline]
     pub(crate) fn side(&self, slot: u32, head: &Head) -> Option<Side> {
         head.has_side.then(|| self.sides[slot as usize])
+    }
+
+    /// Whose event waits in this slot.
+    #[inline(always)]
+    pub(crate) fn receiver(&self, slot: u32) -> EntityId {
+        self.waiting[slot as usize].head.receiver
+    }
+
+    /// True if what waits does not fit into a processor's nearest caches.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        const LARGE: usize = 4096;
+        self.waiting.len() >= LARGE
     }
 
     /// Cancels the timer in `slot` if `is_it` says that it is the one meant; true if so.

@@ -402,7 +402,6 @@ impl Simulation {
         let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
         for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
-            let state = CellState::new(declared as u32);
             let built = match fault {
                 None => guarded(|| (actor.factory)(&actor.name)).map_err(|cause| {
                     let key = topology.key(SimTime::ZERO, 0, *entity, 0);
@@ -418,10 +417,8 @@ impl Simulation {
                 Some(_) => Err(()),
             };
             let cell = ActorCell {
-                entity: *entity,
                 actor: built.ok(),
-                factory: actor.factory,
-                state,
+                state: CellState::new(*entity, declared as u32, actor.factory),
             };
             actors[topology.place(*entity).engine as usize].push(cell);
         }
