@@ -500,6 +500,30 @@ impl Simulation {
         self.interrupt.clone()
     }
 
+    /// The executor that pays: kameo on `threads` threads if there are several and at least two
+    /// hosts were declared heavy ([`Simulation::heavy`]), so that there is work to be done side by
+    /// side; else inline. It hangs on what was declared and on nothing measured, and the result is
+    /// the same on either.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("rover_01"), sim.host("rover_02"));
+    /// sim.heavy(a);
+    /// assert_eq!(sim.executor_that_pays(4), Executor::Inline);
+    /// sim.heavy(b);
+    /// assert_eq!(sim.executor_that_pays(4), Executor::Kameo { threads: 4 });
+    /// assert_eq!(sim.executor_that_pays(1), Executor::Inline);
+    /// ```
+    pub fn executor_that_pays(&self, threads: usize) -> Executor {
+        let heavy = self.hosts.iter().filter(|host| host.heavy).count();
+        if heavy >= 2 && threads >= 2 {
+            Executor::Kameo { threads }
+        } else {
+            Executor::Inline
+        }
+    }
+
     /// Runs to the end.
     ///
     /// # Errors
