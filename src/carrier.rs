@@ -141,6 +141,7 @@ impl Parcel<'_> {
     /// The address of this link's draws for this message: (run seed, link, purpose, message
     /// identity, attempt, copy). The identity is the match key where the protocol gave one, so
     /// that matching messages of two runs meet the same luck.
+    #[inline]
     pub fn random(&self, purpose: u64, attempt: u32, copy: u32) -> RandomKey {
         let identity = match self.match_key {
             Some(key) => RandomKey::new(self.topology.seed)

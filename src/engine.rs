@@ -384,7 +384,7 @@ impl Engine {
             }
             Action::Change(change) => {
                 let links = &self.parts.topology.links;
-                head = head.of_kind(links.get(&entity).map(|link| link.change_kind));
+                head = head.of_kind(links.get(entity).map(|link| link.change_kind));
                 let parts = &mut self.parts;
                 guarded(|| parts.apply_change(local, key, head.kind(), change))
                     .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;

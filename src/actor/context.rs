@@ -175,7 +175,10 @@ impl<'a, A: Actor> Context<'a, A> {
         let routes = &topology.routes[host as usize];
         let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
         links.extend(routes.uplink);
-        links.retain(|link| topology.links[link].change_kind == *kind);
+        links.retain(|link| {
+            let entry = topology.links.get(*link);
+            entry.is_some_and(|link| link.change_kind == *kind)
+        });
         links.sort_unstable();
         links.dedup();
         let id = |link: EntityId| {

@@ -264,7 +264,7 @@ impl Parts {
             });
         };
         let mut head = head.through(link);
-        if self.is_shared(link) {
+        if self.topology.links.is_shared(link) {
             let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
             let engine = self.topology.place(link).engine;
             head.class = Class::HandOver;
@@ -435,7 +435,8 @@ impl Parts {
 
     /// Drops the links, once the run is over.
     pub(super) fn drop_carriers(&mut self, remains: &mut Remains) {
-        let mut entities: Vec<_> = self.topology.links.keys().copied().collect();
+        let links = self.topology.links.iter();
+        let mut entities: Vec<_> = links.map(|(link, _)| link).collect();
         entities.retain(|link| self.topology.place(*link).engine == self.index);
         entities.sort_unstable_by_key(|link| self.topology.place(*link).local);
         for (link, cell) in entities.into_iter().zip(std::mem::take(&mut self.links)) {

@@ -14,8 +14,8 @@ use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
-    Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, PlannedAction, PlannedEvent, Routes,
-    RunInfo, Topology,
+    Entity, EntityRole, FixedMap, Kind, LinkEntry, Links, Location, PlannedAction, PlannedEvent,
+    Routes, RunInfo, Topology,
 };
 
 /// Which entity each declaration became.
@@ -122,7 +122,7 @@ impl Simulation {
         })
     }
 
-    fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> FixedMap<EntityId, LinkEntry> {
+    fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> Links {
         let entry = |(link, entity): (&LinkDecl, &EntityId)| {
             let entry = LinkEntry {
                 min_delay: link.carrier.min_delay(),
@@ -131,7 +131,7 @@ impl Simulation {
             };
             (*entity, entry)
         };
-        self.links.iter().zip(&ranked.links).map(entry).collect()
+        Links::new(self.links.iter().zip(&ranked.links).map(entry))
     }
 
     fn check_names(&self) -> Result<(), BuildError> {

@@ -41,7 +41,7 @@ impl Coordinator {
         threads: usize,
     ) -> Self {
         let shared = topology.links.iter().find(|(_, link)| link.shared);
-        let shared = shared.map(|(link, _)| topology.place(*link).engine as usize);
+        let shared = shared.map(|(link, _)| topology.place(link).engine as usize);
         let look_ahead = topology.info.look_ahead;
         let helpers = (0..threads).map(|_| Helper::spawn(Helper)).collect();
         Coordinator {
