@@ -39,6 +39,18 @@ impl RandomKey {
         RandomKey { bytes, len }.number(seed)
     }
 
+    /// A key of all these parts, the run's seed first.
+    #[inline]
+    pub(crate) fn of<const PARTS: usize>(parts: [u64; PARTS]) -> Self {
+        const { assert!(PARTS <= MAX_PARTS) };
+        let mut bytes = [0; MAX_PARTS * 8];
+        for (place, part) in bytes.chunks_exact_mut(8).zip(parts) {
+            place.copy_from_slice(&part.to_le_bytes());
+        }
+        let len = PARTS * 8;
+        RandomKey { bytes, len }
+    }
+
     /// Adds a name.
     #[inline]
     pub fn text(self, text: &str) -> Self {
@@ -218,6 +230,13 @@ mod tests {
         });
         assert!((second - 4.0).abs() < 0.08);
         assert!((mean(&mut || s.below(7) as f64) - 3.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn a_key_of_parts_is_one_that_they_were_added_to() {
+        let all = RandomKey::of([1, 2, 3]);
+        assert_eq!(all.hash(), RandomKey::new(1).number(2).number(3).hash());
+        assert_eq!(all.number(4).hash(), RandomKey::of([1, 2, 3, 4]).hash());
     }
 
     #[test]
