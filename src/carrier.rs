@@ -141,25 +141,24 @@ impl Parcel<'_> {
     /// The address of this link's draws for this message: (run seed, link, purpose, message
     /// identity, attempt, copy). The identity is the match key where the protocol gave one, so
     /// that matching messages of two runs meet the same luck.
+    #[inline]
     pub fn random(&self, purpose: u64, attempt: u32, copy: u32) -> RandomKey {
-        let identity = match self.match_key {
-            Some(key) => RandomKey::new(self.topology.seed)
-                .number(key.bits())
-                .number(
-                    // Keeps a keyed message apart from an unkeyed one with an equal ordinal.
-                    u64::from(self.repeat) | 1 << 63,
-                ),
-            None => RandomKey::new(self.topology.seed)
-                .number(self.ordinal)
-                .number(0),
+        let (identity, turn) = match self.match_key {
+            // Keeps a keyed message apart from an unkeyed one with an equal ordinal.
+            Some(key) => (key.bits(), u64::from(self.repeat) | 1 << 63),
+            None => (self.ordinal, 0),
         };
-        identity
-            .number(self.topology.name_hash(self.link))
-            .number(purpose)
-            .number(self.topology.name_hash(self.sender))
-            .number(self.topology.name_hash(self.receiver))
-            .number(self.kind.hash())
-            .number(u64::from(attempt) << 32 | u64::from(copy))
+        RandomKey::of([
+            self.topology.seed,
+            identity,
+            turn,
+            self.topology.name_hash(self.link),
+            purpose,
+            self.topology.name_hash(self.sender),
+            self.topology.name_hash(self.receiver),
+            self.kind.hash(),
+            u64::from(attempt) << 32 | u64::from(copy),
+        ])
     }
 }
 

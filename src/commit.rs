@@ -4,14 +4,13 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::carrier::Carriage;
 use crate::digest::Digest;
-use crate::engine::{FirstSample, Head, InFlight, Sink, hash_if_wanted};
+use crate::engine::{FirstSample, Happened, Head, InFlight, Side, Sink};
 use crate::fault::ObserverError;
 use crate::guard::{dropped, guarded};
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::record::{Checkpoint, Flow, Observer, Record, RecordClass, Wants};
+use crate::record::{Checkpoint, Flow, Observer, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
 use crate::time::SimTime;
 use crate::topology::{Kind, Topology};
@@ -90,11 +89,20 @@ impl Committer {
         end_time: SimTime,
         mut in_flight: Vec<InFlight>,
     ) -> Report {
-        in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy));
+        in_flight.sort_unstable_by_key(|(key, head, _)| (*key, head.copy()));
         let topology = self.topology.clone();
         for (key, head, body) in in_flight {
-            let record = head.record(&topology, RecordClass::InFlight, key, &body, None);
-            self.commit(&record, hash_if_wanted(&topology, &record));
+            let class = RecordClass::InFlight;
+            self.commit(&Happened {
+                class,
+                key,
+                head: &head,
+                side: None,
+                sample: None,
+                body: &body,
+                sends: 0,
+                hash: head.hash_if_wanted(&topology, class, key, &body),
+            });
         }
         self.checkpoint();
         self.counts.lost_by_reason = self
@@ -124,11 +132,11 @@ impl Committer {
         report
     }
 
-    #[inline]
-    fn count(&mut self, class: RecordClass, copy: u32, reason: &'static str, sends: u32) {
+    #[inline(always)]
+    fn count(&mut self, class: RecordClass, head: &Head, sends: u32) {
         let counts = &mut self.counts;
         counts.sent += u64::from(sends);
-        if class.is_fate() && copy > 0 {
+        if class.is_fate() && head.copy() > 0 {
             counts.duplicated += 1;
         }
         match class {
@@ -138,6 +146,7 @@ impl Committer {
             }
             RecordClass::Lost => {
                 counts.lost += 1;
+                let reason = self.topology.reason(head.reason);
                 match self.reasons.iter_mut().find(|(known, _)| *known == reason) {
                     Some((_, n)) => *n += 1,
                     None => self.reasons.push((reason, 1)),
@@ -170,15 +179,16 @@ impl Committer {
     }
 }
 
-impl Sink for Committer {
-    fn commit(&mut self, record: &Record<'_>, hash: u128) {
-        self.count(record.class, record.copy, record.reason, record.sends);
-        self.last = record.key;
+impl Committer {
+    /// Shows observers a record of what happened.
+    #[inline(never)]
+    fn show(&mut self, happened: &Happened<'_>) {
+        let record = happened.record(&self.topology);
         for (wants, observer) in &mut self.observers {
             if record.class == RecordClass::Sample && !wants.samples {
                 continue;
             }
-            match guarded(|| observer.record(record)) {
+            match guarded(|| observer.record(&record)) {
                 Ok(Ok(Flow::Continue)) => {}
                 Ok(Ok(Flow::Stop(reason))) => {
                     self.stop
@@ -192,26 +202,26 @@ impl Sink for Committer {
                 }
             }
         }
-        if self.topology.digest && record.class != RecordClass::Sample {
-            self.digest.extend(hash);
+    }
+}
+
+impl Sink for Committer {
+    #[inline(always)]
+    fn commit(&mut self, happened: &Happened<'_>) {
+        let Happened { class, head, .. } = *happened;
+        self.count(class, head, happened.sends);
+        self.last = happened.key;
+        if !self.observers.is_empty() {
+            self.show(happened);
+        }
+        if self.topology.digest && class != RecordClass::Sample {
+            self.digest.extend(happened.hash);
             self.hashed += 1;
-            self.hashes.push(hash as u32);
+            self.hashes.push(happened.hash as u32);
             if self.hashes.len() == CHECKPOINT_RECORDS {
                 self.checkpoint();
             }
         }
-    }
-
-    fn count_event(
-        &mut self,
-        class: RecordClass,
-        key: EventKey,
-        head: &Head,
-        reason: &'static str,
-        sends: u32,
-    ) {
-        self.count(class, head.copy, reason, sends);
-        self.last = key;
     }
 
     /// The one engine that commits here has compared it with all others.
@@ -222,12 +232,16 @@ impl Sink for Committer {
     }
 }
 
-/// A record kept until its window is committed.
+/// Something that happened, kept until its window is committed.
 struct Kept {
-    record: Record<'static>,
-    kind: Option<Arc<Kind>>,
-    carriage: Option<Carriage>,
+    class: RecordClass,
+    key: EventKey,
+    head: Head,
+    /// Its place among the sides.
+    side: Option<usize>,
+    sample: Option<Arc<Kind>>,
     body: Range<usize>,
+    sends: u32,
     hash: u128,
 }
 
@@ -235,30 +249,35 @@ struct Kept {
 #[derive(Default)]
 pub(crate) struct Batch {
     kept: Vec<Kept>,
+    sides: Vec<Side>,
     bytes: Vec<u8>,
     pub(crate) first_samples: Vec<FirstSample>,
 }
 
 impl Batch {
-    /// The key of the record at `at`.
+    /// The key of what happened at `at`.
     pub(crate) fn key(&self, at: usize) -> Option<EventKey> {
-        self.kept.get(at).map(|kept| kept.record.key)
+        self.kept.get(at).map(|kept| kept.key)
     }
 
-    /// Commits the record at `at`.
+    /// Commits what happened at `at`.
     pub(crate) fn commit(&self, at: usize, sink: &mut impl Sink) {
         let kept = &self.kept[at];
-        let record = Record {
-            kind: kept.kind.as_ref(),
-            carriage: kept.carriage.as_ref(),
+        sink.commit(&Happened {
+            class: kept.class,
+            key: kept.key,
+            head: &kept.head,
+            side: kept.side.map(|at| &self.sides[at]),
+            sample: kept.sample.as_ref(),
             body: &self.bytes[kept.body.clone()],
-            ..kept.record
-        };
-        sink.commit(&record, kept.hash);
+            sends: kept.sends,
+            hash: kept.hash,
+        });
     }
 
     pub(crate) fn clear(&mut self) {
         self.kept.clear();
+        self.sides.clear();
         self.bytes.clear();
     }
 
@@ -266,35 +285,24 @@ impl Batch {
     /// committed events before `fault` sent them.
     pub(crate) fn undone(&self, at: usize, fault: EventKey, topology: &Topology) -> Vec<InFlight> {
         let mut found = Vec::new();
-        let mut unit: Option<(EventKey, RecordClass)> = None;
+        let mut unit: Option<EventKey> = None;
         for kept in &self.kept[at..] {
-            let record = &kept.record;
-            let first = unit.is_none_or(|(key, _)| key != record.key);
-            if first {
-                unit = Some((record.key, record.class));
-            }
+            let first = unit != Some(kept.key);
+            unit = Some(kept.key);
             // A loss that a hand-over decided is undone with the hand-over, which is counted.
-            let message = match record.class {
+            let message = match kept.class {
                 RecordClass::Delivered | RecordClass::HandOver => true,
                 RecordClass::Lost => first,
                 _ => false,
             };
-            if message && record.scheduled_by.is_some_and(|by| by < fault) {
-                let head = Head {
-                    sender: record.sender,
-                    receiver: record.receiver,
-                    link: record.link,
-                    kind: kept
-                        .kind
-                        .as_ref()
-                        .and_then(|kind| topology.kind_index(kind)),
-                    ordinal: record.ordinal,
-                    copy: record.copy,
-                    match_key: record.match_key,
-                    cause: record.cause,
-                    ..Head::of_entity(record.sender)
-                };
-                found.push((record.key, head, self.bytes[kept.body.clone()].to_vec()));
+            let side = kept.side.map(|at| &self.sides[at]);
+            let by = kept.head.scheduled_by(topology, side);
+            if message && by.is_some_and(|by| by < fault) {
+                found.push((
+                    kept.key,
+                    kept.head.left_over(),
+                    self.bytes[kept.body.clone()].to_vec(),
+                ));
             }
         }
         found
@@ -302,51 +310,23 @@ impl Batch {
 }
 
 impl Sink for Batch {
-    fn commit(&mut self, record: &Record<'_>, hash: u128) {
+    fn commit(&mut self, happened: &Happened<'_>) {
         let start = self.bytes.len();
-        self.bytes.extend_from_slice(record.body);
-        self.kept.push(Kept {
-            record: Record {
-                kind: None,
-                body: &[],
-                carriage: None,
-                ..*record
-            },
-            carriage: record.carriage.copied(),
-            kind: record.kind.cloned(),
-            body: start..self.bytes.len(),
-            hash,
+        self.bytes.extend_from_slice(happened.body);
+        let side = happened.side.map(|side| {
+            self.sides.push(*side);
+            self.sides.len() - 1
         });
-    }
-
-    fn count_event(
-        &mut self,
-        class: RecordClass,
-        key: EventKey,
-        head: &Head,
-        reason: &'static str,
-        sends: u32,
-    ) {
-        // A window's events are merged by key before they count, so they are kept all the same.
-        let record = Record {
-            class,
-            key,
-            cause: head.cause,
-            scheduled_by: head.cause,
-            sender: head.sender,
-            receiver: head.receiver,
-            link: head.link,
-            kind: None,
-            ordinal: head.ordinal,
-            copy: head.copy,
-            match_key: head.match_key,
-            sent: head.sent(key),
-            reason,
-            body: &[],
-            sends,
-            carriage: None,
-        };
-        self.commit(&record, 0);
+        self.kept.push(Kept {
+            class: happened.class,
+            key: happened.key,
+            head: *happened.head,
+            side,
+            sample: happened.sample.cloned(),
+            body: start..self.bytes.len(),
+            sends: happened.sends,
+            hash: happened.hash,
+        });
     }
 
     fn first_sample(&mut self, sample: FirstSample) {

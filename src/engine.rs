@@ -3,121 +3,42 @@
 //! An engine knows nothing of threads. What leaves its hosts for another engine's waits in
 //! `outgoing` for the executor to carry over.
 
+mod cell;
 mod erased;
 mod event;
+mod flows;
+mod hash;
 mod parts;
 mod remains;
 mod store;
 
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::carrier::{AnyCarrier, SealedChange};
 use crate::fault::{Fault, FaultCause, Outcome};
 use crate::guard::{dropped, guarded};
-use crate::ids::{EntityId, KindIndex, MatchKey};
+use crate::ids::{EntityId, KindIndex};
 use crate::key::{Bound, EventKey};
 use crate::queue::Entry;
-use crate::random::Stream;
-use crate::record::{Record, RecordClass, record_hash};
+use crate::record::RecordClass;
 use crate::time::SimTime;
-use crate::topology::{FixedMap, Topology};
+use crate::topology::Topology;
 
+pub(crate) use cell::{ActorCell, CellState};
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
-pub(crate) use event::{Class, Head, InFlight, Outbound, Outgoing, Pending, Side};
+pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
 pub(crate) use remains::Remains;
 
 /// Where an engine commits what happened, in key order.
 pub(crate) trait Sink {
-    fn commit(&mut self, record: &Record<'_>, hash: u128);
-    /// Commits an event of which nobody wants a record: it is only counted.
-    fn count_event(
-        &mut self,
-        class: RecordClass,
-        key: EventKey,
-        head: &Head,
-        reason: &'static str,
-        sends: u32,
-    );
+    fn commit(&mut self, happened: &Happened<'_>);
     /// A type of samples was used for the first time in one engine, in the event just committed.
     fn first_sample(&mut self, sample: FirstSample);
     /// True once the run must not go on without its driver having a look.
     fn paused(&self) -> bool;
-}
-
-/// What a sender keeps of a flow (receiver, kind) in which it gives messages match keys.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct KeyedFlow {
-    last_key: Option<MatchKey>,
-    repeat: u32,
-}
-
-/// What the kernel keeps for an actor, crashed or not.
-pub(crate) struct CellState {
-    pub(crate) declared: u32,
-    pub(crate) incarnation: u32,
-    /// The next of the keys that this actor assigns.
-    pub(crate) count: u64,
-    pub(crate) streams: Vec<(&'static str, Stream)>,
-    pub(crate) durable: Vec<Box<dyn Any + Send>>,
-    /// What links have charged this actor. Spent energy outlives a crash.
-    pub(crate) charged_j: f64,
-    /// The next ordinal by receiver and kind; a timer's receiver is `u32::MAX`. One word for each,
-    /// since a team in which everyone talks to everyone has very many.
-    ordinals: FixedMap<u64, u64>,
-    keyed_flows: FixedMap<u64, KeyedFlow>,
-}
-
-impl CellState {
-    pub(crate) fn new(declared: u32) -> Self {
-        CellState {
-            declared,
-            incarnation: 0,
-            count: 0,
-            streams: Vec::new(),
-            durable: Vec::new(),
-            charged_j: 0.0,
-            ordinals: FixedMap::default(),
-            keyed_flows: FixedMap::default(),
-        }
-    }
-
-    /// The ordinal of the next message in a flow, and how many right before it had the same key.
-    #[inline]
-    pub(crate) fn next_in_flow(
-        &mut self,
-        receiver: u32,
-        kind: KindIndex,
-        match_key: Option<MatchKey>,
-    ) -> (u64, u32) {
-        let flow = u64::from(receiver) << 32 | u64::from(kind);
-        let next = self.ordinals.entry(flow).or_insert(0);
-        let ordinal = *next;
-        *next += 1;
-        if match_key.is_none() {
-            return (ordinal, 0);
-        }
-        let keyed = self.keyed_flows.entry(flow).or_default();
-        keyed.repeat = if keyed.last_key == match_key {
-            keyed.repeat + 1
-        } else {
-            0
-        };
-        keyed.last_key = match_key;
-        (ordinal, keyed.repeat)
-    }
-}
-
-/// An actor, with what outlives it.
-pub(crate) struct ActorCell {
-    pub(crate) entity: EntityId,
-    /// `None` while crashed.
-    pub(crate) actor: Option<Box<dyn AnyActor>>,
-    pub(crate) factory: Factory,
-    pub(crate) state: CellState,
 }
 
 /// A link, with its key counter.
@@ -171,13 +92,14 @@ impl Engine {
             parts: Parts::new(topology, index, links),
         };
         for cell in &mut engine.actors {
-            let key = engine
-                .parts
-                .topology
-                .key(SimTime::ZERO, 0, cell.entity, cell.state.count);
+            let key =
+                engine
+                    .parts
+                    .topology
+                    .key(SimTime::ZERO, 0, cell.state.entity, cell.state.count);
             cell.state.count += 1;
-            let head = Head::of_entity(cell.entity);
-            engine.parts.insert(key, Class::Start, head, None);
+            let head = Head::of_entity(Class::Start, cell.state.entity);
+            engine.parts.insert(key, head, None);
         }
         engine
     }
@@ -193,56 +115,105 @@ impl Engine {
             let Some(entry) = self.parts.queue.pop_before(bound) else {
                 break;
             };
+            if self.parts.queue.has_new_batch() && self.parts.store.is_large() {
+                self.read_ahead();
+            }
             self.handle(entry, sink)?;
         }
         Ok(())
     }
 
+    /// Reads what the next few events will need. They lie anywhere in memory; read one after the
+    /// other, when each is handled, every miss of the cache would be waited for. Read here, where no
+    /// read depends on the one before, a processor waits for many of them at once.
+    #[inline(never)]
+    fn read_ahead(&self) {
+        let mut read = 0;
+        for entry in self.parts.queue.batch() {
+            read ^= self.parts.store.receiver(entry.slot).0;
+        }
+        let mut counts = u64::from(read);
+        for entry in self.parts.queue.batch() {
+            let receiver = self.parts.store.receiver(entry.slot);
+            let local = self.parts.topology.place(receiver).local as usize;
+            // Not every event is an actor's.
+            if let Some(cell) = self.actors.get(local) {
+                counts ^= cell.read_ahead();
+            }
+        }
+        std::hint::black_box(counts);
+    }
+
+    /// The way of nearly all events: a message or a timer for an actor that is there, of which
+    /// nothing more is to be known.
+    #[inline(always)]
     fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
-        let Pending {
-            class,
-            head,
-            letter,
-            side,
-        } = self.parts.take(entry.slot);
+        let (head, letter) = self.parts.store.take(entry.slot);
         let key = entry.key();
+        let record = match head.class {
+            Class::Message if !head.has_side => RecordClass::Delivered,
+            Class::Timer if head.life() == self.cell(head.receiver).state.incarnation => {
+                RecordClass::Timer
+            }
+            _ => return self.handle_other(key, head, letter, entry.slot, sink),
+        };
+        if self.is_crashed(head.receiver) || key.step > self.parts.topology.step_limit {
+            return self.handle_other(key, head, letter, entry.slot, sink);
+        }
+        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
+            self.parts.note_unfinished(key, head);
+            return Err(fault);
+        }
+        self.run_handler(record, key, &head, letter, sink)
+    }
+
+    /// The way of every event, whatever it is.
+    #[inline(never)]
+    fn handle_other(
+        &mut self,
+        key: EventKey,
+        head: Head,
+        letter: Option<Sealed>,
+        slot: u32,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let side = self.parts.store.side(slot, &head);
         self.parts.side = side;
-        if class == Class::Void {
+        if head.class == Class::Void {
             return Ok(());
         }
-        if self.died_with_its_incarnation(class, &head) {
-            return self.discard(key, class, head, letter);
+        if self.died_with_its_incarnation(&head) {
+            return self.discard(key, head, letter);
         }
-        if let Err(fault) = self.parts.begin(key, letter.as_ref(), head.kind) {
-            self.parts.note_unfinished(key, class, head);
+        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
+            self.parts.note_unfinished(key, head);
             return Err(fault);
         }
         if key.step > self.parts.topology.step_limit {
-            return Err(self.step_limit_fault(key, class, &head));
+            return Err(self.step_limit_fault(key, &head));
         }
-        if class == Class::Message && head.has_side {
+        if head.class == Class::Message && head.has_side {
             self.charge_receiver(head.receiver, side);
         }
-        let record = match class {
+        let record = match head.class {
             Class::Void => return Ok(()),
             Class::Start => RecordClass::Start,
             Class::Timer => RecordClass::Timer,
             Class::Message if self.is_crashed(head.receiver) => {
-                self.discard(key, class, head, letter)?;
-                let reason = self.parts.topology.intern("crashed");
-                self.commit(RecordClass::Lost, key, &Head { reason, ..head }, sink);
+                self.discard(key, head, letter)?;
+                let mut head = head;
+                head.reason = self.parts.topology.intern("crashed");
+                self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
             }
             Class::Message => RecordClass::Delivered,
-            Class::HandOver | Class::Held => {
-                return self.hand_over(class, key, head, letter, sink);
-            }
+            Class::HandOver | Class::Held => return self.hand_over(key, head, letter, sink),
             Class::Tell => return self.tell(key, &head, letter, sink),
             Class::Charge => {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.topology.place(head.receiver).local as usize;
                 let charge = charge.unwrap_or_default();
-                self.actors[local].state.charged_j += charge.energy_j;
+                self.actors[local].state.rest.charged_j += charge.energy_j;
                 let host = self.parts.topology.place(head.receiver).host;
                 let energy = self.parts.energy(host);
                 energy.transmit_j += charge.energy_j;
@@ -250,24 +221,23 @@ impl Engine {
                 return Ok(());
             }
             Class::LateLoss => {
-                self.discard(key, class, head, letter)?;
+                self.discard(key, head, letter)?;
                 self.commit(RecordClass::Lost, key, &head, sink);
                 return Ok(());
             }
         };
-        self.run_handler(class, record, key, &head, letter, sink)
+        self.run_handler(record, key, &head, letter, sink)
     }
 
     /// Drops a message or timer that nobody handles.
     fn discard(
         &mut self,
         key: EventKey,
-        class: Class,
         head: Head,
         letter: Option<Sealed>,
     ) -> Result<(), Box<Fault>> {
         dropped(letter).map_err(|cause| {
-            self.parts.note_unfinished(key, class, head);
+            self.parts.note_unfinished(key, head);
             let message = head.message(&self.parts.topology);
             self.parts.fault_at(key, head.receiver, message, *cause)
         })
@@ -294,19 +264,18 @@ impl Engine {
     }
 
     /// True for a start or a timer whose actor has crashed or was restarted since.
-    fn died_with_its_incarnation(&self, class: Class, head: &Head) -> bool {
-        if !matches!(class, Class::Start | Class::Timer) {
+    fn died_with_its_incarnation(&self, head: &Head) -> bool {
+        if !matches!(head.class, Class::Start | Class::Timer) {
             return false;
         }
         let cell = self.cell(head.receiver);
-        cell.actor.is_none() || head.incarnation != cell.state.incarnation
+        cell.actor.is_none() || head.life() != cell.state.incarnation
     }
 
     /// Runs one handler, and commits the event if it did not fail.
     #[inline(always)]
     fn run_handler(
         &mut self,
-        class: Class,
         record: RecordClass,
         key: EventKey,
         head: &Head,
@@ -316,7 +285,7 @@ impl Engine {
         let cell = &mut self.actors[self.parts.topology.place(head.receiver).local as usize];
         let result = invoke(cell, &mut self.parts, key, letter);
         if result.is_err() || self.parts.fault.is_some() {
-            return Err(self.handler_fault(class, key, head, result));
+            return Err(self.handler_fault(key, head, result));
         }
         self.commit(record, key, head, sink);
         Ok(())
@@ -325,7 +294,6 @@ impl Engine {
     #[cold]
     fn handler_fault(
         &mut self,
-        class: Class,
         key: EventKey,
         head: &Head,
         result: Result<(), Box<FaultCause>>,
@@ -335,23 +303,22 @@ impl Engine {
             unreachable!("called with a fault at hand");
         };
         let message = head.message(&self.parts.topology);
-        self.parts.note_unfinished(key, class, *head);
+        self.parts.note_unfinished(key, *head);
         let blamed = self.parts.carrying.unwrap_or(head.receiver);
         self.parts.fault_at(key, blamed, message, *cause)
     }
 
     fn hand_over(
         &mut self,
-        class: Class,
         key: EventKey,
         head: Head,
         letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let (Some(link), Some(letter)) = (head.link, letter) else {
+        let (Some(link), Some(letter)) = (head.link(), letter) else {
             unreachable!("a message is handed over with its letter, to a link");
         };
-        let held = self.parts.side.filter(|_| class == Class::Held);
+        let held = self.parts.side.filter(|_| head.class == Class::Held);
         let parts = &mut self.parts;
         let carried = guarded(|| parts.carry(link, head, letter, held));
         let result = carried.and_then(|charge_j| match self.parts.fault.take() {
@@ -359,7 +326,7 @@ impl Engine {
             None => Ok(charge_j),
         });
         if let Err(cause) = result {
-            self.parts.note_unfinished(key, class, head);
+            self.parts.note_unfinished(key, head);
             let message = format!("a message from {}", self.parts.topology.name(head.sender));
             return Err(self.parts.fault_at(key, link, Some(message), *cause));
         }
@@ -393,10 +360,10 @@ impl Engine {
         action: Action,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let mut head = Head::of_entity(entity);
+        let mut head = Head::of_entity(Class::Tell, entity);
         head.sender = EntityId::CONTROL;
         let local = self.parts.topology.place(entity).local as usize;
-        self.parts.begin(key, None, None)?;
+        self.parts.begin(key, None, &head)?;
         match action {
             Action::Crash => {
                 dropped(self.actors[local].actor.take())
@@ -407,23 +374,19 @@ impl Engine {
             Action::Restart => {
                 let cell = &mut self.actors[local];
                 cell.state.incarnation += 1;
-                cell.state.streams.clear();
-                let (topology, factory) = (&self.parts.topology, &cell.factory);
+                cell.state.clear_streams();
+                let (topology, factory) = (&self.parts.topology, &cell.state.rest.factory);
                 let old = dropped(cell.actor.take());
                 let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
                 cell.actor =
                     Some(built.map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?);
-                self.run_handler(Class::Start, RecordClass::Restart, key, &head, None, sink)
+                self.run_handler(RecordClass::Restart, key, &head, None, sink)
             }
             Action::Change(change) => {
-                head.kind = self
-                    .parts
-                    .topology
-                    .links
-                    .get(&entity)
-                    .map(|link| link.change_kind);
+                let links = &self.parts.topology.links;
+                head = head.of_kind(links.get(entity).map(|link| link.change_kind));
                 let parts = &mut self.parts;
-                guarded(|| parts.apply_change(local, key, head.kind, change))
+                guarded(|| parts.apply_change(local, key, head.kind(), change))
                     .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
@@ -444,41 +407,37 @@ impl Engine {
         let local = self.parts.topology.place(head.receiver).local as usize;
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
-        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL.0, kind, None);
-        let head = Head {
-            kind: Some(kind),
-            ordinal,
-            ..head
-        };
-        self.parts.begin(key, Some(&letter), head.kind)?;
+        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL, kind, None);
+        let mut head = head.of_kind(Some(kind));
+        head.ordinal = ordinal;
+        self.parts.begin(key, Some(&letter), &head)?;
         if self.is_crashed(head.receiver) {
-            self.discard(key, Class::Tell, head, Some(letter))?;
+            self.discard(key, head, Some(letter))?;
             self.commit(RecordClass::Told, key, &head, sink);
             return Ok(());
         }
-        self.run_handler(
-            Class::Tell,
-            RecordClass::Told,
-            key,
-            &head,
-            Some(letter),
-            sink,
-        )
+        self.run_handler(RecordClass::Told, key, &head, Some(letter), sink)
     }
 
     /// Commits the event just handled, then what happened in it.
-    #[inline]
+    #[inline(always)]
     fn commit(&mut self, class: RecordClass, key: EventKey, head: &Head, sink: &mut impl Sink) {
         let parts = &mut self.parts;
-        if parts.topology.recording() {
-            let side = parts.side.as_ref().filter(|_| head.has_side);
-            let mut record = head.record(&parts.topology, class, key, &parts.body, side);
-            record.sends = parts.sends;
-            sink.commit(&record, hash_if_wanted(&parts.topology, &record));
+        let side = if head.has_side {
+            parts.side.as_ref()
         } else {
-            let reason = parts.topology.reason(head.reason);
-            sink.count_event(class, key, head, reason, parts.sends);
-        }
+            None
+        };
+        sink.commit(&Happened {
+            class,
+            key,
+            head,
+            side,
+            sample: None,
+            body: &parts.body,
+            sends: parts.sends,
+            hash: head.hash_if_wanted(&parts.topology, class, key, &parts.body),
+        });
         if !parts.effects.is_empty() {
             parts.commit_effects(head, sink);
         }
@@ -487,21 +446,24 @@ impl Engine {
     /// Takes apart what is left once the run is over; see [`Remains`].
     pub(crate) fn dissolve(&mut self, until: Option<EventKey>, remains: &mut Remains) {
         self.parts.take_in_flight(until, remains);
-        for cell in std::mem::take(&mut self.actors) {
-            remains.drop_of(&self.parts.topology, cell.entity, cell.actor);
-            for kept in cell.state.durable {
-                remains.drop_of(&self.parts.topology, cell.entity, kept);
+        for ActorCell { actor, state } in std::mem::take(&mut self.actors) {
+            let (entity, rest) = (state.entity, *state.rest);
+            remains.drop_of(&self.parts.topology, entity, actor);
+            for kept in rest.durable {
+                remains.drop_of(&self.parts.topology, entity, kept);
             }
-            remains.drop_of(&self.parts.topology, cell.entity, cell.factory);
+            remains.drop_of(&self.parts.topology, entity, rest.factory);
         }
         self.parts.drop_carriers(remains);
     }
 
-    fn step_limit_fault(&mut self, key: EventKey, class: Class, head: &Head) -> Box<Fault> {
+    fn step_limit_fault(&mut self, key: EventKey, head: &Head) -> Box<Fault> {
         // The hops that follow would show the same loop: name the ones still waiting here.
         let topology = self.parts.topology.clone();
         let hop = |head: &Head| {
-            let kind = head.kind.map_or("start", |kind| topology.kind(kind).name());
+            let kind = head
+                .kind()
+                .map_or("start", |kind| topology.kind(kind).name());
             format!(
                 "{} -> {} ({kind})",
                 topology.name(head.sender),
@@ -511,25 +473,18 @@ impl Engine {
         let mut chain = vec![hop(head)];
         for entry in self.parts.queue.drain_sorted() {
             let (waiting, at) = (self.parts.take(entry.slot), entry.key());
-            if at.time == key.time && waiting.class != Class::Void && chain.len() < 8 {
+            let void = waiting.head.class == Class::Void;
+            if at.time == key.time && !void && chain.len() < 8 {
                 chain.push(hop(&waiting.head));
             }
             self.parts.insert_pending(at, waiting);
         }
-        self.parts.note_unfinished(key, class, *head);
+        self.parts.note_unfinished(key, *head);
         let cause = FaultCause::StepLimit {
             limit: topology.step_limit,
             chain,
         };
         self.parts.fault_at(key, head.receiver, None, cause)
-    }
-}
-
-pub(crate) fn hash_if_wanted(topology: &Topology, record: &Record<'_>) -> u128 {
-    if topology.digest {
-        record_hash(topology, record)
-    } else {
-        0
     }
 }
 
@@ -545,8 +500,8 @@ fn invoke(
     };
     let mut core = Core {
         parts,
+        me: cell.state.entity,
         state: &mut cell.state,
-        me: cell.entity,
         key,
     };
     let outcome: Result<Outcome, _> = guarded(|| match letter {

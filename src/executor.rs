@@ -10,8 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::commit::Committer;
-use crate::engine::{Engine, Head, Remains};
-use crate::engine::{Sink, hash_if_wanted};
+use crate::engine::{Class, Engine, Happened, Head, Remains, Sink};
 use crate::fault::{BuildError, Fault};
 use crate::ids::EntityId;
 use crate::key::EventKey;
@@ -131,10 +130,19 @@ impl Ending {
         by: EntityId,
         reason: String,
     ) -> Self {
-        let mut head = Head::of_entity(EntityId::CONTROL);
+        let mut head = Head::of_entity(Class::Tell, EntityId::CONTROL);
         head.sender = by;
-        let record = head.record(topology, RecordClass::Stop, key, reason.as_bytes(), None);
-        committer.commit(&record, hash_if_wanted(topology, &record));
+        let (class, body) = (RecordClass::Stop, reason.as_bytes());
+        committer.commit(&Happened {
+            class,
+            key,
+            head: &head,
+            side: None,
+            sample: None,
+            body,
+            sends: 0,
+            hash: head.hash_if_wanted(topology, class, key, body),
+        });
         let by = topology.name(by).to_owned();
         Ending {
             end: End::Stopped { by, reason },

@@ -114,7 +114,7 @@ const NEAR: usize = 48;
 const SORTED: usize = 512;
 
 /// A heap of more than this is spread over buckets. A smaller one lies in the first cache.
-const HEAP: usize = 512;
+const HEAP: usize = 96;
 
 /// Events yet to be handled, by key.
 pub(crate) struct Queue {
@@ -126,6 +126,8 @@ pub(crate) struct Queue {
     far: Far,
     /// The size at which the heap is spread.
     spread_at: usize,
+    /// A bucket was taken, and nobody has asked.
+    new_batch: bool,
     /// The rest of the present step, in key order.
     present: VecDeque<Entry>,
     /// The next step of the present instant, in order of arrival.
@@ -141,6 +143,7 @@ impl Default for Queue {
             heap: QuaternaryHeap::default(),
             far: Far::default(),
             spread_at: HEAP,
+            new_batch: false,
             present: VecDeque::new(),
             next: Vec::new(),
             now: None,
@@ -243,9 +246,21 @@ impl Queue {
             self.near.reverse();
         } else if !self.far.is_empty() {
             self.far.take_next(&mut self.near);
+            self.new_batch = true;
             // Greatest entry first is least key first, which belongs at the end.
             self.near.sort_unstable();
         }
+    }
+
+    /// True once each time events that lay far ahead have become the next ones.
+    #[inline(always)]
+    pub(crate) fn has_new_batch(&mut self) -> bool {
+        std::mem::take(&mut self.new_batch)
+    }
+
+    /// The next events, as far as they stand sorted.
+    pub(crate) fn batch(&self) -> &[Entry] {
+        &self.near
     }
 
     /// Time and step of the next event.

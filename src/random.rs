@@ -25,19 +25,34 @@ const MAX_PARTS: usize = 12;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RandomKey {
-    parts: [u64; MAX_PARTS],
+    /// The parts as they are hashed: little-endian, one after the other.
+    bytes: [u8; MAX_PARTS * 8],
+    /// How many bytes are used.
     len: usize,
 }
 
 impl RandomKey {
     /// A key under the run's `seed`.
+    #[inline]
     pub fn new(seed: u64) -> Self {
-        let mut parts = [0; MAX_PARTS];
-        parts[0] = seed;
-        RandomKey { parts, len: 1 }
+        let (bytes, len) = ([0; MAX_PARTS * 8], 0);
+        RandomKey { bytes, len }.number(seed)
+    }
+
+    /// A key of all these parts, the run's seed first.
+    #[inline]
+    pub(crate) fn of<const PARTS: usize>(parts: [u64; PARTS]) -> Self {
+        const { assert!(PARTS <= MAX_PARTS) };
+        let mut bytes = [0; MAX_PARTS * 8];
+        for (place, part) in bytes.chunks_exact_mut(8).zip(parts) {
+            place.copy_from_slice(&part.to_le_bytes());
+        }
+        let len = PARTS * 8;
+        RandomKey { bytes, len }
     }
 
     /// Adds a name.
+    #[inline]
     pub fn text(self, text: &str) -> Self {
         self.number(xxh3_64(text.as_bytes()))
     }
@@ -46,19 +61,16 @@ impl RandomKey {
     ///
     /// # Panics
     /// When the key has 12 parts already: a bug in the caller.
+    #[inline]
     pub fn number(mut self, number: u64) -> Self {
-        self.parts[self.len] = number;
-        self.len += 1;
+        self.bytes[self.len..self.len + 8].copy_from_slice(&number.to_le_bytes());
+        self.len += 8;
         self
     }
 
     /// The 128 bits that the key hashes to.
     pub fn hash(&self) -> u128 {
-        let mut bytes = [0u8; MAX_PARTS * 8];
-        for (chunk, part) in bytes.chunks_exact_mut(8).zip(self.parts) {
-            chunk.copy_from_slice(&part.to_le_bytes());
-        }
-        xxh3_128(&bytes[..self.len * 8])
+        xxh3_128(&self.bytes[..self.len])
     }
 
     /// The stream at this address, at its beginning.
@@ -222,6 +234,13 @@ mod tests {
         });
         assert!((second - 4.0).abs() < 0.08);
         assert!((mean(&mut || s.below(7) as f64) - 3.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn a_key_of_parts_is_one_that_they_were_added_to() {
+        let all = RandomKey::of([1, 2, 3]);
+        assert_eq!(all.hash(), RandomKey::new(1).number(2).number(3).hash());
+        assert_eq!(all.number(4).hash(), RandomKey::of([1, 2, 3, 4]).hash());
     }
 
     #[test]

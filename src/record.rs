@@ -5,8 +5,6 @@
 
 use std::sync::Arc;
 
-use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
-
 use crate::carrier::Carriage;
 use crate::digest::Digest;
 pub use crate::fault::ObserverError;
@@ -14,7 +12,7 @@ use crate::ids::{EntityId, MatchKey};
 use crate::key::EventKey;
 use crate::report::Report;
 use crate::time::SimTime;
-use crate::topology::{Kind, RunInfo, Topology};
+use crate::topology::{Kind, RunInfo};
 
 /// What a [`Record`] is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -204,49 +202,4 @@ impl<F: FnMut(&Record<'_>) + Send> Observer for F {
         self(record);
         Ok(Flow::Continue)
     }
-}
-
-/// What stands for the cause of an event that has none.
-const NO_CAUSE: EventKey = EventKey {
-    time: SimTime::MAX,
-    step: u32::MAX,
-    tie: 0,
-    source: EntityId::CONTROL,
-    count: u64::MAX,
-};
-
-/// The hash of one record, to extend a digest with: sixteen words, which is as far as the hash
-/// function's fast path goes. When the message was sent is not among them: it is the cause's time.
-pub(crate) fn record_hash(topology: &Topology, record: &Record<'_>) -> u128 {
-    let (key, cause) = (record.key, record.cause.unwrap_or(NO_CAUSE));
-    let shape = record.class as u64
-        | u64::from(record.match_key.is_some()) << 8
-        | u64::from(record.copy) << 32;
-    let words = [
-        key.time.as_nanos(),
-        u64::from(key.step) << 32 | u64::from(cause.step),
-        topology.name_hash(key.source),
-        key.count,
-        cause.time.as_nanos(),
-        topology.name_hash(cause.source),
-        cause.count,
-        shape,
-        topology.name_hash(record.sender),
-        topology.name_hash(record.receiver),
-        record.link.map_or(0, |link| topology.name_hash(link)),
-        record.kind.map_or(0, |kind| kind.hash()),
-        record.ordinal,
-        record.match_key.map_or(0, |key| key.bits()),
-        if record.reason.is_empty() {
-            0
-        } else {
-            xxh3_64(record.reason.as_bytes())
-        },
-        record.body.len() as u64,
-    ];
-    let mut bytes = [0u8; 16 * 8];
-    for (place, word) in bytes.chunks_exact_mut(8).zip(words) {
-        place.copy_from_slice(&word.to_le_bytes());
-    }
-    xxh3_128_with_seed(&bytes, xxh3_64(record.body))
 }

@@ -16,7 +16,7 @@ use crate::payload::Message;
 use crate::record::Observer;
 use crate::report::Report;
 use crate::time::{SimDuration, SimTime};
-use crate::topology::{ActorType, KindEntry};
+use crate::topology::{ActorType, FixedMap, KindEntry};
 
 struct HostDecl {
     name: String,
@@ -72,6 +72,8 @@ pub struct Simulation {
     seed: u64,
     tie_seed: Option<u64>,
     hosts: Vec<HostDecl>,
+    /// The number of each host, by name.
+    host_numbers: FixedMap<String, u32>,
     actors: Vec<ActorDecl>,
     links: Vec<LinkDecl>,
     routes: Vec<RouteDecl>,
@@ -91,6 +93,7 @@ impl Simulation {
             seed,
             tie_seed: None,
             hosts: Vec::new(),
+            host_numbers: FixedMap::default(),
             actors: Vec::new(),
             links: Vec::new(),
             routes: Vec::new(),
@@ -106,15 +109,16 @@ impl Simulation {
 
     /// The host called `name`, declared if it is new.
     pub fn host(&mut self, name: &str) -> HostId {
-        let at = self.hosts.iter().position(|host| host.name == name);
-        let at = at.unwrap_or_else(|| {
-            self.hosts.push(HostDecl {
-                name: name.to_owned(),
-                heavy: false,
-            });
-            self.hosts.len() - 1
+        if let Some(at) = self.host_numbers.get(name) {
+            return HostId(*at);
+        }
+        let at = self.hosts.len() as u32;
+        self.hosts.push(HostDecl {
+            name: name.to_owned(),
+            heavy: false,
         });
-        HostId(at as u32)
+        self.host_numbers.insert(name.to_owned(), at);
+        HostId(at)
     }
 
     /// Declares that handlers on this host take long enough (tens of microseconds) to be worth a
@@ -498,6 +502,30 @@ impl Simulation {
     /// The flag that ends the run after the event in hand when it is raised, as Ctrl-C does.
     pub fn interrupt(&self) -> Arc<AtomicBool> {
         self.interrupt.clone()
+    }
+
+    /// The executor that pays: kameo on `threads` threads if there are several and at least two
+    /// hosts were declared heavy ([`Simulation::heavy`]), so that there is work to be done side by
+    /// side; else inline. It hangs on what was declared and on nothing measured, and the result is
+    /// the same on either.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("rover_01"), sim.host("rover_02"));
+    /// sim.heavy(a);
+    /// assert_eq!(sim.executor_that_pays(4), Executor::Inline);
+    /// sim.heavy(b);
+    /// assert_eq!(sim.executor_that_pays(4), Executor::Kameo { threads: 4 });
+    /// assert_eq!(sim.executor_that_pays(1), Executor::Inline);
+    /// ```
+    pub fn executor_that_pays(&self, threads: usize) -> Executor {
+        let heavy = self.hosts.iter().filter(|host| host.heavy).count();
+        if heavy >= 2 && threads >= 2 {
+            Executor::Kameo { threads }
+        } else {
+            Executor::Inline
+        }
     }
 
     /// Runs to the end.

@@ -256,6 +256,40 @@ pub(crate) struct LinkEntry {
     pub(crate) change_kind: KindIndex,
 }
 
+/// The links of a run, by entity: a message looks for its link several times.
+pub(crate) struct Links(Vec<Option<LinkEntry>>);
+
+impl Links {
+    /// From entities and their links, in any order.
+    pub(crate) fn new(entries: impl Iterator<Item = (EntityId, LinkEntry)>) -> Self {
+        let mut links = Vec::new();
+        for (entity, entry) in entries {
+            if links.len() <= entity.index() {
+                links.resize(entity.index() + 1, None);
+            }
+            links[entity.index()] = Some(entry);
+        }
+        Links(links)
+    }
+
+    /// What is known of the link; none of what is no link.
+    #[inline(always)]
+    pub(crate) fn get(&self, link: EntityId) -> Option<&LinkEntry> {
+        self.0.get(link.index())?.as_ref()
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_shared(&self, link: EntityId) -> bool {
+        self.get(link).is_some_and(|link| link.shared)
+    }
+
+    /// All links, in name order.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (EntityId, &LinkEntry)> {
+        let numbered = self.0.iter().enumerate();
+        numbered.filter_map(|(at, link)| Some((EntityId::from_index(at), link.as_ref()?)))
+    }
+}
+
 /// Everything fixed about a run.
 pub(crate) struct Topology {
     pub(crate) seed: u64,
@@ -274,7 +308,7 @@ pub(crate) struct Topology {
     pub(crate) places: Vec<Location>,
     pub(crate) host_names: Vec<String>,
     pub(crate) routes: Vec<Routes>,
-    pub(crate) links: FixedMap<EntityId, LinkEntry>,
+    pub(crate) links: Links,
     pub(crate) kind_of_type: FixedMap<TypeId, KindIndex>,
     /// Reasons met so far. Their numbers differ from run to run, and leave the kernel as texts.
     pub(crate) reasons: Mutex<Vec<&'static str>>,
@@ -317,15 +351,6 @@ impl Topology {
             .copied()
             .flatten()
             .or(routes.uplink)
-    }
-
-    pub(crate) fn kind_index(&self, kind: &Arc<Kind>) -> Option<KindIndex> {
-        let at = self
-            .info
-            .kinds
-            .iter()
-            .position(|known| Arc::ptr_eq(known, kind));
-        at.and_then(|at| KindIndex::try_from(at).ok())
     }
 
     /// The number in the address of the actor called `name`, and the actor's type.

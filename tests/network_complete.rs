@@ -239,7 +239,13 @@ fn threads_change_nothing() {
             loss: 0.1,
         };
         let world = WorldConfig::default();
-        let (sim, network) = queued(&world, 20, 9, radio, &config(Policy::Complete));
+        let (mut sim, network) = queued(&world, 20, 9, radio, &config(Policy::Complete));
+        // They are not, but the run is to have several engines.
+        let host = sim.host("node_01");
+        sim.heavy(host);
+        let host = sim.host("node_02");
+        sim.heavy(host);
+        assert_eq!(sim.executor_that_pays(2), Executor::Kameo { threads: 2 });
         let report = sim.run(executor).unwrap();
         (network.metrics(), report)
     };

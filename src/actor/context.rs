@@ -13,6 +13,7 @@ use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::{RandomKey, Stream};
 use crate::time::{SimDuration, SimTime};
+use crate::topology::Topology;
 
 /// A handler's way to the world, at one instant of virtual time.
 pub struct Context<'a, A> {
@@ -174,7 +175,10 @@ impl<'a, A: Actor> Context<'a, A> {
         let routes = &topology.routes[host as usize];
         let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
         links.extend(routes.uplink);
-        links.retain(|link| topology.links[link].change_kind == *kind);
+        links.retain(|link| {
+            let entry = topology.links.get(*link);
+            entry.is_some_and(|link| link.change_kind == *kind)
+        });
         links.sort_unstable();
         links.dedup();
         let id = |link: EntityId| {
@@ -198,7 +202,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// What links have charged this actor so far for transmitting what it sent, in joules. It
     /// outlives a crash, as spent energy does.
     pub fn transmit_energy_j(&self) -> f64 {
-        self.state.charged_j
+        self.state.rest.charged_j
     }
 
     /// What links have charged all actors of this host so far for transmitting, in joules: so that
@@ -294,34 +298,23 @@ impl<'a, A: Actor> Context<'a, A> {
     /// This actor's random stream for `purpose`, derived from (run seed, actor, purpose,
     /// incarnation). It goes on where it was left.
     pub fn random(&mut self, purpose: &'static str) -> &mut Stream {
-        // A purpose is nearly always the same literal: compare its address before its letters.
-        let same = |known: &str| std::ptr::eq(known, purpose) || known == purpose;
-        let at = match self.state.streams.iter().position(|(known, _)| same(known)) {
-            Some(at) => at,
-            None => {
-                let stream = self
-                    .random_at(purpose, u64::from(self.state.incarnation))
-                    .stream();
-                self.state.streams.push((purpose, stream));
-                self.state.streams.len() - 1
-            }
-        };
-        &mut self.state.streams[at].1
+        let (topology, me) = (&self.parts.topology, self.me);
+        let incarnation = u64::from(self.state.incarnation);
+        self.state.stream(purpose, || {
+            draws(topology, me, purpose, incarnation).stream()
+        })
     }
 
     /// The address of draws by `key` (a cycle, a sample's number), the same whatever was drawn
     /// before.
     pub fn random_at(&self, purpose: &str, key: u64) -> RandomKey {
-        RandomKey::new(self.parts.topology.seed)
-            .number(self.parts.topology.name_hash(self.me))
-            .text(purpose)
-            .number(key)
+        draws(&self.parts.topology, self.me, purpose, key)
     }
 
     /// Durable memory: a value of type `D` that outlives a crash, made by `Default` when first
     /// asked for. One for each type.
     pub fn durable<D: Default + Send + 'static>(&mut self) -> &mut D {
-        let durable = &mut self.state.durable;
+        let durable = &mut self.state.rest.durable;
         let at = match durable.iter().position(|value| value.is::<D>()) {
             Some(at) => at,
             None => {
@@ -385,4 +378,12 @@ impl<'a, A: Actor> Context<'a, A> {
         let kind = std::any::type_name::<M>().to_owned();
         self.parts.raise(FaultCause::NotListed { receiver, kind });
     }
+}
+
+/// The address of draws by an actor.
+fn draws(topology: &Topology, me: EntityId, purpose: &str, key: u64) -> RandomKey {
+    RandomKey::new(topology.seed)
+        .number(topology.name_hash(me))
+        .text(purpose)
+        .number(key)
 }

@@ -50,13 +50,14 @@ fn encode_as<T: Serialize + ?Sized, const NOTING: bool>(
     out: &mut Vec<u8>,
 ) -> Result<(), EncodeError> {
     let start = out.len();
-    let root = ValueSer::<NOTING> {
+    let mut writer = Writer {
         flat,
         out,
-        field: &flat.root,
-        first: flat.root.first,
-        position: Position::Root,
         depth: 0,
+    };
+    let root = ValueSer::<NOTING> {
+        to: &mut writer,
+        field: &flat.root,
     };
     match value.serialize(root) {
         Ok(()) => Ok(()),
@@ -67,70 +68,53 @@ fn encode_as<T: Serialize + ?Sized, const NOTING: bool>(
     }
 }
 
-/// What goes before a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Position {
-    /// Neither tag nor length.
-    Root,
-    /// A tag, and a length where the wire type has one.
-    Tagged,
-    /// No tag: one of many in a packed field.
-    Packed,
-}
-
 /// Stands for "nothing is open here" among offsets.
 const NONE: usize = usize::MAX;
 
-/// Writes one value of one field.
-struct ValueSer<'a, const NOTING: bool> {
-    flat: &'a FlatSchema,
-    out: &'a mut Vec<u8>,
-    field: &'a Field,
-    /// What may come at once: the field's own `first`, or its kind inside an option or sequence.
-    first: ValueType,
-    position: Position,
+/// Where values are written, and by which schema.
+struct Writer<'s> {
+    flat: &'s FlatSchema,
+    out: &'s mut Vec<u8>,
+    /// How many messages are open around the value in hand.
     depth: u32,
 }
 
-impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
-    /// A value of the field at `index` in a message that is open in `out`.
-    #[inline(always)]
-    fn inside(
-        flat: &'a FlatSchema,
-        out: &'a mut Vec<u8>,
-        field: &'a Field,
-        depth: u32,
-    ) -> ValueSer<'a, NOTING> {
-        ValueSer {
-            flat,
-            out,
-            field,
-            first: field.first,
-            position: Position::Tagged,
-            depth,
-        }
-    }
+/// Writes one value of one field: two words, which pass in registers. What goes before the value
+/// is the field's: a tag, or nothing at the root and for one of many in a packed field.
+struct ValueSer<'w, 's, const NOTING: bool> {
+    to: &'w mut Writer<'s>,
+    field: &'s Field,
+}
 
+impl<'w, 's, const NOTING: bool> ValueSer<'w, 's, NOTING> {
+    /// A value of a field of a message that is open, as one of so many.
     #[inline(always)]
-    fn tag(&self) -> Tag {
-        match self.position {
-            Position::Tagged => self.field.tag,
-            Position::Root | Position::Packed => Tag::NONE,
-        }
+    fn inside(to: &'w mut Writer<'s>, field: &'s Field, depth: u32) -> Self {
+        to.depth = depth;
+        ValueSer { to, field }
     }
 
     #[inline(always)]
     fn is(&self, kind: ValueType) -> bool {
-        self.first == kind
+        self.field.first == kind
     }
 
     /// The cardinality that must come first.
     #[inline(always)]
     fn expect(&self) -> Card {
-        if self.first == ValueType::Pending {
+        if self.field.first == ValueType::Pending {
             self.field.card
         } else {
             Card::Single
+        }
+    }
+
+    /// The field for what an option holds, if one must come now.
+    #[inline(always)]
+    fn optional(&self) -> Option<&'s Field> {
+        match self.field.card {
+            Card::Optional => self.field.element.as_deref(),
+            _ => None,
         }
     }
 
@@ -139,7 +123,7 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
     fn mismatch<T>(&self, actual: impl std::fmt::Display) -> Result<T, Fault> {
         Err(Box::new(EncodeError::Mismatch {
             place: self.field.place.clone(),
-            expected: self.flat.describe(self.field, self.expect()),
+            expected: self.to.flat.describe(self.field, self.expect()),
             actual: actual.to_string(),
         }))
     }
@@ -149,11 +133,7 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
         }
-        if self.position == Position::Packed {
-            wire::put_packed_varint(self.out, value);
-        } else {
-            wire::put_varint(self.out, self.field.tag, value);
-        }
+        wire::put_varint(self.to.out, self.field.tag, value);
         Ok(())
     }
 
@@ -162,17 +142,17 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
         if !self.is(kind) {
             return self.mismatch(format_args!("{kind:?}"));
         }
-        wire::put_bytes(self.out, self.tag(), bytes);
+        wire::put_bytes(self.to.out, self.field.tag, bytes);
         Ok(())
     }
 
     /// Writes a variant of a plain enum.
     #[inline]
     fn number(self, index: u32, variant: &'static str) -> Result<(), Fault> {
-        let ValueType::Enum(id) = self.first else {
+        let ValueType::Enum(id) = self.field.first else {
             return self.mismatch("a unit variant");
         };
-        let enumeration = &self.flat.enums[id];
+        let enumeration = &self.to.flat.enums[id];
         match position(&enumeration.values, |value| &value.key, index, variant) {
             Some(number) => self.varint(ValueType::Enum(id), number as u64),
             None => Err(unknown_variant(&enumeration.name, variant)),
@@ -181,40 +161,42 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
 
     /// The message that a value of this field is, if one must come now.
     #[inline(always)]
-    fn message(&self) -> Option<&'a Message> {
-        match self.first {
-            ValueType::Message(id) => Some(&self.flat.messages[id]),
+    fn message(&self) -> Option<&'s Message> {
+        match self.field.first {
+            ValueType::Message(id) => Some(&self.to.flat.messages[id]),
             _ => None,
         }
     }
 
     /// Opens the message that this value is.
     #[inline(always)]
-    fn open(self, shape: Shape) -> Result<Compound<'a, NOTING>, Fault> {
+    fn open(self, shape: Shape) -> Result<Compound<'w, 's, NOTING>, Fault> {
         let message = match self.message() {
             Some(message) if message.shape == shape => message,
             _ => return self.mismatch(shape),
         };
-        if self.depth >= MAX_DEPTH {
+        let depth = self.to.depth;
+        if depth >= MAX_DEPTH {
             return Err(too_deep());
         }
-        let start = match self.position {
-            Position::Root => NONE,
-            _ => begin(self.out, self.field.tag),
+        // The root has neither tag nor length.
+        let start = if self.field.tag.len() == 0 {
+            NONE
+        } else {
+            begin(self.to.out, self.field.tag)
         };
         Ok(Compound {
-            flat: self.flat,
-            out: self.out,
+            to: self.to,
             message,
             rest: &message.fields,
             start,
             outer: NONE,
-            depth: self.depth + 1,
+            depth: depth + 1,
         })
     }
 
     /// Opens the helper that stands around an option or collection here.
-    fn open_wrapper(self, actual: &'static str) -> Result<Compound<'a, NOTING>, Fault> {
+    fn open_wrapper(self, actual: &'static str) -> Result<Compound<'w, 's, NOTING>, Fault> {
         match self.message() {
             Some(message) if message.shape == Shape::Wrapper => self.open(Shape::Wrapper),
             _ => self.mismatch(actual),
@@ -227,7 +209,7 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
         self,
         index: u32,
         variant: &'static str,
-    ) -> Result<(Compound<'a, NOTING>, &'a Field), Fault> {
+    ) -> Result<(Compound<'w, 's, NOTING>, &'s Field), Fault> {
         let oneof = self.open(Shape::Oneof)?;
         let fields = &oneof.message.fields;
         let found = position(fields, |field| &field.key, index, variant);
@@ -244,16 +226,12 @@ impl<'a, const NOTING: bool> ValueSer<'a, NOTING> {
         index: u32,
         variant: &'static str,
         shape: Shape,
-    ) -> Result<Compound<'a, NOTING>, Fault> {
+    ) -> Result<Compound<'w, 's, NOTING>, Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
         let Compound {
-            flat,
-            out,
-            start,
-            depth,
-            ..
+            to, start, depth, ..
         } = oneof;
-        let mut content = ValueSer::<NOTING>::inside(flat, out, field, depth).open(shape)?;
+        let mut content = ValueSer::<NOTING>::inside(to, field, depth).open(shape)?;
         content.outer = start;
         Ok(content)
     }
@@ -347,16 +325,16 @@ fn canonical32(value: f32) -> u32 {
     }
 }
 
-impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
+impl<'w, 's, const NOTING: bool> ser::Serializer for ValueSer<'w, 's, NOTING> {
     type Ok = ();
     type Error = Fault;
-    type SerializeSeq = SeqSer<'a, NOTING>;
-    type SerializeTuple = TupleSer<'a, NOTING>;
-    type SerializeTupleStruct = Compound<'a, NOTING>;
-    type SerializeTupleVariant = Compound<'a, NOTING>;
-    type SerializeMap = MapSer<'a, NOTING>;
-    type SerializeStruct = Compound<'a, NOTING>;
-    type SerializeStructVariant = Compound<'a, NOTING>;
+    type SerializeSeq = SeqSer<'w, 's, NOTING>;
+    type SerializeTuple = TupleSer<'w, 's, NOTING>;
+    type SerializeTupleStruct = Compound<'w, 's, NOTING>;
+    type SerializeTupleVariant = Compound<'w, 's, NOTING>;
+    type SerializeMap = MapSer<'w, 's, NOTING>;
+    type SerializeStruct = Compound<'w, 's, NOTING>;
+    type SerializeStructVariant = Compound<'w, 's, NOTING>;
 
     fn is_human_readable(&self) -> bool {
         false
@@ -420,7 +398,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         if !self.is(ValueType::F32) {
             return self.mismatch("f32");
         }
-        wire::put_fixed32(self.out, self.tag(), canonical32(v));
+        wire::put_fixed32(self.to.out, self.field.tag, canonical32(v));
         Ok(())
     }
 
@@ -429,7 +407,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         if !self.is(ValueType::F64) {
             return self.mismatch("f64");
         }
-        wire::put_fixed64(self.out, self.tag(), canonical64(v));
+        wire::put_fixed64(self.to.out, self.field.tag, canonical64(v));
         Ok(())
     }
 
@@ -448,7 +426,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
     }
 
     fn serialize_none(self) -> Result<(), Fault> {
-        if self.expect() == Card::Optional {
+        if self.optional().is_some() {
             return Ok(());
         }
         let wrapper = self.open_wrapper("an option")?;
@@ -460,20 +438,17 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
 
     #[inline(always)]
     fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Result<(), Fault> {
-        if self.expect() == Card::Optional {
-            return value.serialize(ValueSer::<NOTING> {
-                first: self.field.kind,
-                ..self
-            });
+        if let Some(field) = self.optional() {
+            return value.serialize(ValueSer::<NOTING> { to: self.to, field });
         }
         let mut wrapper = self.open_wrapper("an option")?;
         let inner = wrapper.reborrow_inner();
-        if inner.expect() != Card::Optional {
+        let Some(field) = inner.optional() else {
             return inner.mismatch("an option");
-        }
+        };
         value.serialize(ValueSer::<NOTING> {
-            first: inner.field.kind,
-            ..inner
+            to: inner.to,
+            field,
         })?;
         wrapper.close()
     }
@@ -536,8 +511,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
     ) -> Result<(), Fault> {
         let (oneof, field) = self.open_variant(index, variant)?;
         value.serialize(ValueSer::<NOTING>::inside(
-            oneof.flat,
-            &mut *oneof.out,
+            &mut *oneof.to,
             field,
             oneof.depth,
         ))?;
@@ -545,12 +519,12 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
     }
 
     #[inline(always)]
-    fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'a, NOTING>, Fault> {
+    fn serialize_seq(self, len: Option<usize>) -> Result<SeqSer<'w, 's, NOTING>, Fault> {
         SeqSer::<NOTING>::open(self, len)
     }
 
     #[inline(always)]
-    fn serialize_tuple(self, len: usize) -> Result<TupleSer<'a, NOTING>, Fault> {
+    fn serialize_tuple(self, len: usize) -> Result<TupleSer<'w, 's, NOTING>, Fault> {
         match self.message() {
             Some(message) if message.shape == Shape::Tuple => {
                 Ok(TupleSer::Mixed(self.open(Shape::Tuple)?))
@@ -564,7 +538,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         self,
         _name: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a, NOTING>, Fault> {
+    ) -> Result<Compound<'w, 's, NOTING>, Fault> {
         self.open(Shape::Tuple)
     }
 
@@ -575,12 +549,12 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         index: u32,
         variant: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a, NOTING>, Fault> {
+    ) -> Result<Compound<'w, 's, NOTING>, Fault> {
         self.open_content(index, variant, Shape::Tuple)
     }
 
     #[inline]
-    fn serialize_map(self, _len: Option<usize>) -> Result<MapSer<'a, NOTING>, Fault> {
+    fn serialize_map(self, _len: Option<usize>) -> Result<MapSer<'w, 's, NOTING>, Fault> {
         MapSer::<NOTING>::open(self)
     }
 
@@ -589,7 +563,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         self,
         _name: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a, NOTING>, Fault> {
+    ) -> Result<Compound<'w, 's, NOTING>, Fault> {
         self.open(Shape::Struct)
     }
 
@@ -600,7 +574,7 @@ impl<'a, const NOTING: bool> ser::Serializer for ValueSer<'a, NOTING> {
         index: u32,
         variant: &'static str,
         _len: usize,
-    ) -> Result<Compound<'a, NOTING>, Fault> {
+    ) -> Result<Compound<'w, 's, NOTING>, Fault> {
         self.open_content(index, variant, Shape::Struct)
     }
 }

@@ -84,6 +84,8 @@ pub(super) struct Field {
     /// What an encoder may write at once: the kind, or `Pending` where the cardinality comes
     /// first. One comparison of it checks both.
     pub(super) first: ValueType,
+    /// How each value of an option or a sequence is written, where this field is one.
+    pub(super) element: Option<Box<Field>>,
     /// The serde name.
     pub(super) key: Key,
     /// Set when a reader was seen to reject the field's absence. Such a field reads as zero where

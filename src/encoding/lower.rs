@@ -34,6 +34,7 @@ pub(super) fn lower(containers: &[Container], root: usize) -> FlatSchema {
         first: ValueType::Message(0),
         card: Card::Single,
         packed: false,
+        element: None,
         key: Key::new(""),
         required: AtomicBool::new(true),
         left_out: AtomicBool::new(false),
@@ -181,21 +182,29 @@ impl Lowering<'_> {
             let numeric = !matches!(kind.wire(), Wire::Bytes);
             let packed = card == Card::Repeated && numeric;
             let wire = if packed { Wire::Bytes } else { kind.wire() };
-            let field = Field {
-                tag: Tag::new(position as u32 + 1, wire),
+            let place = format!("{}.{name}", self.messages[id].name);
+            let field = |tag, first, card, packed, element| Field {
+                tag,
                 kind,
-                first: if card == Card::Single {
-                    kind
-                } else {
-                    ValueType::Pending
-                },
+                first,
                 card,
                 packed,
+                element,
                 key: Key::new(key),
                 required: AtomicBool::new(false),
                 left_out: AtomicBool::new(false),
-                place: format!("{}.{name}", self.messages[id].name),
-                name,
+                place: place.clone(),
+                name: name.clone(),
+            };
+            let tag = Tag::new(position as u32 + 1, wire);
+            let one = |tag| field(tag, kind, Card::Single, false, None);
+            let field = match card {
+                Card::Single => one(tag),
+                Card::Map => field(tag, ValueType::Pending, card, packed, None),
+                Card::Optional | Card::Repeated => {
+                    let element = Box::new(one(if packed { Tag::NONE } else { tag }));
+                    field(tag, ValueType::Pending, card, packed, Some(element))
+                }
             };
             self.messages[id].fields.push(field);
         }
@@ -314,6 +323,7 @@ impl Lowering<'_> {
                 first: kind,
                 card: Card::Single,
                 packed: false,
+                element: None,
                 key: Key::new(key),
                 required: AtomicBool::new(false),
                 left_out: AtomicBool::new(false),

@@ -95,21 +95,20 @@ fn spread(value: u64, len: usize) -> u64 {
 pub(super) fn put_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
     if value < 0x80 && tag.len == 1 {
         out.extend_from_slice(&[tag.bits as u8, value as u8]);
-        return;
+    } else if tag.len == 0 && value < 0x4000 {
+        put_short_packed(out, value as u16);
+    } else {
+        put_long_varint(out, tag, value);
     }
-    put_long_varint(out, tag, value);
 }
 
-/// Appends `value` as a varint without a tag.
+/// Appends one of many in a packed field. Indices of vertices are mostly of this size.
 #[inline(always)]
-pub(super) fn put_packed_varint(out: &mut Vec<u8>, value: u64) {
+fn put_short_packed(out: &mut Vec<u8>, value: u16) {
     if value < 0x80 {
         out.push(value as u8);
-    } else if value < 0x4000 {
-        // Indices of vertices are mostly of this size.
-        out.extend_from_slice(&[value as u8 | 0x80, (value >> 7) as u8]);
     } else {
-        put_long_varint(out, Tag::NONE, value);
+        out.extend_from_slice(&[value as u8 | 0x80, (value >> 7) as u8]);
     }
 }
 

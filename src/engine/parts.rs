@@ -51,10 +51,12 @@ pub(crate) struct HostEnergy {
 /// The mutable part of an engine, apart from its actors.
 pub(crate) struct Parts {
     pub(crate) topology: Arc<Topology>,
+    /// As the topology says.
+    recording: bool,
     index: u32,
     links: Vec<LinkCell>,
     pub(crate) queue: Queue,
-    store: Store,
+    pub(super) store: Store,
     pub(crate) outgoing: Vec<Outgoing>,
     /// The key of the event in hand.
     key: EventKey,
@@ -77,7 +79,7 @@ pub(crate) struct Parts {
     /// The first request to stop: at which event, by whom, why.
     pub(crate) stop: Option<(EventKey, EntityId, String)>,
     /// The event whose handler failed, so that its message can be counted as in flight.
-    pub(crate) unfinished: Option<(EventKey, Class, Head)>,
+    pub(crate) unfinished: Option<(EventKey, Head)>,
     /// The last kind looked up: handlers tend to send one kind at a time.
     last_kind: Option<(TypeId, KindIndex)>,
 }
@@ -86,6 +88,7 @@ impl Parts {
     pub(crate) fn new(topology: Arc<Topology>, index: u32, links: Vec<LinkCell>) -> Self {
         Parts {
             key: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            recording: topology.recording(),
             topology,
             index,
             links,
@@ -109,28 +112,23 @@ impl Parts {
     }
 
     #[inline(always)]
-    pub(crate) fn insert(
-        &mut self,
-        key: EventKey,
-        class: Class,
-        head: Head,
-        letter: Option<Sealed>,
-    ) -> u32 {
-        let slot = self.store.insert(class, head, letter);
+    pub(crate) fn insert(&mut self, key: EventKey, head: Head, letter: Option<Sealed>) -> u32 {
+        let slot = self.store.insert(head, letter);
         self.queue.push(Entry::new(key, slot));
         slot
     }
 
     pub(crate) fn insert_pending(&mut self, key: EventKey, pending: Pending) {
-        let slot = self.insert(key, pending.class, pending.head, pending.letter);
+        let slot = self.insert(key, pending.head, pending.letter);
         if let Some(side) = pending.side {
             self.store.set_side(slot, side);
         }
     }
 
-    #[inline(always)]
     pub(crate) fn take(&mut self, slot: u32) -> Pending {
-        self.store.take(slot)
+        let (head, letter) = self.store.take(slot);
+        let side = self.store.side(slot, &head);
+        Pending { head, letter, side }
     }
 
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
@@ -139,13 +137,16 @@ impl Parts {
         &mut self,
         key: EventKey,
         letter: Option<&Sealed>,
-        kind: Option<KindIndex>,
+        head: &Head,
     ) -> Result<(), Box<Fault>> {
         self.key = key;
         self.sends = 0;
         self.carrying = None;
         self.body.clear();
-        if let (Some(letter), Some(kind), true) = (letter, kind, self.topology.recording()) {
+        if !self.recording {
+            return Ok(());
+        }
+        if let (Some(letter), Some(kind)) = (letter, head.kind()) {
             let kind = self.topology.kind(kind);
             let body = &mut self.body;
             let encoded = guarded(|| letter.0.encode(kind.schema(), body));
@@ -207,10 +208,11 @@ impl Parts {
         })
     }
 
-    pub(crate) fn note_unfinished(&mut self, key: EventKey, class: Class, head: Head) {
-        self.unfinished = Some((key, class, head));
+    pub(crate) fn note_unfinished(&mut self, key: EventKey, head: Head) {
+        self.unfinished = Some((key, head));
     }
 
+    #[inline]
     pub(crate) fn send(&mut self, state: &mut CellState, me: EntityId, outbound: Outbound) {
         if self.fault.is_some() {
             return;
@@ -222,52 +224,57 @@ impl Parts {
             match_key,
             delay,
         } = outbound;
-        let (ordinal, repeat) = state.next_in_flow(receiver.0, kind, match_key);
-        let head = Head {
-            receiver,
-            kind: Some(kind),
-            ordinal,
-            repeat,
-            match_key,
-            cause: Some(self.key),
-            ..Head::of_entity(me)
-        };
+        let (ordinal, repeat) = state.next_in_flow(receiver, kind, match_key);
+        let mut head = Head::of_entity(Class::Message, me).caused(self.key, kind, ordinal);
+        head.receiver = receiver;
+        if let Some(match_key) = match_key {
+            head = head.keyed(match_key, repeat);
+        }
         self.sends += 1;
         let (from, to) = (self.topology.place(me), self.topology.place(receiver));
         if from.host == to.host {
             let key = self.later_key(me, &mut state.count, delay);
-            self.schedule(to.engine, key, Class::Message, head, Some(letter));
-        } else if !delay.is_zero() {
+            self.insert(key, head, Some(letter));
+        } else if delay.is_zero() {
+            self.send_away(state, (from.host, to.host), head, letter);
+        } else {
             let receiver = self.topology.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
-        } else if let Some(link) = self.topology.link(from.host, to.host) {
-            let head = Head {
-                link: Some(link),
-                ..head
-            };
-            if self
-                .topology
-                .links
-                .get(&link)
-                .is_some_and(|link| link.shared)
-            {
-                let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
-                let engine = self.topology.place(link).engine;
-                self.schedule(engine, key, Class::HandOver, head, Some(letter));
-            } else {
-                let charge_j = self.carry(link, head, letter, None);
-                if charge_j != 0.0 {
-                    state.charged_j += charge_j;
-                    self.energy(from.host).transmit_j += charge_j;
-                }
-            }
-        } else {
-            self.raise(FaultCause::NoRoute {
+        }
+    }
+
+    /// Sends a message to another host.
+    fn send_away(
+        &mut self,
+        state: &mut CellState,
+        (from, to): (HostIndex, HostIndex),
+        head: Head,
+        letter: Sealed,
+    ) {
+        let me = head.sender;
+        let Some(link) = self.topology.link(from, to) else {
+            let kind = head
+                .kind()
+                .map(|kind| self.topology.kind(kind).name().to_owned());
+            return self.raise(FaultCause::NoRoute {
                 from: self.topology.host_name(me).to_owned(),
-                to: self.topology.host_name(receiver).to_owned(),
-                receiver: self.topology.name(receiver).to_owned(),
-                kind: self.topology.kind(kind).name().to_owned(),
+                to: self.topology.host_name(head.receiver).to_owned(),
+                receiver: self.topology.name(head.receiver).to_owned(),
+                kind: kind.unwrap_or_default(),
             });
+        };
+        let mut head = head.through(link);
+        if self.topology.links.is_shared(link) {
+            let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
+            let engine = self.topology.place(link).engine;
+            head.class = Class::HandOver;
+            self.schedule(engine, key, head, Some(letter));
+            return;
+        }
+        let charge_j = self.carry(link, head, letter, None);
+        if charge_j != 0.0 {
+            state.rest.charged_j += charge_j;
+            self.energy(from).transmit_j += charge_j;
         }
     }
 
@@ -304,22 +311,14 @@ impl Parts {
     }
 
     #[inline(always)]
-    fn schedule(
-        &mut self,
-        engine: u32,
-        key: EventKey,
-        class: Class,
-        head: Head,
-        letter: Option<Sealed>,
-    ) {
+    fn schedule(&mut self, engine: u32, key: EventKey, head: Head, letter: Option<Sealed>) {
         if engine == self.index {
-            self.insert(key, class, head, letter);
+            self.insert(key, head, letter);
         } else {
             self.outgoing.push(Outgoing {
                 engine,
                 key,
                 pending: Pending {
-                    class,
                     head,
                     letter,
                     side: None,
@@ -351,16 +350,11 @@ impl Parts {
         letter: Sealed,
         delay: SimDuration,
     ) -> TimerId {
-        let (ordinal, _) = state.next_in_flow(u32::MAX, kind, None);
-        let head = Head {
-            kind: Some(kind),
-            ordinal,
-            cause: Some(self.key),
-            incarnation: state.incarnation,
-            ..Head::of_entity(me)
-        };
+        let ordinal = state.next_timer(kind);
+        let head = Head::of_entity(Class::Timer, me).caused(self.key, kind, ordinal);
+        let head = head.in_life(state.incarnation);
         let key = self.later_key(me, &mut state.count, delay);
-        let slot = self.insert(key, Class::Timer, head, Some(letter));
+        let slot = self.insert(key, head, Some(letter));
         // The ordinal tells a reused slot from this timer's.
         TimerId {
             slot,
@@ -371,7 +365,7 @@ impl Parts {
 
     pub(crate) fn cancel_timer(&mut self, me: EntityId, timer: TimerId) -> bool {
         let cancelled = self.store.cancel(timer.slot, |head| {
-            head.receiver == me && head.kind == Some(timer.kind) && head.ordinal == timer.ordinal
+            head.receiver == me && head.kind() == Some(timer.kind) && head.ordinal == timer.ordinal
         });
         if cancelled {
             self.shed_voids();
@@ -401,7 +395,7 @@ impl Parts {
         kind: Option<KindIndex>,
         change: SealedChange,
     ) {
-        if let (Some(kind), true) = (kind, self.topology.recording()) {
+        if let (Some(kind), true) = (kind, self.recording) {
             (change.encode)(
                 &*change.value,
                 self.topology.kind(kind).schema(),
@@ -414,8 +408,8 @@ impl Parts {
     /// Takes every message still on its way, with the key its next event would have had.
     pub(super) fn take_in_flight(&mut self, until: Option<EventKey>, remains: &mut Remains) {
         let topology = self.topology.clone();
-        if let Some((key, class, head)) = self.unfinished.take()
-            && head.in_flight(&topology, class, self.side.as_ref(), until)
+        if let Some((key, head)) = self.unfinished.take()
+            && head.in_flight(&topology, self.side.as_ref(), until)
         {
             let body = std::mem::take(&mut self.body);
             remains.in_flight.push((key, head, body));
@@ -428,7 +422,9 @@ impl Parts {
             // Those with a latest instant were in the queue.
             let parked = std::mem::take(&mut cell.parked).into_values();
             for parked in parked.filter(|parked| parked.latest.is_none()) {
-                let pending = self.store.take(parked.slot);
+                let (head, letter) = self.store.take(parked.slot);
+                let side = self.store.side(parked.slot, &head);
+                let pending = Pending { head, letter, side };
                 remains.take(&topology, self.key, pending, until);
             }
         }
@@ -439,7 +435,8 @@ impl Parts {
 
     /// Drops the links, once the run is over.
     pub(super) fn drop_carriers(&mut self, remains: &mut Remains) {
-        let mut entities: Vec<_> = self.topology.links.keys().copied().collect();
+        let links = self.topology.links.iter();
+        let mut entities: Vec<_> = links.map(|(link, _)| link).collect();
         entities.retain(|link| self.topology.place(*link).engine == self.index);
         entities.sort_unstable_by_key(|link| self.topology.place(*link).local);
         for (link, cell) in entities.into_iter().zip(std::mem::take(&mut self.links)) {

@@ -7,7 +7,7 @@ use crate::guard::{dropped, guarded};
 use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::time::SimTime;
-use crate::topology::{Reason, Topology};
+use crate::topology::Topology;
 
 /// Something panicked while it was dropped.
 struct Panicked {
@@ -50,33 +50,28 @@ impl Remains {
         mut pending: Pending,
         until: Option<EventKey>,
     ) {
-        let (class, head) = (pending.class, pending.head);
+        let head = pending.head;
         let letter = pending.letter.take();
         // Until when a link would have left it parked may hang on what a fault undid.
         let parked = pending.side.filter(|side| head.has_side && side.parked);
-        let key = match (parked, head.link) {
+        let key = match (parked, head.link()) {
             (Some(side), Some(link)) => topology.key(SimTime::MAX, 0, link, side.token),
             _ => key,
         };
-        if head.in_flight(topology, class, pending.side.as_ref(), until) {
+        if head.in_flight(topology, pending.side.as_ref(), until) {
             let mut body = Vec::new();
-            if let (Some(letter), Some(kind), true) = (&letter, head.kind, topology.recording()) {
+            if let (Some(letter), Some(kind), true) = (&letter, head.kind(), topology.recording()) {
                 // It will never be handled; what cannot be encoded is recorded empty.
                 let schema = topology.kind(kind).schema();
                 if !matches!(guarded(|| letter.0.encode(schema, &mut body)), Ok(Ok(()))) {
                     body.clear();
                 }
             }
-            let head = Head {
-                reason: Reason::default(),
-                has_side: false,
-                ..head
-            };
-            self.in_flight.push((key, head, body));
+            self.in_flight.push((key, head.left_over(), body));
         }
         if let Err(cause) = dropped(letter) {
             self.panicked.push(Panicked {
-                order: (key, head.copy),
+                order: (key, head.copy()),
                 entity: head.receiver,
                 message: head.message(topology),
                 cause,
@@ -103,7 +98,6 @@ impl Head {
     pub(super) fn in_flight(
         &self,
         topology: &Topology,
-        class: Class,
         side: Option<&Side>,
         until: Option<EventKey>,
     ) -> bool {
@@ -111,7 +105,7 @@ impl Head {
         let by = || self.scheduled_by(topology, side);
         let undone = until.is_some_and(|until| by().is_none_or(|by| by >= until));
         let message = matches!(
-            class,
+            self.class,
             Class::Message | Class::HandOver | Class::Held | Class::LateLoss
         );
         message && !undone

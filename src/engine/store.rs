@@ -1,13 +1,19 @@
-//! Where events wait: what is known of a message in one table, the message itself in another, both
-//! by slot. Slots are reused, last freed first, while they are still in the cache.
+//! Where events wait, by slot. Slots are reused, last freed first, while they are still in the cache.
 
-use super::{Class, Head, Pending, Sealed, Side};
+use super::{Class, Head, Sealed, Side};
+use crate::ids::EntityId;
+
+/// An event that waits: what is known of a message and the message itself, in two lines of cache.
+#[repr(align(64))]
+struct Waiting {
+    head: Head,
+    letter: Option<Sealed>,
+}
 
 /// The events that wait, by slot.
 #[derive(Default)]
 pub(crate) struct Store {
-    heads: Vec<(Class, Head)>,
-    letters: Vec<Option<Sealed>>,
+    waiting: Vec<Waiting>,
     /// What few events have besides, by slot; shorter than the others if no late slot has any.
     sides: Vec<Side>,
     free: Vec<u32>,
@@ -18,15 +24,19 @@ pub(crate) struct Store {
 impl Store {
     /// Puts an event in a free slot. Inlined, so that it is built where it waits.
     #[inline(always)]
-    pub(crate) fn insert(&mut self, class: Class, head: Head, letter: Option<Sealed>) -> u32 {
+    pub(crate) fn insert(&mut self, head: Head, letter: Option<Sealed>) -> u32 {
+        let waiting = Waiting { head, letter };
         if let Some(slot) = self.free.pop() {
-            self.heads[slot as usize] = (class, head);
-            self.letters[slot as usize] = letter;
+            self.waiting[slot as usize] = waiting;
             return slot;
         }
-        let slot = u32::try_from(self.heads.len()).expect("fewer than 2^32 events wait");
-        self.heads.push((class, head));
-        self.letters.push(letter);
+        self.append(waiting)
+    }
+
+    #[cold]
+    fn append(&mut self, waiting: Waiting) -> u32 {
+        let slot = u32::try_from(self.waiting.len()).expect("fewer than 2^32 events wait");
+        self.waiting.push(waiting);
         slot
     }
 
@@ -38,57 +48,82 @@ impl Store {
         self.sides[slot as usize] = side;
     }
 
-    /// Takes the event out of its slot, which must hold one.
+    /// Takes the event out of its slot, which must hold one. Its side stays there until the slot is
+    /// used again.
     #[inline(always)]
-    pub(crate) fn take(&mut self, slot: u32) -> Pending {
-        let (class, head) = self.heads[slot as usize];
+    pub(crate) fn take(&mut self, slot: u32) -> (Head, Option<Sealed>) {
+        let waiting = &mut self.waiting[slot as usize];
         self.free.push(slot);
-        if class == Class::Void {
+        if waiting.head.class == Class::Void {
             self.voids -= 1;
         }
-        Pending {
-            class,
-            head,
-            letter: self.letters[slot as usize].take(),
-            side: head.has_side.then(|| self.sides[slot as usize]),
-        }
+        (waiting.head, waiting.letter.take())
+    }
+
+    /// What an event just taken has besides.
+    #[inline]
+    pub(crate) fn side(&self, slot: u32, head: &Head) -> Option<Side> {
+        head.has_side.then(|| self.sides[slot as usize])
+    }
+
+    /// Whose event waits in this slot.
+    #[inline(always)]
+    pub(crate) fn receiver(&self, slot: u32) -> EntityId {
+        self.waiting[slot as usize].head.receiver
+    }
+
+    /// True if what waits does not fit into a processor's nearest caches.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        const LARGE: usize = 4096;
+        self.waiting.len() >= LARGE
     }
 
     /// Cancels the timer in `slot` if `is_it` says that it is the one meant; true if so.
     pub(crate) fn cancel(&mut self, slot: u32, is_it: impl FnOnce(&Head) -> bool) -> bool {
-        // A free slot still has its last head, but no letter.
-        let waits = self.letters.get(slot as usize).is_some_and(Option::is_some);
-        let Some((class, head)) = self.heads.get_mut(slot as usize).filter(|_| waits) else {
+        let Some(Waiting { head, letter }) = self.waiting.get_mut(slot as usize) else {
             return false;
         };
-        if *class != Class::Timer || !is_it(head) {
+        // A free slot still has its last head, but no letter.
+        if letter.is_none() || head.class != Class::Timer || !is_it(head) {
             return false;
         }
-        *class = Class::Void;
+        head.class = Class::Void;
         self.voids += 1;
         // Last, since dropping a message may panic.
-        self.letters[slot as usize] = None;
+        *letter = None;
         true
     }
 
     /// Takes an event out of a slot whose place in the queue stays behind, without effect.
-    pub(crate) fn take_ahead(&mut self, slot: u32) -> Pending {
-        let pending = self.take(slot);
+    pub(crate) fn take_ahead(&mut self, slot: u32) -> (Head, Option<Sealed>, Option<Side>) {
+        let (head, letter) = self.take(slot);
         self.free.pop();
-        self.heads[slot as usize].0 = Class::Void;
+        self.waiting[slot as usize].head.class = Class::Void;
         self.voids += 1;
-        pending
+        (head, letter, self.side(slot, &head))
     }
 
     /// True once events without effect are worth shedding: many, and most of what waits.
     pub(crate) fn is_mostly_void(&self) -> bool {
         const WORTH_IT: usize = 1024;
-        let waiting = self.heads.len() - self.free.len();
+        let waiting = self.waiting.len() - self.free.len();
         self.voids >= WORTH_IT && self.voids * 2 > waiting
     }
 
     /// True for an event without effect: a cancelled timer, or what came sooner.
     pub(crate) fn is_void(&self, slot: u32) -> bool {
-        self.heads[slot as usize].0 == Class::Void
+        self.waiting[slot as usize].head.class == Class::Void
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every event is written and read once; each further line of cache costs as much again.
+    #[test]
+    fn an_event_waits_in_two_lines_of_cache() {
+        assert_eq!(size_of::<Waiting>(), 128);
     }
 }

@@ -9,7 +9,7 @@ use super::Entry;
 use crate::time::SimTime;
 
 /// How many events a bucket is meant to hold.
-const PER_BUCKET: usize = 32;
+const PER_BUCKET: usize = 12;
 
 /// The most buckets of a rung: their heads and last lines are to stay in a cache.
 const MOST_BUCKETS: usize = 1 << 13;

@@ -14,8 +14,8 @@ use crate::random::name_hash;
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
-    Entity, EntityRole, FixedMap, Kind, LinkEntry, Location, PlannedAction, PlannedEvent, Routes,
-    RunInfo, Topology,
+    Entity, EntityRole, FixedMap, Kind, LinkEntry, Links, Location, PlannedAction, PlannedEvent,
+    Routes, RunInfo, Topology,
 };
 
 /// Which entity each declaration became.
@@ -122,7 +122,7 @@ impl Simulation {
         })
     }
 
-    fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> FixedMap<EntityId, LinkEntry> {
+    fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> Links {
         let entry = |(link, entity): (&LinkDecl, &EntityId)| {
             let entry = LinkEntry {
                 min_delay: link.carrier.min_delay(),
@@ -131,7 +131,7 @@ impl Simulation {
             };
             (*entity, entry)
         };
-        self.links.iter().zip(&ranked.links).map(entry).collect()
+        Links::new(self.links.iter().zip(&ranked.links).map(entry))
     }
 
     fn check_names(&self) -> Result<(), BuildError> {
@@ -402,7 +402,6 @@ impl Simulation {
         let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
         for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
-            let state = CellState::new(declared as u32);
             let built = match fault {
                 None => guarded(|| (actor.factory)(&actor.name)).map_err(|cause| {
                     let key = topology.key(SimTime::ZERO, 0, *entity, 0);
@@ -418,10 +417,8 @@ impl Simulation {
                 Some(_) => Err(()),
             };
             let cell = ActorCell {
-                entity: *entity,
                 actor: built.ok(),
-                factory: actor.factory,
-                state,
+                state: CellState::new(*entity, declared as u32, actor.factory),
             };
             actors[topology.place(*entity).engine as usize].push(cell);
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use farside::{Counts, End, Executor, Report, SimDuration};
+use farside::{Counts, End, Executor, Report, SimDuration, Simulation};
 use farside_actors::units;
 use farside_logs::{Attachment, LogOptions, LogWriter, may_hold_log};
 use serde::Serialize;
@@ -47,8 +47,9 @@ pub(crate) struct Args {
     /// Stop at this virtual time, as in 90s
     #[arg(long, value_name = "DURATION", value_parser = duration, allow_hyphen_values = true)]
     until: Option<SimDuration>,
-    /// Execute on one thread (inline) or on many (kameo): the result is the same
-    #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
+    /// Execute on one thread (inline) or on many (kameo): the result is the same. `auto` takes kameo
+    /// where the scenario says that several hosts' handlers take long, as with policy `max-plus`
+    #[arg(long, value_enum, default_value_t = ExecutorName::Auto)]
     executor: ExecutorName,
     /// Threads for kameo; as many as there are cores unless given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -65,6 +66,7 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum ExecutorName {
+    Auto,
     Inline,
     Kameo,
 }
@@ -74,13 +76,14 @@ pub(super) fn duration(text: &str) -> Result<SimDuration, String> {
 }
 
 impl ExecutorName {
-    pub(super) fn executor(self, threads: Option<u16>) -> Executor {
+    /// The executor for `sim`, with so many threads or as many as there are cores.
+    pub(super) fn executor(self, sim: &Simulation, threads: Option<u16>) -> Executor {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = threads.map_or_else(cores, usize::from);
         match self {
+            ExecutorName::Auto => sim.executor_that_pays(threads),
             ExecutorName::Inline => Executor::Inline,
-            ExecutorName::Kameo => Executor::Kameo {
-                threads: threads.map_or_else(cores, usize::from),
-            },
+            ExecutorName::Kameo => Executor::Kameo { threads },
         }
     }
 }
@@ -144,13 +147,13 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if let Some(until) = args.until {
         scenario.set_until(until);
     }
-    let executor = args.executor.executor(args.threads);
+    let mut assembled = scenario.assemble()?;
+    let executor = args.executor.executor(&assembled.sim, args.threads);
     tracing::info!(
         "scenario {}, seed {}, executor {executor:?}",
         scenario.name(),
         scenario.shared().seed
     );
-    let mut assembled = scenario.assemble()?;
     for remark in &assembled.remarks {
         tracing::warn!("{remark}");
     }

@@ -25,8 +25,8 @@ pub(crate) struct Args {
     /// The log
     #[arg(value_name = "RUN.mcap")]
     log: PathBuf,
-    /// Execute on one thread (inline) or on many (kameo): the result is the same
-    #[arg(long, value_enum, default_value_t = ExecutorName::Kameo)]
+    /// Execute on one thread (inline) or on many (kameo), or as pays (auto): the result is the same
+    #[arg(long, value_enum, default_value_t = ExecutorName::Auto)]
     executor: ExecutorName,
     /// Threads for kameo; as many as there are cores unless given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -74,7 +74,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     progress::show(&mut assembled.sim, assembled.system.goal, until);
     let interrupt = assembled.sim.interrupt();
     interrupt::raise_on_interrupt(interrupt);
-    let executor = args.executor.executor(args.threads);
+    let executor = args.executor.executor(&assembled.sim, args.threads);
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;
     if report.end == farside::End::Interrupted && summary.end.as_deref() != Some("interrupted") {

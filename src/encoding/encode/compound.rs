@@ -5,17 +5,16 @@ use std::sync::atomic::Ordering;
 use serde::ser::{self, Serialize};
 
 use super::super::error::EncodeError;
-use super::super::flat::{Card, Field, FlatSchema, Message, ValueType};
+use super::super::flat::{Card, Field, Message, ValueType};
 use super::super::wire;
-use super::{Fault, NONE, Position, ValueSer, begin, finish, widen};
+use super::{Fault, NONE, ValueSer, Writer, begin, finish, widen};
 
 /// A message whose fields are being written.
-pub(super) struct Compound<'a, const NOTING: bool> {
-    pub(super) flat: &'a FlatSchema,
-    pub(super) out: &'a mut Vec<u8>,
-    pub(super) message: &'a Message,
+pub(super) struct Compound<'w, 's, const NOTING: bool> {
+    pub(super) to: &'w mut Writer<'s>,
+    pub(super) message: &'s Message,
     /// The fields that are still to come.
-    pub(super) rest: &'a [Field],
+    pub(super) rest: &'s [Field],
     /// Where the content begins.
     pub(super) start: usize,
     /// Where the content of the oneof around it begins.
@@ -23,30 +22,28 @@ pub(super) struct Compound<'a, const NOTING: bool> {
     pub(super) depth: u32,
 }
 
-impl<'a, const NOTING: bool> Compound<'a, NOTING> {
+impl<'w, 's, const NOTING: bool> Compound<'w, 's, NOTING> {
     #[inline(always)]
     pub(super) fn close(self) -> Result<(), Fault> {
-        finish(self.out, self.start);
-        finish(self.out, self.outer);
+        finish(self.to.out, self.start);
+        finish(self.to.out, self.outer);
         Ok(())
     }
 
     /// The one field of a wrapper or newtype.
-    pub(super) fn inner(self) -> ValueSer<'a, NOTING> {
-        ValueSer::<NOTING>::inside(self.flat, self.out, &self.message.fields[0], self.depth)
+    pub(super) fn inner(self) -> ValueSer<'w, 's, NOTING> {
+        ValueSer::<NOTING>::inside(self.to, &self.message.fields[0], self.depth)
     }
 
     /// The one field of a wrapper or newtype that is closed later.
     #[inline(always)]
-    pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_, NOTING> {
-        ValueSer::<NOTING>::inside(self.flat, self.out, &self.message.fields[0], self.depth)
+    pub(super) fn reborrow_inner(&mut self) -> ValueSer<'_, 's, NOTING> {
+        ValueSer::<NOTING>::inside(self.to, &self.message.fields[0], self.depth)
     }
 
     #[inline(always)]
-    fn put<T: ?Sized + Serialize>(&mut self, field: &'a Field, value: &T) -> Result<(), Fault> {
-        value.serialize(ValueSer::<NOTING>::inside(
-            self.flat, self.out, field, self.depth,
-        ))
+    fn put<T: ?Sized + Serialize>(&mut self, field: &'s Field, value: &T) -> Result<(), Fault> {
+        value.serialize(ValueSer::<NOTING>::inside(self.to, field, self.depth))
     }
 
     #[inline(always)]
@@ -63,7 +60,7 @@ impl<'a, const NOTING: bool> Compound<'a, NOTING> {
 
     /// Finds a field that is not the next one: those between were skipped.
     #[cold]
-    fn find(&mut self, key: &'static str) -> Result<&'a Field, Fault> {
+    fn find(&mut self, key: &'static str) -> Result<&'s Field, Fault> {
         match self
             .message
             .fields
@@ -109,7 +106,7 @@ impl<'a, const NOTING: bool> Compound<'a, NOTING> {
     }
 }
 
-impl<const NOTING: bool> ser::SerializeStruct for Compound<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeStruct for Compound<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -133,7 +130,7 @@ impl<const NOTING: bool> ser::SerializeStruct for Compound<'_, NOTING> {
     }
 }
 
-impl<const NOTING: bool> ser::SerializeStructVariant for Compound<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeStructVariant for Compound<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -157,7 +154,7 @@ impl<const NOTING: bool> ser::SerializeStructVariant for Compound<'_, NOTING> {
     }
 }
 
-impl<const NOTING: bool> ser::SerializeTupleStruct for Compound<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeTupleStruct for Compound<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -172,7 +169,7 @@ impl<const NOTING: bool> ser::SerializeTupleStruct for Compound<'_, NOTING> {
     }
 }
 
-impl<const NOTING: bool> ser::SerializeTupleVariant for Compound<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeTupleVariant for Compound<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -184,16 +181,24 @@ impl<const NOTING: bool> ser::SerializeTupleVariant for Compound<'_, NOTING> {
     #[inline(always)]
     fn end(self) -> Result<(), Fault> {
         self.close()
+    }
+}
+
+/// The field for each element, if this field is a sequence.
+#[inline(always)]
+fn repeated(field: &Field) -> Option<&Field> {
+    match field.card {
+        Card::Repeated => field.element.as_deref(),
+        _ => None,
     }
 }
 
 /// A repeated field whose elements are being written.
-pub(super) struct SeqSer<'a, const NOTING: bool> {
-    flat: &'a FlatSchema,
-    out: &'a mut Vec<u8>,
-    field: &'a Field,
-    kind: ValueType,
-    position: Position,
+pub(super) struct SeqSer<'w, 's, const NOTING: bool> {
+    to: &'w mut Writer<'s>,
+    field: &'s Field,
+    /// How each element is written.
+    element: &'s Field,
     /// Where the packed elements begin, and how many bytes are kept for their length.
     packed: usize,
     kept: usize,
@@ -204,37 +209,33 @@ pub(super) struct SeqSer<'a, const NOTING: bool> {
     depth: u32,
 }
 
-impl<'a, const NOTING: bool> SeqSer<'a, NOTING> {
+impl<'w, 's, const NOTING: bool> SeqSer<'w, 's, NOTING> {
     #[inline(always)]
     pub(super) fn open(
-        value: ValueSer<'a, NOTING>,
+        value: ValueSer<'w, 's, NOTING>,
         len: Option<usize>,
-    ) -> Result<SeqSer<'a, NOTING>, Fault> {
-        if value.expect() == Card::Repeated {
-            return Ok(SeqSer::<NOTING>::begin(value, len, NONE));
+    ) -> Result<SeqSer<'w, 's, NOTING>, Fault> {
+        if let Some(element) = repeated(value.field) {
+            return Ok(SeqSer::<NOTING>::begin(value, element, len, NONE));
         }
         let wrapper = value.open_wrapper("a sequence")?;
         let start = wrapper.start;
         let inner = wrapper.inner();
-        if inner.expect() != Card::Repeated {
+        let Some(element) = repeated(inner.field) else {
             return inner.mismatch("a sequence");
-        }
-        Ok(SeqSer::<NOTING>::begin(inner, len, start))
+        };
+        Ok(SeqSer::<NOTING>::begin(inner, element, len, start))
     }
 
     #[inline(always)]
     fn begin(
-        value: ValueSer<'a, NOTING>,
+        value: ValueSer<'w, 's, NOTING>,
+        element: &'s Field,
         len: Option<usize>,
         wrapper: usize,
-    ) -> SeqSer<'a, NOTING> {
-        let ValueSer {
-            flat,
-            out,
-            field,
-            depth,
-            ..
-        } = value;
+    ) -> SeqSer<'w, 's, NOTING> {
+        let ValueSer { to, field } = value;
+        let (out, depth) = (&mut *to.out, to.depth);
         let (mut packed, mut kept, mut least) = (NONE, 0, 0);
         if field.packed {
             // Elements take at least their width, or one byte: a good guess of the length's size
@@ -248,18 +249,10 @@ impl<'a, const NOTING: bool> SeqSer<'a, NOTING> {
             packed = out.len();
             kept = packed - before;
         }
-        let position = if field.packed {
-            Position::Packed
-        } else {
-            Position::Tagged
-        };
-        let kind = field.kind;
         SeqSer {
-            flat,
-            out,
+            to,
             field,
-            kind,
-            position,
+            element,
             packed,
             kept,
             least,
@@ -270,35 +263,32 @@ impl<'a, const NOTING: bool> SeqSer<'a, NOTING> {
 
     #[inline(always)]
     fn element<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
-        value.serialize(ValueSer::<NOTING> {
-            flat: self.flat,
-            out: self.out,
-            field: self.field,
-            first: self.kind,
-            position: self.position,
-            depth: self.depth,
-        })
+        value.serialize(ValueSer::<NOTING>::inside(
+            self.to,
+            self.element,
+            self.depth,
+        ))
     }
 
     #[inline(always)]
     fn close(self) -> Result<(), Fault> {
         if self.packed != NONE {
-            let len = self.out.len() - self.packed;
+            let out = &mut *self.to.out;
+            let len = out.len() - self.packed;
             if len == 0 {
-                self.out
-                    .truncate(self.packed - self.kept - self.field.tag.len());
+                out.truncate(self.packed - self.kept - self.field.tag.len());
             } else if len < 0x80 && self.kept == 1 {
-                self.out[self.packed - 1] = len as u8;
+                out[self.packed - 1] = len as u8;
             } else if self.least != len {
-                widen(self.out, self.packed, self.kept, len);
+                widen(out, self.packed, self.kept, len);
             }
         }
-        finish(self.out, self.wrapper);
+        finish(self.to.out, self.wrapper);
         Ok(())
     }
 }
 
-impl<const NOTING: bool> ser::SerializeSeq for SeqSer<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeSeq for SeqSer<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -314,12 +304,12 @@ impl<const NOTING: bool> ser::SerializeSeq for SeqSer<'_, NOTING> {
 }
 
 /// A tuple: repeated where all its elements have one type, a message otherwise.
-pub(super) enum TupleSer<'a, const NOTING: bool> {
-    Alike(SeqSer<'a, NOTING>),
-    Mixed(Compound<'a, NOTING>),
+pub(super) enum TupleSer<'w, 's, const NOTING: bool> {
+    Alike(SeqSer<'w, 's, NOTING>),
+    Mixed(Compound<'w, 's, NOTING>),
 }
 
-impl<const NOTING: bool> ser::SerializeTuple for TupleSer<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeTuple for TupleSer<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
@@ -350,11 +340,10 @@ struct EntrySpan {
 }
 
 /// A map whose entries are being written.
-pub(super) struct MapSer<'a, const NOTING: bool> {
-    flat: &'a FlatSchema,
-    out: &'a mut Vec<u8>,
-    field: &'a Field,
-    entry: &'a Message,
+pub(super) struct MapSer<'w, 's, const NOTING: bool> {
+    to: &'w mut Writer<'s>,
+    field: &'s Field,
+    entry: &'s Message,
     /// Where the entries are, to sort them by encoded key at the end.
     spans: Vec<EntrySpan>,
     /// Where the open entry begins: at its tag, and at its key.
@@ -365,9 +354,9 @@ pub(super) struct MapSer<'a, const NOTING: bool> {
     depth: u32,
 }
 
-impl<'a, const NOTING: bool> MapSer<'a, NOTING> {
+impl<'w, 's, const NOTING: bool> MapSer<'w, 's, NOTING> {
     #[inline(always)]
-    pub(super) fn open(value: ValueSer<'a, NOTING>) -> Result<MapSer<'a, NOTING>, Fault> {
+    pub(super) fn open(value: ValueSer<'w, 's, NOTING>) -> Result<MapSer<'w, 's, NOTING>, Fault> {
         let (value, wrapper) = if value.expect() == Card::Map {
             (value, NONE)
         } else {
@@ -381,18 +370,11 @@ impl<'a, const NOTING: bool> MapSer<'a, NOTING> {
         if value.expect() != Card::Map {
             return value.mismatch("a map");
         }
-        let ValueSer {
-            flat,
-            out,
-            field,
-            depth,
-            ..
-        } = value;
-        let entry = &flat.messages[entry];
+        let ValueSer { to, field } = value;
+        let (entry, depth) = (&to.flat.messages[entry], to.depth);
         let (spans, tag, key, key_end) = (Vec::new(), NONE, NONE, NONE);
         Ok(MapSer {
-            flat,
-            out,
+            to,
             field,
             entry,
             spans,
@@ -405,7 +387,7 @@ impl<'a, const NOTING: bool> MapSer<'a, NOTING> {
     }
 
     fn sort(&mut self) {
-        let out = &*self.out;
+        let out = &*self.to.out;
         let key = |span: &EntrySpan| &out[span.key..span.key_end];
         if self.spans.is_sorted_by(|a, b| key(a) <= key(b)) {
             return;
@@ -416,46 +398,36 @@ impl<'a, const NOTING: bool> MapSer<'a, NOTING> {
         for span in &self.spans {
             sorted.extend_from_slice(&out[span.tag..span.end]);
         }
-        self.out[begin..].copy_from_slice(&sorted);
+        self.to.out[begin..].copy_from_slice(&sorted);
     }
 }
 
-impl<const NOTING: bool> ser::SerializeMap for MapSer<'_, NOTING> {
+impl<const NOTING: bool> ser::SerializeMap for MapSer<'_, '_, NOTING> {
     type Ok = ();
     type Error = Fault;
 
     #[inline(always)]
     fn serialize_key<T: ?Sized + Serialize>(&mut self, key: &T) -> Result<(), Fault> {
-        self.tag = self.out.len();
-        self.key = begin(self.out, self.field.tag);
+        self.tag = self.to.out.len();
+        self.key = begin(self.to.out, self.field.tag);
         let field = &self.entry.fields[0];
-        key.serialize(ValueSer::<NOTING>::inside(
-            self.flat,
-            self.out,
-            field,
-            self.depth + 1,
-        ))?;
-        self.key_end = self.out.len();
+        key.serialize(ValueSer::<NOTING>::inside(self.to, field, self.depth + 1))?;
+        self.key_end = self.to.out.len();
         Ok(())
     }
 
     #[inline(always)]
     fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         let field = &self.entry.fields[1];
-        value.serialize(ValueSer::<NOTING>::inside(
-            self.flat,
-            self.out,
-            field,
-            self.depth + 1,
-        ))?;
-        let before = self.out.len();
-        finish(self.out, self.key);
-        let moved = self.out.len() - before;
+        value.serialize(ValueSer::<NOTING>::inside(self.to, field, self.depth + 1))?;
+        let before = self.to.out.len();
+        finish(self.to.out, self.key);
+        let moved = self.to.out.len() - before;
         self.spans.push(EntrySpan {
             tag: self.tag,
             key: self.key + moved,
             key_end: self.key_end + moved,
-            end: self.out.len(),
+            end: self.to.out.len(),
         });
         Ok(())
     }
@@ -463,7 +435,7 @@ impl<const NOTING: bool> ser::SerializeMap for MapSer<'_, NOTING> {
     #[inline(always)]
     fn end(mut self) -> Result<(), Fault> {
         self.sort();
-        finish(self.out, self.wrapper);
+        finish(self.to.out, self.wrapper);
         Ok(())
     }
 }

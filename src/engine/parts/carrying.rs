@@ -6,14 +6,13 @@ use std::cell::Cell;
 use std::num::NonZeroU64;
 
 use super::{Effect, Parts};
-use crate::carrier::{Carriage, Parcel, Verdict, Verdicts};
+use crate::carrier::{Carriage, Parcel, Verdict};
 use crate::engine::{CellState, Class, Head, Parked, Pending, Sealed, Side};
 use crate::fault::FaultCause;
 use crate::ids::{EntityId, KindIndex};
 use crate::key::EventKey;
 use crate::queue::Entry;
 use crate::time::{SimDuration, SimTime};
-use crate::topology::Kind;
 
 impl Parts {
     /// Lets `link` decide the fate of a message, now; `held` if it held it before. Returns what the
@@ -26,45 +25,64 @@ impl Parts {
         held: Option<Side>,
     ) -> f64 {
         self.carrying = Some(link);
-        let topology = self.topology.clone();
-        let Some(kind) = head.kind.map(|kind| topology.kind(kind)) else {
+        let Parts {
+            topology, links, ..
+        } = self;
+        let Some(kind) = head.kind() else {
             return 0.0;
         };
+        let local = topology.place(link).local as usize;
         let parcel = Parcel {
-            topology: &topology,
+            topology,
             now: self.key.time,
             sent: head.sent(self.key),
             link,
             sender: head.sender,
             receiver: head.receiver,
-            kind,
+            kind: topology.kind(kind),
             ordinal: head.ordinal,
-            repeat: head.repeat,
-            copy: head.copy,
+            repeat: head.repeat(),
+            copy: head.copy(),
             token: held.map(|held| held.token),
-            match_key: head.match_key,
+            match_key: head.match_key(),
             letter: &*letter.0,
             size: Cell::new(None),
         };
-        let mut verdicts = std::mem::take(&mut self.verdicts);
-        let cell = &mut self.links[topology.place(link).local as usize];
+        let cell = &mut links[local];
         if let Some(held) = held.filter(|held| held.parked) {
             cell.parked.remove(&held.token);
         }
-        cell.carrier.carry(&parcel, &mut verdicts);
+        cell.carrier.carry(&parcel, &mut self.verdicts);
         let mut count = cell.count;
-        self.execute(link, &mut count, head, letter, kind, &verdicts);
-        for (token, delay) in verdicts.wakes.drain(..) {
+        self.execute(link, &mut count, head, letter);
+        for at in 0..self.verdicts.wakes.len() {
+            let (token, delay) = self.verdicts.wakes[at];
             self.wake(link, &mut count, token, delay);
         }
-        self.links[topology.place(link).local as usize].count = count;
-        let charge_j = std::mem::take(&mut verdicts.charge_j);
-        let charge_receiver_j = std::mem::take(&mut verdicts.charge_receiver_j);
-        verdicts.list.clear();
-        self.verdicts = verdicts;
+        self.verdicts.wakes.clear();
+        self.links[local].count = count;
+        let charge_j = std::mem::take(&mut self.verdicts.charge_j);
+        let charge_receiver_j = std::mem::take(&mut self.verdicts.charge_receiver_j);
+        self.verdicts.list.clear();
         if self.fault.is_none() {
             self.carrying = None;
         }
+        if charge_j == 0.0 && charge_receiver_j == 0.0 {
+            return 0.0;
+        }
+        self.charge(link, &head, held.is_some(), charge_j, charge_receiver_j)
+    }
+
+    /// Charges what a link asks for; returns what the sender is charged at once, in joules.
+    #[inline(never)]
+    fn charge(
+        &mut self,
+        link: EntityId,
+        head: &Head,
+        held: bool,
+        charge_j: f64,
+        charge_receiver_j: f64,
+    ) -> f64 {
         if charge_receiver_j != 0.0 {
             let charge = Carriage {
                 receive_j: charge_receiver_j,
@@ -74,7 +92,7 @@ impl Parts {
         }
         // Only while its sender is at hand can a message's cost be charged at once, and whether it
         // is must not hang on how hosts are dealt to engines.
-        if charge_j == 0.0 || held.is_none() && !self.is_shared(link) {
+        if charge_j == 0.0 || !held && !self.topology.links.is_shared(link) {
             return charge_j;
         }
         let charge = Carriage {
@@ -102,13 +120,8 @@ impl Parts {
                 parked.slot
             }
             Some(_) => {
-                let Pending {
-                    class,
-                    head,
-                    letter,
-                    side,
-                } = self.store.take_ahead(parked.slot);
-                let slot = self.insert(key, class, head, letter);
+                let (head, letter, side) = self.store.take_ahead(parked.slot);
+                let slot = self.insert(key, head, letter);
                 self.store.set_side(slot, side.unwrap_or_default());
                 slot
             }
@@ -128,11 +141,9 @@ impl Parts {
         latest: Option<SimDuration>,
         (head, letter, side): (Head, Sealed, Side),
     ) {
-        let head = Head {
-            has_side: true,
-            ..head
-        };
-        let slot = self.store.insert(Class::Held, head, Some(letter));
+        let mut head = head;
+        (head.class, head.has_side) = (Class::Held, true);
+        let slot = self.store.insert(head, Some(letter));
         self.store.set_side(slot, side);
         if let Some(after) = latest {
             let key = self.later_key(link, count, after);
@@ -147,30 +158,21 @@ impl Parts {
         );
     }
 
-    fn is_shared(&self, link: EntityId) -> bool {
-        self.topology
-            .links
-            .get(&link)
-            .is_some_and(|link| link.shared)
-    }
-
     fn charge_later(&mut self, link: EntityId, whom: EntityId, charge: Carriage) {
-        let topology = self.topology.clone();
-        let min_delay = topology.links.get(&link).map(|link| link.min_delay);
-        let cell = &mut self.links[topology.place(link).local as usize];
-        let mut count = cell.count;
+        let min_delay = self.topology.links.get(link).map(|link| link.min_delay);
+        let local = self.topology.place(link).local as usize;
+        let mut count = self.links[local].count;
         let key = self.later_key(link, &mut count, min_delay.unwrap_or(SimDuration::ZERO));
-        self.links[topology.place(link).local as usize].count = count;
+        self.links[local].count = count;
         let pending = Pending {
-            class: Class::Charge,
-            head: Head::of_entity(whom),
+            head: Head::of_entity(Class::Charge, whom),
             letter: None,
             side: Some(Side {
                 carriage: Some(charge),
                 ..Side::default()
             }),
         };
-        self.schedule_with(topology.place(whom).engine, key, pending);
+        self.schedule_with(self.topology.place(whom).engine, key, pending);
     }
 
     /// Asks for a change of a link on behalf of an actor.
@@ -185,7 +187,7 @@ impl Parts {
         if self.fault.is_some() {
             return;
         }
-        if mine.host != its.host && !self.is_shared(link) {
+        if mine.host != its.host && !self.topology.links.is_shared(link) {
             return self.raise(FaultCause::NoRoute {
                 from: self.topology.host_name(me).to_owned(),
                 to: self.topology.host_name(link).to_owned(),
@@ -193,17 +195,13 @@ impl Parts {
                 kind: "a change".to_owned(),
             });
         }
-        let kind = self.topology.links.get(&link).map(|link| link.change_kind);
-        let flow = state.next_in_flow(link.0, kind.unwrap_or(KindIndex::MAX), None);
-        let head = Head {
-            receiver: link,
-            kind,
-            ordinal: flow.0,
-            cause: Some(self.key),
-            ..Head::of_entity(me)
-        };
+        let kind = self.topology.links.get(link).map(|link| link.change_kind);
+        let flow = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX), None);
+        let mut head = Head::of_entity(Class::Tell, me);
+        head.receiver = link;
+        let head = head.caused(self.key, KindIndex::MAX, flow.0).of_kind(kind);
         let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
-        self.schedule(its.engine, key, Class::Tell, head, Some(letter));
+        self.schedule(its.engine, key, head, Some(letter));
     }
 
     /// Gives a link a change.
@@ -213,44 +211,53 @@ impl Parts {
     }
 
     /// Turns a link's verdicts into events, the last copy with the letter itself.
-    fn execute(
+    #[inline(always)]
+    fn execute(&mut self, link: EntityId, count: &mut u64, mut head: Head, letter: Sealed) {
+        // Of the messages that a link decides about, only those that it held have a side.
+        let held = head.has_side;
+        // Only a hand-over is an event of its own between the cause and this, unless it was held.
+        let handed_over = head.cause().filter(|cause| *cause != self.key && !held);
+        head.handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
+        let scheduled_by = held.then_some(self.key);
+        let [verdict] = self.verdicts.list[..] else {
+            return self.execute_all(link, count, head, letter, scheduled_by);
+        };
+        if let Err(cause) = self.obey(link, count, verdict, (head, letter), scheduled_by) {
+            self.raise(*cause);
+        }
+    }
+
+    /// As [`Parts::execute`], for any number of verdicts.
+    #[inline(never)]
+    fn execute_all(
         &mut self,
         link: EntityId,
         count: &mut u64,
         head: Head,
         letter: Sealed,
-        kind: &Kind,
-        verdicts: &Verdicts,
+        scheduled_by: Option<EventKey>,
     ) {
+        let copies = self.verdicts.list.len();
         let mut letter = Some(letter);
-        // Of the messages that a link decides about, only those that it held have a side.
-        let held = head.has_side;
-        // Only a hand-over is an event of its own between the cause and this, unless it was held.
-        let handed_over = head.cause.filter(|cause| *cause != self.key && !held);
-        let handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
-        let scheduled_by = held.then_some(self.key);
-        for (copy, verdict) in verdicts.list.iter().enumerate() {
-            let last = copy + 1 == verdicts.list.len();
-            let Some(own) = (if last {
+        for copy in 0..copies {
+            let Some(own) = (if copy + 1 == copies {
                 letter.take()
             } else {
-                self.copy_of(letter.as_ref(), kind)
+                self.copy_of(letter.as_ref(), &head)
             }) else {
                 return;
             };
-            let head = Head {
-                copy: head.copy + copy as u32,
-                handed_over,
-                ..head
-            };
-            if let Err(cause) = self.obey(link, count, *verdict, (head, own, kind), scheduled_by) {
-                return self.raise(cause);
+            let verdict = self.verdicts.list[copy];
+            let head = head.as_copy(head.copy() + copy as u32);
+            if let Err(cause) = self.obey(link, count, verdict, (head, own), scheduled_by) {
+                return self.raise(*cause);
             }
         }
-        if verdicts.list.is_empty() {
+        if copies == 0 {
+            let kind = head.kind().map(|kind| self.topology.kind(kind).name());
             self.raise(FaultCause::NoFate {
                 link: self.topology.name(link).to_owned(),
-                kind: kind.name().to_owned(),
+                kind: kind.unwrap_or_default().to_owned(),
                 sender: self.topology.name(head.sender).to_owned(),
             });
         }
@@ -263,9 +270,24 @@ impl Parts {
         link: EntityId,
         count: &mut u64,
         verdict: Verdict,
-        (mut head, letter, kind): (Head, Sealed, &Kind),
+        (mut head, letter): (Head, Sealed),
         scheduled_by: Option<EventKey>,
-    ) -> Result<(), FaultCause> {
+    ) -> Result<(), Box<FaultCause>> {
+        if let (
+            Verdict::Deliver {
+                after,
+                carriage: None,
+            },
+            None,
+        ) = (verdict, scheduled_by)
+        {
+            self.check_delay(link, after)?;
+            let engine = self.topology.place(head.receiver).engine;
+            let key = self.later_key(link, count, after);
+            (head.class, head.has_side) = (Class::Message, false);
+            self.schedule(engine, key, head, Some(letter));
+            return Ok(());
+        }
         let side = |carriage: Option<Carriage>| {
             (carriage.is_some() || scheduled_by.is_some()).then_some(Side {
                 carriage,
@@ -292,7 +314,7 @@ impl Parts {
                 token,
                 copy,
             } => {
-                head.copy = copy.unwrap_or(head.copy);
+                head = head.as_copy(copy.unwrap_or(head.copy()));
                 let side = Side {
                     scheduled_by,
                     token,
@@ -309,15 +331,15 @@ impl Parts {
             } => {
                 head.reason = self.topology.intern(reason);
                 if after.is_zero() {
-                    self.lose(head, &letter, kind, side(carriage));
+                    self.lose(head, &letter, side(carriage));
                     return Ok(());
                 }
                 (Class::LateLoss, self.index, after, side(carriage))
             }
         };
         let key = self.later_key(link, count, after);
+        head.class = class;
         let pending = Pending {
-            class,
             head,
             letter: Some(letter),
             side,
@@ -327,8 +349,9 @@ impl Parts {
     }
 
     /// A further copy of a message, through its encoding.
-    fn copy_of(&mut self, letter: Option<&Sealed>, kind: &Kind) -> Option<Sealed> {
+    fn copy_of(&mut self, letter: Option<&Sealed>, head: &Head) -> Option<Sealed> {
         let letter = letter?;
+        let kind = self.topology.kind(head.kind()?);
         let mut bytes = Vec::new();
         let encoded = letter
             .0
@@ -343,40 +366,50 @@ impl Parts {
         match copy {
             Ok(copy) => Some(copy),
             Err(error) => {
-                self.raise(FaultCause::Encoding {
-                    kind: kind.name().to_owned(),
-                    error,
-                });
+                let kind = kind.name().to_owned();
+                self.raise(FaultCause::Encoding { kind, error });
                 None
             }
         }
     }
 
-    fn check_delay(&self, link: EntityId, actual: SimDuration) -> Result<(), FaultCause> {
+    #[inline(always)]
+    fn check_delay(&self, link: EntityId, actual: SimDuration) -> Result<(), Box<FaultCause>> {
         let declared = self
             .topology
             .links
-            .get(&link)
+            .get(link)
             .map_or(SimDuration::ZERO, |link| link.min_delay);
         if actual >= declared || !self.topology.check_min_delay {
             return Ok(());
         }
+        self.undercut(link, declared, actual)
+    }
+
+    #[cold]
+    fn undercut(
+        &self,
+        link: EntityId,
+        declared: SimDuration,
+        actual: SimDuration,
+    ) -> Result<(), Box<FaultCause>> {
         // A delay that would pass the clock's end stops there. Nothing happens at that instant, so
         // nobody hears of it too soon.
         if self.key.time + actual == SimTime::MAX {
             return Ok(());
         }
         let link = self.topology.name(link).to_owned();
-        Err(FaultCause::UndercutsMinDelay {
+        Err(Box::new(FaultCause::UndercutsMinDelay {
             link,
             declared,
             actual,
-        })
+        }))
     }
 
-    fn lose(&mut self, head: Head, letter: &Sealed, kind: &Kind, side: Option<Side>) {
+    fn lose(&mut self, head: Head, letter: &Sealed, side: Option<Side>) {
         let start = self.effect_bytes.len();
-        if self.topology.recording()
+        if self.recording
+            && let Some(kind) = head.kind().map(|kind| self.topology.kind(kind))
             && let Err(error) = letter.0.encode(kind.schema(), &mut self.effect_bytes)
         {
             let (kind, error) = (kind.name().to_owned(), error.to_string());

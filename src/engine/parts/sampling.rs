@@ -9,9 +9,9 @@ use std::any::TypeId;
 use std::sync::Arc;
 
 use super::{Effect, Parts, Sink};
-use crate::engine::{Head, hash_if_wanted};
+use crate::engine::{Class, Happened, Head};
 use crate::fault::{Fault, FaultCause};
-use crate::ids::EntityId;
+use crate::ids::{EntityId, KindIndex};
 use crate::key::EventKey;
 use crate::payload::Message;
 use crate::record::RecordClass;
@@ -153,22 +153,31 @@ impl Parts {
         for effect in self.effects.drain(..) {
             match effect {
                 Effect::Lost { head, body, side } => {
-                    let body = &self.effect_bytes[body];
-                    let side = side.as_deref();
-                    let record =
-                        head.record(&self.topology, RecordClass::Lost, self.key, body, side);
-                    sink.commit(&record, hash_if_wanted(&self.topology, &record));
+                    let (class, body) = (RecordClass::Lost, &self.effect_bytes[body]);
+                    sink.commit(&Happened {
+                        class,
+                        key: self.key,
+                        head: &head,
+                        side: side.as_deref(),
+                        sample: None,
+                        body,
+                        sends: 0,
+                        hash: head.hash_if_wanted(&self.topology, class, self.key, body),
+                    });
                 }
                 Effect::Sample { entity, kind, body } => {
-                    let head = Head {
-                        cause: Some(self.key),
-                        ..Head::of_entity(entity)
-                    };
-                    let body = &self.effect_bytes[body];
-                    let class = RecordClass::Sample;
-                    let mut record = head.record(&self.topology, class, self.key, body, None);
-                    record.kind = Some(&kind);
-                    sink.commit(&record, 0);
+                    let head = Head::of_entity(Class::Message, entity);
+                    let head = head.caused(self.key, KindIndex::MAX, 0);
+                    sink.commit(&Happened {
+                        class: RecordClass::Sample,
+                        key: self.key,
+                        head: &head,
+                        side: None,
+                        sample: Some(&kind),
+                        body: &self.effect_bytes[body],
+                        sends: 0,
+                        hash: 0,
+                    });
                 }
                 Effect::FirstSample(mut sample) => {
                     sample.message = event.message(&self.topology);

@@ -2,6 +2,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+// Real time decides here who runs an engine, and nothing of what the engine does.
+#[expect(clippy::disallowed_types)]
+use std::time::{Duration, Instant};
 
 use crate::commit::Batch;
 use crate::engine::{Action, Engine, Outgoing};
@@ -16,6 +19,8 @@ pub(super) struct Seat {
     pub(super) batch: Batch,
     pub(super) fault: Option<Box<Fault>>,
     pub(super) stops: Vec<(EventKey, EntityId, String)>,
+    /// How long it takes for a window, as the last few have shown.
+    pub(super) expected: Duration,
 }
 
 impl Seat {
@@ -26,6 +31,7 @@ impl Seat {
             batch: Batch::default(),
             fault: None,
             stops: Vec::new(),
+            expected: Duration::ZERO,
         }
     }
 
@@ -39,7 +45,9 @@ impl Seat {
     }
 
     /// Goes on until `bound`.
+    #[expect(clippy::disallowed_types)]
     fn run(&mut self, bound: Bound) {
+        let begin = Instant::now();
         for Outgoing { key, pending, .. } in self.inbox.drain(..) {
             self.engine.parts.insert_pending(key, pending);
         }
@@ -52,6 +60,8 @@ impl Seat {
             }
         };
         self.fault = result.err();
+        // Windows in which much is done and windows in which little is often take turns.
+        self.expected = (3 * self.expected + begin.elapsed()) / 4;
     }
 
     /// Applies a control event.
@@ -84,13 +94,19 @@ impl Seats {
         self.0[at].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Hands what the engine at `at` sent to other engines over to them.
-    pub(super) fn hand_out(&self, at: usize) {
+    /// Hands what the engine at `at` sent to other engines over to them, and notes in `next` when
+    /// they and it have something to do.
+    pub(super) fn hand_out(&self, at: usize, next: &mut [Option<Bound>]) {
         let mut outgoing = std::mem::take(&mut self.take(at).engine.parts.outgoing);
         for event in outgoing.drain(..) {
-            self.take(event.engine as usize).inbox.push(event);
+            let (time, step) = (event.key.time, event.key.step);
+            let (to, arrival) = (event.engine as usize, Bound { time, step });
+            next[to] = Some(next[to].map_or(arrival, |known| known.min(arrival)));
+            self.take(to).inbox.push(event);
         }
-        self.take(at).engine.parts.outgoing = outgoing;
+        let mut seat = self.take(at);
+        seat.engine.parts.outgoing = outgoing;
+        next[at] = seat.peek();
     }
 }
 

@@ -1,6 +1,7 @@
 //! Windows: which engines may run up to where, and how what they did becomes one order.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use kameo::actor::{ActorRef, Spawn};
 
@@ -17,10 +18,17 @@ use crate::schedule::{Due, Schedule};
 use crate::time::SimDuration;
 use crate::topology::Topology;
 
+/// A thread that sleeps is woken for so much work, or not at all: waking it takes a few
+/// microseconds, and so does waiting for what it did.
+const WORTH_A_THREAD: Duration = Duration::from_micros(25);
+
 /// Leads the engines of one run from window to window.
 pub(super) struct Coordinator {
     topology: Arc<Topology>,
     seats: Seats,
+    /// By seat, time and step of the first event that it would handle. Windows look at no engine
+    /// that has none in them.
+    next: Vec<Option<Bound>>,
     helpers: Vec<ActorRef<Helper>>,
     /// The engine of shared links, which runs after the others in each window.
     shared: Option<usize>,
@@ -41,12 +49,15 @@ impl Coordinator {
         threads: usize,
     ) -> Self {
         let shared = topology.links.iter().find(|(_, link)| link.shared);
-        let shared = shared.map(|(link, _)| topology.place(*link).engine as usize);
+        let shared = shared.map(|(link, _)| topology.place(link).engine as usize);
         let look_ahead = topology.info.look_ahead;
         let helpers = (0..threads).map(|_| Helper::spawn(Helper)).collect();
+        let seats = Seats::new(engines);
+        let next = (0..seats.len()).map(|at| seats.take(at).peek()).collect();
         Coordinator {
             topology,
-            seats: Seats::new(engines),
+            seats,
+            next,
             helpers,
             shared,
             schedule,
@@ -81,8 +92,7 @@ impl Coordinator {
         if let Some(end) = self.committer.verdict() {
             return Some(Ending::early(end, self.committer.last().time));
         }
-        let seats = 0..self.seats.len();
-        let earliest = seats.filter_map(|at| self.seats.take(at).peek()).min();
+        let earliest = self.next.iter().flatten().min().copied();
         let limit = self.schedule.bound();
         match earliest {
             Some(earliest) if earliest < limit => {
@@ -128,14 +138,18 @@ impl Coordinator {
         engines: impl Iterator<Item = usize>,
         bound: Bound,
     ) -> Vec<usize> {
-        let is_due = |at: &usize| self.seats.take(*at).peek().is_some_and(|next| next < bound);
+        let is_due = |at: &usize| self.next[*at].is_some_and(|next| next < bound);
         let due: Vec<usize> = engines.filter(is_due).collect();
+        if due.is_empty() {
+            return due;
+        }
+        let threads = self.threads_worth_waking(&due);
         let round = Arc::new(Round::new(self.seats.clone(), due, bound));
-        if round.due.len() > 1 {
+        if threads > 1 {
             // The leader takes no share itself: tokio starts the last actor that it asks on its own
             // thread, and only once it waits.
             let mut asked = Vec::with_capacity(self.helpers.len());
-            for helper in self.helpers.iter().take(round.due.len()) {
+            for helper in self.helpers.iter().take(threads) {
                 let answer = helper.ask(Share(round.clone())).enqueue().await;
                 asked.push(answer.unwrap_or_else(|error| lost_worker(&error)));
             }
@@ -146,9 +160,21 @@ impl Coordinator {
             round.share();
         }
         for at in &round.due {
-            self.seats.hand_out(*at);
+            self.seats.hand_out(*at, &mut self.next);
         }
         round.due.clone()
+    }
+
+    /// How many threads are to share the work of these engines.
+    fn threads_worth_waking(&self, due: &[usize]) -> usize {
+        let most = due.len().min(self.helpers.len());
+        // Tests have little work, and are to see threads.
+        if most < 2 || cfg!(debug_assertions) {
+            return most;
+        }
+        let expected: Duration = due.iter().map(|at| self.seats.take(*at).expected).sum();
+        let worth_it = (expected.as_nanos() / WORTH_A_THREAD.as_nanos()) as usize;
+        worth_it.min(most)
     }
 
     fn apply(
@@ -160,7 +186,7 @@ impl Coordinator {
     ) -> Option<Ending> {
         let at = self.topology.place(entity).engine as usize;
         self.seats.take(at).control(key, entity, action);
-        self.seats.hand_out(at);
+        self.seats.hand_out(at, &mut self.next);
         self.settle(&[at], undone)
     }
 

@@ -1,0 +1,306 @@
+//! What an event costs, counted: allocations, instructions, misses of the first cache and of the
+//! last. Counts do not depend on what else the machine does, so that a loss is seen.
+//!
+//! `cargo bench -p farside --bench events` prints a table: sizes from 16 actors to 100,000, each on
+//! one host, with the digest, and on hosts of their own joined by links. Instructions and misses are
+//! counted by valgrind, which runs this program again; where it is not installed, the table has
+//! allocations only, and a line says so.
+//!
+//! The model is PHOLD, the hold model: each event sends a message of 24 bytes to a random actor,
+//! which arrives after a look-ahead plus an exponential delay. Each figure is the difference of two
+//! runs, one longer than the other, so that the start is in none.
+
+use std::process::{Command, ExitCode};
+use std::sync::{Arc, OnceLock};
+
+use farside::carrier::NoChange;
+use farside::prelude::*;
+use farside::random::Stream;
+use farside::{Carrier, Parcel, Verdicts};
+use serde::{Deserialize, Serialize};
+
+/// The look-ahead: no event is scheduled sooner \[ns\].
+const LOOK_AHEAD_NS: u64 = 100_000_000;
+/// The mean of the exponential part \[ns\].
+const MEAN_NS: f64 = 900_000_000.0;
+
+/// The caches that valgrind imagines: size in bytes, ways, bytes of a line. Fixed, so that figures
+/// of two machines can be compared.
+const CACHES: [&str; 3] = ["--I1=32768,8,64", "--D1=32768,8,64", "--LL=33554432,16,64"];
+
+/// A job that passes from actor to actor: 24 bytes.
+#[derive(Serialize, Deserialize)]
+struct Job {
+    id: u64,
+    hops: u64,
+    payload: u64,
+}
+
+/// What all actors know.
+type Others = Arc<OnceLock<Vec<Address<Holder>>>>;
+
+struct Holder {
+    at: u32,
+    others: Others,
+    size: Size,
+    by_link: bool,
+}
+
+impl Actor for Holder {
+    type Accepts = (Job,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for id in 0..u64::from(self.size.population) {
+            self.pass(
+                Job {
+                    id,
+                    hops: 0,
+                    payload: 0,
+                },
+                ctx,
+            );
+        }
+        Ok(())
+    }
+}
+
+impl Holder {
+    fn pass(&mut self, job: Job, ctx: &mut Context<'_, Self>) {
+        let stream = ctx.random("hold");
+        let others = self.others.get().expect("set before the run");
+        let at = stream.below(others.len() as u64) as usize;
+        if self.by_link && at != self.at as usize {
+            ctx.send(others[at], job);
+        } else {
+            let delay = delay(stream);
+            ctx.send_after(others[at], delay, job);
+        }
+    }
+}
+
+impl Handler<Job> for Holder {
+    fn handle(&mut self, job: Job, ctx: &mut Context<'_, Self>) -> Outcome {
+        let hops = job.hops + 1;
+        self.pass(Job { hops, ..job }, ctx);
+        Ok(())
+    }
+}
+
+fn delay(stream: &mut Stream) -> SimDuration {
+    SimDuration::from_nanos(LOOK_AHEAD_NS + stream.exponential(MEAN_NS) as u64)
+}
+
+/// A link that delays by the look-ahead plus an exponential time.
+struct Hold;
+
+impl Carrier for Hold {
+    type Change = NoChange;
+
+    fn min_delay(&self) -> SimDuration {
+        SimDuration::from_nanos(LOOK_AHEAD_NS)
+    }
+
+    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        verdicts.deliver(delay(&mut parcel.random(0, 0, 0).stream()));
+    }
+
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+}
+
+/// What is done with events.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    /// All actors on one host; no digest.
+    Plain,
+    /// All actors on one host.
+    Digest,
+    /// A host for each actor, joined by links; no digest.
+    Links,
+}
+
+const MODES: [(&str, Mode); 3] = [
+    ("plain", Mode::Plain),
+    ("digest", Mode::Digest),
+    ("links", Mode::Links),
+];
+
+#[derive(Clone, Copy)]
+struct Size {
+    actors: u32,
+    /// Events on their way for each actor, all the time.
+    population: u32,
+    /// How many events the shorter run has, and how many more the longer.
+    events: u64,
+    more: u64,
+}
+
+const fn size(actors: u32, population: u32, events: u64, more: u64) -> Size {
+    Size {
+        actors,
+        population,
+        events,
+        more,
+    }
+}
+
+const SIZES: [Size; 5] = [
+    size(16, 1, 50_000, 100_000),
+    size(128, 4, 50_000, 100_000),
+    size(1024, 16, 100_000, 200_000),
+    size(10_000, 4, 100_000, 200_000),
+    size(100_000, 4, 400_000, 400_000),
+];
+
+/// Runs until about so many events were handled; returns how many were.
+fn hold(size: Size, events: u64, mode: Mode) -> u64 {
+    let by_link = mode == Mode::Links;
+    let mut sim = Simulation::new(1);
+    let one_host = sim.host("all");
+    let others = Others::default();
+    let mut addresses = Vec::new();
+    for at in 0..size.actors {
+        let name = format!("holder_{at}");
+        let host = if by_link { sim.host(&name) } else { one_host };
+        let others = others.clone();
+        addresses.push(sim.actor(host, &name, move |_| {
+            let others = others.clone();
+            Holder {
+                at,
+                others,
+                size,
+                by_link,
+            }
+        }));
+        if by_link {
+            sim.uplink(host, &format!("{name}-all"), Hold);
+        }
+    }
+    assert!(others.set(addresses).is_ok(), "set once");
+    if mode != Mode::Digest {
+        sim.without_digest();
+    }
+    // In the mean one event in (look-ahead + mean) for each of the population.
+    let in_flight = f64::from(size.actors) * f64::from(size.population);
+    let until_ns = events as f64 / in_flight * (LOOK_AHEAD_NS as f64 + MEAN_NS);
+    sim.stop_at(SimTime::from_nanos(until_ns as u64), "enough events");
+    sim.run(Executor::Inline)
+        .expect("the model can start")
+        .counts
+        .events
+}
+
+/// How often memory was asked for, in a run of so many events; and how many events it had.
+fn allocations(size: Size, events: u64, mode: Mode) -> (u64, u64) {
+    let mut handled = 0;
+    let counted = allocation_counter::measure(|| handled = hold(size, events, mode));
+    (counted.count_total, handled)
+}
+
+/// What valgrind counts in one run of this program: instructions, misses of the first data cache,
+/// and of the last.
+fn count(name: &str, size: Size, events: u64) -> Result<[u64; 3], String> {
+    let program = std::env::current_exe().map_err(|error| error.to_string())?;
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args([
+        "--tool=cachegrind",
+        "--cache-sim=yes",
+        "--cachegrind-out-file=/dev/null",
+    ]);
+    valgrind.args(CACHES).arg(program);
+    let numbers = [u64::from(size.actors), u64::from(size.population), events];
+    valgrind
+        .args(["run", name])
+        .args(numbers.map(|number| number.to_string()));
+    let done = valgrind
+        .output()
+        .map_err(|error| format!("valgrind: {error}"))?;
+    let said = String::from_utf8_lossy(&done.stderr);
+    let of = |label: &str| {
+        let squeezed = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+        let line = said.lines().find(|line| squeezed(line).contains(label));
+        let total = line.and_then(|line| line.split(':').nth(1)?.split_whitespace().next());
+        let digits = total.map(|total| total.replace(',', ""));
+        let number = digits.and_then(|digits| digits.parse().ok());
+        number.ok_or_else(|| format!("valgrind did not say `{label}`: {said}"))
+    };
+    Ok([of("I refs:")?, of("D1 misses:")?, of("LLd misses:")?])
+}
+
+/// Counts one size in one mode, and prints its line.
+fn line(size: Size, name: &str, mode: Mode, with_valgrind: bool) -> Result<(), String> {
+    let long = size.events + size.more;
+    let (short_allocations, short_events) = allocations(size, size.events, mode);
+    let (long_allocations, long_events) = allocations(size, long, mode);
+    let events = (long_events - short_events) as f64;
+    let an_event = |more: u64, less: u64| (more as f64 - less as f64) / events;
+    let label = format!("{}x{}", size.actors, size.population);
+    let allocated = an_event(long_allocations, short_allocations);
+    print!("{label:>9} {name:>7} {allocated:12.4}");
+    if with_valgrind {
+        let (short, long) = (count(name, size, size.events)?, count(name, size, long)?);
+        let [instructions, first, last] = [0, 1, 2].map(|at| an_event(long[at], short[at]));
+        print!(" {instructions:13.0} {first:10.2} {last:10.3}");
+    }
+    println!();
+    Ok(())
+}
+
+/// `run MODE ACTORS POPULATION EVENTS`: one run, for valgrind.
+fn run_once(arguments: &[String]) -> Option<()> {
+    let (_, mode) = MODES
+        .iter()
+        .find(|(name, _)| Some(name) == arguments.first().map(|a| a.as_str()).as_ref())?;
+    let mut numbers = arguments[1..]
+        .iter()
+        .map_while(|text| text.parse::<u64>().ok());
+    let (actors, population) = (numbers.next()? as u32, numbers.next()? as u32);
+    let events = numbers.next()?;
+    hold(size(actors, population, events, 0), events, *mode);
+    Some(())
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
+    if arguments.first().is_some_and(|first| first == "run") {
+        return match run_once(&arguments[1..]) {
+            Some(()) => ExitCode::SUCCESS,
+            None => {
+                eprintln!("expected: run plain|digest|links ACTORS POPULATION EVENTS");
+                ExitCode::from(2)
+            }
+        };
+    }
+    let version = Command::new("valgrind").arg("--version").output();
+    let with_valgrind = version.is_ok_and(|version| version.status.success());
+    println!("counts an event; a plain event handles one message and sends one");
+    print!("{:>9} {:>7} {:>12}", "size", "mode", "allocations");
+    if with_valgrind {
+        println!(
+            " {:>13} {:>10} {:>10}",
+            "instructions", "D1 misses", "LL misses"
+        );
+    } else {
+        println!("\n(valgrind is not installed: instructions and misses are not counted)");
+    }
+    for size in SIZES {
+        for (name, mode) in MODES {
+            // An argument picks sizes or modes, as benchmarks' arguments do.
+            let label = format!("{}x{}/{name}", size.actors, size.population);
+            if arguments
+                .iter()
+                .any(|filter| !label.contains(filter.as_str()))
+            {
+                continue;
+            }
+            if let Err(trouble) = line(size, name, mode, with_valgrind) {
+                println!();
+                eprintln!("{trouble}");
+                return ExitCode::FAILURE;
+            }
+        }
+    }
+    ExitCode::SUCCESS
+}
