@@ -7,11 +7,17 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`arena`] | values with ids that a later value in the same place does not answer to |
+//! | [`database`] | tokens on timelines, tied by rules, times and parameters |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
+pub mod database;
 pub mod model;
+pub mod objective;
+pub mod parameters;
+pub mod profile;
+pub mod search;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.
