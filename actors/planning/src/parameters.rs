@@ -29,6 +29,8 @@ mod domain;
 mod entailed;
 mod propagate;
 mod table;
+#[cfg(test)]
+mod tests;
 mod trail;
 
 use std::collections::VecDeque;
@@ -319,6 +321,8 @@ impl<O: Clone> Store<O> {
             // Its other links may have been next.
             link = self.node(variable.index() as u32).first;
         }
+        // It may be on the list of variables to be started anew, and needs not be.
+        self.node_mut(variable.index() as u32).marked = false;
         self.take_out(variable);
         self.start_anew();
         self.settle(mark);

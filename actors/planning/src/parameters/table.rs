@@ -66,6 +66,11 @@ impl Rows {
         self.values.is_empty()
     }
 
+    /// All rows, rising.
+    pub fn rows(&self) -> impl Iterator<Item = &[Value]> {
+        self.values.chunks_exact(self.columns)
+    }
+
     fn row(&self, at: usize) -> &[Value] {
         &self.values[at * self.columns..(at + 1) * self.columns]
     }
@@ -124,15 +129,17 @@ impl<O: Clone> Store<O> {
             if now.value().is_some() {
                 continue;
             }
+            // A variable that is twice in the row may have lost values since.
             let live = self.scratch.live.iter();
-            let value = |&at: &u32| rows.row(at as usize)[column];
+            let live = live.map(|&at| rows.row(at as usize)[column]);
+            let live = live.filter(|&value| now.contains(value));
             let domain = if let Some(bits) = now.bits() {
-                let bit = |at| 1 << value(at).abs_diff(now.min());
+                let bit = |value: Value| 1 << value.abs_diff(now.min());
                 let found = live.map(bit).fold(0, |all: u64, bit: u64| all | bit);
                 (found != bits).then(|| Domain::of_bits(now.min(), found))
             } else {
                 self.scratch.values.clear();
-                self.scratch.values.extend(live.map(value));
+                self.scratch.values.extend(live);
                 self.scratch.values.sort_unstable();
                 self.scratch.values.dedup();
                 let all = self.scratch.values.len() as u64 == now.len() && !now.is_interval();
