@@ -9,6 +9,7 @@
 //! | [`arena`] | values with ids that a later value in the same place does not answer to |
 //! | [`database`] | tokens on timelines, tied by rules, times and parameters |
 //! | [`model`] | what a model and a problem say, with every name resolved |
+//! | [`parameters`] | variables and what ties them together, kept consistent edit by edit |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
