@@ -8,10 +8,12 @@
 //! |---|---|
 //! | [`arena`] | values with ids that a later value in the same place does not answer to |
 //! | [`model`] | what a model and a problem say, with every name resolved |
+//! | [`profile`] | how low and how high the level of a resource can be while times are flexible |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
 pub mod model;
+pub mod profile;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.

@@ -18,6 +18,7 @@
 //! Shortest-Path Problem*, 1996).
 
 mod conflict;
+mod distance;
 mod propagate;
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ mod trail;
 use std::fmt;
 
 pub use conflict::{Conflict, Link};
+pub use distance::Distances;
 
 use crate::Ticks;
 use crate::arena::{Arena, Id};
