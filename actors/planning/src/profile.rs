@@ -121,6 +121,11 @@ impl Use {
         min.max(max)
     }
 
+    /// When it starts, or when it ends, if it does.
+    fn time(&self, is_end: bool) -> Option<Span> {
+        if is_end { self.end } else { Some(self.start) }
+    }
+
     /// The ticks at which it may be in force.
     fn possible(&self) -> Span {
         let last = self.end.map_or(Ticks::MAX, |end| end.max.saturating_sub(1));
@@ -436,8 +441,7 @@ impl<O: Clone> Profile<O> {
         put_interval(&mut self.in_force, place, possible(&old), possible(&new));
         for is_end in [false, true] {
             let open = |one: &Option<Use>| {
-                let one = one.as_ref()?;
-                let span = if is_end { one.end? } else { one.start };
+                let span = one.as_ref()?.time(is_end)?;
                 Some(Span::new(span.min, span.max.saturating_sub(1)))
             };
             let of = 2 * place + u32::from(is_end);

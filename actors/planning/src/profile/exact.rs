@@ -6,6 +6,8 @@
 //! if the distances are those that the temporal network implies. The worst level is that of the
 //! worst set: a closure of most weight.
 
+use std::ops::Range;
+
 use super::flow::Flow;
 use super::steps::{GREATEST, LEAST, Side};
 use super::{Bound, Contributor, Moment, Order, OverUse, Profile};
@@ -42,6 +44,9 @@ pub struct Exact {
     weights: Vec<i64>,
     /// By place: whether it lies before the tick where the level is worst.
     chosen: Vec<bool>,
+    known: Known,
+    /// By the number of a time: its place among those that are open at the present tick.
+    places: Vec<Option<u32>>,
     found: Vec<u32>,
     flow: Flow,
     work: ExactWork,
@@ -68,6 +73,97 @@ struct Open {
     is_end: bool,
 }
 
+impl Open {
+    /// As the profile's tree of open times has it.
+    fn of(number: u32) -> Self {
+        Open {
+            place: number / 2,
+            is_end: number % 2 == 1,
+        }
+    }
+
+    fn number(self) -> u32 {
+        2 * self.place + u32::from(self.is_end)
+    }
+}
+
+/// What is known of the order of times that are open at some ticks: asked once for each.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    /// How often all was forgotten.
+    pass: u64,
+    /// By the number of a time: where in `never_after` its part is, and in which pass it was asked
+    /// for.
+    parts: Vec<(u64, usize, usize)>,
+    /// The numbers of times that lie after one in no schedule.
+    never_after: Vec<u32>,
+    others: Vec<u32>,
+}
+
+impl Known {
+    /// Forgets all.
+    fn begin(&mut self, times: usize) {
+        self.pass += 1;
+        self.never_after.clear();
+        self.parts.resize(times.max(self.parts.len()), (0, 0, 0));
+    }
+
+    /// Where those are that lie after a time in no schedule, and are open at one of the ticks
+    /// at which it is itself, `within` some.
+    fn of<O: Clone>(
+        &mut self,
+        profile: &Profile<O>,
+        one: Open,
+        within: Span,
+        order: &mut impl Order<O>,
+    ) -> Range<usize> {
+        let (pass, mut start, mut end) = self.parts[one.number() as usize];
+        if pass != self.pass {
+            start = self.never_after.len();
+            self.ask(profile, one, within, order);
+            end = self.never_after.len();
+            self.parts[one.number() as usize] = (self.pass, start, end);
+        }
+        start..end
+    }
+
+    fn ask<O: Clone>(
+        &mut self,
+        profile: &Profile<O>,
+        one: Open,
+        within: Span,
+        order: &mut impl Order<O>,
+    ) {
+        let moment = |one: Open| {
+            let of = profile.uses.id_at(one.place as usize);
+            Moment {
+                of: of.expect("the use is there"),
+                owner: &profile.owners[one.place as usize],
+                is_end: one.is_end,
+            }
+        };
+        let used = profile.uses.at(one.place as usize);
+        let span = used.and_then(|used| used.time(one.is_end));
+        let open = span.map(|span| Span::new(span.min, span.max - 1));
+        self.others.clear();
+        if let Some(open) = open {
+            profile
+                .open
+                .overlapping(open.intersect(within), &mut self.others);
+        }
+        // Of a use's own, the start does not lie after the end: that need not be asked.
+        let start = one.is_end.then(|| one.number() - 1);
+        self.others
+            .retain(|other| *other != one.number() && Some(*other) != start);
+        self.never_after.extend(start);
+        let others = self.others.iter().copied().map(Open::of);
+        let moments: Vec<Moment<'_, O>> = others.map(moment).collect();
+        order.never_after(&moments, moment(one), |other| {
+            self.never_after.push(self.others[other]);
+        });
+    }
+}
+
 impl Exact {
     /// Without memory yet.
     pub fn new() -> Self {
@@ -84,7 +180,18 @@ impl Exact {
         tick: Ticks,
         order: &mut impl Order<O>,
     ) -> Span {
-        self.prepare(profile, tick, order);
+        self.begin(profile);
+        self.level_within(profile, tick, Span::exactly(tick), order)
+    }
+
+    fn level_within<O: Clone>(
+        &mut self,
+        profile: &Profile<O>,
+        tick: Ticks,
+        within: Span,
+        order: &mut impl Order<O>,
+    ) -> Span {
+        self.prepare(profile, tick, within, order);
         let [least, greatest] = [LEAST, GREATEST].map(|side| self.extreme(profile, tick, side));
         Span::new(least, greatest)
     }
@@ -95,9 +202,10 @@ impl Exact {
         profile: &Profile<O>,
         order: &mut impl Order<O>,
     ) -> Vec<(Ticks, Span)> {
+        self.begin(profile);
         let ticks = profile.steps.entries().map(|step| step.tick);
         ticks
-            .map(|tick| (tick, self.level(profile, tick, order)))
+            .map(|tick| (tick, self.level_within(profile, tick, Span::ALL, order)))
             .collect()
     }
 
@@ -144,6 +252,13 @@ impl Exact {
         }
     }
 
+    /// Forgets what was known of the order of times, which may be another one now.
+    fn begin<O: Clone>(&mut self, profile: &Profile<O>) {
+        let times = 2 * profile.uses.places();
+        self.known.begin(times);
+        self.places.resize(times.max(self.places.len()), None);
+    }
+
     /// The first over-use within ticks at which there may be one.
     fn within<O: Clone>(
         &mut self,
@@ -153,10 +268,11 @@ impl Exact {
         order: &mut impl Order<O>,
     ) -> Option<OverUse<O>> {
         let (side, test) = (bound.side(), bound.test(profile.limits));
+        self.begin(profile);
         let mut found: Option<OverUse<O>> = None;
         let mut tick = run.min;
         loop {
-            self.prepare(profile, tick, order);
+            self.prepare(profile, tick, run, order);
             let level = self.extreme(profile, tick, side);
             if test.holds(level) {
                 let amount = bound.excess(level, profile.limits);
@@ -204,39 +320,34 @@ impl Exact {
     }
 
     /// Gathers the times that are open at a tick, and what is known of their order.
-    fn prepare<O: Clone>(&mut self, profile: &Profile<O>, tick: Ticks, order: &mut impl Order<O>) {
+    fn prepare<O: Clone>(
+        &mut self,
+        profile: &Profile<O>,
+        tick: Ticks,
+        within: Span,
+        order: &mut impl Order<O>,
+    ) {
+        for one in &self.open {
+            self.places[one.number() as usize] = None;
+        }
         self.found.clear();
-        profile.open.holding(tick, &mut self.found);
+        let at = Span::exactly(tick);
+        profile.open.overlapping(at, &mut self.found);
+        // The start of a use comes before its end.
         self.found.sort_unstable();
         self.open.clear();
-        self.open.extend(self.found.iter().map(|of| Open {
-            place: of / 2,
-            is_end: of % 2 == 1,
-        }));
+        self.open.extend(self.found.iter().copied().map(Open::of));
+        for (place, one) in (0..).zip(&self.open) {
+            self.places[one.number() as usize] = Some(place);
+        }
         self.needs.clear();
-        let moments: Vec<Moment<'_, O>> = self
-            .open
-            .iter()
-            .filter_map(|one| {
-                Some(Moment {
-                    of: profile.uses.id_at(one.place as usize)?,
-                    owner: &profile.owners[one.place as usize],
-                    is_end: one.is_end,
-                })
-            })
-            .collect();
-        for (at, moment) in (0..).zip(&moments) {
-            if moment.is_end
-                && at > 0
-                && self.open[at as usize - 1].place == self.open[at as usize].place
-            {
-                self.needs.push((at, at - 1));
-            }
-            order.never_after(&moments, *moment, |other| {
-                if other as u32 != at {
-                    self.needs.push((at, other as u32));
+        for (place, one) in (0..).zip(&self.open) {
+            for at in self.known.of(profile, *one, within, order) {
+                let other = self.known.never_after[at];
+                if let Some(other) = self.places[other as usize] {
+                    self.needs.push((place, other));
                 }
-            });
+            }
         }
         self.work.open += self.open.len() as u64;
         self.work.pairs += self.needs.len() as u64;

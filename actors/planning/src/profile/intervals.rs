@@ -1,7 +1,8 @@
-//! Intervals of time, asked for those that hold a tick.
+//! Intervals of time, asked for those that hold a tick or share one with a span.
 
 use super::tree::{Entry, NONE, Tree};
 use crate::Ticks;
+use crate::temporal::Span;
 
 /// From a tick to another one, both included, with a number that says whose it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,22 +36,22 @@ impl Entry for Interval {
 }
 
 impl Tree<Interval> {
-    /// Whose intervals hold a tick, in the order of their first ticks.
-    pub(super) fn holding(&self, tick: Ticks, found: &mut Vec<u32>) {
-        self.holding_below(self.root(), tick, found);
+    /// Whose intervals share a tick with a span, in the order of their first ticks.
+    pub(super) fn overlapping(&self, span: Span, found: &mut Vec<u32>) {
+        self.overlapping_below(self.root(), span, found);
     }
 
-    fn holding_below(&self, at: u32, tick: Ticks, found: &mut Vec<u32>) {
-        if at == NONE || *self.sum(at) < tick {
+    fn overlapping_below(&self, at: u32, span: Span, found: &mut Vec<u32>) {
+        if at == NONE || *self.sum(at) < span.min {
             return;
         }
         let (interval, left, right) = self.look(at);
-        self.holding_below(left, tick, found);
-        if interval.first <= tick {
-            if interval.last >= tick {
+        self.overlapping_below(left, span, found);
+        if interval.first <= span.max {
+            if interval.last >= span.min {
                 found.push(interval.of);
             }
-            self.holding_below(right, tick, found);
+            self.overlapping_below(right, span, found);
         }
     }
 }

@@ -181,7 +181,7 @@ impl<O: Clone> Profile<O> {
         mut is_in_force: impl FnMut(u32) -> bool,
     ) -> Vec<Contributor<O>> {
         let mut places = Vec::new();
-        self.in_force.holding(tick, &mut places);
+        self.in_force.overlapping(Span::exactly(tick), &mut places);
         let mut found = Vec::new();
         for place in places {
             let (Some(one), Some(of)) = (
