@@ -111,3 +111,71 @@ impl Search {
         last
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::profile::{Profile, Use};
+    use crate::temporal::Span;
+
+    fn over_use(amounts: &[i64], capacity: i64) -> Option<OverUse<()>> {
+        let mut profile = Profile::new(capacity, Span::at_least(0));
+        for amount in amounts {
+            let times = [Span::exactly(0), Span::exactly(9)];
+            let one = Use::renewable(times[0], times[1], Span::exactly(*amount));
+            profile.add(one, ()).unwrap();
+        }
+        profile.first_over_use(0)
+    }
+
+    proptest! {
+        /// They are the sets that are too much, and with any member less are not: all of them, or
+        /// as many as were asked for.
+        #[test]
+        fn critical_sets_are_all_minimal_sets(
+            amounts in prop::collection::vec(1..8i64, 1..10),
+            capacity in 0..20i64,
+            most in 0..12usize,
+        ) {
+            let Some(over_use) = over_use(&amounts, capacity) else { return Ok(()) };
+            let sum = |set: &BTreeSet<usize>| -> i64 { set.iter().map(|at| amounts[*at]).sum() };
+            let subsets = (1..1u32 << amounts.len()).map(|bits| {
+                (0..amounts.len()).filter(|at| bits >> at & 1 == 1).collect::<BTreeSet<usize>>()
+            });
+            let is_critical = |set: &BTreeSet<usize>| {
+                let least = set.iter().map(|at| amounts[*at]).min().unwrap_or(0);
+                sum(set) > capacity && sum(set) - least <= capacity
+            };
+            let expected: BTreeSet<BTreeSet<usize>> = subsets.filter(is_critical).collect();
+            let found = critical_sets(&over_use, most);
+            let distinct: BTreeSet<BTreeSet<usize>> =
+                found.iter().map(|set| set.iter().copied().collect()).collect();
+            prop_assert_eq!(distinct.len(), found.len());
+            prop_assert!(distinct.is_subset(&expected));
+            let all = critical_sets(&over_use, 1 << amounts.len());
+            prop_assert_eq!(all.len(), expected.len());
+            prop_assert!(found.len() <= most && (most == 0 || !found.is_empty()));
+        }
+    }
+
+    /// A thousand uses of one: each set has hundreds of members, and few are asked for.
+    #[test]
+    fn large_sets_are_found_without_a_search_through_all() {
+        let over_use = over_use(&[1; 1_000], 500).unwrap();
+        let found = critical_sets(&over_use, 100);
+        assert!(!found.is_empty() && found.len() <= 100);
+        assert!(found.iter().all(|set| set.len() == 501));
+    }
+
+    #[test]
+    fn what_is_broken_without_uses_has_no_critical_set() {
+        let mut profile = Profile::new(-2, Span::at_least(0));
+        let one = Use::consumption(Span::exactly(0), Span::exactly(1));
+        profile.add(one, ()).unwrap();
+        assert!(critical_sets(&profile.first_over_use(0).unwrap(), 9).is_empty());
+    }
+}

@@ -138,3 +138,37 @@ impl Flow {
         Some(more)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        /// No set that holds what its members need weighs more, and none that weighs as much has
+        /// fewer members.
+        #[test]
+        fn a_closure_is_the_best_of_all_sets(
+            weights in prop::collection::vec(-5..6i64, 0..9),
+            needs in prop::collection::vec((0..8u32, 0..8u32), 0..14),
+        ) {
+            let many = weights.len() as u32;
+            let needs: Vec<_> = needs.into_iter().filter(|(a, b)| *a.max(b) < many).collect();
+            let (mut flow, mut chosen) = (Flow::default(), Vec::new());
+            let found = flow.closure(&weights, &needs, &mut chosen);
+            let holds = |set: u32| needs.iter().all(|(a, b)| set >> a & 1 == 0 || set >> b & 1 == 1);
+            let weight = |set: u32| -> i64 {
+                (0..many).filter(|at| set >> at & 1 == 1).map(|at| weights[at as usize]).sum()
+            };
+            let sets = (0..1u32 << many).filter(|set| holds(*set));
+            let best = sets.map(|set| (weight(set), std::cmp::Reverse(set.count_ones()))).max();
+            let set = (0..many).filter(|at| chosen[*at as usize]).fold(0, |set, at| set | 1 << at);
+            prop_assert!(holds(set));
+            prop_assert_eq!(Some((found, std::cmp::Reverse(set.count_ones()))), best);
+            prop_assert_eq!(weight(set), found);
+        }
+    }
+}

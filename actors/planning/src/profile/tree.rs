@@ -287,3 +287,96 @@ impl<E: Entry> Tree<E> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A number by a key, of which a part of the tree knows the sum, in an order that shows.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Numbered(u8, i64);
+
+    impl Entry for Numbered {
+        type Key = u8;
+        /// How many entries, and what they add up to, each times one more than the last one's.
+        type Sum = (i64, i64, i64);
+        const EMPTY: &'static (i64, i64, i64) = &(0, 0, 0);
+
+        fn key(&self) -> u8 {
+            self.0
+        }
+
+        fn sum(&self, left: &Self::Sum, right: &Self::Sum) -> Self::Sum {
+            let many = left.0 + 1 + right.0;
+            let total = left.1 + self.1 + right.1;
+            let before = left.0 + 1;
+            let weighted = left.2 + before * self.1 + right.2 + before * right.1;
+            (many, total, weighted)
+        }
+
+        fn merge(&mut self, other: &Self) {
+            self.1 += other.1;
+        }
+
+        fn is_void(&self) -> bool {
+            self.1 == 0
+        }
+    }
+
+    impl Tree<Numbered> {
+        /// Whether levels are as they must be, below a node.
+        fn is_balanced(&self, at: u32) -> bool {
+            if at == NONE {
+                return true;
+            }
+            let [left, right] = self.nodes[at as usize].children;
+            let outer = self
+                .child(at, RIGHT)
+                .map_or(NONE, |right| self.nodes[right as usize].children[RIGHT]);
+            self.level(left) + 1 == self.level(at)
+                && self.level(right) <= self.level(at)
+                && self.level(right) + 1 >= self.level(at)
+                && self.level(outer) < self.level(at)
+                && self.is_balanced(left)
+                && self.is_balanced(right)
+        }
+    }
+
+    proptest! {
+        /// It holds what was put in and not taken out, in order and in balance, and the sum of it.
+        #[test]
+        fn it_is_an_ordered_map(edits in prop::collection::vec((0..40u8, -1..3i64), 0..200)) {
+            let mut tree = Tree::default();
+            let mut expected: BTreeMap<u8, i64> = BTreeMap::new();
+            for (key, number) in edits {
+                // Numbers above 0 are put in, others take it all out, one way or the other.
+                let old = expected.get(&key).copied();
+                match number {
+                    0 => {
+                        tree.remove(key);
+                        expected.remove(&key);
+                    }
+                    -1 => if let Some(old) = old {
+                        tree.put(Numbered(key, -old));
+                        expected.remove(&key);
+                    },
+                    _ => {
+                        tree.put(Numbered(key, number));
+                        *expected.entry(key).or_default() += number;
+                    }
+                }
+                let entries = expected.iter().map(|(key, number)| Numbered(*key, *number));
+                prop_assert!(tree.entries().copied().eq(entries));
+                prop_assert!(tree.is_balanced(tree.root()));
+                let weighted = (1..).zip(expected.values()).map(|(at, number)| at * number);
+                let sum = (expected.len() as i64, expected.values().sum(), weighted.sum());
+                prop_assert_eq!(*tree.sum(tree.root()), sum);
+                prop_assert!(tree.nodes.len() - tree.free.len() == expected.len());
+            }
+        }
+    }
+}

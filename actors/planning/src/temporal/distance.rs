@@ -175,3 +175,109 @@ impl Distances {
         seen
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const HORIZON: Span = Span::new(-20, 100);
+
+    /// The shortest paths between all points, through the horizon too.
+    fn all_pairs(network: &Network<()>, points: &[Point]) -> Vec<Vec<Ticks>> {
+        let many = points.len();
+        let mut distance = vec![vec![Ticks::MAX / 4; many]; many];
+        let place = |point: Point| points.iter().position(|other| *other == point).unwrap();
+        let origin = place(network.origin());
+        distance[origin].fill(HORIZON.max);
+        for (at, from) in distance.iter_mut().enumerate() {
+            from[origin] = -HORIZON.min;
+            from[at] = 0;
+        }
+        for (_, from, to, span) in network.all_constraints() {
+            let (from, to) = (place(from), place(to));
+            if span.max < Ticks::MAX {
+                distance[from][to] = distance[from][to].min(span.max);
+            }
+            if span.min > Ticks::MIN {
+                distance[to][from] = distance[to][from].min(-span.min);
+            }
+        }
+        for through in 0..many {
+            for a in 0..many {
+                for b in 0..many {
+                    let longer = distance[a][through] + distance[through][b];
+                    distance[a][b] = distance[a][b].min(longer);
+                }
+            }
+        }
+        distance
+    }
+
+    fn span() -> impl Strategy<Value = Span> {
+        prop_oneof![
+            (-20..30i64).prop_map(Span::at_least),
+            (-20..30i64).prop_map(Span::at_most),
+            (-20..30i64, 0..20i64).prop_map(|(min, more)| Span::new(min, min + more)),
+            Just(Span::ALL),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1_000))]
+
+        /// Differences and greatest distances are those of all paths, in whatever order they are
+        /// asked for.
+        #[test]
+        fn distances_are_those_of_all_paths(
+            constraints in prop::collection::vec((0..8usize, 0..8usize, span()), 0..20),
+            bounds in prop::collection::vec(-30..60i64, 8),
+        ) {
+            let mut network = Network::new(HORIZON);
+            let mut points = vec![network.origin()];
+            points.extend((1..8).map(|_| network.add_point()));
+            for (from, to, span) in constraints {
+                // Refused, it changes nothing.
+                let _ = network.constrain(points[from], points[to], span, ());
+            }
+            let expected = all_pairs(&network, &points);
+            let mut distances = Distances::new();
+            for a in 0..points.len() {
+                for b in 0..points.len() {
+                    let difference = distances.difference(&network, points[a], points[b]);
+                    prop_assert_eq!(difference, Span::new(-expected[b][a], expected[a][b]));
+                }
+                let mut found = vec![None; points.len()];
+                distances.greatest(&network, points[a], &points, bounds[a], |place, greatest| {
+                    found[place] = Some(greatest);
+                });
+                let within = expected[a].iter().map(|most| Some(*most).filter(|most| *most <= bounds[a]));
+                prop_assert_eq!(found, within.collect::<Vec<_>>());
+            }
+        }
+    }
+
+    /// In a long chain, the search ends when all that is asked for is known.
+    #[test]
+    fn a_search_ends_with_the_last_target() {
+        for length in [100, 10_000] {
+            let mut network = Network::new(Span::new(0, 1_000_000));
+            let chain: Vec<Point> = (0..length).map(|_| network.add_point()).collect();
+            for pair in chain.windows(2) {
+                let gap = Span::new(5, 10);
+                network.constrain(pair[0], pair[1], gap, ()).unwrap();
+            }
+            let middle = length / 2;
+            let mut distances = Distances::new();
+            let targets = &chain[middle - 3..=middle];
+            let mut found = Vec::new();
+            distances.greatest(&network, chain[middle], targets, 0, |_, most| {
+                found.push(most)
+            });
+            assert_eq!(found, [-15, -10, -5, 0]);
+            let Work { points, .. } = distances.work();
+            assert!(points <= 4, "{points} points of {length}");
+        }
+    }
+}

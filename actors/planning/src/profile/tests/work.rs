@@ -17,13 +17,18 @@ fn one(at: Ticks, open: Ticks) -> Use {
     Use::renewable(start, end, Span::exactly(1))
 }
 
+/// The logarithm of how many uses there are, rounded up: a path in a tree is at most twice as long.
+fn log(uses: i64) -> u64 {
+    u64::from((uses as u64 + 1).next_power_of_two().ilog2())
+}
+
 fn looked_at(profile: &Profile<i64>) -> u64 {
     profile.work().steps + profile.work().intervals
 }
 
 /// The most that something looks at, over many places, and whether that is at most so many times
 /// the logarithm of how many uses there are.
-fn most(uses: i64, times: f64, open: Ticks, mut ask: impl FnMut(&mut Profile<i64>, UseId, Ticks)) {
+fn most(uses: i64, times: u64, open: Ticks, mut ask: impl FnMut(&mut Profile<i64>, UseId, Ticks)) {
     let (mut profile, ids) = plan(uses, open);
     let mut most = 0;
     for at in (0..uses).step_by(uses as usize / 10) {
@@ -32,9 +37,9 @@ fn most(uses: i64, times: f64, open: Ticks, mut ask: impl FnMut(&mut Profile<i64
         ask(&mut profile, id, at * 20);
         most = most.max(looked_at(&profile) - before);
     }
-    let bound = times * (uses as f64 + 1.0).log2() + 4.0;
+    let bound = times * log(uses) + 4;
     assert!(
-        most as f64 <= bound,
+        most <= bound,
         "{most} looks, more than {bound}, with {uses} uses"
     );
 }
@@ -43,19 +48,19 @@ fn most(uses: i64, times: f64, open: Ticks, mut ask: impl FnMut(&mut Profile<i64
 fn an_edit_looks_at_a_logarithm_of_nodes_for_each_time_that_changes() {
     for uses in [10, 100, 1_000, 10_000] {
         // With fixed times a use is two steps and one interval, with open ones four and three.
-        for (open, paths) in [(0, 3.0), (5, 7.0)] {
-            most(uses, 4.0 * paths, open, |profile, id, _| profile.remove(id));
-            most(uses, 2.0 * paths, open, |profile, _, tick| {
+        for (open, paths) in [(0, 3), (5, 7)] {
+            most(uses, 4 * paths, open, |profile, id, _| profile.remove(id));
+            most(uses, 2 * paths, open, |profile, _, tick| {
                 profile.add(one(tick + 3, open), 0).unwrap();
             });
         }
         // Of its four times one changes, and what is in force stays.
-        most(uses, 7.0, 5, |profile, id, _| {
+        most(uses, 7, 5, |profile, id, _| {
             let old = *profile.get(id).unwrap();
             let start = Span::new(old.start.min, old.start.max - 1);
             profile.update(id, Use { start, ..old }).unwrap();
         });
-        most(uses, 0.0, 5, |profile, id, _| {
+        most(uses, 0, 5, |profile, id, _| {
             let old = *profile.get(id).unwrap();
             profile.update(id, old).unwrap();
         });
@@ -65,11 +70,11 @@ fn an_edit_looks_at_a_logarithm_of_nodes_for_each_time_that_changes() {
 #[test]
 fn a_question_looks_at_a_logarithm_of_nodes() {
     for uses in [10, 100, 1_000, 10_000] {
-        most(uses, 2.0, 5, |profile, _, tick| {
+        most(uses, 2, 5, |profile, _, tick| {
             profile.level(tick);
         });
         // There is none.
-        most(uses, 4.0, 5, |profile, _, tick| {
+        most(uses, 4, 5, |profile, _, tick| {
             assert_eq!(profile.first_over_use(tick - 1_000), None);
         });
     }
@@ -87,10 +92,10 @@ fn the_first_over_use_is_found_without_a_scan() {
         assert_eq!(over_use.during, Span::new(last + 2, last + 11));
         let owners: Vec<_> = over_use.contributors.iter().map(|one| one.owner).collect();
         assert_eq!(owners, [uses - 1, -1]);
-        let bound = 30.0 * (uses as f64 + 1.0).log2();
+        let bound = 30 * log(uses);
         let looks = looked_at(&profile) - before;
         assert!(
-            looks as f64 <= bound,
+            looks <= bound,
             "{looks} looks, more than {bound}, with {uses} uses"
         );
     }
@@ -102,13 +107,13 @@ fn to_undo_costs_what_it_undoes() {
         let (mut profile, ids) = plan(uses, 5);
         let built = looked_at(&profile);
         profile.push();
-        for at in 0..8 {
-            profile.update(ids[at], one(5, 7)).unwrap();
+        for id in &ids[..8] {
+            profile.update(*id, one(5, 7)).unwrap();
         }
         let edits = looked_at(&profile);
         profile.pop();
         let undo = looked_at(&profile) - edits;
-        (edits - built, undo, (uses as f64).log2())
+        (edits - built, undo, log(uses))
     });
     for (edits, undo, _) in costs {
         assert!(undo <= 2 * edits, "{undo} looks to undo {edits}");
@@ -116,7 +121,7 @@ fn to_undo_costs_what_it_undoes() {
     let [(_, few, of_few), .., (_, many, of_many)] = costs;
     // More only by the depth of the trees.
     assert!(
-        many as f64 <= 1.5 * few as f64 * of_many / of_few,
+        many * of_few * 2 <= few * of_many * 3,
         "{few} and {many} looks"
     );
 }
