@@ -38,7 +38,7 @@ use crate::Ticks;
 use crate::arena::{Arena, Id};
 use crate::temporal::Span;
 use intervals::Interval;
-use steps::{GREATEST, LEAST, Side, Step};
+use steps::{GREATEST, LEAST, Side, Step, Test};
 use trail::Change;
 use tree::Tree;
 
@@ -384,6 +384,21 @@ impl<O: Clone> Profile<O> {
     pub fn level(&self, tick: Ticks) -> Span {
         let sums = self.steps.until(tick);
         Span::new(self.initial + sums[LEAST], self.initial + sums[GREATEST])
+    }
+
+    /// The least and the greatest level at the ticks of a span, in the same sense.
+    ///
+    /// # Panics
+    ///
+    /// If the span is empty.
+    pub fn levels(&self, during: Span) -> Span {
+        assert!(!during.is_empty(), "{during:?}: expected at least one tick");
+        let first = self.level(during.min);
+        let range = (during.min, during.max);
+        let later = |side, test| self.steps.extreme(range, side, self.initial, test);
+        let least = later(LEAST, Test::Below(0)).map_or(first.min, |level| level.min(first.min));
+        let most = later(GREATEST, Test::Above(0)).map_or(first.max, |level| level.max(first.max));
+        Span::new(least, most)
     }
 
     /// The envelopes as steps: from each of these ticks on the level is within the span. Before the

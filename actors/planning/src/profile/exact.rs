@@ -236,7 +236,7 @@ impl Exact {
         order: &mut impl Order<O>,
     ) -> Option<OverUse<O>> {
         loop {
-            let run = profile.run(bound, from)?;
+            let run = profile.beyond(bound, from)?;
             if let Some(found) = self.within(profile, bound, run, order) {
                 return Some(found);
             }

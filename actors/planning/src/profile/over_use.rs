@@ -87,7 +87,7 @@ impl<O: Clone> Profile<O> {
     /// It is found for the logarithm of how many uses there are, and one look for each use that
     /// may be in force.
     pub fn first_over_use(&self, from: Ticks) -> Option<OverUse<O>> {
-        let [least, most] = [Bound::Least, Bound::Most].map(|bound| self.run(bound, from));
+        let [least, most] = [Bound::Least, Bound::Most].map(|bound| self.beyond(bound, from));
         let first = match (least, most) {
             (Some(least), Some(most)) if most.min < least.min => (Bound::Most, most),
             (Some(least), _) => (Bound::Least, least),
@@ -99,7 +99,7 @@ impl<O: Clone> Profile<O> {
     /// The first over-use at or after a tick that breaks a certain limit, if each time lies
     /// anywhere within its span.
     pub fn first_over_use_of(&self, bound: Bound, from: Ticks) -> Option<OverUse<O>> {
-        let run = self.run(bound, from)?;
+        let run = self.beyond(bound, from)?;
         Some(self.over_use(bound, run))
     }
 
@@ -120,7 +120,7 @@ impl<O: Clone> Profile<O> {
         let of = |bound| {
             let mut from = Some(Ticks::MIN);
             std::iter::from_fn(move || {
-                let run = self.run(bound, from?)?;
+                let run = self.beyond(bound, from?)?;
                 from = run.max.checked_add(1);
                 Some(self.over_use(bound, run))
             })
@@ -128,9 +128,50 @@ impl<O: Clone> Profile<O> {
         of(Bound::Least).chain(of(Bound::Most))
     }
 
-    /// The first ticks at or after one at which a limit may be broken, without a gap.
-    pub(super) fn run(&self, bound: Bound, from: Ticks) -> Option<Span> {
-        let (side, test) = (bound.side(), bound.test(self.limits));
+    /// The first tick at or after one from which on `change` can be added to the level for so many
+    /// ticks without breaking a limit in any schedule: where a new use fits. None if there is no
+    /// such tick.
+    ///
+    /// It costs the logarithm of how many uses there are for each gap that is too short.
+    ///
+    /// ```
+    /// use farside_planning::Ticks;
+    /// use farside_planning::profile::{Profile, Use};
+    /// use farside_planning::temporal::Span;
+    /// let mut lane = Profile::new(1, Span::at_least(0));
+    /// for (start, end) in [(0, 10), (13, 20), (25, 30)] {
+    ///     let one = Use::renewable(Span::exactly(start), Span::exactly(end), Span::exactly(1));
+    ///     lane.add(one, ()).unwrap();
+    /// }
+    /// assert_eq!(lane.first_fit(0, 3, -1), Some(10));
+    /// assert_eq!(lane.first_fit(0, 4, -1), Some(20));
+    /// // For good.
+    /// assert_eq!(lane.first_fit(0, Ticks::MAX, -1), Some(30));
+    /// assert_eq!(lane.first_fit(0, 1, -2), None);
+    /// ```
+    pub fn first_fit(&self, from: Ticks, duration_ticks: Ticks, change: i64) -> Option<Ticks> {
+        let (bound, limit) = if change < 0 {
+            (Bound::Least, self.limits.min)
+        } else {
+            (Bound::Most, self.limits.max)
+        };
+        if limit == i64::MIN || limit == i64::MAX {
+            return Some(from);
+        }
+        let within = Span::exactly(limit.saturating_sub(change));
+        let mut start = from;
+        loop {
+            let end = start.saturating_add(duration_ticks.max(0));
+            match self.run(bound, bound.test(within), start) {
+                Some(run) if run.min < end => start = run.max.checked_add(1)?,
+                _ => return Some(start),
+            }
+        }
+    }
+
+    /// The first ticks at or after one at which the level may pass a test, without a gap.
+    pub(super) fn run(&self, bound: Bound, test: Test, from: Ticks) -> Option<Span> {
+        let side = bound.side();
         let start = if test.holds(self.side_at(from, side)) {
             from
         } else {
@@ -138,6 +179,11 @@ impl<O: Clone> Profile<O> {
         };
         let end = self.steps.first(start, side, self.initial, test.opposite());
         Some(Span::new(start, end.map_or(Ticks::MAX, |end| end - 1)))
+    }
+
+    /// The first ticks at or after one at which a limit may be broken, without a gap.
+    pub(super) fn beyond(&self, bound: Bound, from: Ticks) -> Option<Span> {
+        self.run(bound, bound.test(self.limits), from)
     }
 
     /// What is to be said of ticks at which a limit may be broken.

@@ -93,6 +93,31 @@ fn check(profile: &Profile<u32>) -> Result<(), TestCaseError> {
     for (tick, level) in TICKS.zip(&levels) {
         prop_assert_eq!(profile.level(tick), *level, "at {} of {:?}", tick, uses);
     }
+    for (from, many) in [(0, 30), (5, 1), (17, 9)] {
+        let during = Span::new(from, from + many);
+        let all = levels[(from - TICKS.start) as usize..]
+            .iter()
+            .take(many as usize + 1);
+        let all = all.fold(Span::new(i64::MAX, i64::MIN), |all, level| {
+            Span::new(all.min.min(level.min), all.max.max(level.max))
+        });
+        prop_assert_eq!(profile.levels(during), all);
+        for change in [-4, 3] {
+            let fits = |start: &Ticks| {
+                let mut ticks = levels[(start - TICKS.start) as usize..]
+                    .iter()
+                    .take(many as usize);
+                ticks.all(|level| match change {
+                    ..0 => level.min + change >= LIMITS.min,
+                    _ => level.max + change <= LIMITS.max,
+                })
+            };
+            let is_in = |start: &Ticks| start + many < TICKS.end;
+            let expected = (from..TICKS.end).filter(is_in).find(fits);
+            let found = profile.first_fit(from, many, change);
+            prop_assert_eq!(found.filter(is_in), expected);
+        }
+    }
     let mut rebuilt = Profile::new(INITIAL, LIMITS);
     for (_, one, owner) in profile.uses() {
         rebuilt.add(*one, *owner).unwrap();
