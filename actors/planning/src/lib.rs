@@ -10,6 +10,7 @@
 //! | [`database`] | tokens on timelines, tied by rules, times and parameters |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`parameters`] | variables and what ties them together, kept consistent edit by edit |
+//! | [`profile`] | how low and how high the level of a resource can be while times are flexible |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
