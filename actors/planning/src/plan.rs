@@ -43,6 +43,7 @@ use serde::{Deserialize, Serialize};
 use crate::Ticks;
 use crate::temporal::Span;
 
+pub(crate) use build::argument_name;
 pub use build::{Effects, place};
 pub use json::{FORMAT, MAX_FILE_BYTES, PlanError};
 
