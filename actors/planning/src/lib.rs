@@ -20,6 +20,12 @@ pub mod objective;
 pub mod parameters;
 pub mod profile;
 pub mod search;
+//! | [`checker`] | whether a plan is valid, and if not, why: shares no code with the planners |
+//! | [`plan`] | a plan as data and as JSON |
+
+pub mod checker;
+mod nearest;
+pub mod plan;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.
