@@ -104,7 +104,9 @@ impl fmt::Display for Conflict {
                 is,
                 expected,
             } => write!(f, "{owner:?}: {is} ticks where {expected:?} are expected"),
-            Conflict::Amount { owner } => write!(f, "{owner:?}: amounts beyond what can be counted"),
+            Conflict::Amount { owner } => {
+                write!(f, "{owner:?}: amounts beyond what can be counted")
+            }
             Conflict::Mismatch { owner } => write!(f, "{owner:?}: not what the relation asks for"),
         }
     }
@@ -185,7 +187,11 @@ impl Database {
     /// As [`Network::new`] does: if the horizon does not hold 0.
     pub fn new(model: Arc<Model>, horizon: Span) -> Self {
         let flats = model.rules.iter().map(Flat::of).collect();
-        let domains = model.types.iter().map(|of| Domain::from(&of.values)).collect();
+        let domains = model
+            .types
+            .iter()
+            .map(|of| Domain::from(&of.values))
+            .collect();
         let tables = model.tables.iter().map(parameters::Rows::from).collect();
         let levels_by_resource = model.resources.iter().map(Levels::of).collect();
         let lanes = vec![Lane::default(); model.timelines.len()];

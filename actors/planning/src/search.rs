@@ -13,7 +13,9 @@
 mod chronological;
 pub mod complete;
 pub mod executive;
+mod extract;
 pub mod schedule;
+mod solve;
 
 use crate::Ticks;
 use crate::database::{Conflict, Database, InstanceId, Open, Slot, TokenId};
@@ -21,6 +23,8 @@ use crate::model::{End, ResourceId, TimelineId, Value};
 use crate::profile::Bound;
 
 pub use chronological::{Stack, chronological};
+pub use extract::extract;
+pub use solve::{Answer, Forward, Planner, Settings};
 
 /// What is missing in a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

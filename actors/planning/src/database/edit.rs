@@ -79,7 +79,10 @@ impl Database {
         self.note(Change::TokenAdded(token));
         self.point_at(token, [start, finish]);
         let owner = Owner::Token(token);
-        let least = match wanted.timeline.map(|timeline| model.timelines[timeline].kind) {
+        let least = match wanted
+            .timeline
+            .map(|timeline| model.timelines[timeline].kind)
+        {
             Some(TimelineKind::State | TimelineKind::Unary) => 1,
             Some(TimelineKind::Free) | None => 0,
         };

@@ -28,7 +28,8 @@ impl Database {
                 let Some(second) = self.at(first).after else {
                     break;
                 };
-                let second_is_past = self.is_past(second, before) && self.at(second).after.is_some();
+                let second_is_past =
+                    self.is_past(second, before) && self.at(second).after.is_some();
                 if !second_is_past {
                     break;
                 }
@@ -60,7 +61,11 @@ impl Database {
         }
         for &(instance, _) in &at.supported {
             // Who asked for it has it: the label is of a token that was.
-            let step = self.instance_at(instance).labels.iter().position(|&at| at == Some(token));
+            let step = self
+                .instance_at(instance)
+                .labels
+                .iter()
+                .position(|&at| at == Some(token));
             debug_assert!(step.is_some(), "the label was given to the token");
         }
         self.change(token).instances.clear();

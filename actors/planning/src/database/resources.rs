@@ -49,7 +49,9 @@ impl Levels {
         let owner = Owner::Given;
         for profile in self.each() {
             let one = Use::production(Span::exactly(tick), Span::exactly(change));
-            profile.add(one, owner).map_err(|_| Conflict::Amount { owner })?;
+            profile
+                .add(one, owner)
+                .map_err(|_| Conflict::Amount { owner })?;
         }
         Ok(())
     }

@@ -7,8 +7,8 @@ use super::resources::Effected;
 use super::trail::Change;
 use super::{Conflict, Database, InstanceId, Owner, TokenId};
 use crate::model::{
-    Argument, Body, Bound, End, Operand as Term, Relation, Relationship, Rule, RuleId, Target,
-    VariableId,
+    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship, Rule, RuleId,
+    Target, VariableId,
 };
 use crate::parameters::{self, Operand};
 use crate::temporal::{Constraint, Span};
@@ -153,6 +153,11 @@ impl Database {
     pub fn relation(&self, instance: InstanceId, relation: u32) -> &Relation {
         let rule = self.instance_at(instance).rule;
         &self.flats[rule].relations[relation as usize]
+    }
+
+    /// Where a relation of a rule stands.
+    pub fn position_of(&self, rule: RuleId, relation: u32) -> Position {
+        self.flats[rule].relations[relation as usize].position
     }
 
     /// The alternatives of a choice: what each asks for.
@@ -525,7 +530,12 @@ impl Database {
                     };
                     let bounds = [distance.min, distance.max];
                     let from = self.time(anchor, distance.from);
-                    (bounds, distance.backward, from, self.time(target, distance.to))
+                    (
+                        bounds,
+                        distance.backward,
+                        from,
+                        self.time(target, distance.to),
+                    )
                 }
             };
             if !matches!(min, Bound::Variable(_)) && !matches!(max, Bound::Variable(_)) {

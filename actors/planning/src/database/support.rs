@@ -403,4 +403,3 @@ pub struct Slot {
     /// After which of its tokens; before all, if none.
     pub after: Option<TokenId>,
 }
-

@@ -92,9 +92,7 @@ impl Database {
                 None
             }
             (Time::At(from), Time::Point(to)) => Some((origin, to, shifted(span, from))),
-            (Time::Point(from), Time::At(to)) => {
-                Some((origin, from, shifted(span.negated(), to)))
-            }
+            (Time::Point(from), Time::At(to)) => Some((origin, from, shifted(span.negated(), to))),
             (Time::Point(from), Time::Point(to)) => Some((from, to, span)),
         })
     }
@@ -245,11 +243,7 @@ impl Database {
     }
 
     /// The variable that is when a token starts or ends, or, without an end, how long it lasts.
-    pub(super) fn mirror(
-        &mut self,
-        token: TokenId,
-        end: Option<End>,
-    ) -> Result<Operand, Conflict> {
+    pub(super) fn mirror(&mut self, token: TokenId, end: Option<End>) -> Result<Operand, Conflict> {
         let made = |mirror: &&Mirror| (mirror.token, mirror.end) == (token, end);
         if let Some(mirror) = self.mirrors.iter().find(made) {
             return Ok(Operand::Variable(mirror.variable));
@@ -273,12 +267,15 @@ impl Database {
     fn reflect(&mut self, place: usize) -> Result<bool, Conflict> {
         let mirror = self.mirrors[place];
         let bounds = self.mirrored(mirror);
-        if self.store.domain(mirror.variable).span().intersect(bounds) == self.store.domain(mirror.variable).span()
+        if self.store.domain(mirror.variable).span().intersect(bounds)
+            == self.store.domain(mirror.variable).span()
         {
             return Ok(false);
         }
         let owner = Owner::Token(mirror.token);
-        let posted = self.store.restrict(mirror.variable, Domain::from(bounds), owner)?;
+        let posted = self
+            .store
+            .restrict(mirror.variable, Domain::from(bounds), owner)?;
         if let Some(old) = mirror.value {
             self.store.retract(old);
         }

@@ -100,7 +100,10 @@ pub(super) fn first_open(database: &Database) -> Option<Open> {
             }
         }
     };
-    let ranked = database.open().iter().filter_map(|open| Some((rank(open)?, open)));
+    let ranked = database
+        .open()
+        .iter()
+        .filter_map(|open| Some((rank(open)?, open)));
     // The first of the least.
     ranked.min_by_key(|at| at.0).map(|at| *at.1)
 }
@@ -136,9 +139,14 @@ pub(super) fn first_gap(database: &Database) -> Option<Flaw> {
 pub(super) fn first_over_use(database: &mut Database) -> Option<(ResourceId, OverUse<Owner>)> {
     let mut first: Option<(ResourceId, OverUse<Owner>)> = None;
     for resource in 0..database.model().resources.len() {
-        let over_use = database.levels(resource).earliest.first_over_use(Ticks::MIN);
+        let over_use = database
+            .levels(resource)
+            .earliest
+            .first_over_use(Ticks::MIN);
         if let Some(over_use) = over_use
-            && first.as_ref().is_none_or(|(_, at)| over_use.worst_tick < at.worst_tick)
+            && first
+                .as_ref()
+                .is_none_or(|(_, at)| over_use.worst_tick < at.worst_tick)
         {
             first = Some((resource, over_use));
         }
@@ -167,9 +175,8 @@ impl Strategy for Complete {
         if let Some(open) = first_open(database) {
             return Some(Flaw::Open(open));
         }
-        let missing = |goal: &GoalId| {
-            self.wanted[*goal] && !Schedule::is_in(database, self.goals[*goal])
-        };
+        let missing =
+            |goal: &GoalId| self.wanted[*goal] && !Schedule::is_in(database, self.goals[*goal]);
         if let Some(goal) = (0..self.goals.len()).find(missing) {
             return Some(Flaw::Goal(self.goals[goal]));
         }
@@ -187,7 +194,9 @@ impl Strategy for Complete {
         match flaw {
             Flaw::Open(Open { instance, step }) => open_decisions(database, instance, step, into),
             Flaw::Goal(token) => self.goal_decisions(database, token, into),
-            Flaw::OverUse { resource, bound, .. } => {
+            Flaw::OverUse {
+                resource, bound, ..
+            } => {
                 let levels = database.levels(resource);
                 if let Some(over_use) = levels.earliest.first_over_use_of(bound, Ticks::MIN) {
                     over_use_decisions(database, resource, &over_use, into);
@@ -307,7 +316,9 @@ impl Complete {
         let pattern = &self.problem.goals[goal].pattern;
         for &timeline in &pattern.timelines {
             if database.model().timelines[timeline].kind != TimelineKind::Free {
-                let same = database.on(timeline).filter(|&at| same_kind(database, token, at));
+                let same = database
+                    .on(timeline)
+                    .filter(|&at| same_kind(database, token, at));
                 into.extend(same.map(Decision::Support));
             }
         }
@@ -322,19 +333,18 @@ fn same_kind(database: &Database, token: TokenId, other: TokenId) -> bool {
         return false;
     };
     token.predicate == other.predicate
-        && token.parameters.iter().zip(&other.parameters).all(|(one, other)| {
-            one == other
-                || database.store().entailed(&Kind::Equal, &[*one, *other]) != Some(false)
-        })
+        && token
+            .parameters
+            .iter()
+            .zip(&other.parameters)
+            .all(|(one, other)| {
+                one == other
+                    || database.store().entailed(&Kind::Equal, &[*one, *other]) != Some(false)
+            })
 }
 
 /// All that may put right what an instance asks for.
-fn open_decisions(
-    database: &Database,
-    instance: InstanceId,
-    step: Step,
-    into: &mut Vec<Decision>,
-) {
+fn open_decisions(database: &Database, instance: InstanceId, step: Step, into: &mut Vec<Decision>) {
     let relation = match step {
         Step::Choice(choice) => {
             let alternatives = database.alternatives(instance, choice).len() as u32;
@@ -348,7 +358,10 @@ fn open_decisions(
         into.push(Decision::Relate);
         return;
     };
-    let Some(anchor) = database.instance(instance).and_then(|at| at.label(said.anchor)) else {
+    let Some(anchor) = database
+        .instance(instance)
+        .and_then(|at| at.label(said.anchor))
+    else {
         return;
     };
     let mut window = [Span::ALL; 2];
@@ -502,8 +515,10 @@ fn least_critical(
     let sets = critical_sets(over_use, CRITICAL_SETS);
     let mut best: Option<Vec<(Ticks, Precedence)>> = None;
     for set in sets {
-        let members: Vec<&Contributor<Owner>> =
-            set.iter().map(|&place| &over_use.contributors[place]).collect();
+        let members: Vec<&Contributor<Owner>> = set
+            .iter()
+            .map(|&place| &over_use.contributors[place])
+            .collect();
         let mut found = Vec::new();
         for one in &members {
             for other in &members {
@@ -606,7 +621,9 @@ fn next_change(
     over_use: &OverUse<Owner>,
 ) -> Option<Ticks> {
     let profile = &database.known_levels(resource).earliest;
-    let given = profile.uses().filter(|(_, _, owner)| **owner == Owner::Given);
+    let given = profile
+        .uses()
+        .filter(|(_, _, owner)| **owner == Owner::Given);
     let helps = given.filter(|(_, one, _)| match over_use.bound {
         Bound::Least => one.change.min > 0,
         Bound::Most => one.change.max < 0,
@@ -665,11 +682,7 @@ fn close(
 }
 
 /// A timeline says its default after a token, from that token's end on.
-fn fill(
-    database: &mut Database,
-    slot: Slot,
-    after: Option<TokenId>,
-) -> Result<(), Conflict> {
+fn fill(database: &mut Database, slot: Slot, after: Option<TokenId>) -> Result<(), Conflict> {
     let model = database.model().clone();
     let Some(default) = &model.timelines[slot.timeline].default else {
         let owner = after.map_or(Owner::Given, Owner::Token);

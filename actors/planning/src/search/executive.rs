@@ -181,7 +181,9 @@ fn subgoal_order(model: &Model) -> Vec<Vec<u32>> {
     timelines
         .map(|(timeline, at)| {
             let predicates = at.predicates.iter();
-            predicates.map(|&predicate| early(timeline, predicate)).collect()
+            predicates
+                .map(|&predicate| early(timeline, predicate))
+                .collect()
         })
         .collect()
 }
@@ -230,12 +232,7 @@ impl Now {
             if from.min != from.max || from.max > self.tick {
                 return None;
             }
-            let span = database.span(
-                open.instance,
-                distance.min,
-                distance.max,
-                distance.backward,
-            );
+            let span = database.span(open.instance, distance.min, distance.max, distance.backward);
             if span.min != Ticks::MIN && from.min.saturating_add(span.min) > self.tick {
                 return None;
             }
@@ -399,7 +396,10 @@ fn fill(database: &mut Database, slot: Slot, now: Ticks) -> Result<(), Conflict>
             finish: None,
             cause: Cause::Filler,
         })?;
-        debug_assert_eq!(database.token(token).map(|at| at.status), Some(Status::Free));
+        debug_assert_eq!(
+            database.token(token).map(|at| at.status),
+            Some(Status::Free)
+        );
         database.activate(token, slot)
     })
 }

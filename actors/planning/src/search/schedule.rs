@@ -5,13 +5,12 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use crate::database::{Cause, Conflict, Database, Owner, Slot, Status, TokenId, Wanted};
-use crate::model::{
-    Argument, Bound, Distance, End, Fact, Goal, GoalId, Model, Problem, TimelineKind,
-};
+use crate::model::{Argument, Bound, Distance, End, Fact, Goal, GoalId, Model, Problem};
 use crate::parameters::Operand;
 use crate::temporal::Span;
 
 /// A problem, and the plan for it that is in the making.
+#[derive(Debug)]
 pub struct Schedule {
     /// The plan.
     pub database: Database,
@@ -223,11 +222,6 @@ impl Schedule {
         let status = database.token(token).map(|at| at.status);
         matches!(status, Some(Status::Active | Status::Merged(_)))
     }
-
-    /// Whether a timeline can have gaps.
-    pub(super) fn is_of_states(database: &Database, timeline: usize) -> bool {
-        database.model().timelines[timeline].kind == TimelineKind::State
-    }
 }
 
 /// The bounds of a distance whose bounds are values.
@@ -236,9 +230,10 @@ fn span_of(distance: &Distance) -> Span {
         Bound::Value(value) => value,
         Bound::None | Bound::Variable(_) => none,
     };
-    let span = Span::new(
-        value(distance.min, i64::MIN),
-        value(distance.max, i64::MAX),
-    );
-    if distance.backward { span.negated() } else { span }
+    let span = Span::new(value(distance.min, i64::MIN), value(distance.max, i64::MAX));
+    if distance.backward {
+        span.negated()
+    } else {
+        span
+    }
 }
