@@ -7,10 +7,12 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`arena`] | values with ids that a later value in the same place does not answer to |
+//! | [`language`] | from the text of a model or a problem to its tables, with what is wrong and where |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
+pub mod language;
 pub mod model;
 pub mod temporal;
 
