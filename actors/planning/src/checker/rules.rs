@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::{Bindings, Kind, Report, Scene, apart};
 use crate::Ticks;
 use crate::model::{Body, Bound, Distance, End, Pattern, Relation, Rule, Target, Value};
+use crate::plan;
 use failure::{Failure, Why};
 
 /// The most steps of a search for one rule of one token.
@@ -64,6 +65,14 @@ fn check_rule<'a>(
         return;
     }
     let seen = &scene.tokens[master];
+    // That the rule does not hold is told once, and not once more for each of its effects.
+    for (listed, used) in seen.token.effects.iter().zip(search.used.iter_mut()) {
+        let mut places = rule
+            .effects
+            .iter()
+            .map(|of| plan::place(scene.model, of.position));
+        *used |= places.any(|place| place == listed.place);
+    }
     let place = scene.place(rule.position);
     if search.steps >= MAX_STEPS {
         let message = format!("token {}: there are too many ways to try", seen.token);
@@ -265,13 +274,13 @@ impl<'a> Search<'a, '_> {
     /// Whether a relation's target could only lie outside the horizon; none if that depends on
     /// bounds that are not known.
     fn is_outside(&self, state: &State<'a>, relation: &Relation, anchor: usize) -> Option<bool> {
-        let reach = self.reach(state, relation, anchor);
-        if reach.start.0 >= self.scene.problem.horizon || reach.end.1 <= 0 {
-            return Some(true);
-        }
+        let Reach { start, end, .. } = self.reach(state, relation, anchor);
         let mut bounds = relation.distances.iter().flat_map(|at| [at.min, at.max]);
         let all_known = bounds.all(|bound| self.bounds(state, [bound; 2])[0].is_some());
-        all_known.then_some(false)
+        // Bounds that leave no time at all are not kept outside either.
+        let any_time = start.0 <= start.1 && end.0 <= end.1;
+        let outside = start.0 >= self.scene.problem.horizon || end.1 <= 0;
+        all_known.then_some(any_time && outside)
     }
 
     /// Goes on without a token for a relation, since it could only lie outside the horizon.
