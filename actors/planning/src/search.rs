@@ -16,6 +16,8 @@ pub mod executive;
 mod extract;
 pub mod schedule;
 mod solve;
+#[cfg(test)]
+mod tests;
 
 use crate::Ticks;
 use crate::database::{Conflict, Database, InstanceId, Open, Slot, TokenId};

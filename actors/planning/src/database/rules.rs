@@ -213,7 +213,7 @@ impl Database {
             self.note(Change::InstanceAdded(id));
             self.change(token).instances.push(id);
             self.adopt_master(id);
-            self.watch_guard(id);
+            self.watch_guard(id)?;
             self.reconsider(id)?;
         }
         Ok(())
@@ -247,10 +247,10 @@ impl Database {
     }
 
     /// Asks to be told of all that the guard speaks of.
-    fn watch_guard(&mut self, instance: InstanceId) {
+    fn watch_guard(&mut self, instance: InstanceId) -> Result<(), Conflict> {
         let rule = self.instance_at(instance).rule;
         if self.flats[rule].unguarded {
-            return;
+            return Ok(());
         }
         let model = self.model.clone();
         let rule = &model.rules[rule];
@@ -262,12 +262,20 @@ impl Database {
             }
         }
         for term in rule.when.iter().flat_map(|when| &when.operands) {
-            if let Term::Variable(variable) = *term
-                && let Some(operand) = self.instance_at(instance).variables[variable]
-            {
+            let operand = match *term {
+                Term::Value(_) => continue,
+                Term::Variable(variable) => self.instance_at(instance).variables[variable],
+                // Only the master is there when the guard is asked.
+                Term::Start(0) => Some(self.mirror(master, Some(End::Start))?),
+                Term::Finish(0) => Some(self.mirror(master, Some(End::Finish))?),
+                Term::Duration(0) => Some(self.mirror(master, None)?),
+                Term::Start(_) | Term::Finish(_) | Term::Duration(_) => None,
+            };
+            if let Some(operand) = operand {
                 self.watch(instance, operand);
             }
         }
+        Ok(())
     }
 
     fn watch(&mut self, instance: InstanceId, operand: Operand) {
@@ -357,27 +365,12 @@ impl Database {
             operands.push(match *term {
                 Term::Value(value) => Operand::Value(value),
                 Term::Variable(variable) => at.variables[variable]?,
-                Term::Start(label) => self.known_time(at, label, End::Start)?,
-                Term::Finish(label) => self.known_time(at, label, End::Finish)?,
-                Term::Duration(label) => {
-                    let times = [End::Start, End::Finish];
-                    let [start, finish] = times.map(|end| self.known_time(at, label, end));
-                    match (start?, finish?) {
-                        (Operand::Value(start), Operand::Value(finish)) => {
-                            Operand::Value(finish - start)
-                        }
-                        _ => return None,
-                    }
-                }
+                Term::Start(label) => self.mirrored_by(at.label(label)?, Some(End::Start))?,
+                Term::Finish(label) => self.mirrored_by(at.label(label)?, Some(End::Finish))?,
+                Term::Duration(label) => self.mirrored_by(at.label(label)?, None)?,
             });
         }
         self.store.entailed(&self.kind(when), &operands)
-    }
-
-    /// When a token with a label starts or ends, if it can only be then.
-    fn known_time(&self, at: &Instance, label: usize, end: End) -> Option<Operand> {
-        let bounds = self.bounds_of(self.time(at.label(label)?, end));
-        (bounds.min == bounds.max).then_some(Operand::Value(bounds.min))
     }
 
     /// What a relationship is for the store.
@@ -553,9 +546,6 @@ impl Database {
     /// What an instance brought goes; tokens that it alone asked for go with it.
     pub(super) fn withdraw(&mut self, instance: InstanceId) {
         let at = self.instance_at(instance).clone();
-        for label in 1..at.labels.len() {
-            self.let_go(instance, label);
-        }
         for posted in &at.times {
             self.network.retract(posted.constraint);
         }
@@ -574,6 +564,9 @@ impl Database {
         now.values.clear();
         now.effects.clear();
         now.chosen.fill(None);
+        for label in 1..at.labels.len() {
+            self.let_go(instance, label);
+        }
         self.loosen_mirrors();
     }
 

@@ -325,23 +325,40 @@ impl Database {
         let Target::New(_, label) = relations[relation as usize].target else {
             return;
         };
-        let depends = |at: usize| {
-            at as u32 == relation
-                || relations[at].anchor == label
-                || matches!(relations[at].target, Target::Label(target) if target == label)
-        };
-        for at in (0..relations.len()).filter(|&at| depends(at)) {
-            let done = self.is_fulfilled(instance, at as u32);
-            self.take_back(instance, at as u32);
-            if done {
-                if let Target::New(_, other) = relations[at].target {
-                    self.let_go(instance, other);
+        // What is said of the token, of tokens that are said of, and so on.
+        let mut labels: SmallVec<[usize; 4]> = SmallVec::from_slice(&[label]);
+        let mut depend: SmallVec<[u32; 4]> = SmallVec::new();
+        let mut grows = true;
+        while grows {
+            grows = false;
+            for (at, said) in (0..).zip(relations) {
+                let target = match said.target {
+                    Target::New(_, label) | Target::Label(label) => label,
+                };
+                let depends = labels.contains(&said.anchor) || labels.contains(&target);
+                if depends && !depend.contains(&at) {
+                    depend.push(at);
+                    grows = true;
+                    if !labels.contains(&target) {
+                        labels.push(target);
+                    }
                 }
-                self.push_open(Open {
-                    instance,
-                    step: Step::Relation(at as u32),
-                });
             }
+        }
+        depend.sort_unstable();
+        let fulfilled = depend.iter().filter(|&&at| self.is_fulfilled(instance, at));
+        let fulfilled: SmallVec<[u32; 4]> = fulfilled.copied().collect();
+        for &at in &depend {
+            self.take_back(instance, at);
+        }
+        // The token that leaves is let go by itself.
+        self.change_instance(instance).labels[label] = None;
+        for &other in labels.iter().filter(|&&other| other != label) {
+            self.let_go(instance, other);
+        }
+        for &at in &fulfilled {
+            let step = Step::Relation(at);
+            self.push_open(Open { instance, step });
         }
     }
 

@@ -244,9 +244,8 @@ impl Database {
 
     /// The variable that is when a token starts or ends, or, without an end, how long it lasts.
     pub(super) fn mirror(&mut self, token: TokenId, end: Option<End>) -> Result<Operand, Conflict> {
-        let made = |mirror: &&Mirror| (mirror.token, mirror.end) == (token, end);
-        if let Some(mirror) = self.mirrors.iter().find(made) {
-            return Ok(Operand::Variable(mirror.variable));
+        if let Some(operand) = self.mirrored_by(token, end) {
+            return Ok(operand);
         }
         let variable = self.store.add(Domain::ALL);
         let operand = Operand::Variable(variable);
@@ -261,6 +260,13 @@ impl Database {
         self.note(Change::Mirrored);
         self.reflect(self.mirrors.len() - 1)?;
         Ok(operand)
+    }
+
+    /// The variable that follows a time of a token, if there is one.
+    pub(super) fn mirrored_by(&self, token: TokenId, end: Option<End>) -> Option<Operand> {
+        let made = |mirror: &&Mirror| (mirror.token, mirror.end) == (token, end);
+        let mirror = self.mirrors.iter().find(made)?;
+        Some(Operand::Variable(mirror.variable))
     }
 
     /// What the network knows of a mirrored time, the store knows too. Whether that was news.
@@ -296,16 +302,17 @@ impl Database {
 
     /// Times changed: the variables that follow them are told, and what follows from that.
     pub(super) fn settle_times(&mut self) -> Result<(), Conflict> {
-        let mut at = 0;
-        while at < self.mirrors.len() {
-            if self.reflect(at)? {
-                self.settle_values()?;
-                at = 0;
-            } else {
-                at += 1;
+        loop {
+            let mut news = false;
+            // All of them, before anybody is told: what was loosened is as tight as before then.
+            for place in 0..self.mirrors.len() {
+                news |= self.reflect(place)?;
             }
+            if !news {
+                return Ok(());
+            }
+            self.settle_values()?;
         }
-        Ok(())
     }
 
     /// A variable changed that follows a time: the time follows it.
@@ -348,6 +355,8 @@ impl Database {
                 self.network.retract(time);
             }
         }
+        let settled = self.settle_times();
+        debug_assert!(settled.is_ok(), "less holds than before");
     }
 
     fn change_mirror(&mut self, place: usize) -> &mut Mirror {

@@ -273,7 +273,12 @@ impl Complete {
                     .map(|_| ()),
                 (Step::Relation(relation), Decision::Displace { slot, token }) => {
                     database.attempt(|database| {
-                        database.remove(token);
+                        make_room(database, slot, token)?;
+                        // Whoever asks may have gone with it.
+                        if !database.open().contains(&Open { instance, step }) {
+                            let owner = Owner::Token(token);
+                            return Err(Conflict::Mismatch { owner });
+                        }
                         database.insert_for(instance, relation, slot, None)?;
                         Ok(())
                     })
@@ -302,7 +307,7 @@ impl Complete {
         match decision {
             Decision::Insert(slot) => Schedule::activate_goal(problem, goals, database, goal, slot),
             Decision::Displace { slot, token } => database.attempt(|database| {
-                database.remove(token);
+                make_room(database, slot, token)?;
                 Schedule::activate_goal(problem, goals, database, goal, slot)
             }),
             Decision::Support(into) => Schedule::merge_goal(problem, goals, database, goal, into),
@@ -702,6 +707,17 @@ fn fill(database: &mut Database, slot: Slot, after: Option<TokenId>) -> Result<(
         database.activate(token, slot)?;
         close(database, slot.timeline, after)
     })
+}
+
+/// Removes a token, so that there is room where it was; not if the slot goes with it.
+fn make_room(database: &mut Database, slot: Slot, token: TokenId) -> Result<(), Conflict> {
+    database.remove(token);
+    let stays = |after| database.token(after).is_some_and(|at| at.status == Status::Active);
+    if slot.after.is_none_or(stays) {
+        return Ok(());
+    }
+    let owner = Owner::Token(token);
+    Err(Conflict::Mismatch { owner })
 }
 
 /// Posts a precedence, or its contrary.
