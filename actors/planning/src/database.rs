@@ -135,6 +135,7 @@ pub(crate) struct Lane {
 }
 
 /// A plan database.
+#[derive(Clone)]
 pub struct Database {
     model: Arc<Model>,
     /// By rule: its body without nesting.

@@ -10,10 +10,12 @@
 //! parts, and never by a clock: the same problem gives the same plan, or the same want of one, on
 //! any machine.
 
+pub mod choices;
 mod chronological;
 pub mod complete;
 pub mod executive;
 mod extract;
+mod repair;
 pub mod schedule;
 mod solve;
 #[cfg(test)]
@@ -26,6 +28,7 @@ use crate::profile::Bound;
 
 pub use chronological::{Stack, chronological};
 pub use extract::extract;
+pub use repair::Repair;
 pub use solve::{Answer, Forward, Planner, Settings};
 
 /// What is missing in a plan.

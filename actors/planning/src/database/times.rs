@@ -198,9 +198,9 @@ impl Database {
         })
     }
 
-    /// Posts a distance between two tokens' times: that an end of the second lies within `span`
-    /// after an end of the first. While a token is there it stays, and is its: it goes when that
-    /// leaves the plan.
+    /// Posts that the second of two times lies within `span` after the first. It is a token's: it
+    /// goes when that leaves the plan, or when it is taken back. Gives the token and what was
+    /// posted; nothing, if both times are known.
     ///
     /// # Errors
     ///
@@ -208,19 +208,28 @@ impl Database {
     pub fn order_for(
         &mut self,
         token: TokenId,
-        [from, to]: [(TokenId, End); 2],
+        [from, to]: [Time; 2],
         span: Span,
         owner: Owner,
-    ) -> Result<Option<Constraint>, Conflict> {
+    ) -> Result<Option<(TokenId, Constraint)>, Conflict> {
         self.attempt(|database| {
-            let [from, to] = [from, to].map(|(token, end)| database.time(token, end));
             let posted = database.between(from, to, span, owner)?;
             if let Some(posted) = posted {
                 database.change(token).orders.push(posted);
             }
             database.settle_times()?;
-            Ok(posted)
+            Ok(posted.map(|posted| (token, posted)))
         })
+    }
+
+    /// Whether a time rests on a constraint: whether it alone keeps an earliest time from being
+    /// earlier, or may.
+    pub fn is_tight(&self, constraint: Constraint) -> bool {
+        let Some((from, to, span)) = self.network.constraint(constraint) else {
+            return false;
+        };
+        let (from, to) = (self.network.bounds(from), self.network.bounds(to));
+        to.min == from.min.saturating_add(span.min)
     }
 
     /// Takes back an order that was posted for a token, if it is there still.

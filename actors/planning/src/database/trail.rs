@@ -6,7 +6,7 @@ use super::{Conflict, Database, InstanceId, Lane, Level, Token, TokenId};
 use crate::model::TimelineId;
 
 /// A change of what the database itself keeps, with what was there before.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Change {
     TokenAdded(TokenId),
     TokenChanged(TokenId, Box<Token>),

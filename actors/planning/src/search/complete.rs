@@ -12,7 +12,7 @@ use super::schedule::Schedule;
 use super::{Decision, Flaw, Precedence, Strategy};
 use crate::Ticks;
 use crate::database::{
-    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Status, Step, TokenId, Wanted,
+    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Status, Step, Time, TokenId, Wanted,
 };
 use crate::model::{
     EffectKind, End, GoalId, Pattern, Problem, ResourceId, ResourceKind, SlotOrder, Target,
@@ -20,7 +20,7 @@ use crate::model::{
 };
 use crate::parameters::{Kind, Operand};
 use crate::profile::{Bound, Contributor, OverUse, critical_sets};
-use crate::temporal::Span;
+use crate::temporal::{Constraint, Span};
 
 /// How many critical sets of an over-use are compared.
 const CRITICAL_SETS: usize = 32;
@@ -232,32 +232,53 @@ impl Strategy for Complete {
                     }
                 }
                 let owner = self.owner();
-                precede(database, precedence, true, owner)
+                precede(database, precedence, true, owner)?;
+                Ok(())
             });
         }
-        self.carry_out(database, flaw, decision)
+        self.carry_out(database, flaw, decision).map(|_| ())
     }
 }
 
+/// An order that was posted for a token, and whose it is.
+pub(super) type Posted = (Option<(TokenId, Constraint)>, Owner);
+
 impl Complete {
-    /// Carries out a decision that excludes no other.
+    /// Carries out a decision that excludes no other: what it posted, if that can be taken back.
     pub(super) fn carry_out(
         &mut self,
         database: &mut Database,
         flaw: Flaw,
         decision: Decision,
+    ) -> Result<Posted, Conflict> {
+        let owner = self.owner();
+        let posted = match (flaw, decision) {
+            (_, Decision::Order(precedence, _)) => precede(database, precedence, true, owner)?,
+            (_, Decision::Wait { token, until }) => {
+                let times = [Time::At(0), database.time(token, End::Start)];
+                database.order_for(token, times, Span::at_least(until), owner)?
+            }
+            (Flaw::Gap { timeline, after }, Decision::Close) => {
+                close(database, timeline, after, owner)?
+            }
+            _ => {
+                self.put_right(database, flaw, decision, owner)?;
+                None
+            }
+        };
+        Ok((posted, owner))
+    }
+
+    /// Carries out a decision about tokens and values.
+    fn put_right(
+        &mut self,
+        database: &mut Database,
+        flaw: Flaw,
+        decision: Decision,
+        owner: Owner,
     ) -> Result<(), Conflict> {
         match (flaw, decision) {
-            (_, Decision::Order(precedence, _)) => {
-                let owner = self.owner();
-                precede(database, precedence, true, owner)
-            }
-            (_, Decision::Wait { token, until }) => {
-                let owner = self.owner();
-                database.restrict_time(token, End::Start, Span::at_least(until), owner)
-            }
             (Flaw::Unbound { token, parameter }, Decision::Bind(value)) => {
-                let owner = self.owner();
                 database.bind(token, parameter, value, owner)
             }
             (Flaw::Open(Open { instance, step }), decision) => match (step, decision) {
@@ -289,8 +310,7 @@ impl Complete {
                 _ => unreachable!("{decision:?} is no decision for {flaw:?}"),
             },
             (Flaw::Goal(token), decision) => self.put_goal(database, token, decision),
-            (Flaw::Gap { timeline, after }, Decision::Close) => close(database, timeline, after),
-            (Flaw::Gap { after, .. }, Decision::Insert(slot)) => fill(database, slot, after),
+            (Flaw::Gap { after, .. }, Decision::Insert(slot)) => fill(database, slot, after, owner),
             _ => unreachable!("{decision:?} is no decision for {flaw:?}"),
         }
     }
@@ -661,33 +681,41 @@ fn close(
     database: &mut Database,
     timeline: TimelineId,
     after: Option<TokenId>,
-) -> Result<(), Conflict> {
+    owner: Owner,
+) -> Result<Option<(TokenId, Constraint)>, Conflict> {
     let horizon = database.horizon();
     let next = match after {
         None => database.first(timeline),
         Some(after) => database.token(after).and_then(|at| at.after()),
     };
-    match (after, next) {
+    let (token, times, span) = match (after, next) {
         (None, Some(first)) => {
-            let owner = Owner::Token(first);
-            database.restrict_time(first, End::Start, Span::exactly(horizon.min), owner)
+            let times = [Time::At(0), database.time(first, End::Start)];
+            (first, times, Span::exactly(horizon.min))
         }
         (Some(last), None) => {
-            let owner = Owner::Token(last);
-            database.restrict_time(last, End::Finish, Span::exactly(horizon.max), owner)
+            let times = [Time::At(0), database.time(last, End::Finish)];
+            (last, times, Span::exactly(horizon.max))
         }
         (Some(first), Some(second)) => {
-            let owner = Owner::Sequence { first, second };
-            let ends = [(first, End::Finish), (second, End::Start)];
-            database.order_for(second, ends, Span::exactly(0), owner)?;
-            Ok(())
+            let times = [
+                database.time(first, End::Finish),
+                database.time(second, End::Start),
+            ];
+            (second, times, Span::exactly(0))
         }
-        (None, None) => Ok(()),
-    }
+        (None, None) => return Ok(None),
+    };
+    database.order_for(token, times, span, owner)
 }
 
 /// A timeline says its default after a token, from that token's end on.
-fn fill(database: &mut Database, slot: Slot, after: Option<TokenId>) -> Result<(), Conflict> {
+fn fill(
+    database: &mut Database,
+    slot: Slot,
+    after: Option<TokenId>,
+    owner: Owner,
+) -> Result<(), Conflict> {
     let model = database.model().clone();
     let Some(default) = &model.timelines[slot.timeline].default else {
         let owner = after.map_or(Owner::Given, Owner::Token);
@@ -705,14 +733,19 @@ fn fill(database: &mut Database, slot: Slot, after: Option<TokenId>) -> Result<(
             cause: Cause::Filler,
         })?;
         database.activate(token, slot)?;
-        close(database, slot.timeline, after)
+        close(database, slot.timeline, after, owner)?;
+        Ok(())
     })
 }
 
 /// Removes a token, so that there is room where it was; not if the slot goes with it.
 fn make_room(database: &mut Database, slot: Slot, token: TokenId) -> Result<(), Conflict> {
     database.remove(token);
-    let stays = |after| database.token(after).is_some_and(|at| at.status == Status::Active);
+    let stays = |after| {
+        database
+            .token(after)
+            .is_some_and(|at| at.status == Status::Active)
+    };
     if slot.after.is_none_or(stays) {
         return Ok(());
     }
@@ -726,13 +759,13 @@ pub(super) fn precede(
     precedence: Precedence,
     holds: bool,
     owner: Owner,
-) -> Result<(), Conflict> {
+) -> Result<Option<(TokenId, Constraint)>, Conflict> {
     let Precedence { from, to, gap } = precedence;
     let span = if holds {
         Span::at_least(gap)
     } else {
         Span::at_most(gap - 1)
     };
-    database.order_for(to.0, [from, to], span, owner)?;
-    Ok(())
+    let times = [from, to].map(|(token, end)| database.time(token, end));
+    database.order_for(to.0, times, span, owner)
 }

@@ -210,8 +210,9 @@ impl Schedule {
             let (from, to) = (goals[order.from], goals[order.to]);
             for distance in &order.distances {
                 let span = span_of(distance);
-                let ends = [(from, distance.from), (to, distance.to)];
-                database.order_for(goals[goal], ends, span, Owner::Order(place))?;
+                let times = [(from, distance.from), (to, distance.to)];
+                let times = times.map(|(token, end)| database.time(token, end));
+                database.order_for(goals[goal], times, span, Owner::Order(place))?;
             }
         }
         Ok(())

@@ -226,7 +226,7 @@ impl Run {
 }
 
 /// The goal not yet tried that brings most; of equals, the first.
-fn most_gain(objective: &Objective, tried: &[bool]) -> Option<GoalId> {
+pub(super) fn most_gain(objective: &Objective, tried: &[bool]) -> Option<GoalId> {
     let open = (0..tried.len()).filter(|&goal| !tried[goal]);
     open.fold(None, |best: Option<GoalId>, goal| match best {
         Some(best) if objective.gain(best) >= objective.gain(goal) => Some(best),

@@ -50,7 +50,9 @@ fn an_observation_elsewhere_brings_a_drive() {
 fn polling() -> executive::Executive {
     let text = include_str!("../../models/polling.ddl");
     let model = read_model("polling.ddl", text, &Options::default()).ok();
-    executive::Executive::new(Arc::new(model.unwrap_or_else(|findings| panic!("{findings}"))))
+    executive::Executive::new(Arc::new(
+        model.unwrap_or_else(|findings| panic!("{findings}")),
+    ))
 }
 
 /// Section 3.3 of the IDEA paper: the fan is turned on in the cycle in which a temperature above
@@ -72,7 +74,9 @@ fn a_fan_is_turned_on_in_the_cycle_that_learns_the_temperature() {
     for (tick, temperature, fan) in [(1, 290, 0), (2, 301, 1), (3, 299, 0)] {
         let poll = executive.present(0).expect("there is a poll");
         let outputs = [i64::from(temperature > 300), temperature, 1];
-        executive.report(poll, &outputs, true, tick).expect("it ends after a tick");
+        executive
+            .report(poll, &outputs, true, tick)
+            .expect("it ends after a tick");
         assert!(matches!(executive.cycle(tick, 10_000), Verdict::Solved));
         let fans = ("DeviceSetFanState".to_owned(), vec![Some(fan)], tick);
         assert_eq!(said(&executive, 1), fans);
@@ -82,5 +86,9 @@ fn a_fan_is_turned_on_in_the_cycle_that_learns_the_temperature() {
     assert!(matches!(executive.cycle(4, 10_000), Verdict::Solved));
     assert_eq!(said(&executive, 1).2, 3);
     assert_eq!(said(&executive, 0).2, 4);
-    assert!(executive.database().len() <= 4, "{}", executive.database().len());
+    assert!(
+        executive.database().len() <= 4,
+        "{}",
+        executive.database().len()
+    );
 }
