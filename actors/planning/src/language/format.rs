@@ -5,7 +5,7 @@ use super::parser::parse;
 use super::tree::{Comment, Kind, Tree};
 
 /// A list that fits on a line this long stands on one.
-const WIDTH: usize = 88;
+const WIDTH: usize = 96;
 
 /// Writes a text in its normal form.
 pub(super) fn format(text: &str) -> Result<String, Findings> {
@@ -30,8 +30,8 @@ pub(super) fn format(text: &str) -> Result<String, Findings> {
 }
 
 /// The normal form of a tree: a list on one line if it fits and no comment stands in it; else its
-/// first words, then each of its other children on a line of its own, a keyword with its first
-/// value.
+/// first words, then each of its other children on a line of its own, but an option that fits with
+/// its values.
 fn write(tree: &Tree) -> String {
     let widths = widths(tree);
     let mut writer = Writer {
@@ -176,51 +176,35 @@ impl Writer<'_> {
         let tree = self.tree;
         let (open, close) = signs(tree, node);
         self.text(open);
-        let inner = indent + 1;
-        let end = tree.nodes[node as usize].next;
-        let mut fresh = false;
-        let first_comment = self.next_comment(node + 1, Some(node));
-        if let Some(comment) = first_comment.filter(|comment| !comment.alone) {
-            self.comment += 1;
-            self.text(" ");
-            self.write_comment(comment);
-            self.end_line();
-            fresh = true;
-        }
-        let mut before: Option<Kind> = None;
-        for (place, child) in tree.form(node).children().enumerate() {
+        let (inner, end) = (indent + 1, tree.nodes[node as usize].next);
+        // Whether the line is new, so that what comes next is not preceded by a blank.
+        let mut fresh = self.first_trailing(node);
+        // Up to where children stay on the line: the first words, then an option that fits.
+        let mut line_until = self.head_end(node, indent, closing);
+        for child in tree.form(node).children() {
             let at = child.node();
-            let alone = self.next_comment(at, Some(node)).is_some();
-            if alone && !fresh {
+            if !fresh && self.next_comment(at, Some(node)).is_some() {
                 self.end_line();
                 fresh = true;
             }
             self.comments_before(at, Some(node), inner);
-            let last = tree.nodes[at as usize].next == end;
-            let after = if last { closing + 1 } else { 0 };
-            // The head's words stay on its line, and a value on that of its keyword.
-            let kind = child.kind();
-            let is_word = !matches!(kind, Kind::List | Kind::Span | Kind::Keyword);
-            let stays = before == Some(Kind::Keyword) || (place < 3 && is_word);
-            let room = self.column + 1 + self.widths[at as usize] + after <= WIDTH || !is_word;
-            let column = match (fresh, place) {
-                (true, _) => {
-                    self.indent(inner);
-                    inner
-                }
-                (false, 0) => inner,
-                (false, _) if stays && room && kind != Kind::Keyword => {
-                    self.text(" ");
-                    self.column
-                }
-                (false, _) => {
+            let is_last = tree.nodes[at as usize].next == end;
+            let after = if is_last { closing + 1 } else { 0 };
+            if at == node + 1 && !fresh {
+                self.column = self.column.max(inner);
+            } else if !fresh && at < line_until {
+                self.text(" ");
+            } else {
+                if !fresh {
                     self.end_line();
-                    self.indent(inner);
-                    inner
                 }
-            };
+                self.indent(inner);
+                if child.kind() == Kind::Keyword {
+                    line_until = self.option_end(at, end, inner, closing);
+                }
+            }
+            let column = self.column;
             self.node(at, column, after);
-            before = Some(kind);
             let comments = self.comment;
             self.trailing(at, Some(node));
             fresh = self.comment > comments;
@@ -239,6 +223,52 @@ impl Writer<'_> {
             self.indent(indent);
         }
         self.text(close);
+    }
+
+    /// A comment that follows the parenthesis of a list; whether there is one.
+    fn first_trailing(&mut self, list: u32) -> bool {
+        let first = self.next_comment(list + 1, Some(list));
+        let Some(comment) = first.filter(|comment| !comment.alone) else {
+            return false;
+        };
+        self.comment += 1;
+        self.text(" ");
+        self.write_comment(comment);
+        self.end_line();
+        true
+    }
+
+    /// The node up to which the first words and spans of a list stay on its first line.
+    fn head_end(&self, list: u32, indent: usize, closing: usize) -> u32 {
+        let mut column = indent + 1;
+        let mut end = list + 1;
+        for child in self.tree.form(list).children().take(3) {
+            let is_word = !matches!(child.kind(), Kind::List | Kind::Keyword);
+            column += self.widths[child.node() as usize] + 1;
+            if !is_word || column + closing > WIDTH {
+                break;
+            }
+            end = self.tree.nodes[child.node() as usize].next;
+        }
+        end
+    }
+
+    /// The node up to which an option stays on one line: its keyword alone, if it does not fit.
+    fn option_end(&self, keyword: u32, list_end: u32, indent: usize, closing: usize) -> u32 {
+        let mut column = indent + self.widths[keyword as usize];
+        let mut at = keyword + 1;
+        while at < list_end && self.tree.nodes[at as usize].kind != Kind::Keyword {
+            column += 1 + self.widths[at as usize];
+            at = self.tree.nodes[at as usize].next;
+        }
+        let closing = if at == list_end { closing + 1 } else { 0 };
+        let comments = &self.tree.comments[self.comment..];
+        let within = comments.first().is_some_and(|comment| comment.before < at);
+        if within || column + closing > WIDTH {
+            keyword + 1
+        } else {
+            at
+        }
     }
 }
 

@@ -2,9 +2,14 @@
 
 use super::*;
 use crate::model::*;
+use crate::temporal::Span;
+
+mod format;
 
 const FIGURE_5: &str = include_str!("../../models/figure-5.ddl");
 const ROVER: &str = include_str!("../../models/rover.ddl");
+const EXECUTIVE: &str = include_str!("../../models/executive.ddl");
+const TOO_MUCH: &str = include_str!("../../models/rover-too-much.ddl");
 const ROVER_PROBLEM: &str = include_str!("../../models/rover-problem.ddl");
 
 /// The findings of a reading, one a line.
@@ -70,4 +75,18 @@ fn the_rover_and_its_problem_are_read() {
     let problem = read.value.expect("it is right");
     assert_eq!(problem.goals.len(), 4);
     assert_eq!(problem.goals[3].name, "downlink_1");
+    assert_eq!(problem.goals[3].start, Span::new(300, 400));
+    let read = read_problem("rover-too-much.ddl", TOO_MUCH, &model, &Options::default());
+    assert_eq!(shown(&read), "");
+}
+
+#[test]
+fn the_executive_has_eleven_timelines_and_no_finding() {
+    let read = read_model("executive.ddl", EXECUTIVE, &Options::default());
+    assert_eq!(shown(&read), "");
+    let model = read.value.expect("it is right");
+    assert_eq!(
+        (model.timelines.len(), model.profile),
+        (11, Profile::Executive)
+    );
 }

@@ -142,21 +142,23 @@ impl Tree {
     }
 }
 
-/// Trees are the same if they say the same, wherever it stands.
+/// Trees are the same if they say the same, with the same comments, on whichever lines it stands.
 impl PartialEq for Tree {
     fn eq(&self, other: &Tree) -> bool {
         let same = |node: usize| {
             let (a, b) = (self.nodes[node], other.nodes[node]);
             a.kind == b.kind && a.next == b.next && self.word(node) == other.word(node)
         };
-        let words = |tree: &Tree| -> Vec<_> {
+        let comments = |tree: &Tree| -> Vec<_> {
             let comments = tree.comments.iter();
-            let texts = comments.map(|at| &tree.source.text[at.start as usize..at.end as usize]);
-            texts.map(str::to_owned).collect()
+            let text = |at: &Comment| &tree.source.text[at.start as usize..at.end as usize];
+            comments
+                .map(|at| (text(at).to_owned(), at.before, at.within))
+                .collect()
         };
         self.nodes.len() == other.nodes.len()
             && (0..self.nodes.len()).all(same)
-            && words(self) == words(other)
+            && comments(self) == comments(other)
     }
 }
 
