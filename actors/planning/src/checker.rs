@@ -184,29 +184,25 @@ impl Report {
 struct Added<'a>(Option<&'a mut Violation>);
 
 impl Added<'_> {
-    fn tokens(self, tokens: impl IntoIterator<Item = TokenId>) -> Self {
-        if let Some(violation) = &self.0 {
-            debug_assert!(violation.tokens.is_empty());
-        }
-        let Added(violation) = self;
-        Added(violation.map(|violation| {
+    fn tokens(mut self, tokens: impl IntoIterator<Item = TokenId>) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.tokens.extend(tokens);
-            violation
-        }))
+        }
+        self
     }
 
-    fn times(self, from: Ticks, to: Ticks) -> Self {
-        Added(self.0.map(|violation| {
+    fn times(mut self, from: Ticks, to: Ticks) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.times = Some([from, to]);
-            violation
-        }))
+        }
+        self
     }
 
-    fn at(self, place: String) -> Self {
-        Added(self.0.map(|violation| {
+    fn at(mut self, place: String) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.place = place;
-            violation
-        }))
+        }
+        self
     }
 }
 

@@ -195,7 +195,6 @@ impl<'a> Search<'a, '_> {
     /// # Errors
     ///
     /// What does not hold.
-    #[expect(clippy::type_complexity, reason = "pairs, used once")]
     fn undecided(&self, state: &State<'a>) -> Result<Vec<(Vec<VariableId>, Position)>, Why<'a>> {
         let rule = self.rule;
         let mut undecided = Vec::new();
