@@ -10,6 +10,7 @@
 //! | [`checker`] | whether a plan is valid, and if not, why: shares no code with the planners |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`plan`] | a plan as data and as JSON |
+//! | [`sch`] | project scheduling problems (RCPSP/max) in ProGen/max's format |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
@@ -17,6 +18,7 @@ pub mod checker;
 pub mod model;
 mod nearest;
 pub mod plan;
+pub mod sch;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.
