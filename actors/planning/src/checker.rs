@@ -20,7 +20,8 @@
 //!   for its relations, other than the master, and values for its variables, such that all that it
 //!   says is true. A relationship that only an unbound argument leaves undecided is no violation;
 //!   one that speaks of a token that was not asked for is none either.
-//! - **Resources.** Each effect of a rule that holds is listed with the resource that was taken.
+//! - **Resources.** Each effect of a rule that holds is listed with the resource that was taken,
+//!   but for what changes it by 0.
 //!   The level stays within the limits from time 0 to the horizon's end. A use that ends when
 //!   another begins does not meet it. A take of a rate-limited resource counts from when it is
 //!   made until the window is over, a use until the window after its end is.

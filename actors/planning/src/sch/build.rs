@@ -9,8 +9,7 @@ use crate::model::{
 };
 use crate::temporal::{FURTHEST, Span};
 
-/// Types: truth values, numbers, the project, numbers of activities, demands.
-const PROJECT: usize = 2;
+/// Types, after truth values, numbers and the project.
 const ACTIVITY: usize = 3;
 const DEMAND: usize = 4;
 

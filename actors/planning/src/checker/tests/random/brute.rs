@@ -235,6 +235,11 @@ pub(super) fn rule_holds(model: &Model, rule: &Rule, plan: &Plan, master: usize)
         };
         let effects = match (&rule.effects[..], listed.len()) {
             ([], 0) => true,
+            ([one], 0) => match one.amount {
+                Bound::Value(amount) => amount == 0,
+                Bound::Variable(variable) => values[variable] == 0,
+                Bound::None => false,
+            },
             ([one], 1) => is_listed(one, 0),
             _ => false,
         };
