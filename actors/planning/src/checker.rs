@@ -20,7 +20,8 @@
 //!   for its relations, other than the master, and values for its variables, such that all that it
 //!   says is true. A relationship that only an unbound argument leaves undecided is no violation;
 //!   one that speaks of a token that was not asked for is none either.
-//! - **Resources.** Each effect of a rule that holds is listed with the resource that was taken.
+//! - **Resources.** Each effect of a rule that holds is listed with the resource that was taken,
+//!   but for what changes it by 0.
 //!   The level stays within the limits from time 0 to the horizon's end. A use that ends when
 //!   another begins does not meet it. A take of a rate-limited resource counts from when it is
 //!   made until the window is over, a use until the window after its end is.
@@ -184,29 +185,25 @@ impl Report {
 struct Added<'a>(Option<&'a mut Violation>);
 
 impl Added<'_> {
-    fn tokens(self, tokens: impl IntoIterator<Item = TokenId>) -> Self {
-        if let Some(violation) = &self.0 {
-            debug_assert!(violation.tokens.is_empty());
-        }
-        let Added(violation) = self;
-        Added(violation.map(|violation| {
+    fn tokens(mut self, tokens: impl IntoIterator<Item = TokenId>) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.tokens.extend(tokens);
-            violation
-        }))
+        }
+        self
     }
 
-    fn times(self, from: Ticks, to: Ticks) -> Self {
-        Added(self.0.map(|violation| {
+    fn times(mut self, from: Ticks, to: Ticks) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.times = Some([from, to]);
-            violation
-        }))
+        }
+        self
     }
 
-    fn at(self, place: String) -> Self {
-        Added(self.0.map(|violation| {
+    fn at(mut self, place: String) -> Self {
+        if let Some(violation) = &mut self.0 {
             violation.place = place;
-            violation
-        }))
+        }
+        self
     }
 }
 

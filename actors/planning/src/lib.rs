@@ -16,6 +16,7 @@
 //! | [`plan`] | a plan as data and as JSON |
 //! | [`profile`] | how low and how high the level of a resource can be while times are flexible |
 //! | [`search`] | how what is missing in a plan is put right |
+//! | [`sch`] | project scheduling problems (RCPSP/max) in ProGen/max's format |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
@@ -29,6 +30,7 @@ pub mod parameters;
 pub mod plan;
 pub mod profile;
 pub mod search;
+pub mod sch;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.

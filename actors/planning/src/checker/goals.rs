@@ -32,7 +32,7 @@ fn facts(scene: &Scene<'_>, report: &mut Report) {
     let mut token_of: Vec<Option<usize>> = vec![None; facts.len()];
     let mut fact_of = vec![None; scene.tokens.len()];
     let mut reached = vec![usize::MAX; scene.tokens.len()];
-    for fact in 0..facts.len() {
+    for (fact, missing) in facts.iter().enumerate() {
         // By token: the fact from which it was reached.
         let mut from = BTreeMap::new();
         let mut queue = VecDeque::from([fact]);
@@ -53,7 +53,7 @@ fn facts(scene: &Scene<'_>, report: &mut Report) {
             }
         }
         let Some(mut token) = free else {
-            missing_fact(scene, &facts[fact], report);
+            missing_fact(scene, missing, report);
             continue;
         };
         // Each fact on the path gives the token that it had to the one before.

@@ -126,8 +126,8 @@ struct State<'a> {
     /// Relations whose target is taken to lie outside the horizon, with their anchor: that it
     /// could lie nowhere else is not known yet.
     outside: Vec<(&'a Relation, usize)>,
-    /// By effect of the rule, so far: the listed effect that it is.
-    effects: Vec<usize>,
+    /// By effect of the rule, so far: the listed effect that it is, or none if it does nothing.
+    effects: Vec<Option<usize>>,
 }
 
 /// What is still to be found: bodies, and then more.

@@ -86,7 +86,7 @@ impl<'a> Search<'a, '_> {
         let mut any = false;
         for (index, listed) in seen.token.effects.iter().enumerate() {
             let is_it = !self.used[index]
-                && !state.effects.contains(&index)
+                && !state.effects.contains(&Some(index))
                 && listed.does == does
                 && listed.place == at
                 && seen.resources[index].is_some_and(|id| effect.resources.contains(&id));
@@ -94,7 +94,7 @@ impl<'a> Search<'a, '_> {
                 continue;
             }
             let mut next = state.clone();
-            next.effects.push(index);
+            next.effects.push(Some(index));
             let is_amount = match effect.amount {
                 Bound::None => false,
                 Bound::Value(amount) => amount == listed.amount,
@@ -109,7 +109,18 @@ impl<'a> Search<'a, '_> {
                 return true;
             }
         }
-        match any {
+        // What does nothing need not be listed.
+        let mut next = state.clone();
+        next.effects.push(None);
+        let does_nothing = match effect.amount {
+            Bound::None => false,
+            Bound::Value(amount) => amount == 0,
+            Bound::Variable(variable) => self.bind(&mut next, variable, 0),
+        };
+        if does_nothing && self.effects(&next) {
+            return true;
+        }
+        match any || does_nothing {
             true => false,
             false => self.fail(state, Why::Effect(effect)),
         }
@@ -158,7 +169,7 @@ impl<'a> Search<'a, '_> {
         if let Some(&(_, position)) = left {
             return self.fail(&state, Why::Unknown(position));
         }
-        for &index in &state.effects {
+        for index in state.effects.into_iter().flatten() {
             self.used[index] = true;
         }
         true
@@ -195,7 +206,6 @@ impl<'a> Search<'a, '_> {
     /// # Errors
     ///
     /// What does not hold.
-    #[expect(clippy::type_complexity, reason = "pairs, used once")]
     fn undecided(&self, state: &State<'a>) -> Result<Vec<(Vec<VariableId>, Position)>, Why<'a>> {
         let rule = self.rule;
         let mut undecided = Vec::new();
