@@ -19,6 +19,7 @@ mod critical;
 mod exact;
 mod flow;
 mod intervals;
+mod known;
 mod order;
 mod over_use;
 mod steps;
