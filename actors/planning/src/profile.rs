@@ -384,6 +384,43 @@ impl<O: Clone> Profile<O> {
         }
     }
 
+    /// Takes a use out whose times have all passed at a tick; whether it did. What it changed for
+    /// good becomes part of the initial level, if it is known exactly, and the use stays otherwise.
+    /// From that tick on levels are as before; earlier ones must not be asked for any more.
+    ///
+    /// ```
+    /// use farside_planning::profile::{Profile, Use};
+    /// use farside_planning::temporal::Span;
+    /// let mut memory = Profile::new(100, Span::new(0, 100));
+    /// let picture = Use::consumption(Span::exactly(5), Span::exactly(40));
+    /// let picture = memory.add(picture, "picture").unwrap();
+    /// assert!(!memory.forget(picture, 4));
+    /// assert!(memory.forget(picture, 5));
+    /// assert_eq!((memory.len(), memory.level(5)), (0, Span::exactly(60)));
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn forget(&mut self, id: UseId, before: Ticks) -> bool {
+        let one = *self.uses.get(id).expect("the use is there");
+        let stays = one.end.is_none();
+        let initial = self.initial + if stays { one.change.max } else { 0 };
+        let is_known = !stays || one.change.min == one.change.max;
+        if one.end.unwrap_or(one.start).max > before
+            || !is_known
+            || !(-MOST..=MOST).contains(&initial)
+        {
+            return false;
+        }
+        self.remove(id);
+        if initial != self.initial {
+            self.note(Change::Initial(self.initial));
+            self.initial = initial;
+        }
+        true
+    }
+
     /// The least and the greatest level at a tick, with what happens at that tick, if each time
     /// lies anywhere within its span.
     pub fn level(&self, tick: Ticks) -> Span {

@@ -25,10 +25,8 @@ use crate::temporal::Span;
 /// motor.add(first, 1).unwrap();
 /// motor.add(second, 2).unwrap();
 /// assert_eq!(motor.level(50), Span::new(-1, 1));
-/// // Of what is known, only that the first one ends before or when the second one starts.
-/// let mut order = |a: Moment<'_, i32>, b: Moment<'_, i32>| {
-///     *a.owner == 1 && *b.owner == 2 && !(!a.is_end && b.is_end)
-/// };
+/// // The first one ends before the second one starts: none of its times lies after the other's.
+/// let mut order = |a: Moment<'_, i32>, b: Moment<'_, i32>| *a.owner == 1 && *b.owner == 2;
 /// let mut exact = Exact::new();
 /// assert_eq!(exact.level(&motor, 50, &mut order), Span::new(0, 1));
 /// assert_eq!(exact.first_over_use(&motor, 0, &mut order), None);
