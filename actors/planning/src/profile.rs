@@ -19,6 +19,7 @@ mod critical;
 mod exact;
 mod flow;
 mod intervals;
+mod known;
 mod order;
 mod over_use;
 mod steps;
@@ -212,6 +213,8 @@ pub enum UseError {
 /// How much edits and questions looked at: counts that say whether work follows the change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
+    /// How often a step of the envelopes or an interval of a use changed: so many paths in a tree.
+    pub changes: u64,
     /// How often a node of the envelopes was looked at.
     pub steps: u64,
     /// How often a node of the trees of intervals was looked at, by which uses are found.
@@ -260,6 +263,7 @@ pub struct Profile<O> {
     /// When it is open whether a time has passed: twice the place of its use, and one more for an
     /// end.
     open: Tree<Interval>,
+    changes: u64,
     trail: Vec<Change<O>>,
     /// How long the trail was at each push.
     levels: Vec<usize>,
@@ -285,6 +289,7 @@ impl<O: Clone> Profile<O> {
             steps: Tree::default(),
             in_force: Tree::default(),
             open: Tree::default(),
+            changes: 0,
             trail: Vec::new(),
             levels: Vec::new(),
         }
@@ -379,6 +384,43 @@ impl<O: Clone> Profile<O> {
         }
     }
 
+    /// Takes a use out whose times have all passed at a tick; whether it did. What it changed for
+    /// good becomes part of the initial level, if it is known exactly, and the use stays otherwise.
+    /// From that tick on levels are as before; earlier ones must not be asked for any more.
+    ///
+    /// ```
+    /// use farside_planning::profile::{Profile, Use};
+    /// use farside_planning::temporal::Span;
+    /// let mut memory = Profile::new(100, Span::new(0, 100));
+    /// let picture = Use::consumption(Span::exactly(5), Span::exactly(40));
+    /// let picture = memory.add(picture, "picture").unwrap();
+    /// assert!(!memory.forget(picture, 4));
+    /// assert!(memory.forget(picture, 5));
+    /// assert_eq!((memory.len(), memory.level(5)), (0, Span::exactly(60)));
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn forget(&mut self, id: UseId, before: Ticks) -> bool {
+        let one = *self.uses.get(id).expect("the use is there");
+        let stays = one.end.is_none();
+        let initial = self.initial + if stays { one.change.max } else { 0 };
+        let is_known = !stays || one.change.min == one.change.max;
+        if one.end.unwrap_or(one.start).max > before
+            || !is_known
+            || !(-MOST..=MOST).contains(&initial)
+        {
+            return false;
+        }
+        self.remove(id);
+        if initial != self.initial {
+            self.note(Change::Initial(self.initial));
+            self.initial = initial;
+        }
+        true
+    }
+
     /// The least and the greatest level at a tick, with what happens at that tick, if each time
     /// lies anywhere within its span.
     pub fn level(&self, tick: Ticks) -> Span {
@@ -416,6 +458,7 @@ impl<O: Clone> Profile<O> {
     /// How much was looked at since the profile was made.
     pub fn work(&self) -> Work {
         Work {
+            changes: self.changes,
             steps: self.steps.looked_at(),
             intervals: self.in_force.looked_at() + self.open.looked_at(),
         }
@@ -453,14 +496,14 @@ impl<O: Clone> Profile<O> {
         self.magnitude += magnitude(&new) - magnitude(&old);
         self.put_steps(old.as_ref(), new.as_ref());
         let possible = |one: &Option<Use>| one.as_ref().map(Use::possible);
-        put_interval(&mut self.in_force, place, possible(&old), possible(&new));
+        self.changes += put_interval(&mut self.in_force, place, possible(&old), possible(&new));
         for is_end in [false, true] {
             let open = |one: &Option<Use>| {
                 let span = one.as_ref()?.time(is_end)?;
                 Some(Span::new(span.min, span.max.saturating_sub(1)))
             };
             let of = 2 * place + u32::from(is_end);
-            put_interval(&mut self.open, of, open(&old), open(&new));
+            self.changes += put_interval(&mut self.open, of, open(&old), open(&new));
         }
     }
 
@@ -493,21 +536,25 @@ impl<O: Clone> Profile<O> {
             }
             if step.times != 0 || step.change != [0; 2] {
                 self.steps.put(step);
+                self.changes += 1;
             }
         }
     }
 }
 
-/// Gives an interval another extent; an empty one is in no tree.
-fn put_interval(tree: &mut Tree<Interval>, of: u32, old: Option<Span>, new: Option<Span>) {
+/// Gives an interval another extent; an empty one is in no tree. It says how often it had to go
+/// through the tree.
+fn put_interval(tree: &mut Tree<Interval>, of: u32, old: Option<Span>, new: Option<Span>) -> u64 {
     let [old, new] = [old, new].map(|span| span.filter(|span| !span.is_empty()));
+    let mut changes = 0;
     if old == new {
-        return;
+        return changes;
     }
     if let Some(old) = old
         && new.is_none_or(|new| new.min != old.min)
     {
         tree.remove((old.min, of));
+        changes += 1;
     }
     if let Some(new) = new {
         tree.put(Interval {
@@ -515,7 +562,9 @@ fn put_interval(tree: &mut Tree<Interval>, of: u32, old: Option<Span>, new: Opti
             last: new.max,
             of,
         });
+        changes += 1;
     }
+    changes
 }
 
 impl<O: fmt::Debug> fmt::Debug for Profile<O> {

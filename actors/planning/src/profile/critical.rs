@@ -11,9 +11,8 @@ use super::OverUse;
 /// Project Scheduling with Time Windows*, 2002).
 ///
 /// Each is a list of places in [`OverUse::contributors`], the largest amounts first. At most `most`
-/// are given, and each contributor in turn gives some of which it is the largest: the same ones for
-/// the same over-use. Are there more, those with the largest amounts, which have the fewest
-/// members, are among them.
+/// are given, the same ones for the same over-use. Are there more, each contributor gives a share
+/// of which it is the largest, and of those the ones with the largest amounts come first.
 ///
 /// For contributors at one tick of a renewable or rate-limited resource. All of an exact over-use
 /// are in force at once in one schedule; of others some may be known to follow each other.
@@ -54,10 +53,19 @@ pub fn critical_sets<O>(over_use: &OverUse<O>, most: usize) -> Vec<Vec<usize>> {
         set: Vec::new(),
         found: Vec::new(),
     };
-    for first in 0..places.len() {
-        let left = places.len() - first;
-        let share = (most - search.found.len()).div_ceil(left);
-        search.gather(first, search.found.len() + share);
+    let mut share = most.div_ceil(places.len().max(1));
+    loop {
+        let mut is_cut = false;
+        search.found.clear();
+        for first in 0..places.len() {
+            let end = most.min(search.found.len().saturating_add(share));
+            is_cut |= !search.gather(first, end);
+        }
+        // Some have more than their share, and others less.
+        if !is_cut || search.found.len() == most {
+            break;
+        }
+        share *= 2;
     }
     let in_places = |set: Vec<usize>| set.into_iter().map(|at| places[at]).collect();
     search.found.into_iter().map(in_places).collect()
@@ -76,8 +84,9 @@ struct Search {
 }
 
 impl Search {
-    /// Finds sets of which `first` is the largest, until there are `most` of all.
-    fn gather(&mut self, first: usize, most: usize) {
+    /// Finds sets of which `first` is the largest, until there are `most` of all; whether there
+    /// are no more.
+    fn gather(&mut self, first: usize, most: usize) -> bool {
         let mut at = first;
         while self.found.len() < most {
             // With all from here on there is a set; otherwise with none of them.
@@ -94,12 +103,13 @@ impl Search {
                 at = self.leave() + 1;
             }
             if self.set.is_empty() {
-                return;
+                return true;
             }
         }
         while !self.set.is_empty() {
             self.leave();
         }
+        false
     }
 
     /// Takes the last one out of the set.
@@ -158,7 +168,7 @@ mod tests {
             prop_assert!(distinct.is_subset(&expected));
             let all = critical_sets(&over_use, 1 << amounts.len());
             prop_assert_eq!(all.len(), expected.len());
-            prop_assert!(found.len() <= most && (most == 0 || !found.is_empty()));
+            prop_assert_eq!(found.len(), most.min(expected.len()));
         }
     }
 

@@ -6,9 +6,8 @@
 //! if the distances are those that the temporal network implies. The worst level is that of the
 //! worst set: a closure of most weight.
 
-use std::ops::Range;
-
 use super::flow::Flow;
+use super::known::Known;
 use super::steps::{GREATEST, LEAST, Side};
 use super::{Bound, Contributor, Moment, Order, OverUse, Profile};
 use crate::Ticks;
@@ -26,10 +25,8 @@ use crate::temporal::Span;
 /// motor.add(first, 1).unwrap();
 /// motor.add(second, 2).unwrap();
 /// assert_eq!(motor.level(50), Span::new(-1, 1));
-/// // Of what is known, only that the first one ends before or when the second one starts.
-/// let mut order = |a: Moment<'_, i32>, b: Moment<'_, i32>| {
-///     *a.owner == 1 && *b.owner == 2 && !(!a.is_end && b.is_end)
-/// };
+/// // The first one ends before the second one starts: none of its times lies after the other's.
+/// let mut order = |a: Moment<'_, i32>, b: Moment<'_, i32>| *a.owner == 1 && *b.owner == 2;
 /// let mut exact = Exact::new();
 /// assert_eq!(exact.level(&motor, 50, &mut order), Span::new(0, 1));
 /// assert_eq!(exact.first_over_use(&motor, 0, &mut order), None);
@@ -45,7 +42,7 @@ pub struct Exact {
     /// By place: whether it lies before the tick where the level is worst.
     chosen: Vec<bool>,
     known: Known,
-    /// By the number of a time: its place among those that are open at the present tick.
+    /// By moment: its place among those that are open at the present tick.
     places: Vec<Option<u32>>,
     found: Vec<u32>,
     flow: Flow,
@@ -57,9 +54,9 @@ pub struct Exact {
 pub struct ExactWork {
     /// How often an extreme level was found.
     pub levels: u64,
-    /// How many times of uses were open then, added up over the levels.
+    /// How many times of uses were open then, added up over the ticks.
     pub open: u64,
-    /// How many pairs of them were found to have an order.
+    /// How many pairs of them have an order, added up too.
     pub pairs: u64,
     /// How often an arc of a flow was looked at.
     pub arcs: u64,
@@ -71,97 +68,8 @@ struct Open {
     /// The place of the use.
     place: u32,
     is_end: bool,
-}
-
-impl Open {
-    /// As the profile's tree of open times has it.
-    fn of(number: u32) -> Self {
-        Open {
-            place: number / 2,
-            is_end: number % 2 == 1,
-        }
-    }
-
-    fn number(self) -> u32 {
-        2 * self.place + u32::from(self.is_end)
-    }
-}
-
-/// What is known of the order of times that are open at some ticks: asked once for each.
-#[derive(Clone, Debug, Default)]
-struct Known {
-    /// How often all was forgotten.
-    pass: u64,
-    /// By the number of a time: where in `never_after` its part is, and in which pass it was asked
-    /// for.
-    parts: Vec<(u64, usize, usize)>,
-    /// The numbers of times that lie after one in no schedule.
-    never_after: Vec<u32>,
-    others: Vec<u32>,
-}
-
-impl Known {
-    /// Forgets all.
-    fn begin(&mut self, times: usize) {
-        self.pass += 1;
-        self.never_after.clear();
-        self.parts.resize(times.max(self.parts.len()), (0, 0, 0));
-    }
-
-    /// Where those are that lie after a time in no schedule, and are open at one of the ticks
-    /// at which it is itself, `within` some.
-    fn of<O: Clone>(
-        &mut self,
-        profile: &Profile<O>,
-        one: Open,
-        within: Span,
-        order: &mut impl Order<O>,
-    ) -> Range<usize> {
-        let (pass, mut start, mut end) = self.parts[one.number() as usize];
-        if pass != self.pass {
-            start = self.never_after.len();
-            self.ask(profile, one, within, order);
-            end = self.never_after.len();
-            self.parts[one.number() as usize] = (self.pass, start, end);
-        }
-        start..end
-    }
-
-    fn ask<O: Clone>(
-        &mut self,
-        profile: &Profile<O>,
-        one: Open,
-        within: Span,
-        order: &mut impl Order<O>,
-    ) {
-        let moment = |one: Open| {
-            let of = profile.uses.id_at(one.place as usize);
-            Moment {
-                of: of.expect("the use is there"),
-                owner: &profile.owners[one.place as usize],
-                is_end: one.is_end,
-            }
-        };
-        let used = profile.uses.at(one.place as usize);
-        let span = used.and_then(|used| used.time(one.is_end));
-        let open = span.map(|span| Span::new(span.min, span.max - 1));
-        self.others.clear();
-        if let Some(open) = open {
-            profile
-                .open
-                .overlapping(open.intersect(within), &mut self.others);
-        }
-        // Of a use's own, the start does not lie after the end: that need not be asked.
-        let start = one.is_end.then(|| one.number() - 1);
-        self.others
-            .retain(|other| *other != one.number() && Some(*other) != start);
-        self.never_after.extend(start);
-        let others = self.others.iter().copied().map(Open::of);
-        let moments: Vec<Moment<'_, O>> = others.map(moment).collect();
-        order.never_after(&moments, moment(one), |other| {
-            self.never_after.push(self.others[other]);
-        });
-    }
+    /// Its place among the moments that are open within the ticks in question.
+    moment: u32,
 }
 
 impl Exact {
@@ -180,18 +88,18 @@ impl Exact {
         tick: Ticks,
         order: &mut impl Order<O>,
     ) -> Span {
-        self.begin(profile);
-        self.level_within(profile, tick, Span::exactly(tick), order)
+        let moments = self.begin(profile, Span::exactly(tick), order);
+        self.level_of(profile, &moments, tick, order)
     }
 
-    fn level_within<O: Clone>(
+    fn level_of<O: Clone>(
         &mut self,
         profile: &Profile<O>,
+        moments: &[Moment<'_, O>],
         tick: Ticks,
-        within: Span,
         order: &mut impl Order<O>,
     ) -> Span {
-        self.prepare(profile, tick, within, order);
+        self.prepare(profile, moments, tick, order);
         let [least, greatest] = [LEAST, GREATEST].map(|side| self.extreme(profile, tick, side));
         Span::new(least, greatest)
     }
@@ -202,10 +110,10 @@ impl Exact {
         profile: &Profile<O>,
         order: &mut impl Order<O>,
     ) -> Vec<(Ticks, Span)> {
-        self.begin(profile);
+        let moments = self.begin(profile, Span::ALL, order);
         let ticks = profile.steps.entries().map(|step| step.tick);
         ticks
-            .map(|tick| (tick, self.level_within(profile, tick, Span::ALL, order)))
+            .map(|tick| (tick, self.level_of(profile, &moments, tick, order)))
             .collect()
     }
 
@@ -252,11 +160,18 @@ impl Exact {
         }
     }
 
-    /// Forgets what was known of the order of times, which may be another one now.
-    fn begin<O: Clone>(&mut self, profile: &Profile<O>) {
-        let times = 2 * profile.uses.places();
-        self.known.begin(times);
-        self.places.resize(times.max(self.places.len()), None);
+    /// Begins with the times that are open at a tick of a span.
+    fn begin<'a, O: Clone>(
+        &mut self,
+        profile: &'a Profile<O>,
+        within: Span,
+        order: &mut impl Order<O>,
+    ) -> Vec<Moment<'a, O>> {
+        let moments = self.known.begin(profile, within, order);
+        self.open.clear();
+        self.places.clear();
+        self.places.resize(self.known.len(), None);
+        moments
     }
 
     /// The first over-use within ticks at which there may be one.
@@ -268,11 +183,11 @@ impl Exact {
         order: &mut impl Order<O>,
     ) -> Option<OverUse<O>> {
         let (side, test) = (bound.side(), bound.test(profile.limits));
-        self.begin(profile);
+        let moments = self.begin(profile, run, order);
         let mut found: Option<OverUse<O>> = None;
         let mut tick = run.min;
         loop {
-            self.prepare(profile, tick, run, order);
+            self.prepare(profile, &moments, tick, order);
             let level = self.extreme(profile, tick, side);
             if test.holds(level) {
                 let amount = bound.excess(level, profile.limits);
@@ -323,12 +238,12 @@ impl Exact {
     fn prepare<O: Clone>(
         &mut self,
         profile: &Profile<O>,
+        moments: &[Moment<'_, O>],
         tick: Ticks,
-        within: Span,
         order: &mut impl Order<O>,
     ) {
         for one in &self.open {
-            self.places[one.number() as usize] = None;
+            self.places[one.moment as usize] = None;
         }
         self.found.clear();
         let at = Span::exactly(tick);
@@ -336,14 +251,21 @@ impl Exact {
         // The start of a use comes before its end.
         self.found.sort_unstable();
         self.open.clear();
-        self.open.extend(self.found.iter().copied().map(Open::of));
-        for (place, one) in (0..).zip(&self.open) {
-            self.places[one.number() as usize] = Some(place);
+        for &number in &self.found {
+            let Some(moment) = self.known.place(number) else {
+                continue;
+            };
+            self.places[moment as usize] = Some(self.open.len() as u32);
+            self.open.push(Open {
+                place: number / 2,
+                is_end: number % 2 == 1,
+                moment,
+            });
         }
         self.needs.clear();
         for (place, one) in (0..).zip(&self.open) {
-            for at in self.known.of(profile, *one, within, order) {
-                let other = self.known.never_after[at];
+            for at in self.known.part(moments, one.moment, order) {
+                let other = self.known.at(at);
                 if let Some(other) = self.places[other as usize] {
                     self.needs.push((place, other));
                 }

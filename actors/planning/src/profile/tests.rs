@@ -60,6 +60,32 @@ fn a_meeting_within_spans_is_only_certain_with_an_order() {
     assert!(exact.work().levels > 0);
 }
 
+/// Where the first interval that looks like an over-use is none, a later one is found, with what an
+/// order makes certain.
+#[test]
+fn an_order_may_clear_a_first_over_use_and_not_a_later_one() {
+    let mut profile = Profile::new(1, Span::at_least(0));
+    let one = |from: Ticks| {
+        let [start, end] = [from, from + 5].map(|time| Span::new(time, time + 5));
+        Use::renewable(start, end, Span::exactly(1))
+    };
+    for (owner, from) in [(0, 0), (1, 5), (2, 100), (3, 103)] {
+        profile.add(one(from), owner).unwrap();
+    }
+    // The second one starts when the first one ends, and the last one with the third one.
+    let mut order = |a: Moment<'_, i32>, b: Moment<'_, i32>| match (*a.owner, *b.owner) {
+        (0, 1) => a.is_end && !b.is_end,
+        (2, 3) | (3, 2) => a.is_end == b.is_end,
+        _ => false,
+    };
+    let over_use = Exact::new()
+        .first_over_use(&profile, 0, &mut order)
+        .unwrap();
+    assert_eq!(over_use.during, Span::new(103, 109));
+    let owners: Vec<_> = over_use.contributors.iter().map(|one| one.owner).collect();
+    assert_eq!(owners, [2, 3]);
+}
+
 #[test]
 fn what_is_taken_from_a_rate_limited_resource_counts_for_its_window() {
     let mut starts = Profile::new(2, Span::at_least(0));

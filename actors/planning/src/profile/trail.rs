@@ -8,6 +8,7 @@ pub(super) enum Change<O> {
     Added(UseId),
     Updated(UseId, Use),
     Removed(UseId, Use, O),
+    Initial(i64),
 }
 
 impl<O: Clone> Profile<O> {
@@ -67,6 +68,7 @@ impl<O: Clone> Profile<O> {
                 self.owners.truncate(self.uses.places());
                 self.put_in(id, one, None);
             }
+            Change::Initial(old) => self.initial = old,
             Change::Updated(id, old) => self.replace(id, old),
             Change::Removed(id, old, owner) => {
                 self.uses.undo_remove(id, old);

@@ -221,6 +221,7 @@ type Whole = (
     Vec<Interval>,
     i128,
     usize,
+    i64,
 );
 
 fn whole(profile: &Profile<u32>) -> Whole {
@@ -234,6 +235,7 @@ fn whole(profile: &Profile<u32>) -> Whole {
         profile.open.entries().copied().collect(),
         profile.magnitude,
         profile.owners.len(),
+        profile.initial,
     )
 }
 
@@ -289,5 +291,29 @@ proptest! {
             profile.pop();
             prop_assert_eq!(whole(&profile), state);
         }
+    }
+
+    /// When the past is forgotten, what comes is as before; undone, the past is back.
+    #[test]
+    fn the_future_knows_what_was_forgotten(
+        uses in prop::collection::vec(any_use(), 0..12),
+        before in 0..60i64,
+    ) {
+        let mut profile = Profile::new(INITIAL, LIMITS);
+        let ids: Vec<UseId> = uses.iter().map(|one| profile.add(*one, 0).unwrap()).collect();
+        let state = whole(&profile);
+        let levels = |profile: &Profile<u32>| -> Vec<Span> {
+            (before..TICKS.end).map(|tick| profile.level(tick)).collect()
+        };
+        let expected = levels(&profile);
+        profile.push();
+        for (id, one) in ids.into_iter().zip(&uses) {
+            let is_past = one.end.unwrap_or(one.start).max <= before;
+            let is_known = one.end.is_some() || one.change.min == one.change.max;
+            prop_assert_eq!(profile.forget(id, before), is_past && is_known);
+        }
+        prop_assert_eq!(levels(&profile), expected);
+        profile.pop();
+        prop_assert_eq!(whole(&profile), state);
     }
 }

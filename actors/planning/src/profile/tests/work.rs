@@ -1,6 +1,7 @@
 //! How much is looked at: it follows what is asked, not how many uses there are.
 
 use super::*;
+use crate::temporal::{Network, Point};
 
 /// A plan of so many uses, one after the other, each open by `open` ticks.
 fn plan(uses: i64, open: Ticks) -> (Profile<i64>, Vec<UseId>) {
@@ -101,29 +102,33 @@ fn the_first_over_use_is_found_without_a_scan() {
     }
 }
 
+/// Edits and their undoing go as often through a tree in any plan, each time for its depth.
 #[test]
 fn to_undo_costs_what_it_undoes() {
-    let costs = [10, 100, 1_000, 10_000].map(|uses| {
+    for uses in [10, 100, 1_000, 10_000] {
         let (mut profile, ids) = plan(uses, 5);
-        let built = looked_at(&profile);
+        let built = profile.work();
         profile.push();
-        for id in &ids[..8] {
-            profile.update(*id, one(5, 7)).unwrap();
+        for (place, id) in ids[..8].iter().enumerate() {
+            let old = *profile.get(*id).unwrap();
+            // Between others' times, whatever their number.
+            profile.update(*id, one(old.start.min + 2, 5)).unwrap();
+            if place % 2 == 0 {
+                profile.remove(*id);
+            }
         }
-        let edits = looked_at(&profile);
+        let added = profile.add(one(7, 5), -1).unwrap();
+        let edited = profile.work();
         profile.pop();
-        let undo = looked_at(&profile) - edits;
-        (edits - built, undo, log(uses))
-    });
-    for (edits, undo, _) in costs {
-        assert!(undo <= 2 * edits, "{undo} looks to undo {edits}");
+        assert_eq!((profile.len(), profile.get(added)), (uses as usize, None));
+        let undone = profile.work();
+        // Each moved one has four steps and three intervals taken out and put in.
+        assert_eq!(edited.changes - built.changes, 8 * 14 + 4 * 7 + 7);
+        assert_eq!(undone.changes - edited.changes, 8 * 14 + 4 * 7 + 7);
+        let looks = |work: Work| work.steps + work.intervals;
+        let most = 4 * (log(uses) + 1) * (8 * 14 + 4 * 7 + 7);
+        assert!(looks(undone) - looks(edited) <= most);
     }
-    let [(_, few, of_few), .., (_, many, of_many)] = costs;
-    // More only by the depth of the trees.
-    assert!(
-        many * of_few * 2 <= few * of_many * 3,
-        "{few} and {many} looks"
-    );
 }
 
 /// The exact levels are found only where the profile's own envelopes are beyond a limit.
@@ -141,4 +146,46 @@ fn exact_levels_are_found_where_they_matter() {
         levels <= 8 && open <= 16,
         "{levels} levels of {open} open times"
     );
+}
+
+/// An exact level costs what is open at its tick and what that reaches, in any plan.
+#[test]
+fn an_exact_level_costs_what_is_open() {
+    let costs = [100, 1_000, 5_000].map(|uses| {
+        let mut network = Network::new(Span::new(0, 100_000));
+        let mut profile = Profile::new(2, Span::at_least(0));
+        let mut points: Vec<[Point; 2]> = Vec::new();
+        for at in 0..uses {
+            let [start, end] = [network.add_point(), network.add_point()];
+            let window = Span::new(7 * at, 7 * at + 40);
+            network
+                .constrain(start, end, Span::exactly(10), ())
+                .unwrap();
+            network
+                .constrain(network.origin(), start, window, ())
+                .unwrap();
+            // Those of a row follow each other.
+            if at % 5 != 0 {
+                let before = points[at as usize - 1][1];
+                network
+                    .constrain(before, start, Span::at_least(0), ())
+                    .unwrap();
+            }
+            points.push([start, end]);
+        }
+        for (owner, [start, end]) in points.iter().enumerate() {
+            let [start, end] = [start, end].map(|point| network.bounds(*point));
+            let one = Use::renewable(start, end, Span::exactly(1));
+            profile.add(one, owner).unwrap();
+        }
+        let mut order = InNetwork::new(&network, |moment: Moment<'_, usize>| {
+            (points[*moment.owner][usize::from(moment.is_end)], 0)
+        });
+        let mut exact = Exact::new();
+        let level = exact.level(&profile, 7 * 55, &mut order);
+        (level, exact.work(), order.distances().work())
+    });
+    assert!(costs[0].1.open >= 6 && costs[0].1.pairs >= 6, "{costs:?}");
+    assert_eq!(costs[0], costs[1]);
+    assert_eq!(costs[1], costs[2]);
 }
