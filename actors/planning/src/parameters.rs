@@ -446,13 +446,8 @@ impl<O: Clone> Store<O> {
     /// the order in which they first did. New variables are not among them until they change.
     pub fn take_changed(&mut self, into: &mut Vec<Variable>) {
         into.clear();
-        for variable in self.changed.drain(..) {
-            if let Some(node) = self.nodes.get_mut(variable)
-                && std::mem::take(&mut node.told)
-            {
-                into.push(variable);
-            }
-        }
+        std::mem::swap(into, &mut self.changed);
+        self.take_told(into);
     }
 
     /// All variables and their domains, place by place, for comparing whole states.

@@ -38,7 +38,7 @@ enum Inner {
     /// What bits say, the lowest for the least value; the ends lie less than 64 apart.
     Bits(u64),
     /// These, in rising order, as far as they lie within the ends, which are 64 or more apart.
-    Set(Arc<[Value]>),
+    Set(Arc<Vec<Value>>),
 }
 
 /// The width from which on bits do not do.
@@ -84,7 +84,7 @@ impl Domain {
         let inner = if max.abs_diff(min) < BITS {
             Inner::Bits(bits_of(min, values))
         } else {
-            Inner::Set(values.into())
+            Inner::Set(Arc::new(values.to_vec()))
         };
         Domain { min, max, inner }
     }
@@ -192,7 +192,7 @@ impl Domain {
     }
 
     /// What is in a set, whose values these are, and in a domain that is no interval.
-    fn intersect_set(&self, values: &Arc<[Value]>, other: &Domain) -> Domain {
+    fn intersect_set(&self, values: &Arc<Vec<Value>>, other: &Domain) -> Domain {
         match &other.inner {
             Inner::Bits(bits) => {
                 let near = self.within_span(other.span());
@@ -248,7 +248,7 @@ impl Domain {
     }
 
     /// The values of a set that lie within a span.
-    fn of_set_within(values: &Arc<[Value]>, span: Span) -> Domain {
+    fn of_set_within(values: &Arc<Vec<Value>>, span: Span) -> Domain {
         let from = values.partition_point(|&value| value < span.min);
         let to = values.partition_point(|&value| value <= span.max);
         let some = &values[from..to];

@@ -1,7 +1,7 @@
 //! What constraints say, and of what.
 
 use super::{Domain, Rows, Variable};
-use crate::model::Value;
+use crate::model::{Function, RelationshipKind, Value};
 
 /// What a constraint says of its operands.
 ///
@@ -31,6 +31,32 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// What a model says, with its tables and functions.
+    ///
+    /// ```
+    /// use farside_planning::model::{RelationshipKind, Table};
+    /// use farside_planning::parameters::{Kind, Rows};
+    /// let table = Table { name: "even".into(), columns: 1, rows: vec![0, 2, 4] };
+    /// let kind = Kind::of(RelationshipKind::Table(0), &[Rows::from(&table)], &[]);
+    /// assert!(kind.takes(1) && !kind.takes(2));
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If the model has no such table or function.
+    pub fn of(kind: RelationshipKind, tables: &[Rows], functions: &[Function]) -> Kind {
+        match kind {
+            RelationshipKind::Equal => Kind::Equal,
+            RelationshipKind::Different => Kind::Different,
+            RelationshipKind::Less => Kind::Less,
+            RelationshipKind::AtMost => Kind::AtMost,
+            RelationshipKind::Sum => Kind::Sum,
+            RelationshipKind::Product => Kind::Product,
+            RelationshipKind::Table(place) => Kind::Table(tables[place].clone()),
+            RelationshipKind::Function(place) => Kind::Function(functions[place].call),
+        }
+    }
+
     /// Whether it can be said of so many operands.
     #[inline]
     pub fn takes(&self, operands: usize) -> bool {

@@ -155,6 +155,9 @@ impl<O: Clone> Store<O> {
     #[inline]
     fn equal_two(&mut self, links: [u32; 2], variables: [u32; 2]) -> Result<(), Empty> {
         let [a, b] = variables.map(|variable| &self.node(variable).domain);
+        if a == b {
+            return Ok(());
+        }
         let both = a.intersect(b);
         if both.is_empty() {
             return Err(Empty);
@@ -162,14 +165,9 @@ impl<O: Clone> Store<O> {
         let (less, fewer) = (both != *a, both != *b);
         if less && fewer {
             self.narrow(links[0], both.clone())?;
-            self.narrow(links[1], both)
-        } else if less {
-            self.narrow(links[0], both)
-        } else if fewer {
-            self.narrow(links[1], both)
-        } else {
-            Ok(())
         }
+        // They differ: one of them is narrowed.
+        self.narrow(links[usize::from(fewer)], both)
     }
 
     /// All operands have the same values.

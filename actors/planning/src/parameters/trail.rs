@@ -186,9 +186,27 @@ impl<O: Clone> Store<O> {
             return;
         };
         let node = self.node_mut(place);
-        if !std::mem::replace(&mut node.told, true) {
-            self.changed.push(id);
+        if std::mem::replace(&mut node.told, true) {
+            return;
         }
+        self.changed.push(id);
+        // While nobody asks, those that have gone pile up.
+        if self.changed.len() > 2 * self.nodes.places() + 64 {
+            let mut kept = std::mem::take(&mut self.changed);
+            self.take_told(&mut kept);
+            for &variable in &kept {
+                self.node_mut(variable.index() as u32).told = true;
+            }
+            self.changed = kept;
+        }
+    }
+
+    /// Leaves the variables of a list that are still there and to be told, each once.
+    pub(super) fn take_told(&mut self, list: &mut Vec<Variable>) {
+        list.retain(|&variable| {
+            let node = self.nodes.get_mut(variable);
+            node.is_some_and(|node| std::mem::take(&mut node.told))
+        });
     }
 
     /// Undoes changes, and tells whose domains that changed if somebody may have seen them.

@@ -40,6 +40,9 @@ proptest! {
         let within: BTreeSet<_> = a.iter().copied().filter(|&x| span.contains(x)).collect();
         prop_assert_eq!(one.within_span(span), Domain::of(within.clone()));
         prop_assert_eq!(one.intersect(&span.into()), Domain::of(within));
+        // What shares its values with another one is as if it had its own.
+        let upper = one.within_span(Span::at_least(span.min));
+        prop_assert_eq!(upper.intersect(&one.within_span(Span::at_most(span.max))), one.within_span(span));
         let value = *a.iter().chain(&b).nth(pick % (a.len() + b.len())).unwrap();
         prop_assert_eq!(one.contains(value), a.contains(&value));
         let mut rest = a.clone();
@@ -253,6 +256,81 @@ fn a_retraction_starts_anew_only_what_rested_on_it() {
     // To start them anew, and to narrow them again.
     assert!(domains <= 2 * 10, "{domains}");
     assert_eq!(store.domain(points[999]).min(), 50);
+}
+
+#[test]
+fn what_does_not_matter_is_not_in_a_conflict() {
+    let mut store = Store::new();
+    let [a, b, c] = [(); 3].map(|()| store.add(Span::new(0, 1_000).into()));
+    store.post(Kind::AtMost, &[a.into(), b.into()], 0).unwrap();
+    store.post(Kind::AtMost, &[b.into(), c.into()], 1).unwrap();
+    store.restrict(c, Span::at_least(10).into(), 2).unwrap();
+    store.restrict(b, Span::at_least(500).into(), 3).unwrap();
+    let refused = store.restrict(b, Span::at_most(400).into(), 4);
+    let conflict = refused.unwrap_err().conflict().unwrap();
+    let owners: Vec<u32> = conflict.owners().copied().collect();
+    assert_eq!(owners, [4, 3]);
+}
+
+#[test]
+fn variables_removed_together_are_not_started_anew() {
+    let mut store = Store::new();
+    let all = [(); 10].map(|()| store.add(Span::new(0, 1_000).into()));
+    store.post(Kind::Equal, &all.map(Operand::from), 0).unwrap();
+    store.restrict(all[0], Domain::exactly(5), 1).unwrap();
+    let start = store.work();
+    store.remove_all(&all);
+    assert_eq!(
+        (store.work(), store.variables(), store.constraints()),
+        (start, 0, 0)
+    );
+}
+
+#[test]
+fn what_is_between_the_ends_of_a_domain_decides_too() {
+    let mut store = Store::new();
+    let a = store.add(Domain::of([1, 2, 3]));
+    let within = |store: &Store<u32>, values: &[Value]| {
+        let domain = Domain::of(values.iter().copied());
+        store.entailed(&Kind::In(domain), &[a.into()])
+    };
+    assert_eq!(within(&store, &[1, 3]), None);
+    assert_eq!(within(&store, &[1, 2, 3, 900]), Some(true));
+    assert_eq!(within(&store, &[0, 900]), Some(false));
+    store.restrict(a, Domain::of([1, 3]), 0).unwrap();
+    assert_eq!(within(&store, &[1, 3]), Some(true));
+    assert_eq!(within(&store, &[2]), Some(false));
+}
+
+#[test]
+fn what_was_started_anew_no_longer_rests_on_what_had_narrowed_it() {
+    let mut store = Store::new();
+    let [a, b] = [(); 2].map(|()| store.add(Span::new(0, 1_000).into()));
+    let equal = store.post(Kind::Equal, &[a.into(), b.into()], 0).unwrap();
+    let bound = store.restrict(a, Domain::exactly(4), 1).unwrap();
+    assert_eq!(store.value(b), Some(4));
+    store.retract(bound);
+    let start = store.work();
+    store.retract(equal);
+    assert_eq!(store.work(), start);
+}
+
+#[test]
+fn who_changed_is_not_kept_for_those_that_have_gone() {
+    let mut store = Store::new();
+    let old = store.add(Domain::ALL);
+    store.restrict(old, Domain::exactly(1), 0).unwrap();
+    for _ in 0..10_000 {
+        let new = store.add(Domain::ALL);
+        store.restrict(new, Domain::exactly(1), 0).unwrap();
+        store.remove(new);
+    }
+    assert!(store.changed.len() < 100);
+    let mut changed = Vec::new();
+    store.take_changed(&mut changed);
+    assert_eq!(changed, [old]);
+    store.take_changed(&mut changed);
+    assert!(changed.is_empty());
 }
 
 #[test]
