@@ -27,6 +27,7 @@ mod arithmetic;
 mod conflict;
 mod domain;
 mod entailed;
+mod kind;
 mod propagate;
 mod table;
 #[cfg(test)]
@@ -38,6 +39,7 @@ use std::fmt;
 
 pub use conflict::{Conflict, Part, Refusal};
 pub use domain::Domain;
+pub use kind::{Kind, Operand};
 pub use table::Rows;
 
 use crate::arena::{Arena, Id};
@@ -50,72 +52,6 @@ pub type Variable = Id<Node>;
 
 /// A constraint, or a restriction of a variable's domain.
 pub type Constraint = Id<Edge>;
-
-/// What a constraint says of its operands.
-///
-/// Sums and products are those of whole numbers without bounds: what a domain cannot hold, no
-/// variable can be.
-#[derive(Clone, Debug)]
-pub enum Kind {
-    /// The one is in a domain.
-    In(Domain),
-    /// All are equal: one or more.
-    Equal,
-    /// The two are not.
-    Different,
-    /// The first is less than the second.
-    Less,
-    /// The first is at most the second.
-    AtMost,
-    /// The last is the sum of the others.
-    Sum,
-    /// The last is the product of the others.
-    Product,
-    /// They are a row of a table.
-    Table(Rows),
-    /// The last is what a pure function gives for the others, once they have values. While it gives
-    /// nothing, nothing is said of the last.
-    Function(fn(&[Value]) -> Option<Value>),
-}
-
-impl Kind {
-    /// Whether it can be said of so many operands.
-    pub fn takes(&self, operands: usize) -> bool {
-        match self {
-            Kind::In(_) => operands == 1,
-            Kind::Equal | Kind::Sum | Kind::Product | Kind::Function(_) => operands >= 1,
-            Kind::Different | Kind::Less | Kind::AtMost => operands == 2,
-            Kind::Table(rows) => operands == rows.columns(),
-        }
-    }
-
-    /// Whether its rule, applied twice in a row, finds no more than when applied once.
-    fn is_done_at_once(&self) -> bool {
-        use Kind::{AtMost, Different, Equal, In, Less};
-        matches!(self, In(_) | Equal | Different | Less | AtMost)
-    }
-}
-
-/// What a constraint speaks of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Operand {
-    /// A value.
-    Value(Value),
-    /// A variable.
-    Variable(Variable),
-}
-
-impl From<Variable> for Operand {
-    fn from(variable: Variable) -> Operand {
-        Operand::Variable(variable)
-    }
-}
-
-impl From<Value> for Operand {
-    fn from(value: Value) -> Operand {
-        Operand::Value(value)
-    }
-}
 
 /// What the store keeps of a variable.
 #[derive(Clone, Debug)]
@@ -191,6 +127,7 @@ pub struct Work {
 
 impl Work {
     /// All together: what a budget is about.
+    #[inline]
     pub fn operations(&self) -> u64 {
         self.rules + self.operands + self.rows + self.domains
     }
@@ -304,26 +241,40 @@ impl<O: Clone> Store<O> {
         variable
     }
 
-    /// Removes a variable, with the constraints that it has. It says whether the rules were applied
-    /// to the end, as [`retract`](Self::retract) does.
+    /// Removes a variable: [`remove_all`](Self::remove_all) with one.
     ///
     /// # Panics
     ///
     /// If it is not there.
     pub fn remove(&mut self, variable: Variable) -> bool {
-        let node = self.nodes.get(variable).expect("the variable is there");
-        let mut link = node.first;
+        self.remove_all(&[variable])
+    }
+
+    /// Removes variables, with the constraints that they have. It says whether the rules were
+    /// applied to the end, as [`retract_all`](Self::retract_all) does.
+    ///
+    /// # Panics
+    ///
+    /// If one of them is not there.
+    pub fn remove_all(&mut self, variables: &[Variable]) -> bool {
         let mark = self.begin();
-        while link != NONE {
-            let constraint = self.links.all[link as usize].constraint as usize;
-            let id = self.edges.id_at(constraint);
-            self.loosen(id.expect("a variable's constraints are there"));
-            // Its other links may have been next.
-            link = self.node(variable.index() as u32).first;
+        for &variable in variables {
+            let node = self.nodes.get_mut(variable);
+            // So that none is started anew with what the others had narrowed.
+            node.expect("the variable is there").marked = true;
         }
-        // It may be on the list of variables to be started anew, and needs not be.
-        self.node_mut(variable.index() as u32).marked = false;
-        self.take_out(variable);
+        for &variable in variables {
+            loop {
+                let link = self.node(variable.index() as u32).first;
+                if link == NONE {
+                    break;
+                }
+                let constraint = self.links.all[link as usize].constraint as usize;
+                let id = self.edges.id_at(constraint);
+                self.loosen(id.expect("a variable's constraints are there"));
+            }
+            self.take_out(variable);
+        }
         self.start_anew();
         self.settle(mark);
         !self.unfinished
@@ -376,8 +327,7 @@ impl<O: Clone> Store<O> {
         );
         let mark = self.begin();
         let constraint = self.attach(kind, operands, owner);
-        self.enqueue(constraint.index() as u32);
-        match self.propagate() {
+        match self.propagate_from(constraint.index() as u32) {
             Ok(()) => {
                 self.settle(mark);
                 Ok(constraint)
@@ -496,13 +446,8 @@ impl<O: Clone> Store<O> {
     /// the order in which they first did. New variables are not among them until they change.
     pub fn take_changed(&mut self, into: &mut Vec<Variable>) {
         into.clear();
-        for variable in self.changed.drain(..) {
-            if let Some(node) = self.nodes.get_mut(variable)
-                && std::mem::take(&mut node.told)
-            {
-                into.push(variable);
-            }
-        }
+        std::mem::swap(into, &mut self.changed);
+        self.take_told(into);
     }
 
     /// All variables and their domains, place by place, for comparing whole states.
@@ -525,11 +470,12 @@ impl<O: Clone> Store<O> {
     fn attach(&mut self, kind: Kind, operands: &[Operand], owner: O) -> Constraint {
         // A restriction holds whatever its variable loses.
         let wakes = !matches!(kind, Kind::In(_));
-        let first = self.links.take(operands.len());
+        let count = u32::try_from(operands.len()).expect("fewer than 2^32 operands");
+        let first = self.links.take(count);
         let constraint = self.edges.insert(Edge {
             kind,
             first,
-            count: operands.len() as u32,
+            count,
             queued: false,
             marked: false,
         });

@@ -38,7 +38,7 @@ enum Inner {
     /// What bits say, the lowest for the least value; the ends lie less than 64 apart.
     Bits(u64),
     /// These, in rising order, as far as they lie within the ends, which are 64 or more apart.
-    Set(Arc<[Value]>),
+    Set(Arc<Vec<Value>>),
 }
 
 /// The width from which on bits do not do.
@@ -84,12 +84,13 @@ impl Domain {
         let inner = if max.abs_diff(min) < BITS {
             Inner::Bits(bits_of(min, values))
         } else {
-            Inner::Set(values.into())
+            Inner::Set(Arc::new(values.to_vec()))
         };
         Domain { min, max, inner }
     }
 
     /// Those of `BITS` values from `min` on whose bits are set.
+    #[inline]
     pub(super) fn of_bits(min: Value, bits: u64) -> Domain {
         if bits == 0 {
             return Domain::NONE;
@@ -104,26 +105,31 @@ impl Domain {
     }
 
     /// The least value; above the greatest if there is none.
+    #[inline]
     pub fn min(&self) -> Value {
         self.min
     }
 
     /// The greatest value.
+    #[inline]
     pub fn max(&self) -> Value {
         self.max
     }
 
     /// From the least to the greatest.
+    #[inline]
     pub fn span(&self) -> Span {
         Span::new(self.min, self.max)
     }
 
     /// Whether no value is in it.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.min > self.max
     }
 
     /// Its value, if it has exactly one.
+    #[inline]
     pub fn value(&self) -> Option<Value> {
         (self.min == self.max).then_some(self.min)
     }
@@ -139,6 +145,7 @@ impl Domain {
     }
 
     /// Whether a value is in it.
+    #[inline]
     pub fn contains(&self, value: Value) -> bool {
         self.span().contains(value)
             && match &self.inner {
@@ -165,6 +172,7 @@ impl Domain {
 
     /// What is in both.
     #[must_use]
+    #[inline]
     pub fn intersect(&self, other: &Domain) -> Domain {
         match (&self.inner, &other.inner) {
             (Inner::Interval, _) => other.within_span(self.span()),
@@ -178,20 +186,25 @@ impl Domain {
                 let b = b >> both.min.abs_diff(other.min);
                 Domain::of_bits(both.min, a & b)
             }
-            (Inner::Set(_), Inner::Bits(_)) => other.intersect(self),
-            (Inner::Bits(bits), Inner::Set(values)) => {
-                let near = other.within_span(self.span());
+            (Inner::Set(values), _) => self.intersect_set(values, other),
+            (_, Inner::Set(values)) => other.intersect_set(values, self),
+        }
+    }
+
+    /// What is in a set, whose values these are, and in a domain that is no interval.
+    fn intersect_set(&self, values: &Arc<Vec<Value>>, other: &Domain) -> Domain {
+        match &other.inner {
+            Inner::Bits(bits) => {
+                let near = self.within_span(other.span());
                 if near.is_empty() {
                     return Domain::NONE;
                 }
-                Domain::of_bits(self.min, bits & bits_of(self.min, near.within(values)))
+                Domain::of_bits(other.min, bits & bits_of(other.min, near.within(values)))
             }
-            (Inner::Set(a), Inner::Set(b)) => {
-                if Arc::ptr_eq(a, b) {
-                    return self.within_span(other.span());
-                }
-                self.intersect_sets(self.within(a), other, other.within(b))
+            Inner::Set(others) if !Arc::ptr_eq(values, others) => {
+                self.intersect_sets(self.within(values), other, other.within(others))
             }
+            _ => self.within_span(other.span()),
         }
     }
 
@@ -215,6 +228,7 @@ impl Domain {
 
     /// What is in it and in a span.
     #[must_use]
+    #[inline]
     pub fn within_span(&self, span: Span) -> Domain {
         let both = self.span().intersect(span);
         if both.is_empty() {
@@ -229,19 +243,22 @@ impl Domain {
                 let low = bits >> both.min.abs_diff(self.min);
                 Domain::of_bits(both.min, low & all_bits(both))
             }
-            Inner::Set(values) => {
-                let from = values.partition_point(|&value| value < both.min);
-                let to = values.partition_point(|&value| value <= both.max);
-                let some = &values[from..to];
-                match (some.first(), some.last()) {
-                    (Some(&min), Some(&max)) if max.abs_diff(min) >= BITS => Domain {
-                        min,
-                        max,
-                        inner: Inner::Set(Arc::clone(values)),
-                    },
-                    _ => Domain::of_rising(some),
-                }
-            }
+            Inner::Set(values) => Domain::of_set_within(values, both),
+        }
+    }
+
+    /// The values of a set that lie within a span.
+    fn of_set_within(values: &Arc<Vec<Value>>, span: Span) -> Domain {
+        let from = values.partition_point(|&value| value < span.min);
+        let to = values.partition_point(|&value| value <= span.max);
+        let some = &values[from..to];
+        match (some.first(), some.last()) {
+            (Some(&min), Some(&max)) if max.abs_diff(min) >= BITS => Domain {
+                min,
+                max,
+                inner: Inner::Set(Arc::clone(values)),
+            },
+            _ => Domain::of_rising(some),
         }
     }
 
@@ -271,6 +288,7 @@ impl Domain {
     }
 
     /// The bits of its values, if bits do for it.
+    #[inline]
     pub(super) fn bits(&self) -> Option<u64> {
         match self.inner {
             Inner::Bits(bits) => Some(bits),
@@ -279,6 +297,7 @@ impl Domain {
     }
 
     /// Whether it is a wide interval.
+    #[inline]
     pub(super) fn is_interval(&self) -> bool {
         matches!(self.inner, Inner::Interval)
     }
@@ -298,11 +317,13 @@ fn bits_of(min: Value, values: &[Value]) -> u64 {
 }
 
 /// As many bits as a span has values: 1 to `BITS`.
+#[inline]
 fn all_bits(span: Span) -> u64 {
     u64::MAX >> (BITS - 1 - span.max.abs_diff(span.min))
 }
 
 impl From<Span> for Domain {
+    #[inline]
     fn from(span: Span) -> Domain {
         if span.is_empty() {
             return Domain::NONE;
@@ -328,6 +349,7 @@ impl From<&Values> for Domain {
 }
 
 impl PartialEq for Domain {
+    #[inline]
     fn eq(&self, other: &Domain) -> bool {
         self.span() == other.span()
             && match (&self.inner, &other.inner) {

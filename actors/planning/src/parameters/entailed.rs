@@ -66,6 +66,9 @@ impl<O: Clone> Store<O> {
     }
 
     fn is_in(&self, operand: Operand, domain: &Domain) -> Option<bool> {
+        if let Some(value) = self.bound(operand) {
+            return Some(domain.contains(value));
+        }
         let now = self.values_of(operand);
         let both = now.intersect(domain);
         if both.is_empty() {
@@ -76,6 +79,15 @@ impl<O: Clone> Store<O> {
 
     fn are_equal(&self, operands: &[Operand]) -> Option<bool> {
         let (&first, others) = operands.split_first()?;
+        if let &[second] = others {
+            let spans = (self.span(first), self.span(second));
+            if spans.0.intersect(spans.1).is_empty() {
+                return Some(false);
+            }
+            if self.bound(first).is_some() && spans.0 == spans.1 {
+                return Some(true);
+            }
+        }
         let mut all = self.values_of(first);
         for &other in others {
             all = all.intersect(&self.values_of(other));

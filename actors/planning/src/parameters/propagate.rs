@@ -38,21 +38,39 @@ impl<O: Clone> Store<O> {
         }
     }
 
+    /// Applies the rule of a constraint, and then rules until none is left that may narrow
+    /// something.
+    pub(super) fn propagate_from(&mut self, place: u32) -> Result<(), Stop> {
+        let limit = self.work.operations().saturating_add(self.budget);
+        self.apply_within(limit, place)?;
+        self.propagate_within(limit)
+    }
+
     /// Applies rules until none is left that may narrow something.
     pub(super) fn propagate(&mut self) -> Result<(), Stop> {
         let limit = self.work.operations().saturating_add(self.budget);
+        self.propagate_within(limit)
+    }
+
+    fn propagate_within(&mut self, limit: u64) -> Result<(), Stop> {
         while let Some(place) = self.queue.pop_front() {
-            if self.work.operations() >= limit {
-                self.edge_mut(place).queued = false;
-                self.clear_queue();
-                return Err(Stop::OverBudget);
-            }
-            if self.apply(place).is_err() {
-                self.clear_queue();
-                return Err(Stop::Conflict(place));
-            }
+            self.apply_within(limit, place)?;
         }
         Ok(())
+    }
+
+    fn apply_within(&mut self, limit: u64, place: u32) -> Result<(), Stop> {
+        let outcome = if self.work.operations() >= limit {
+            self.edge_mut(place).queued = false;
+            Err(Stop::OverBudget)
+        } else {
+            let outcome = self.apply(place);
+            outcome.map_err(|Empty| Stop::Conflict(place))
+        };
+        if outcome.is_err() {
+            self.clear_queue();
+        }
+        outcome
     }
 
     fn clear_queue(&mut self) {
@@ -72,6 +90,7 @@ impl<O: Clone> Store<O> {
     }
 
     /// Applies the rule of a constraint once.
+    #[inline]
     fn apply(&mut self, place: u32) -> Result<(), Empty> {
         let edge = self.edges.at_mut(place as usize);
         let edge = edge.expect("the constraint is there");
@@ -132,8 +151,34 @@ impl<O: Clone> Store<O> {
         }
     }
 
+    /// Two variables have the same values.
+    #[inline]
+    fn equal_two(&mut self, links: [u32; 2], variables: [u32; 2]) -> Result<(), Empty> {
+        let [a, b] = variables.map(|variable| &self.node(variable).domain);
+        if a == b {
+            return Ok(());
+        }
+        let both = a.intersect(b);
+        if both.is_empty() {
+            return Err(Empty);
+        }
+        let (less, fewer) = (both != *a, both != *b);
+        if less && fewer {
+            self.narrow(links[0], both.clone())?;
+        }
+        // They differ: one of them is narrowed.
+        self.narrow(links[usize::from(fewer)], both)
+    }
+
     /// All operands have the same values.
     fn equal(&mut self, first: u32, count: u32) -> Result<(), Empty> {
+        if count == 2 {
+            let links = [first, first + 1];
+            let variables = links.map(|link| self.links.all[link as usize].variable);
+            if variables[0] != variables[1] && !variables.contains(&NONE) {
+                return self.equal_two(links, variables);
+            }
+        }
         let mut all = self.domain_of(first);
         for link in first + 1..first + count {
             all = match self.links.all[link as usize] {
@@ -224,6 +269,7 @@ impl<O: Clone> Store<O> {
     }
 
     /// Between which values an operand lies.
+    #[inline]
     pub(super) fn span_of(&self, link: u32) -> Span {
         match self.links.all[link as usize] {
             Link {
@@ -276,6 +322,7 @@ impl<O: Clone> Store<O> {
     }
 
     /// The variable of a link gets a domain that is less than the one that it has.
+    #[inline]
     pub(super) fn narrow(&mut self, link: u32, domain: Domain) -> Result<(), Empty> {
         if domain.is_empty() {
             return Err(Empty);
@@ -299,6 +346,7 @@ impl<O: Clone> Store<O> {
     }
 
     /// Gives a variable a domain; gives the first link in its list.
+    #[inline]
     fn set(&mut self, variable: u32, domain: Domain) -> u32 {
         self.work.domains += 1;
         let edit = self.edit;
@@ -315,15 +363,18 @@ impl<O: Clone> Store<O> {
 
     /// Takes a constraint away, and puts the variables that it had narrowed on the list of those
     /// to be started anew.
+    #[inline]
     pub(super) fn loosen(&mut self, constraint: Constraint) {
         assert!(self.has_constraint(constraint), "the constraint is there");
-        for link in self.links_of(constraint.index() as u32) {
+        for link in self.links_of(constraint.index() as u32).rev() {
             self.affect(link);
+            self.unlink(link);
         }
         self.detach(constraint);
     }
 
     /// What a constraint narrowed is to be started anew.
+    #[inline]
     fn affect(&mut self, link: u32) {
         let Link {
             variable, narrowed, ..
@@ -342,11 +393,7 @@ impl<O: Clone> Store<O> {
         let mut at = 0;
         while let Some(&variable) = self.scratch.affected.get(at) {
             at += 1;
-            // The variable that is being removed may be on the list.
-            let Some(node) = self.nodes.at_mut(variable as usize) else {
-                continue;
-            };
-            let base = node.base.clone();
+            let base = self.node(variable).base.clone();
             let mut next = self.set(variable, base);
             while next != NONE {
                 let link = self.links.all[next as usize];
@@ -365,13 +412,11 @@ impl<O: Clone> Store<O> {
             }
         }
         while let Some(variable) = self.scratch.affected.pop() {
-            if let Some(node) = self.nodes.at_mut(variable as usize) {
-                node.marked = false;
-            }
+            self.node_mut(variable).marked = false;
         }
         // Fewer constraints leave no fewer values: only where rules were left out before can one
         // find now that nothing fits.
-        if self.propagate().is_err() {
+        if !self.queue.is_empty() && self.propagate().is_err() {
             self.unfinished = true;
         }
     }

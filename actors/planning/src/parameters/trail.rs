@@ -45,34 +45,50 @@ pub(super) struct Mark {
     unfinished: bool,
 }
 
-/// The links of constraints, in blocks.
-#[derive(Clone, Debug, Default)]
+/// The links of constraints, in blocks of powers of two.
+#[derive(Clone, Debug)]
 pub(super) struct Links {
     pub(super) all: Vec<Link>,
-    /// By the logarithm of their size: free blocks.
-    free: Vec<Vec<u32>>,
+    /// By the logarithm of their size: the first free block. The next one of its size is what the
+    /// first link of a free block names as its next.
+    free: [u32; 33],
+}
+
+impl Default for Links {
+    fn default() -> Self {
+        Links {
+            all: Vec::new(),
+            free: [NONE; 33],
+        }
+    }
 }
 
 impl Links {
     /// A block of links to be written.
-    pub(super) fn take(&mut self, count: usize) -> u32 {
-        let size = count.next_power_of_two();
-        let class = size.ilog2() as usize;
-        if let Some(first) = self.free.get_mut(class).and_then(Vec::pop) {
+    #[inline]
+    pub(super) fn take(&mut self, count: u32) -> u32 {
+        let class = class(count);
+        let first = self.free[class];
+        if first != NONE {
+            self.free[class] = self.all[first as usize].next;
             return first;
         }
         let first = self.all.len();
-        self.all.resize(first + size, Link::UNUSED);
-        u32::try_from(self.all.len()).expect("fewer than 2^32 links") - size as u32
+        self.all.resize(first + (1 << class), Link::UNUSED);
+        assert!(self.all.len() < NONE as usize, "fewer than 2^32 links");
+        first as u32
     }
 
-    fn give_back(&mut self, first: u32, count: u32) {
-        let class = count.next_power_of_two().ilog2() as usize;
-        if self.free.len() <= class {
-            self.free.resize(class + 1, Vec::new());
-        }
-        self.free[class].push(first);
+    #[inline]
+    pub(super) fn give_back(&mut self, first: u32, count: u32) {
+        let next = std::mem::replace(&mut self.free[class(count)], first);
+        self.all[first as usize].next = next;
     }
+}
+
+/// The logarithm of the size of the block for so many links: 1 to 2^32 - 1.
+fn class(count: u32) -> usize {
+    (u32::BITS - (count - 1).leading_zeros()) as usize
 }
 
 impl<O: Clone> Store<O> {
@@ -116,6 +132,7 @@ impl<O: Clone> Store<O> {
     }
 
     /// An edit begins: each domain that it changes is kept once.
+    #[inline]
     pub(super) fn begin(&mut self) -> Mark {
         self.edit += 1;
         Mark {
@@ -126,7 +143,21 @@ impl<O: Clone> Store<O> {
     }
 
     /// An edit is done: what it changed is told, and without a push nobody will undo it.
+    #[inline]
     pub(super) fn settle(&mut self, mark: Mark) {
+        if self.before.domains.len() > mark.domains {
+            self.tell_since(mark);
+        }
+        // Without a push nothing was kept of what was removed.
+        if self.levels.is_empty() {
+            self.trail.clear();
+            self.before.domains.clear();
+        }
+    }
+
+    /// Tells whose domains an edit changed.
+    #[inline(never)]
+    fn tell_since(&mut self, mark: Mark) {
         let mut kept = mark.domains;
         for at in mark.trail..self.trail.len() {
             if let Change::Domain(place) = self.trail[at] {
@@ -137,11 +168,9 @@ impl<O: Clone> Store<O> {
                 kept += 1;
             }
         }
-        if self.levels.is_empty() {
-            self.forget_changes();
-        }
     }
 
+    /// Nobody will undo the changes.
     fn forget_changes(&mut self) {
         self.trail.clear();
         self.before.domains.clear();
@@ -157,9 +186,27 @@ impl<O: Clone> Store<O> {
             return;
         };
         let node = self.node_mut(place);
-        if !std::mem::replace(&mut node.told, true) {
-            self.changed.push(id);
+        if std::mem::replace(&mut node.told, true) {
+            return;
         }
+        self.changed.push(id);
+        // While nobody asks, those that have gone pile up.
+        if self.changed.len() > 2 * self.nodes.places() + 64 {
+            let mut kept = std::mem::take(&mut self.changed);
+            self.take_told(&mut kept);
+            for &variable in &kept {
+                self.node_mut(variable.index() as u32).told = true;
+            }
+            self.changed = kept;
+        }
+    }
+
+    /// Leaves the variables of a list that are still there and to be told, each once.
+    pub(super) fn take_told(&mut self, list: &mut Vec<Variable>) {
+        list.retain(|&variable| {
+            let node = self.nodes.get_mut(variable);
+            node.is_some_and(|node| std::mem::take(&mut node.told))
+        });
     }
 
     /// Undoes changes, and tells whose domains that changed if somebody may have seen them.
@@ -188,7 +235,9 @@ impl<O: Clone> Store<O> {
                 self.tell(variable.index() as u32);
             }
             Change::Posted(constraint) => {
-                self.unlink(constraint.index() as u32);
+                for link in self.links_of(constraint.index() as u32).rev() {
+                    self.unlink(link);
+                }
                 if let Some(edge) = self.edges.undo_insert(constraint) {
                     self.links.give_back(edge.first, edge.count);
                 }
@@ -213,23 +262,35 @@ impl<O: Clone> Store<O> {
     }
 
     /// Takes a variable out for good, or until that is undone.
+    #[inline]
     pub(super) fn take_out(&mut self, variable: Variable) {
-        let node = self.nodes.remove(variable).expect("the variable is there");
-        self.before.nodes.push(node);
-        self.trail.push(Change::VariableRemoved(variable));
+        let node = self.nodes.remove(variable);
+        // Without a push nobody will undo it: it is not an edit that can be refused.
+        if !self.levels.is_empty() {
+            let mut node = node.expect("the variable is there");
+            node.marked = false;
+            self.before.nodes.push(node);
+            self.trail.push(Change::VariableRemoved(variable));
+        }
     }
 
-    /// Takes a constraint out of its variables' lists, and away.
+    /// Takes a constraint away, which is in no list any more.
+    #[inline]
     pub(super) fn detach(&mut self, constraint: Constraint) {
-        self.unlink(constraint.index() as u32);
         let edge = self.edges.remove(constraint);
         let edge = edge.expect("the constraint is there");
-        let owner = self.owners[constraint.index()].clone();
-        self.before.edges.push((edge, owner));
-        self.trail.push(Change::Retracted(constraint));
+        // Without a push nobody will undo it: it is not an edit that can be refused.
+        if self.levels.is_empty() {
+            self.links.give_back(edge.first, edge.count);
+        } else {
+            let owner = self.owners[constraint.index()].clone();
+            self.before.edges.push((edge, owner));
+            self.trail.push(Change::Retracted(constraint));
+        }
     }
 
     /// Puts a link first in its variable's list.
+    #[inline]
     pub(super) fn link(&mut self, link: u32) {
         let variable = self.links.all[link as usize].variable;
         let first = std::mem::replace(&mut self.node_mut(variable).first, link);
@@ -240,29 +301,29 @@ impl<O: Clone> Store<O> {
         }
     }
 
-    /// Takes the links of a constraint out of their variables' lists. They keep their neighbours.
-    fn unlink(&mut self, place: u32) {
-        for link in self.links_of(place).rev() {
-            let Link {
-                variable,
-                next,
-                before,
-                ..
-            } = self.links.all[link as usize];
-            if variable == NONE {
-                continue;
-            }
-            match before {
-                NONE => self.node_mut(variable).first = next,
-                before => self.links.all[before as usize].next = next,
-            }
-            if next != NONE {
-                self.links.all[next as usize].before = before;
-            }
+    /// Takes a link out of its variable's list. It keeps its neighbours.
+    #[inline]
+    pub(super) fn unlink(&mut self, link: u32) {
+        let Link {
+            variable,
+            next,
+            before,
+            ..
+        } = self.links.all[link as usize];
+        if variable == NONE {
+            return;
+        }
+        match before {
+            NONE => self.node_mut(variable).first = next,
+            before => self.links.all[before as usize].next = next,
+        }
+        if next != NONE {
+            self.links.all[next as usize].before = before;
         }
     }
 
-    /// Undoes the last [`unlink`](Self::unlink): all neighbours are as they were.
+    /// Undoes the [`unlink`](Self::unlink) of the links of a constraint, from the last to the first:
+    /// all neighbours are as they were.
     fn link_again(&mut self, place: u32) {
         for link in self.links_of(place) {
             let Link {

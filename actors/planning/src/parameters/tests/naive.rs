@@ -170,44 +170,7 @@ fn apply(kind: &Kind, operands: &[Operand], domains: &mut Naives) -> Option<()> 
                 domains,
             )
         }
-        Kind::Sum => {
-            for (at, &operand) in operands.iter().enumerate() {
-                let others = (0..last).filter(|&other| other != at);
-                let rest = others.fold((0, 0), |sum, x| (sum.0 + ends(x).0, sum.1 + ends(x).1));
-                let (min, max) = if at == last {
-                    rest
-                } else {
-                    (ends(last).0 - rest.1, ends(last).1 - rest.0)
-                };
-                let current = domain(operand, domains);
-                set(operand, current.within(min, max)?, domains)?;
-            }
-            Some(())
-        }
-        Kind::Product => {
-            for (at, &operand) in operands.iter().enumerate() {
-                let others = (0..last).filter(|&other| other != at);
-                let corners = others.fold(vec![1], |all, x| {
-                    let with = |a: &i128| [a * ends(x).0, a * ends(x).1];
-                    all.iter().flat_map(with).collect()
-                });
-                let least = *corners.iter().min().unwrap();
-                let most = *corners.iter().max().unwrap();
-                let (min, max) = if at == last {
-                    (least, most)
-                } else {
-                    quotients(ends(last), least, most)?
-                };
-                let mut current = domain(operand, domains).within(min, max)?;
-                let no_zero = ends(last).0 > 0 || ends(last).1 < 0;
-                let at_zero = current.ends().0 == 0 || current.ends().1 == 0;
-                if at < last && no_zero && at_zero {
-                    current = current.without(0)?;
-                }
-                set(operand, current, domains)?;
-            }
-            Some(())
-        }
+        Kind::Sum | Kind::Product => arithmetic(kind, operands, &now, domains),
         Kind::Table(rows) => {
             let can_be = |row: &&[Value]| now.iter().zip(*row).all(|(x, &value)| x.has(value));
             let live: Vec<&[Value]> = rows.rows().filter(can_be).collect();
@@ -229,6 +192,45 @@ fn apply(kind: &Kind, operands: &[Operand], domains: &mut Naives) -> Option<()> 
             }
         }
     }
+}
+
+/// A sum or a product: each operand lies between what the ends of the others leave it.
+fn arithmetic(
+    kind: &Kind,
+    operands: &[Operand],
+    now: &[Naive],
+    domains: &mut Naives,
+) -> Option<()> {
+    let is_sum = matches!(kind, Kind::Sum);
+    let ends: Vec<[i128; 2]> = now
+        .iter()
+        .map(|x| [x.ends().0.into(), x.ends().1.into()])
+        .collect();
+    let (output, inputs) = ends.split_last()?;
+    for (at, &operand) in operands.iter().enumerate() {
+        // All sums or products of ends of the other inputs.
+        let mut corners = vec![i128::from(!is_sum)];
+        for (_, ends) in inputs.iter().enumerate().filter(|(other, _)| *other != at) {
+            let with = |a: &i128| ends.map(|end| if is_sum { a + end } else { a * end });
+            corners = corners.iter().flat_map(with).collect();
+        }
+        let (least, most) = (*corners.iter().min()?, *corners.iter().max()?);
+        let (min, max) = if at == inputs.len() {
+            (least, most)
+        } else if is_sum {
+            (output[0] - most, output[1] - least)
+        } else {
+            quotients((output[0], output[1]), least, most)?
+        };
+        let mut current = domain(operand, domains).within(min, max)?;
+        let has_zero = current.ends().0 == 0 || current.ends().1 == 0;
+        let is_factor = !is_sum && at < inputs.len();
+        if is_factor && has_zero && (output[0] > 0 || output[1] < 0) {
+            current = current.without(0)?;
+        }
+        set(operand, current, domains)?;
+    }
+    Some(())
 }
 
 /// Between which whole numbers all quotients of the ends of a product by others lie, tried one by
