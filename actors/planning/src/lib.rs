@@ -15,8 +15,8 @@
 //! | [`parameters`] | variables and what ties them together, kept consistent edit by edit |
 //! | [`plan`] | a plan as data and as JSON |
 //! | [`profile`] | how low and how high the level of a resource can be while times are flexible |
-//! | [`search`] | how what is missing in a plan is put right |
 //! | [`sch`] | project scheduling problems (RCPSP/max) in ProGen/max's format |
+//! | [`search`] | how what is missing in a plan is put right |
 //! | [`temporal`] | points in time and bounds on their differences, kept consistent edit by edit |
 
 pub mod arena;
@@ -29,8 +29,8 @@ pub mod objective;
 pub mod parameters;
 pub mod plan;
 pub mod profile;
-pub mod search;
 pub mod sch;
+pub mod search;
 pub mod temporal;
 
 /// Time in ticks: the user says how long one is.
