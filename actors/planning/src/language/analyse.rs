@@ -141,7 +141,10 @@ pub(super) fn model(loaded: &Loaded, functions: &Functions, notes: &mut Notes) -
         fragment,
     };
     let control = rule::read(scope, &entries, &mut drafts);
-    prove::check(&model, &drafts, notes);
+    // Of rules in which something is wrong, nothing can be proved.
+    if !notes.has_errors() {
+        prove::check(&model, &drafts, notes);
+    }
     model.control = control;
     rule::instantiate(&mut model, &names, drafts, notes);
     model

@@ -177,6 +177,14 @@ impl Finding {
     }
 }
 
+/// How many arguments, in words.
+pub(super) fn arguments(count: usize) -> String {
+    match count {
+        1 => "1 argument".to_owned(),
+        _ => format!("{count} arguments"),
+    }
+}
+
 /// A piece of text as a message shows it.
 pub(super) fn show(text: &str) -> String {
     let mut shown: String = text
@@ -199,8 +207,11 @@ pub(super) fn nearest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> O
     let near = known
         .filter(|known| known.len() <= LONGEST_NAME)
         .map(|known| {
-            let distance = strsim::osa_distance(&lower, &known.to_lowercase());
-            (distance, known)
+            let of = known.to_lowercase();
+            // The begin of a name is near it, however long the rest is.
+            let begins = lower.chars().count() > 2 && of.starts_with(&lower);
+            let distance = strsim::osa_distance(&lower, &of);
+            (if begins { distance.min(1) } else { distance }, known)
         });
     // Of equally near names the first in the alphabet, whatever the order of the known ones.
     let (distance, best) = near.min()?;

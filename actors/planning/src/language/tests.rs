@@ -4,7 +4,9 @@ use super::*;
 use crate::model::*;
 use crate::temporal::Span;
 
+mod findings;
 mod format;
+mod hostile;
 
 const FIGURE_5: &str = include_str!("../../models/figure-5.ddl");
 const ROVER: &str = include_str!("../../models/rover.ddl");

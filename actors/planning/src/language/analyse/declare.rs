@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::entry::Entry;
 use super::literal::{self, Sort};
 use super::resources;
-use crate::language::findings::Notes;
+use crate::language::findings::{Notes, arguments};
 use crate::language::functions::Functions;
 use crate::language::tree::{Form, Kind};
 use crate::model::{
@@ -500,7 +500,7 @@ impl<'t, 'n> Declarations<'t, 'n> {
         let given: Vec<Form> = given.filter(|form| form.kind() != Kind::Arrow).collect();
         let parameters = self.model.predicates[predicate].parameters.clone();
         if list.is_some() && given.len() != parameters.len() {
-            let expected = format!("{} arguments of {}", parameters.len(), name.word());
+            let expected = format!("{} of {}", arguments(parameters.len()), name.word());
             self.notes
                 .refuse(list.unwrap_or(form), expected, given.len().to_string());
             return None;
@@ -563,7 +563,7 @@ impl<'t, 'n> Declarations<'t, 'n> {
         for &row in rows {
             let values: Vec<Form> = row.children().collect();
             if values.len() != types.len() {
-                let expected = format!("a row of {} values", types.len());
+                let expected = format!("as many values as columns, {}", types.len());
                 self.notes.refuse(row, expected, values.len().to_string());
                 continue;
             }
@@ -592,7 +592,7 @@ impl<'t, 'n> Declarations<'t, 'n> {
 
     fn function(&mut self, entry: &Entry<'t>) {
         entry.check_options(&[], self.notes);
-        let &[name, arguments] = entry.values.as_slice() else {
+        let &[name, number] = entry.values.as_slice() else {
             self.notes
                 .error(entry.form, "(Define_Function name number_of_arguments)");
             return;
@@ -600,13 +600,11 @@ impl<'t, 'n> Declarations<'t, 'n> {
         let Some(name_text) = self.name(name) else {
             return;
         };
-        let literal = literal::plain(literal::resolve(arguments, self.constants));
+        let literal = literal::plain(literal::resolve(number, self.constants));
         let count = literal.and_then(|(value, _)| usize::try_from(value).ok());
         let Some(count) = count.filter(|count| (1..=64).contains(count)) else {
-            self.notes.error(
-                arguments,
-                "how many arguments it has with its output, 1 to 64",
-            );
+            self.notes
+                .error(number, "how many arguments it has with its output, 1 to 64");
             return;
         };
         // Who gives functions gives their bodies; without one, its output is never known.
@@ -617,8 +615,8 @@ impl<'t, 'n> Declarations<'t, 'n> {
             .find(|function| function.name == name_text);
         match known.map(|function| function.arguments) {
             Some(known) if known != count => {
-                let expected = format!("{known} arguments, as {name_text} has");
-                self.notes.error(arguments, expected);
+                let expected = format!("{}, as {name_text} has", arguments(known));
+                self.notes.error(number, expected);
             }
             Some(_) => {}
             None => self
@@ -664,7 +662,8 @@ impl<'t, 'n> Declarations<'t, 'n> {
                 }
             }
         }
-        if let (true, Some(form)) = (self.model.timelines.is_empty(), first) {
+        let is_bare = self.model.timelines.is_empty() && !self.notes.has_errors();
+        if let (true, Some(form)) = (is_bare, first) {
             let expected = "a class with state variables, by Define_Object_Class";
             self.notes
                 .refuse(form, expected, "a model without timelines");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Scope;
 use super::literal::{self, Sort, describe};
+use crate::language::findings::arguments;
 use crate::language::tree::{Form, Kind};
 use crate::model::{
     Argument, Bound, NUMBER, Pattern, TimelineId, TypeId, Value, Values, Variable, VariableId,
@@ -268,7 +269,7 @@ impl<'t> Scope<'t, '_> {
         }
         let (count, inputs) = (predicate.parameters.len(), predicate.inputs);
         if given.len() != count {
-            let expected = format!("{count} arguments of {}", predicate.name);
+            let expected = format!("{} of {}", arguments(count), predicate.name);
             self.notes.refuse(list, expected, given.len().to_string());
             return None;
         }
@@ -278,8 +279,8 @@ impl<'t> Scope<'t, '_> {
             return None;
         }
         let types = predicate.parameters.iter().map(|parameter| parameter.of);
-        let arguments = given.into_iter().zip(types);
-        arguments
+        let given = given.into_iter().zip(types);
+        given
             .map(|(form, of)| self.argument(form, of, variables))
             .collect()
     }

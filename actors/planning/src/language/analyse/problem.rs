@@ -1,20 +1,18 @@
 //! Problems: what is the case, what is wanted, and what it is worth.
 
+mod goals;
+
 use std::collections::BTreeMap;
 
 use super::entry::Entry;
 use super::literal::{self, A_NUMBER};
 use super::pattern::{Master, Variables};
 use super::{Scope, body};
-use crate::Ticks;
 use crate::language::tree::{Form, Kind};
 use crate::model::{
-    Argument, Combination, Distance, End, Fact, Goal, GoalId, Order, Problem, ResourceId,
+    Argument, Combination, Distance, End, Fact, GoalId, Order, Problem, ResourceId,
 };
 use crate::temporal::{FURTHEST, Span};
-
-/// How many goals a recurring one may become.
-const MOST_INSTANCES: i64 = 100_000;
 
 /// Reads a problem.
 pub(super) fn read<'t>(scope: Scope<'t, '_>, entries: &[Entry<'t>]) -> Problem {
@@ -163,232 +161,6 @@ impl<'t> Reader<'t, '_> {
             start,
             finish,
         });
-    }
-
-    fn goal(&mut self, entry: &Entry<'t>) {
-        let known = [
-            ":start",
-            ":end",
-            ":duration",
-            ":weight",
-            ":mandatory",
-            ":every",
-            ":from",
-            ":to",
-        ];
-        entry.check_options(&known, self.scope.notes);
-        let &[name, form] = entry.values.as_slice() else {
-            self.scope
-                .notes
-                .error(entry.form, "(Goal name (SINGLE …) :mandatory)");
-            return;
-        };
-        if name.symbol().is_none() {
-            self.scope.notes.error(name, "the goal's name");
-            return;
-        }
-        let mut variables = Variables::default();
-        let found = self.scope.pattern(form, &mut variables, &Master::default());
-        let weight = self.worth(entry);
-        let duration = self.duration(entry);
-        let (Some(found), Some(weight), Some(duration)) = (found, weight, duration) else {
-            return;
-        };
-        let whole = Span::new(0, self.problem.horizon);
-        let goal = Goal {
-            name: name.word().to_owned(),
-            position: entry.form.position(),
-            pattern: found.pattern,
-            variables: variables.list,
-            start: whole,
-            finish: whole,
-            duration,
-            weight,
-        };
-        if entry.keyword(":every").is_some() {
-            self.recur(entry, name, goal);
-            return;
-        }
-        for option in [":from", ":to"] {
-            if let Some(keyword) = entry.keyword(option) {
-                self.scope.notes.error(keyword, "an option :every as well");
-            }
-        }
-        let start = self.times(entry, ":start", whole);
-        let finish = self.times(entry, ":end", whole);
-        let (Some(start), Some(finish)) = (start, finish) else {
-            return;
-        };
-        self.add(
-            name,
-            Goal {
-                start,
-                finish,
-                ..goal
-            },
-        );
-    }
-
-    /// What a goal is worth, or none if it is mandatory.
-    fn worth(&mut self, entry: &Entry<'t>) -> Option<Option<f64>> {
-        let (weight, mandatory) = (entry.keyword(":weight"), entry.keyword(":mandatory"));
-        if let Some(&more) = entry.option(":mandatory").first() {
-            self.scope.notes.error(more, "nothing after :mandatory");
-        }
-        match (weight, mandatory) {
-            (Some(_), None) => self.weight(entry).map(Some),
-            (None, Some(_)) => Some(None),
-            (Some(_), Some(both)) => {
-                self.scope
-                    .notes
-                    .error(both, "either a :weight or :mandatory");
-                None
-            }
-            (None, None) => {
-                self.scope
-                    .notes
-                    .refuse(entry.form, "a :weight or :mandatory", "neither");
-                None
-            }
-        }
-    }
-
-    fn weight(&mut self, entry: &Entry<'t>) -> Option<f64> {
-        let Some(form) = entry.one(":weight", self.scope.notes) else {
-            if entry.keyword(":weight").is_none() {
-                self.scope.notes.refuse(entry.form, "a :weight", "none");
-            }
-            return None;
-        };
-        let literal = literal::resolve(form, self.scope.constants);
-        let is_number = matches!(literal.kind(), Kind::Number | Kind::Decimal);
-        let weight: Option<f64> = literal.word().parse().ok().filter(|_| is_number);
-        let weight = weight.filter(|weight| weight.is_finite());
-        if weight.is_none() {
-            self.scope.notes.error(form, "a number that is finite");
-        }
-        weight
-    }
-
-    fn duration(&mut self, entry: &Entry<'t>) -> Option<Span> {
-        let whole = Span::new(0, self.problem.horizon);
-        let Some(form) = entry.one(":duration", self.scope.notes) else {
-            return entry.keyword(":duration").is_none().then_some(whole);
-        };
-        let span = self.span(form)?;
-        if span.min < 0 && span.min != Ticks::MIN {
-            self.scope
-                .notes
-                .error(form, "a duration that is not negative");
-            return None;
-        }
-        let within = span.intersect(whole);
-        if within.is_empty() {
-            let expected = format!("a duration within the horizon [0 {}]", self.problem.horizon);
-            self.scope.notes.error(form, expected);
-            return None;
-        }
-        Some(within)
-    }
-
-    /// Adds a goal for each instant `from`, `from + every`, … up to and with `to`, its times
-    /// counted from there.
-    fn recur(&mut self, entry: &Entry<'t>, name: Form<'t>, goal: Goal) {
-        let horizon = self.problem.horizon;
-        let mut number = |option: &str, usual: Ticks, least: Ticks| {
-            let Some(form) = entry.one(option, self.scope.notes) else {
-                return Some(usual);
-            };
-            let value = self.scope.number(form)?;
-            if value < least || value > horizon {
-                let expected = format!("a tick from {least} to the horizon's end, {horizon}");
-                self.scope.notes.error(form, expected);
-                return None;
-            }
-            Some(value)
-        };
-        let every = number(":every", 0, 1).filter(|every| *every > 0);
-        let (from, to) = (number(":from", 0, 0), number(":to", horizon, 0));
-        let mut offsets = |option: &str| match entry.one(option, self.scope.notes) {
-            Some(form) => literal::span(form, self.scope.constants, self.scope.notes).map(Some),
-            None => Some(None),
-        };
-        let (start, finish) = (offsets(":start"), offsets(":end"));
-        let (Some(every), Some(from), Some(to)) = (every, from, to) else {
-            return;
-        };
-        let (Some(start), Some(finish)) = (start, finish) else {
-            return;
-        };
-        if from > to || (to - from) / every >= MOST_INSTANCES {
-            let expected =
-                format!("one instant or more, at most {MOST_INSTANCES}, from :from to :to");
-            self.scope
-                .notes
-                .refuse(entry.form, expected, format!("[{from} {to}] every {every}"));
-            return;
-        }
-        self.recurring.push(name.word());
-        let whole = goal.start;
-        let at = |instant: Ticks, offsets: Span| {
-            let moved = [offsets.min, offsets.max].map(|side| side.saturating_add(instant));
-            let open = [offsets.min == Ticks::MIN, offsets.max == Ticks::MAX];
-            let min = if open[0] { 0 } else { moved[0] };
-            let max = if open[1] { horizon } else { moved[1] };
-            Span::new(min, max).intersect(whole)
-        };
-        let instants = (0..=(to - from) / every).map(|count| from + count * every);
-        for (count, instant) in instants.enumerate() {
-            let start = at(instant, start.unwrap_or(Span::exactly(0)));
-            let finish = finish.map_or(whole, |finish| at(instant, finish));
-            if start.is_empty() || finish.is_empty() {
-                let expected = format!("times within the horizon [0 {horizon}]");
-                let found = format!("the one of instant {instant} outside it");
-                self.scope.notes.refuse(entry.form, expected, found);
-                return;
-            }
-            let name_text = format!("{}_{}", goal.name, count + 1);
-            self.add(
-                name,
-                Goal {
-                    name: name_text,
-                    start,
-                    finish,
-                    ..goal.clone()
-                },
-            );
-        }
-    }
-
-    fn add(&mut self, name: Form<'t>, goal: Goal) {
-        if self.goals.contains_key(&goal.name) || self.recurring.contains(&goal.name.as_str()) {
-            self.scope
-                .notes
-                .refuse(name, "a name that no other goal has", goal.name);
-            return;
-        }
-        let earliest = goal
-            .start
-            .min
-            .saturating_add(goal.duration.min)
-            .max(goal.finish.min);
-        let latest = goal
-            .start
-            .max
-            .saturating_add(goal.duration.max)
-            .min(goal.finish.max);
-        if earliest > latest {
-            let expected = "times between which the goal fits";
-            let found = format!(
-                "start {:?}, end {:?}, duration {:?}, horizon [0 {}]",
-                goal.start, goal.finish, goal.duration, self.problem.horizon
-            );
-            self.scope.notes.refuse(name, expected, found);
-            return;
-        }
-        self.goals
-            .insert(goal.name.clone(), self.problem.goals.len());
-        self.problem.goals.push(goal);
     }
 
     /// The goal that a word names.

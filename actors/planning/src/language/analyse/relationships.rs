@@ -3,6 +3,7 @@
 use super::Scope;
 use super::literal::Sort;
 use super::rule::Draft;
+use crate::language::findings::arguments;
 use crate::language::tree::{Form, Kind};
 use crate::model::{Operand, Relationship, RelationshipKind};
 
@@ -122,14 +123,10 @@ impl<'t> Scope<'t, '_> {
         };
         if !fits {
             let expected = match kind {
-                RelationshipKind::Table(table) => {
-                    format!("{} arguments", self.model.tables[table].columns)
-                }
-                RelationshipKind::Function(at) => {
-                    format!("{} arguments", self.model.functions[at].arguments)
-                }
+                RelationshipKind::Table(table) => arguments(self.model.tables[table].columns),
+                RelationshipKind::Function(at) => arguments(self.model.functions[at].arguments),
                 RelationshipKind::Different | RelationshipKind::Less | RelationshipKind::AtMost => {
-                    "2 arguments".to_owned()
+                    arguments(2)
                 }
                 _ => "2 arguments or more".to_owned(),
             };

@@ -201,18 +201,14 @@ impl<'t> Scope<'t, '_> {
             return;
         };
         for &resource in &resources {
-            let fits = match (self.model.resources[resource].kind, kind) {
-                (ResourceKind::Renewable, kind) => kind == EffectKind::Uses,
-                (ResourceKind::RateLimited { .. }, kind) => {
-                    !matches!(kind, EffectKind::Produces(_))
-                }
-                (ResourceKind::Depletable, _) => true,
+            let allowed: &[&str] = match self.model.resources[resource].kind {
+                ResourceKind::Renewable => &[":uses"],
+                ResourceKind::RateLimited { .. } => &[":uses", ":consumes"],
+                ResourceKind::Depletable => continue,
             };
-            if !fits {
-                let expected = format!(
-                    "what can be done to {}",
-                    self.model.resources[resource].name
-                );
+            if !allowed.contains(&option) {
+                let name = &self.model.resources[resource].name;
+                let expected = format!("{} of {name}", allowed.join(" or "));
                 self.notes.refuse(form, expected, option);
                 return;
             }
