@@ -236,10 +236,10 @@ impl Work {
             self.return_to(&base, &[]);
         }
         let mut objective = Objective::new(&problem);
-        let mut closed = vec![false; problem.goals.len()];
-        for goal in 0..problem.goals.len() {
-            closed[goal] = self.complete.wants(goal);
-            objective.set(goal, closed[goal]);
+        let goals = 0..problem.goals.len();
+        let mut closed: Vec<bool> = goals.map(|goal| self.complete.wants(goal)).collect();
+        for (goal, &wanted) in closed.iter().enumerate() {
+            objective.set(goal, wanted);
         }
         let mut best = (self.schedule.database.clone(), self.posted.clone());
         let mut reasons = vec!["it was never the goal that brings most".to_owned(); closed.len()];
