@@ -52,6 +52,15 @@ const PROBLEM_FORMS: [&str; 8] = [
     "Change",
 ];
 
+/// All words that the language gives a meaning to where they start a list.
+#[cfg(test)]
+pub(super) fn words() -> impl Iterator<Item = &'static str> {
+    MODEL_FORMS
+        .into_iter()
+        .chain(PROBLEM_FORMS)
+        .chain(body::relation_words())
+}
+
 /// What everything that resolves names needs.
 struct Scope<'t, 'n> {
     notes: &'n mut Notes,
