@@ -7,6 +7,8 @@ use crate::temporal::Span;
 mod findings;
 mod format;
 mod hostile;
+mod meaning;
+mod proofs;
 mod reference;
 
 const FIGURE_5: &str = include_str!("../../models/figure-5.ddl");
