@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`arena`] | values with ids that a later value in the same place does not answer to |
 //! | [`checker`] | whether a plan is valid, and if not, why: shares no code with the planners |
+//! | [`draw`] | a plan as a Gantt chart |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`plan`] | a plan as data and as JSON |
 //! | [`sch`] | project scheduling problems (RCPSP/max) in ProGen/max's format |
@@ -15,6 +16,7 @@
 
 pub mod arena;
 pub mod checker;
+pub mod draw;
 pub mod model;
 mod nearest;
 pub mod plan;
