@@ -49,10 +49,10 @@ fn changes(
         (end, amount, None)
     };
     let over = match resource {
-        ResourceKind::Renewable | ResourceKind::Depletable => over,
-        ResourceKind::RateLimited { window_ticks } => {
-            Some(over.unwrap_or(at).saturating_add(window_ticks))
+        ResourceKind::RateLimited { window_ticks } if by < 0 => {
+            Some(at.saturating_add(window_ticks))
         }
+        _ => over,
     };
     [Some((at, by)), over.map(|over| (over, -by))]
 }

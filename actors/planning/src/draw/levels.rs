@@ -114,9 +114,7 @@ pub(super) fn levels(plan: &Plan, resource: &PlanResource) -> Vec<(Ticks, i128)>
                 PlanEffectKind::Produces(at) => (end(at), amount, None),
             };
             let over = match resource.kind {
-                PlanResourceKind::RateLimited(window) => {
-                    Some(over.unwrap_or(at).saturating_add(window))
-                }
+                PlanResourceKind::RateLimited(window) if by < 0 => Some(at.saturating_add(window)),
                 _ => over,
             };
             changes.push((at, by));

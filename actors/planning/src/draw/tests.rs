@@ -227,9 +227,9 @@ fn levels_are_those_at_fixed_times() {
     let mut limited = plan.resources[1].clone();
     limited.kind = PlanResourceKind::RateLimited(10);
     let starts = levels::levels(&plan, &limited);
-    // Four uses, each over 10 ticks after its end.
-    assert_eq!(starts[..3], [(0, 100), (30, 75), (36, 50)]);
-    assert_eq!(starts.last(), Some(&(108, 100)));
+    // Each use counts for 10 ticks from its start.
+    assert_eq!(starts[..4], [(0, 100), (30, 75), (36, 50), (40, 75)]);
+    assert_eq!(starts.last(), Some(&(94, 100)));
 }
 
 #[test]
