@@ -101,7 +101,7 @@ fn levels<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Option<Resour
     }
     let mut value = |name: &str, least: Value| {
         let form = entry.one(name, to.notes)?;
-        let value = literal::bound(form, to.constants).ok().flatten();
+        let value = literal::whole(form, to.constants);
         let value = value.filter(|value| *value >= least);
         if value.is_none() {
             to.notes
@@ -162,8 +162,7 @@ fn changes<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Vec<(Ticks, 
     let mut changes = Vec::new();
     for pair in list.into_iter().flat_map(|list| list.children()) {
         let mut parts = pair.children();
-        let numbers = [parts.next(), parts.next()]
-            .map(|form| literal::bound(form?, to.constants).ok().flatten());
+        let numbers = [parts.next(), parts.next()].map(|form| literal::whole(form?, to.constants));
         match (numbers, parts.next()) {
             ([Some(tick), Some(delta)], None) if tick >= 0 => changes.push((tick, delta)),
             _ => to
