@@ -104,10 +104,10 @@ pub(super) fn whole<'t>(form: Form<'t>, constants: &BTreeMap<&'t str, Form<'t>>)
 /// What a number must be, in words.
 pub(super) const A_NUMBER: &str = "a whole number, at most 2^56";
 
-/// The two ends of a span; the number itself twice, if `one` allows that.
-pub(super) fn ends<'t>(form: Form<'t>, one: bool, notes: &mut Notes) -> Option<[Form<'t>; 2]> {
+/// The two ends of bounds; of a number, itself twice.
+pub(super) fn ends<'t>(form: Form<'t>, notes: &mut Notes) -> Option<[Form<'t>; 2]> {
     if form.kind() != Kind::Span {
-        if one && !form.word().is_empty() {
+        if !form.word().is_empty() {
             return Some([form, form]);
         }
         notes.error(form, "bounds, as [0 10]");
@@ -129,7 +129,7 @@ pub(super) fn span<'t>(
     constants: &BTreeMap<&'t str, Form<'t>>,
     notes: &mut Notes,
 ) -> Option<Span> {
-    let [min, max] = ends(form, true, notes)?;
+    let [min, max] = ends(form, notes)?;
     let side = |form: Form<'t>, side: Side, notes: &mut Notes| {
         let (wrong, usual) = match side {
             Side::Least => ("inf", Value::MIN),

@@ -405,7 +405,7 @@ impl<'t> Scope<'t, '_> {
         least: Option<Value>,
         variables: &mut Variables<'t>,
     ) -> Option<[Bound; 2]> {
-        let [min, max] = literal::ends(form, true, self.notes)?;
+        let [min, max] = literal::ends(form, self.notes)?;
         let low = self.bound(min, Side::Least, least, variables);
         let high = self.bound(max, Side::Greatest, least, variables);
         let (low, high) = (low?, high?);

@@ -35,6 +35,8 @@ pub(super) struct Draft<'t> {
     pub(super) same_resources: Vec<Option<&'t str>>,
     /// The numbers of the tokens that have names.
     pub(super) labels: BTreeMap<&'t str, usize>,
+    /// Their names, in the order of the text.
+    pub(super) labelled: Vec<&'t str>,
 }
 
 /// Reads all rules to `drafts`, and how a search decides.
@@ -157,6 +159,7 @@ impl<'t> Scope<'t, '_> {
             same_timelines: vec![None],
             same_resources: Vec::new(),
             labels: BTreeMap::from([("master", 0)]),
+            labelled: Vec::new(),
         })
     }
 
