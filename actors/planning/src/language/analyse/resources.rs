@@ -76,6 +76,22 @@ pub(super) fn declare<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) {
     }
 }
 
+/// Notes options that resources of a kind do not have.
+fn check_options_of<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>, kind: &str) {
+    let allowed: &[&str] = match kind {
+        "unary" => &[":kind", ":changes"],
+        "renewable" => &[":kind", ":changes", ":capacity"],
+        "rate_limited" => &[":kind", ":changes", ":capacity", ":window"],
+        _ => &[":kind", ":changes", ":capacity", ":initial", ":limits"],
+    };
+    for option in OPTIONS.iter().filter(|option| !allowed.contains(option)) {
+        if let Some(keyword) = entry.keyword(option) {
+            to.notes
+                .error(keyword, format!("an option of a {kind} resource"));
+        }
+    }
+}
+
 /// What a declaration says of kind and levels; name, object and position are still to be given.
 fn levels<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Option<Resource> {
     let Some(kind) = entry.one(":kind", to.notes) else {
@@ -87,18 +103,7 @@ fn levels<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Option<Resour
         to.notes.unknown(kind, expected, KINDS.into_iter());
         return None;
     }
-    let allowed: &[&str] = match kind.word() {
-        "unary" => &[":kind", ":changes"],
-        "renewable" => &[":kind", ":changes", ":capacity"],
-        "rate_limited" => &[":kind", ":changes", ":capacity", ":window"],
-        _ => &[":kind", ":changes", ":capacity", ":initial", ":limits"],
-    };
-    for option in OPTIONS.iter().filter(|option| !allowed.contains(option)) {
-        if let Some(keyword) = entry.keyword(option) {
-            to.notes
-                .error(keyword, format!("an option of a {} resource", kind.word()));
-        }
-    }
+    check_options_of(to, entry, kind.word());
     let mut value = |name: &str, least: Value| {
         let form = entry.one(name, to.notes)?;
         let value = literal::whole(form, to.constants);
