@@ -365,6 +365,9 @@ pub enum RelationKind {
     EndsDuring,
     /// The anchor ends after the target does.
     EndsAfter,
+    /// Any distance between an end of the anchor and one of the target: `temporaldistance`. It
+    /// has no usual distances.
+    Distance,
 }
 
 /// That a token stands in a temporal relation to another.
@@ -651,6 +654,7 @@ impl RelationKind {
                 &[(Finish, Start, later, true), (Finish, Finish, later, false)]
             }
             RelationKind::EndsAfter => &[(Finish, Finish, later, true)],
+            RelationKind::Distance => &[],
         };
         let mut distances = Vec::with_capacity(rows.len());
         for (row, &(from, to, usual, backward)) in rows.iter().enumerate() {

@@ -18,6 +18,7 @@
 //! Shortest-Path Problem*, 1996).
 
 mod conflict;
+mod distance;
 mod propagate;
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ mod trail;
 use std::fmt;
 
 pub use conflict::{Conflict, Link};
+pub use distance::Distances;
 
 use crate::Ticks;
 use crate::arena::{Arena, Id};
@@ -78,6 +80,12 @@ impl Span {
     #[must_use]
     pub fn intersect(self, other: Span) -> Span {
         Span::new(self.min.max(other.min), self.max.min(other.max))
+    }
+
+    /// Of the negatives of what is in it.
+    #[must_use]
+    pub fn negated(self) -> Span {
+        Span::new(negated(self.max), negated(self.min))
     }
 
     /// Whether no value is in it.
@@ -155,6 +163,27 @@ type Side = usize;
 const EARLIEST: Side = 0;
 const LATEST: Side = 1;
 
+/// The points whose bounds changed since somebody asked.
+#[derive(Clone, Debug, Default)]
+struct Changed {
+    /// Their places, in the order in which they changed first.
+    points: Vec<u32>,
+    /// By place: whether it is among them.
+    is_in: Vec<bool>,
+}
+
+impl Changed {
+    fn add(&mut self, point: u32) {
+        let place = point as usize;
+        if self.is_in.len() <= place {
+            self.is_in.resize(place + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_in[place], true) {
+            self.points.push(point);
+        }
+    }
+}
+
 /// How much an edit looked at: counts that say whether work follows the change.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
@@ -192,6 +221,7 @@ pub struct Network<O> {
     /// By half.
     halves: Vec<Inequality>,
     scratch: Scratch,
+    changed: Changed,
     trail: Vec<Change<O>>,
     /// How long the trail was at each push.
     levels: Vec<usize>,
@@ -223,6 +253,7 @@ impl<O: Clone> Network<O> {
             owners: Vec::new(),
             halves: Vec::new(),
             scratch: Scratch::default(),
+            changed: Changed::default(),
             trail: Vec::new(),
             levels: Vec::new(),
             work: Work::default(),
@@ -434,6 +465,15 @@ impl<O: Clone> Network<O> {
         self.work
     }
 
+    /// The points whose bounds changed since this was asked last and that are still there, in the
+    /// order in which they changed first. What an undone edit changed may be among them.
+    pub fn take_changed(&mut self, into: &mut Vec<Point>) {
+        for point in self.changed.points.drain(..) {
+            self.changed.is_in[point as usize] = false;
+            into.extend(self.nodes.id_at(point as usize));
+        }
+    }
+
     /// The points and what is known of them, for comparing whole states.
     pub fn all_bounds(&self) -> impl Iterator<Item = (Point, Span)> {
         let of = |(point, node): (Point, &Node)| {
@@ -503,10 +543,10 @@ impl<O: fmt::Debug> fmt::Debug for Network<O> {
 
 /// The negative, which of no bound is none.
 fn negated(bound: Ticks) -> Ticks {
-    if bound == Ticks::MAX {
-        Ticks::MIN
-    } else {
-        -bound
+    match bound {
+        Ticks::MAX => Ticks::MIN,
+        Ticks::MIN => Ticks::MAX,
+        bound => -bound,
     }
 }
 

@@ -248,6 +248,7 @@ impl<O: Clone> Network<O> {
 
     fn set(&mut self, side: Side, point: u32, growth: Ticks, by: Option<Half>) {
         self.work.points += 1;
+        self.changed.add(point);
         let node = self.node_mut(point);
         let old = (node.value[side], node.by[side]);
         node.value[side] += growth;

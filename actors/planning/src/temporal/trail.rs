@@ -130,6 +130,7 @@ impl<O: Clone> Network<O> {
                 value,
                 by,
             } => {
+                self.changed.add(point);
                 let node = self.node_mut(point);
                 node.value[side] = value;
                 node.by[side] = by;

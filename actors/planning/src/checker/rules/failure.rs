@@ -208,5 +208,6 @@ fn name(kind: RelationKind) -> &'static str {
         RelationKind::StartsBefore => "starts_before",
         RelationKind::EndsDuring => "ends_during",
         RelationKind::EndsAfter => "ends_after",
+        RelationKind::Distance => "temporaldistance",
     }
 }

@@ -1,0 +1,624 @@
+//! Rules as they hold for tokens: instances that wait for their guard, hold, or are void, and what
+//! they ask for.
+
+use smallvec::SmallVec;
+
+use super::resources::Effected;
+use super::trail::Change;
+use super::{Conflict, Database, InstanceId, Owner, TokenId};
+use crate::model::{
+    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship, Rule, RuleId,
+    Target, VariableId,
+};
+use crate::parameters::{self, Operand};
+use crate::temporal::{Constraint, Span};
+
+/// A part of a rule's body: a relation or a choice, by its place among those of the rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Step {
+    /// A relation.
+    Relation(u32),
+    /// A choice of alternatives.
+    Choice(u32),
+}
+
+/// What an instance asks for, and nobody decided yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Open {
+    /// Who asks.
+    pub instance: InstanceId,
+    /// What for.
+    pub step: Step,
+}
+
+/// A rule's body without nesting.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Flat {
+    /// The relations, in the order of the text.
+    pub(crate) relations: Vec<Relation>,
+    /// By choice: by alternative: its parts.
+    pub(crate) choices: Vec<Vec<Vec<Step>>>,
+    /// What holds in any case.
+    pub(crate) top: Vec<Step>,
+    /// Whether the rule holds from the first, without a guard.
+    pub(crate) unguarded: bool,
+}
+
+impl Flat {
+    pub(crate) fn of(rule: &Rule) -> Self {
+        let mut flat = Flat::default();
+        flat.top = flat.parts(&rule.body);
+        let mut seen: Vec<VariableId> = Vec::new();
+        flat.unguarded = rule.when.is_empty()
+            && rule.master.arguments.iter().all(|argument| match argument {
+                Argument::Any => true,
+                Argument::Value(_) => false,
+                Argument::Variable(variable) => {
+                    let first = !seen.contains(variable);
+                    seen.push(*variable);
+                    first
+                }
+            });
+        flat
+    }
+
+    fn parts(&mut self, body: &Body) -> Vec<Step> {
+        match body {
+            Body::All(parts) => parts.iter().flat_map(|part| self.parts(part)).collect(),
+            Body::Any(alternatives, _) => {
+                let place = self.choices.len();
+                self.choices.push(Vec::new());
+                let alternatives = alternatives.iter().map(|part| self.parts(part)).collect();
+                self.choices[place] = alternatives;
+                vec![Step::Choice(place as u32)]
+            }
+            Body::Relation(relation) => {
+                self.relations.push((**relation).clone());
+                vec![Step::Relation(self.relations.len() as u32 - 1)]
+            }
+        }
+    }
+}
+
+/// Whether a rule holds for a token.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Guard {
+    /// What it asks is undecided.
+    Waiting,
+    /// It holds.
+    Holds,
+    /// It does not.
+    Void,
+}
+
+/// A rule as it holds for one token, or waits to.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// The rule.
+    pub rule: RuleId,
+    /// The token.
+    pub master: TokenId,
+    /// Whether it holds.
+    pub guard: Guard,
+    /// By variable of the rule: what it stands for, once something says so.
+    pub(super) variables: SmallVec<[Option<Operand>; 4]>,
+    /// By label: the token that has it.
+    pub(super) labels: SmallVec<[Option<TokenId>; 4]>,
+    /// By choice: the alternative that was chosen.
+    pub(super) chosen: SmallVec<[Option<u32>; 1]>,
+    /// Constraints of times, by what they are of.
+    pub(super) times: SmallVec<[Posted; 3]>,
+    /// Constraints of parameters; of which relation, if of one.
+    pub(super) values: SmallVec<[(Option<u32>, parameters::Constraint); 2]>,
+    /// What it does to resources.
+    pub(super) effects: SmallVec<[Effected; 1]>,
+    /// The variables that it asked to be told of.
+    pub(super) watched: SmallVec<[parameters::Variable; 2]>,
+    /// Since which edit the trail need not keep it again.
+    pub(super) kept: u64,
+}
+
+/// A constraint of times that an instance brought.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Posted {
+    /// Of which relation; none, if of the master's duration.
+    pub(super) relation: Option<u32>,
+    /// Which of its distances.
+    pub(super) distance: u32,
+    pub(super) constraint: Constraint,
+}
+
+impl Instance {
+    /// The token that has a label, if one has it yet; label 0 is the master.
+    pub fn label(&self, label: usize) -> Option<TokenId> {
+        self.labels.get(label).copied().flatten()
+    }
+
+    /// What a variable of the rule stands for, if something says so.
+    pub fn variable(&self, variable: VariableId) -> Option<Operand> {
+        self.variables.get(variable).copied().flatten()
+    }
+
+    /// The alternative of a choice that was chosen.
+    pub fn chosen(&self, choice: usize) -> Option<u32> {
+        self.chosen.get(choice).copied().flatten()
+    }
+}
+
+/// What a token of a pattern can be asked for by: of parameters what is known of them.
+pub(crate) type Wishes = SmallVec<[Option<Operand>; 4]>;
+
+impl Database {
+    /// The relation that an instance has in a place.
+    pub fn relation(&self, instance: InstanceId, relation: u32) -> &Relation {
+        let rule = self.instance_at(instance).rule;
+        &self.flats[rule].relations[relation as usize]
+    }
+
+    /// Where a relation of a rule stands.
+    pub fn position_of(&self, rule: RuleId, relation: u32) -> Position {
+        self.flats[rule].relations[relation as usize].position
+    }
+
+    /// The alternatives of a choice: what each asks for.
+    pub fn alternatives(&self, instance: InstanceId, choice: u32) -> &[Vec<Step>] {
+        let rule = self.instance_at(instance).rule;
+        &self.flats[rule].choices[choice as usize]
+    }
+
+    /// Chooses an alternative of an open choice: what it asks for is open now.
+    ///
+    /// # Panics
+    ///
+    /// If the choice is not open, or has no such alternative.
+    pub fn choose(&mut self, instance: InstanceId, choice: u32, alternative: u32) {
+        let open = Open {
+            instance,
+            step: Step::Choice(choice),
+        };
+        assert!(self.open.contains(&open), "{open:?} is open");
+        self.close_open(open);
+        self.change_instance(instance).chosen[choice as usize] = Some(alternative);
+        let flats = self.flats.clone();
+        let rule = self.instance_at(instance).rule;
+        for &step in &flats[rule].choices[choice as usize][alternative as usize] {
+            self.push_open(Open { instance, step });
+        }
+    }
+
+    /// Makes the instances of a token that is active now.
+    pub(super) fn make_instances(&mut self, token: TokenId) -> Result<(), Conflict> {
+        let model = self.model.clone();
+        let at = self.at(token);
+        let Some(timeline) = at.timeline else {
+            return Ok(());
+        };
+        for &rule in model.rules_of(timeline, at.predicate) {
+            let labels = model.rules[rule].labels.max(1);
+            let mut instance = Instance {
+                rule,
+                master: token,
+                guard: Guard::Waiting,
+                variables: SmallVec::from_elem(None, model.rules[rule].variables.len()),
+                labels: SmallVec::from_elem(None, labels),
+                chosen: SmallVec::from_elem(None, self.flats[rule].choices.len()),
+                times: SmallVec::new(),
+                values: SmallVec::new(),
+                effects: SmallVec::new(),
+                watched: SmallVec::new(),
+                kept: self.serial,
+            };
+            instance.labels[0] = Some(token);
+            let id = self.instances.insert(instance);
+            self.note(Change::InstanceAdded(id));
+            self.change(token).instances.push(id);
+            self.adopt_master(id);
+            self.watch_guard(id)?;
+            self.reconsider(id)?;
+        }
+        Ok(())
+    }
+
+    /// The variables among the master's arguments stand for its parameters.
+    fn adopt_master(&mut self, instance: InstanceId) {
+        let model = self.model.clone();
+        let rule = self.instance_at(instance).rule;
+        let master = self.instance_at(instance).master;
+        let pattern = &model.rules[rule].master;
+        for (place, argument) in pattern.arguments.iter().enumerate() {
+            if let Argument::Variable(variable) = *argument
+                && self.instance_at(instance).variables[variable].is_none()
+            {
+                let operand = self.at(master).parameters[place];
+                self.stand_for(instance, variable, operand);
+            }
+        }
+        if let (Some(variable), Some(timeline)) = (pattern.object, self.at(master).timeline)
+            && self.instance_at(instance).variables[variable].is_none()
+        {
+            let object = Operand::Value(model.timelines[timeline].object);
+            self.stand_for(instance, variable, object);
+        }
+    }
+
+    fn stand_for(&mut self, instance: InstanceId, variable: VariableId, operand: Operand) {
+        self.hold(operand);
+        self.change_instance(instance).variables[variable] = Some(operand);
+    }
+
+    /// Asks to be told of all that the guard speaks of.
+    fn watch_guard(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        let rule = self.instance_at(instance).rule;
+        if self.flats[rule].unguarded {
+            return Ok(());
+        }
+        let model = self.model.clone();
+        let rule = &model.rules[rule];
+        let master = self.instance_at(instance).master;
+        for (place, argument) in rule.master.arguments.iter().enumerate() {
+            if *argument != Argument::Any {
+                let operand = self.at(master).parameters[place];
+                self.watch(instance, operand);
+            }
+        }
+        for term in rule.when.iter().flat_map(|when| &when.operands) {
+            let operand = match *term {
+                Term::Value(_) => continue,
+                Term::Variable(variable) => self.instance_at(instance).variables[variable],
+                // Only the master is there when the guard is asked.
+                Term::Start(0) => Some(self.mirror(master, Some(End::Start))?),
+                Term::Finish(0) => Some(self.mirror(master, Some(End::Finish))?),
+                Term::Duration(0) => Some(self.mirror(master, None)?),
+                Term::Start(_) | Term::Finish(_) | Term::Duration(_) => None,
+            };
+            if let Some(operand) = operand {
+                self.watch(instance, operand);
+            }
+        }
+        Ok(())
+    }
+
+    fn watch(&mut self, instance: InstanceId, operand: Operand) {
+        let Operand::Variable(variable) = operand else {
+            return;
+        };
+        if self.instance_at(instance).watched.contains(&variable) {
+            return;
+        }
+        let place = variable.index();
+        if self.watchers.len() <= place {
+            self.watchers.resize_with(place + 1, Vec::new);
+        }
+        self.watchers[place].push(instance);
+        self.note(Change::Watched(place));
+        self.change_instance(instance).watched.push(variable);
+    }
+
+    /// A rule that holds, or may, is told that variables changed: its guard is asked again, and
+    /// bounds of times follow their variables.
+    pub(super) fn reconsider(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        let now = self.guard(instance);
+        let before = self.instance_at(instance).guard;
+        match (before, now) {
+            (Guard::Holds, Guard::Holds) => {
+                let at = self.instance_at(instance);
+                if !at.effects.is_empty() {
+                    self.dirty.push(at.master);
+                }
+                return self.follow_bounds(instance);
+            }
+            (Guard::Holds, _) => self.withdraw(instance),
+            (_, Guard::Holds) => {
+                self.change_instance(instance).guard = now;
+                return self.apply(instance);
+            }
+            _ => {}
+        }
+        if before != now {
+            self.change_instance(instance).guard = now;
+        }
+        Ok(())
+    }
+
+    /// What is known of a guard.
+    fn guard(&self, instance: InstanceId) -> Guard {
+        let at = self.instance_at(instance);
+        if self.flats[at.rule].unguarded {
+            return Guard::Holds;
+        }
+        let rule = &self.model.rules[at.rule];
+        let parameters = &self.at(at.master).parameters;
+        let mut all = Guard::Holds;
+        for (argument, &operand) in rule.master.arguments.iter().zip(parameters) {
+            let wanted = match *argument {
+                Argument::Any => continue,
+                Argument::Value(value) => Operand::Value(value),
+                Argument::Variable(variable) => match at.variables[variable] {
+                    Some(wanted) => wanted,
+                    None => continue,
+                },
+            };
+            if wanted == operand {
+                continue;
+            }
+            let equal = [wanted, operand];
+            match self.store.entailed(&parameters::Kind::Equal, &equal) {
+                Some(true) => {}
+                Some(false) => return Guard::Void,
+                None => all = Guard::Waiting,
+            }
+        }
+        for when in &rule.when {
+            match self.is_certain(at, when) {
+                Some(true) => {}
+                Some(false) => return Guard::Void,
+                None => all = Guard::Waiting,
+            }
+        }
+        all
+    }
+
+    /// Whether a relationship certainly holds, certainly does not, or neither.
+    fn is_certain(&self, at: &Instance, when: &Relationship) -> Option<bool> {
+        let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
+        for term in &when.operands {
+            operands.push(match *term {
+                Term::Value(value) => Operand::Value(value),
+                Term::Variable(variable) => at.variables[variable]?,
+                Term::Start(label) => self.mirrored_by(at.label(label)?, Some(End::Start))?,
+                Term::Finish(label) => self.mirrored_by(at.label(label)?, Some(End::Finish))?,
+                Term::Duration(label) => self.mirrored_by(at.label(label)?, None)?,
+            });
+        }
+        self.store.entailed(&self.kind(when), &operands)
+    }
+
+    /// What a relationship is for the store.
+    pub(super) fn kind(&self, relationship: &Relationship) -> parameters::Kind {
+        use crate::model::RelationshipKind as Said;
+        use crate::parameters::Kind;
+        match relationship.kind {
+            Said::Equal => Kind::Equal,
+            Said::Different => Kind::Different,
+            Said::Less => Kind::Less,
+            Said::AtMost => Kind::AtMost,
+            Said::Sum => Kind::Sum,
+            Said::Product => Kind::Product,
+            Said::Table(table) => Kind::Table(self.tables[table].clone()),
+            Said::Function(function) => Kind::Function(self.model.functions[function].call),
+        }
+    }
+
+    /// The rule holds now: what it says of the master is posted, what it asks for is open.
+    fn apply(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        let model = self.model.clone();
+        let at = self.instance_at(instance);
+        let (rule, master) = (at.rule, at.master);
+        let owner = Owner::Rule {
+            master,
+            rule,
+            relation: None,
+        };
+        let said = &model.rules[rule];
+        for relationship in &said.relationships {
+            let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
+            for term in &relationship.operands {
+                operands.push(self.operand(instance, *term)?);
+            }
+            let kind = self.kind(relationship);
+            let posted = self.store.post(kind, &operands, owner)?;
+            self.change_instance(instance).values.push((None, posted));
+        }
+        if let Some([min, max]) = said.duration {
+            self.watch_bounds(instance, [min, max]);
+            let span = self.span(instance, min, max, false);
+            let (start, finish) = (self.at(master).start, self.at(master).finish);
+            if let Some(constraint) = self.between(start, finish, span, owner)? {
+                self.change_instance(instance).times.push(Posted {
+                    relation: None,
+                    distance: 0,
+                    constraint,
+                });
+            }
+        }
+        self.apply_effects(instance)?;
+        let flats = self.flats.clone();
+        for &step in &flats[rule].top {
+            self.push_open(Open { instance, step });
+        }
+        self.settle_values()
+    }
+
+    /// What a term stands for; a variable that nothing stands for yet gets one of the store.
+    fn operand(&mut self, instance: InstanceId, term: Term) -> Result<Operand, Conflict> {
+        let (label, end) = match term {
+            Term::Value(value) => return Ok(Operand::Value(value)),
+            Term::Variable(variable) => return Ok(self.variable_of(instance, variable)),
+            Term::Start(label) => (label, Some(End::Start)),
+            Term::Finish(label) => (label, Some(End::Finish)),
+            Term::Duration(label) => (label, None),
+        };
+        let at = self.instance_at(instance);
+        let owner = Owner::Rule {
+            master: at.master,
+            rule: at.rule,
+            relation: None,
+        };
+        let Some(token) = at.label(label) else {
+            return Err(Conflict::Mismatch { owner });
+        };
+        self.mirror(token, end)
+    }
+
+    /// What a variable of an instance stands for.
+    pub(super) fn variable_of(&mut self, instance: InstanceId, variable: VariableId) -> Operand {
+        if let Some(operand) = self.instance_at(instance).variables[variable] {
+            return operand;
+        }
+        let rule = self.instance_at(instance).rule;
+        let of = self.model.rules[rule].variables[variable].of;
+        let operand = self.new_variable(of);
+        self.stand_for(instance, variable, operand);
+        operand
+    }
+
+    /// The bounds of a distance, of variables as far as they are known.
+    pub(crate) fn span(
+        &self,
+        instance: InstanceId,
+        min: Bound,
+        max: Bound,
+        backward: bool,
+    ) -> Span {
+        let at = self.instance_at(instance);
+        let bound = |bound: Bound| match bound {
+            Bound::None => Span::ALL,
+            Bound::Value(value) => Span::exactly(value),
+            Bound::Variable(variable) => match at.variables[variable] {
+                Some(operand) => self.values(operand),
+                None => Span::ALL,
+            },
+        };
+        let span = Span::new(bound(min).min, bound(max).max);
+        if backward { span.negated() } else { span }
+    }
+
+    /// Asks to be told when variables of bounds change.
+    pub(super) fn watch_bounds(&mut self, instance: InstanceId, bounds: [Bound; 2]) {
+        for bound in bounds {
+            if let Bound::Variable(variable) = bound {
+                let operand = self.variable_of(instance, variable);
+                self.watch(instance, operand);
+            }
+        }
+    }
+
+    /// Bounds of times follow their variables.
+    fn follow_bounds(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        let flats = self.flats.clone();
+        for place in 0..self.instance_at(instance).times.len() {
+            let at = self.instance_at(instance);
+            let posted = at.times[place];
+            let master = self.at(at.master);
+            let owner = Owner::Rule {
+                master: at.master,
+                rule: at.rule,
+                relation: posted.relation,
+            };
+            let ([min, max], backward, from, to) = match posted.relation {
+                None => {
+                    let bounds = self.model.rules[at.rule].duration;
+                    let bounds = bounds.unwrap_or([Bound::None; 2]);
+                    (bounds, false, master.start, master.finish)
+                }
+                Some(relation) => {
+                    let relation = &flats[at.rule].relations[relation as usize];
+                    let distance = relation.distances[posted.distance as usize];
+                    let label = match relation.target {
+                        Target::New(_, label) | Target::Label(label) => label,
+                    };
+                    let (Some(anchor), Some(target)) = (at.label(relation.anchor), at.label(label))
+                    else {
+                        continue;
+                    };
+                    let bounds = [distance.min, distance.max];
+                    let from = self.time(anchor, distance.from);
+                    (
+                        bounds,
+                        distance.backward,
+                        from,
+                        self.time(target, distance.to),
+                    )
+                }
+            };
+            if !matches!(min, Bound::Variable(_)) && !matches!(max, Bound::Variable(_)) {
+                continue;
+            }
+            let span = self.span(instance, min, max, backward);
+            let now = self.between_again(posted.constraint, from, to, span, owner)?;
+            if now != posted.constraint {
+                self.change_instance(instance).times[place].constraint = now;
+            }
+        }
+        self.settle_times()
+    }
+
+    /// What an instance brought goes; tokens that it alone asked for go with it.
+    pub(super) fn withdraw(&mut self, instance: InstanceId) {
+        let at = self.instance_at(instance).clone();
+        for posted in &at.times {
+            self.network.retract(posted.constraint);
+        }
+        for &(_, posted) in &at.values {
+            self.store.retract(posted);
+        }
+        for &effected in &at.effects {
+            self.take_effect_back(effected);
+        }
+        let open = self.open.iter().filter(|open| open.instance == instance);
+        for open in open.copied().collect::<Vec<_>>() {
+            self.close_open(open);
+        }
+        let now = self.change_instance(instance);
+        now.times.clear();
+        now.values.clear();
+        now.effects.clear();
+        now.chosen.fill(None);
+        for label in 1..at.labels.len() {
+            self.let_go(instance, label);
+        }
+        self.loosen_mirrors();
+    }
+
+    /// Removes an instance of a token that leaves its timeline.
+    pub(super) fn remove_instance(&mut self, instance: InstanceId) {
+        if self.instance_at(instance).guard == Guard::Holds {
+            self.withdraw(instance);
+        }
+        let at = self.instance_at(instance).clone();
+        for &variable in &at.watched {
+            let place = variable.index();
+            if let Some(at) = self.watchers[place].iter().position(|&at| at == instance) {
+                self.watchers[place].remove(at);
+                self.note(Change::Unwatched(place, at, instance));
+            }
+        }
+        for operand in at.variables.into_iter().flatten() {
+            self.release(operand);
+        }
+        if let Some(removed) = self.instances.remove(instance) {
+            let removed = Box::new(removed);
+            self.note(Change::InstanceRemoved(instance, removed));
+        }
+    }
+
+    /// Variables changed: whoever watches them is told, until nothing changes any more.
+    pub(super) fn settle_values(&mut self) -> Result<(), Conflict> {
+        let mut changed = std::mem::take(&mut self.changed);
+        let outcome = loop {
+            changed.clear();
+            self.store.take_changed(&mut changed);
+            if changed.is_empty() {
+                break Ok(());
+            }
+            if let Err(conflict) = self.tell(&changed) {
+                break Err(conflict);
+            }
+        };
+        self.changed = changed;
+        outcome
+    }
+
+    fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
+        for &variable in changed {
+            let place = variable.index();
+            let mut at = 0;
+            while let Some(&instance) = self.watchers.get(place).and_then(|all| all.get(at)) {
+                self.reconsider(instance)?;
+                at += 1;
+            }
+            self.follow_mirrors(variable)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,174 @@
+//! What edits changed, so that they can be undone.
+
+use super::rules::{Instance, Open};
+use super::times::Mirror;
+use super::{Conflict, Database, InstanceId, Lane, Level, Token, TokenId};
+use crate::model::TimelineId;
+
+/// A change of what the database itself keeps, with what was there before.
+#[derive(Clone, Debug)]
+pub(super) enum Change {
+    TokenAdded(TokenId),
+    TokenChanged(TokenId, Box<Token>),
+    TokenRemoved(TokenId, Box<Token>),
+    InstanceAdded(InstanceId),
+    InstanceChanged(InstanceId, Box<Instance>),
+    InstanceRemoved(InstanceId, Box<Instance>),
+    Lane(TimelineId, Lane),
+    Opened,
+    /// What was open is not: at which place it stood.
+    Closed(usize, Open),
+    Held(usize, u32),
+    Watched(usize),
+    Unwatched(usize, usize, InstanceId),
+    Mirrored,
+    MirrorChanged(usize, Mirror),
+    Unmirrored(usize, Mirror),
+}
+
+impl Database {
+    /// From here on changes are kept, until [`pop`](Self::pop) undoes them.
+    pub fn push(&mut self) {
+        self.levels.push(Level {
+            start: self.trail.len(),
+            serial: self.serial,
+        });
+        self.serial += 1;
+        self.push_levels();
+        self.network.push();
+        self.store.push();
+    }
+
+    /// Undoes all changes since the last [`push`](Self::push) that was not undone. Without one,
+    /// nothing happens.
+    pub fn pop(&mut self) {
+        let Some(Level { start, .. }) = self.levels.pop() else {
+            return;
+        };
+        while self.trail.len() > start {
+            let Some(change) = self.trail.pop() else {
+                break;
+            };
+            self.steps += 1;
+            self.undo(change);
+        }
+        self.network.pop();
+        self.store.pop();
+        self.pop_levels();
+    }
+
+    /// Keeps the changes since the last [`push`](Self::push), as if that had not been.
+    pub fn commit(&mut self) {
+        self.levels.pop();
+        if self.levels.is_empty() {
+            self.trail.clear();
+        }
+        self.commit_levels();
+        self.network.commit();
+        self.store.commit();
+    }
+
+    /// How many pushes are neither undone nor committed.
+    pub fn depth(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Does all of an edit or nothing of it.
+    pub(crate) fn attempt<T>(
+        &mut self,
+        edit: impl FnOnce(&mut Self) -> Result<T, Conflict>,
+    ) -> Result<T, Conflict> {
+        self.push();
+        let outcome = edit(self);
+        match outcome {
+            Ok(_) => self.commit(),
+            Err(_) => self.pop(),
+        }
+        outcome
+    }
+
+    pub(super) fn note(&mut self, change: Change) {
+        self.steps += 1;
+        if !self.levels.is_empty() {
+            self.trail.push(change);
+        }
+    }
+
+    /// A token, to be changed: what it was is kept.
+    pub(super) fn change(&mut self, token: TokenId) -> &mut Token {
+        self.steps += 1;
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        if let Some(level) = self.levels.last()
+            && at.kept <= level.serial
+        {
+            let before = Box::new(at.clone());
+            self.trail.push(Change::TokenChanged(token, before));
+            at.kept = self.serial;
+        }
+        at
+    }
+
+    /// An instance, to be changed: what it was is kept.
+    pub(super) fn change_instance(&mut self, instance: InstanceId) -> &mut Instance {
+        self.steps += 1;
+        let at = self.instances.get_mut(instance);
+        let at = at.expect("the instance is there");
+        if let Some(level) = self.levels.last()
+            && at.kept <= level.serial
+        {
+            let before = Box::new(at.clone());
+            self.trail.push(Change::InstanceChanged(instance, before));
+            at.kept = self.serial;
+        }
+        at
+    }
+
+    pub(super) fn change_lane(&mut self, timeline: TimelineId) -> &mut Lane {
+        let lane = self.lanes[timeline];
+        self.note(Change::Lane(timeline, lane));
+        &mut self.lanes[timeline]
+    }
+
+    pub(super) fn push_open(&mut self, open: Open) {
+        self.open.push(open);
+        self.note(Change::Opened);
+    }
+
+    /// What was open is not, if it was.
+    pub(super) fn close_open(&mut self, open: Open) {
+        if let Some(place) = self.open.iter().position(|&at| at == open) {
+            self.open.remove(place);
+            self.note(Change::Closed(place, open));
+        }
+    }
+
+    fn undo(&mut self, change: Change) {
+        match change {
+            Change::TokenAdded(token) => drop(self.tokens.undo_insert(token)),
+            Change::TokenChanged(token, before) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    *at = *before;
+                }
+            }
+            Change::TokenRemoved(token, before) => self.tokens.undo_remove(token, *before),
+            Change::InstanceAdded(instance) => drop(self.instances.undo_insert(instance)),
+            Change::InstanceChanged(instance, before) => {
+                if let Some(at) = self.instances.get_mut(instance) {
+                    *at = *before;
+                }
+            }
+            Change::InstanceRemoved(instance, before) => {
+                self.instances.undo_remove(instance, *before);
+            }
+            Change::Lane(timeline, lane) => self.lanes[timeline] = lane,
+            Change::Opened => drop(self.open.pop()),
+            Change::Closed(place, open) => self.open.insert(place, open),
+            Change::Held(place, count) => self.holders[place] = count,
+            Change::Watched(place) => drop(self.watchers[place].pop()),
+            Change::Unwatched(place, at, instance) => self.watchers[place].insert(at, instance),
+            Change::Mirrored => drop(self.mirrors.pop()),
+            Change::MirrorChanged(place, mirror) => self.mirrors[place] = mirror,
+            Change::Unmirrored(place, mirror) => self.mirrors.insert(place, mirror),
+        }
+    }
+}

@@ -1,0 +1,687 @@
+//! What a model declares: types, objects, predicates, timelines, tables and functions.
+
+use std::collections::BTreeMap;
+
+use super::entry::Entry;
+use super::literal::{self, Sort};
+use super::resources;
+use crate::language::findings::{Notes, arguments};
+use crate::language::functions::Functions;
+use crate::language::tree::{Form, Kind};
+use crate::model::{
+    Filler, Function, Model, NUMBER, Parameter, Predicate, Profile, TRUTH, Table, Timeline,
+    TimelineKind, Type, TypeId, Value, Values,
+};
+use crate::temporal::Span;
+
+/// The words by which a class says what its timelines hold. The words of DDL mean states.
+const KINDS: [(&str, TimelineKind); 6] = [
+    ("State", TimelineKind::State),
+    ("Unary", TimelineKind::Unary),
+    ("Free", TimelineKind::Free),
+    ("Controllable", TimelineKind::State),
+    ("Goal", TimelineKind::State),
+    ("Executable", TimelineKind::State),
+];
+
+/// How many timelines, and resources, all objects may have.
+const MOST_TIMELINES: usize = 1 << 20;
+
+/// A class of objects.
+#[derive(Debug, Default)]
+struct Class<'t> {
+    objects: Vec<Value>,
+    state_variables: Vec<(&'t str, TimelineKind)>,
+    named: bool,
+}
+
+/// What the tokens of a state variable can say.
+#[derive(Debug)]
+struct Members {
+    predicates: Vec<usize>,
+    default: Option<Filler>,
+}
+
+/// The declarations read so far.
+pub(super) struct Declarations<'t, 'n> {
+    pub(super) model: Model,
+    pub(super) constants: &'n BTreeMap<&'t str, Form<'t>>,
+    pub(super) notes: &'n mut Notes,
+    symbols: BTreeMap<&'t str, Value>,
+    types: BTreeMap<&'t str, TypeId>,
+    predicates: BTreeMap<&'t str, usize>,
+    classes: BTreeMap<&'t str, Class<'t>>,
+    /// The classes in the order of the text.
+    order: Vec<&'t str>,
+    members: BTreeMap<(&'t str, &'t str), Members>,
+}
+
+/// The truth values and the numbers, which every model has.
+pub(super) fn usual_types() -> Vec<Type> {
+    let numbers = Values::Numbers(Span::ALL);
+    vec![
+        Type {
+            name: "Boolean".to_owned(),
+            values: Values::Truth,
+        },
+        Type {
+            name: "Number".to_owned(),
+            values: numbers,
+        },
+    ]
+}
+
+/// The functions that a model may call, and those that it only declares.
+pub(super) fn functions(known: &Functions) -> Vec<Function> {
+    let known = known.iter();
+    known
+        .map(|(name, arguments, call)| Function {
+            name: name.to_owned(),
+            arguments,
+            call,
+        })
+        .collect()
+}
+
+/// The model of all declarations, without rules.
+pub(super) fn declare<'t>(
+    entries: &[Entry<'t>],
+    constants: &BTreeMap<&'t str, Form<'t>>,
+    known: &Functions,
+    notes: &mut Notes,
+) -> Model {
+    let model = Model {
+        types: usual_types(),
+        functions: functions(known),
+        ..Model::default()
+    };
+    let mut declarations = Declarations {
+        model,
+        constants,
+        notes,
+        symbols: BTreeMap::new(),
+        types: BTreeMap::from([("Boolean", TRUTH), ("Number", NUMBER)]),
+        predicates: BTreeMap::new(),
+        classes: BTreeMap::new(),
+        order: Vec::new(),
+        members: BTreeMap::new(),
+    };
+    declarations.read(entries);
+    let first = entries.first().map(|entry| entry.form);
+    declarations.timelines(first);
+    for entry in entries
+        .iter()
+        .filter(|entry| entry.head == "Define_Resource")
+    {
+        resources::declare(&mut declarations, entry);
+    }
+    declarations.model
+}
+
+/// Reads a form of some kind.
+type ReadForm<'t, 'n> = fn(&mut Declarations<'t, 'n>, &Entry<'t>);
+
+impl<'t, 'n> Declarations<'t, 'n> {
+    /// Reads all forms but resources. Each kind may use what the ones before it declare, wherever
+    /// they stand.
+    fn read(&mut self, entries: &[Entry<'t>]) {
+        let kinds: [(&str, ReadForm<'t, 'n>); 8] = [
+            ("Define_Model", Declarations::profile),
+            ("Define_Object_Class", Declarations::class),
+            ("Define_Object", Declarations::objects),
+            ("Define_Type", Declarations::named_type),
+            ("Define_Predicate", Declarations::predicate),
+            ("Define_Member_Values", Declarations::member_values),
+            ("Define_Table", Declarations::table),
+            ("Define_Function", Declarations::function),
+        ];
+        for (head, read) in kinds {
+            if head == "Define_Type" {
+                self.types_of_classes();
+            }
+            for entry in entries.iter().filter(|entry| entry.head == head) {
+                read(self, entry);
+            }
+        }
+    }
+
+    /// A name that something is declared by.
+    fn name(&mut self, form: Form<'t>) -> Option<&'t str> {
+        let name = form.symbol().filter(|name| {
+            let taken = ["True", "False", "inf", "+inf", "-inf", "master"];
+            !name.contains('.') && !literal::is_constant(name) && !taken.contains(name)
+        });
+        if name.is_none() {
+            self.notes.error(form, "a name of letters, digits and _");
+        }
+        name
+    }
+
+    fn twice(&mut self, form: Form) {
+        self.notes.error(form, "a name that is not defined yet");
+    }
+
+    fn profile(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[":profile"], self.notes);
+        if entry.values.len() != 1 {
+            self.notes
+                .error(entry.form, "(Define_Model name :profile executive)");
+        }
+        let Some(profile) = entry.one(":profile", self.notes) else {
+            return;
+        };
+        match profile.word() {
+            "executive" => self.model.profile = Profile::Executive,
+            "scheduler" => self.model.profile = Profile::Scheduler,
+            _ => {
+                let known = ["executive", "scheduler"];
+                self.notes
+                    .unknown(profile, "executive or scheduler", known.into_iter());
+            }
+        }
+    }
+
+    fn class(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[":state_variables"], self.notes);
+        let &[name] = entry.values.as_slice() else {
+            let expected = "(Define_Object_Class Name :state_variables ((State Name_SV) …))";
+            self.notes.error(entry.form, expected);
+            return;
+        };
+        let Some(name_text) = self.name(name) else {
+            return;
+        };
+        if self.types.contains_key(name_text) || self.classes.contains_key(name_text) {
+            self.twice(name);
+            return;
+        }
+        let mut class = Class::default();
+        for form in entry
+            .one(":state_variables", self.notes)
+            .iter()
+            .flat_map(|of| of.children())
+        {
+            let mut words = form.children();
+            let head = words.next();
+            let kind = head.and_then(|head| KINDS.iter().find(|(word, _)| *word == head.word()));
+            let Some(&(_, kind)) = kind else {
+                let known = KINDS.iter().map(|(word, _)| *word);
+                self.notes
+                    .unknown(head.unwrap_or(form), "State, Unary or Free", known);
+                continue;
+            };
+            for word in words {
+                let Some(name) = self.name(word) else {
+                    continue;
+                };
+                if class
+                    .state_variables
+                    .iter()
+                    .any(|(other, _)| *other == name)
+                {
+                    self.twice(word);
+                } else {
+                    class.state_variables.push((name, kind));
+                }
+            }
+        }
+        self.order.push(name_text);
+        self.classes.insert(name_text, class);
+    }
+
+    fn objects(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[], self.notes);
+        let Some((class, objects)) = entry.values.split_first().filter(|(_, of)| !of.is_empty())
+        else {
+            self.notes.error(entry.form, "(Define_Object Class name …)");
+            return;
+        };
+        if !self.classes.contains_key(class.word()) {
+            self.notes
+                .unknown(*class, "a class", self.classes.keys().copied());
+            return;
+        }
+        for &object in objects {
+            let Some(name) = self.name(object) else {
+                continue;
+            };
+            if self.symbols.contains_key(name) || self.classes.contains_key(name) {
+                self.twice(object);
+                continue;
+            }
+            let symbol = self.symbol(name);
+            let class = self.classes.get_mut(class.word()).expect("it was found");
+            class.objects.push(symbol);
+            class.named = true;
+        }
+    }
+
+    fn symbol(&mut self, name: &'t str) -> Value {
+        *self.symbols.entry(name).or_insert_with(|| {
+            self.model.symbols.push(name.to_owned());
+            self.model.symbols.len() as Value - 1
+        })
+    }
+
+    /// Gives each class without a named object one of its own name, and each class a type.
+    fn types_of_classes(&mut self) {
+        for name in self.order.clone() {
+            let objects = self.classes[name].objects.clone();
+            let objects = match objects.as_slice() {
+                [] => vec![self.symbol(name)],
+                _ => objects,
+            };
+            self.add_type(name, Values::Symbols(objects.clone()));
+            self.classes.get_mut(name).expect("it was found").objects = objects;
+        }
+    }
+
+    fn add_type(&mut self, name: &'t str, values: Values) {
+        self.types.insert(name, self.model.types.len());
+        self.model.types.push(Type {
+            name: name.to_owned(),
+            values,
+        });
+    }
+
+    fn named_type(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[], self.notes);
+        let &[name, values] = entry.values.as_slice() else {
+            self.notes.error(
+                entry.form,
+                "(Define_Type Name (symbol …)) or (Define_Type Name [0 10])",
+            );
+            return;
+        };
+        let Some(name_text) = self.name(name) else {
+            return;
+        };
+        if self.types.contains_key(name_text) {
+            self.twice(name);
+            return;
+        }
+        let values = match values.kind() {
+            Kind::Span => literal::span(values, self.constants, self.notes).map(Values::Numbers),
+            Kind::List => self.symbols_of(values),
+            _ => {
+                self.notes
+                    .error(values, "symbols, as (left right), or a range, as [0 10]");
+                None
+            }
+        };
+        // A type in which something is wrong is there nevertheless, so that its name is known.
+        let values = values.unwrap_or(Values::Numbers(Span::ALL));
+        self.add_type(name_text, values);
+    }
+
+    fn symbols_of(&mut self, list: Form<'t>) -> Option<Values> {
+        let mut symbols = Vec::new();
+        for word in list.children() {
+            let name = self.name(word)?;
+            symbols.push((self.symbol(name), word));
+        }
+        symbols.sort_by_key(|(symbol, word)| (*symbol, word.node()));
+        for pair in symbols.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+            self.notes.error(pair[1].1, "each symbol once");
+        }
+        if symbols.is_empty() {
+            self.notes.error(list, "one symbol or more");
+            return None;
+        }
+        symbols.dedup_by_key(|(symbol, _)| *symbol);
+        Some(Values::Symbols(
+            symbols.into_iter().map(|(symbol, _)| symbol).collect(),
+        ))
+    }
+
+    /// `(Type ?name)` or `Type`.
+    fn parameter(&mut self, form: Form<'t>) -> Option<Parameter> {
+        let mut parts = form.children();
+        let (of, name) = match form.kind() {
+            Kind::Symbol => (form, ""),
+            Kind::List => match (parts.next(), parts.next(), parts.next()) {
+                (Some(of), Some(name), None) if name.kind() == Kind::Variable => (of, name.word()),
+                _ => {
+                    self.notes.error(form, "a parameter, as (Type ?name)");
+                    return None;
+                }
+            },
+            _ => {
+                self.notes.error(form, "a parameter, as (Type ?name)");
+                return None;
+            }
+        };
+        match self.types.get(of.word()) {
+            Some(&id) => Some(Parameter {
+                name: name.to_owned(),
+                of: id,
+            }),
+            None => {
+                self.notes.unknown(of, "a type", self.types.keys().copied());
+                None
+            }
+        }
+    }
+
+    fn predicate(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[], self.notes);
+        let (name, list) = match *entry.values.as_slice() {
+            [name] => (name, None),
+            [name, list] if list.is_list() => (name, Some(list)),
+            _ => {
+                let expected = "(Define_Predicate Name ((Type ?input) … -> (Type ?output) …))";
+                self.notes.error(entry.form, expected);
+                return;
+            }
+        };
+        let Some(name_text) = self.name(name) else {
+            return;
+        };
+        if self.predicates.contains_key(name_text) {
+            self.twice(name);
+            return;
+        }
+        let (mut parameters, mut inputs) = (Vec::<Parameter>::new(), None);
+        for form in list.iter().flat_map(|list| list.children()) {
+            if form.kind() == Kind::Arrow {
+                if inputs.replace(parameters.len()).is_some() {
+                    self.notes.error(form, "one arrow");
+                }
+                continue;
+            }
+            // An unknown type counts as the numbers, so that the arity is right.
+            let unknown = Parameter {
+                name: String::new(),
+                of: NUMBER,
+            };
+            let parameter = self.parameter(form).unwrap_or(unknown);
+            let same = |other: &Parameter| other.name == parameter.name;
+            if !parameter.name.is_empty() && parameters.iter().any(same) {
+                self.twice(form);
+            }
+            parameters.push(parameter);
+        }
+        let inputs = inputs.unwrap_or(parameters.len());
+        self.predicates
+            .insert(name_text, self.model.predicates.len());
+        self.model.predicates.push(Predicate {
+            name: name_text.to_owned(),
+            parameters,
+            inputs,
+        });
+    }
+
+    /// A class and one more name, as `(Rover Position_SV)`.
+    pub(super) fn of_class(&mut self, form: Form<'t>, what: &str) -> Option<(&'t str, Form<'t>)> {
+        let mut parts = form.children();
+        let (Some(class), Some(name), None) = (parts.next(), parts.next(), parts.next()) else {
+            self.notes
+                .error(form, format!("a class and {what}, as (Rover name)"));
+            return None;
+        };
+        if !self.classes.contains_key(class.word()) {
+            self.notes
+                .unknown(class, "a class", self.classes.keys().copied());
+            return None;
+        }
+        Some((class.word(), name))
+    }
+
+    fn member_values(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[":default"], self.notes);
+        let &[of, list] = entry.values.as_slice() else {
+            let expected = "(Define_Member_Values (Class Name_SV) (Predicate …))";
+            self.notes.error(entry.form, expected);
+            return;
+        };
+        let Some((class, name)) = self.of_class(of, "a state variable") else {
+            return;
+        };
+        let known = &self.classes[class].state_variables;
+        if !known.iter().any(|(known, _)| *known == name.word()) {
+            let known: Vec<&str> = known.iter().map(|(known, _)| *known).collect();
+            self.notes.unknown(
+                name,
+                format!("a state variable of {class}"),
+                known.into_iter(),
+            );
+            return;
+        }
+        let mut predicates = Vec::new();
+        for form in list.children() {
+            match self.predicates.get(form.word()) {
+                Some(id) if predicates.contains(id) => {
+                    self.notes.error(form, "each predicate once")
+                }
+                Some(&id) => predicates.push(id),
+                None => self
+                    .notes
+                    .unknown(form, "a predicate", self.predicates.keys().copied()),
+            }
+        }
+        if list.children().next().is_none() {
+            self.notes
+                .error(list, "one predicate or more, in parentheses");
+        }
+        let default = entry.one(":default", self.notes);
+        let default = default.and_then(|form| self.filler(form, &predicates));
+        let members = Members {
+            predicates,
+            default,
+        };
+        if self.members.insert((class, name.word()), members).is_some() {
+            self.notes
+                .error(of, "member values of each state variable once");
+        }
+    }
+
+    /// `(Predicate (value …))`, with `?any` for values that may be any.
+    fn filler(&mut self, form: Form<'t>, members: &[usize]) -> Option<Filler> {
+        let head = form.children().next();
+        let Some(name) = head.filter(|name| form.is_list() && name.symbol().is_some()) else {
+            self.notes.error(form, "a default, as (Idle ())");
+            return None;
+        };
+        let known = members
+            .iter()
+            .find(|&&id| self.model.predicates[id].name == name.word());
+        let Some(&predicate) = known else {
+            let known: Vec<String> = members
+                .iter()
+                .map(|&id| self.model.predicates[id].name.clone())
+                .collect();
+            let known = known.iter().map(String::as_str);
+            self.notes
+                .unknown(name, "a member of the state variable", known);
+            return None;
+        };
+        let list = form.children().nth(1);
+        let given = list.into_iter().flat_map(|list| list.children());
+        let given: Vec<Form> = given.filter(|form| form.kind() != Kind::Arrow).collect();
+        let parameters = self.model.predicates[predicate].parameters.clone();
+        if list.is_some() && given.len() != parameters.len() {
+            let expected = format!("{} of {}", arguments(parameters.len()), name.word());
+            self.notes
+                .refuse(list.unwrap_or(form), expected, given.len().to_string());
+            return None;
+        }
+        let mut values = vec![None; parameters.len()];
+        for (place, argument) in given.into_iter().enumerate() {
+            if argument.kind() != Kind::Variable {
+                values[place] = Some(self.value_of(argument, parameters[place].of)?);
+            }
+        }
+        Some(Filler { predicate, values })
+    }
+
+    /// The value of a literal of a type.
+    fn value_of(&mut self, form: Form<'t>, of: TypeId) -> Option<Value> {
+        let literal = literal::resolve(form, self.constants);
+        let symbol = literal.symbol().and_then(|word| self.symbols.get(word));
+        let value = literal::plain(literal).or(symbol.map(|&symbol| (symbol, Sort::Symbol)));
+        match value {
+            Some((value, sort)) if literal::fits(&self.model, of, value, sort) => Some(value),
+            _ => {
+                let expected = literal::describe(&self.model, of);
+                self.notes
+                    .unknown(form, expected, self.symbols.keys().copied());
+                None
+            }
+        }
+    }
+
+    fn table(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[], self.notes);
+        let (name, columns, rows) = match entry.values.as_slice() {
+            [name, columns, rows @ ..] if columns.is_list() => (*name, *columns, rows),
+            _ => {
+                let expected = "(Define_Table name (Type …) (value …) …)";
+                self.notes.error(entry.form, expected);
+                return;
+            }
+        };
+        let Some(name_text) = self.name(name) else {
+            return;
+        };
+        if self
+            .model
+            .tables
+            .iter()
+            .any(|table| table.name == name_text)
+        {
+            self.twice(name);
+            return;
+        }
+        let types: Vec<TypeId> = columns
+            .children()
+            .map(|form| {
+                self.parameter(form)
+                    .map_or(NUMBER, |parameter| parameter.of)
+            })
+            .collect();
+        let mut found = Vec::new();
+        for &row in rows {
+            let values: Vec<Form> = row.children().collect();
+            if values.len() != types.len() {
+                let expected = format!("as many values as columns, {}", types.len());
+                self.notes.refuse(row, expected, values.len().to_string());
+                continue;
+            }
+            let values = values.into_iter().zip(&types);
+            found.push(
+                values
+                    .filter_map(|(form, &of)| self.value_of(form, of))
+                    .collect::<Vec<_>>(),
+            );
+        }
+        if types.is_empty() {
+            self.notes.error(columns, "one column or more");
+        } else if rows.is_empty() {
+            self.notes
+                .error(entry.form, "one row or more, each in parentheses");
+        }
+        found.sort_unstable();
+        found.dedup();
+        let rows = found.concat();
+        self.model.tables.push(Table {
+            name: name_text.to_owned(),
+            columns: types.len(),
+            rows,
+        });
+    }
+
+    fn function(&mut self, entry: &Entry<'t>) {
+        entry.check_options(&[], self.notes);
+        let &[name, number] = entry.values.as_slice() else {
+            self.notes
+                .error(entry.form, "(Define_Function name number_of_arguments)");
+            return;
+        };
+        let Some(name_text) = self.name(name) else {
+            return;
+        };
+        let literal = literal::plain(literal::resolve(number, self.constants));
+        let count = literal.and_then(|(value, _)| usize::try_from(value).ok());
+        let Some(count) = count.filter(|count| (1..=64).contains(count)) else {
+            self.notes
+                .error(number, "how many arguments it has with its output, 1 to 64");
+            return;
+        };
+        // Who gives functions gives their bodies; without one, its output is never known.
+        let known = self
+            .model
+            .functions
+            .iter()
+            .find(|function| function.name == name_text);
+        match known.map(|function| function.arguments) {
+            Some(known) if known != count => {
+                let expected = format!("{}, as {name_text} has", arguments(known));
+                self.notes.error(number, expected);
+            }
+            Some(_) => {}
+            None => self
+                .model
+                .functions
+                .push(unknown_function(name_text, count)),
+        }
+    }
+
+    /// Makes the timelines of all objects.
+    fn timelines(&mut self, first: Option<Form<'t>>) {
+        for class in self.order.clone() {
+            let Class {
+                objects,
+                state_variables,
+                named,
+            } = &self.classes[class];
+            if self.model.timelines.len() + objects.len() * state_variables.len() > MOST_TIMELINES {
+                if let Some(form) = first {
+                    let expected = format!("at most {MOST_TIMELINES} timelines in all");
+                    self.notes
+                        .refuse(form, expected, format!("more, with those of {class}"));
+                }
+                return;
+            }
+            for &object in objects {
+                for &(name, kind) in state_variables {
+                    let members = self.members.get(&(class, name));
+                    let full = self.model.symbols[object as usize].clone() + "." + name;
+                    self.model.timelines.push(Timeline {
+                        name: if *named { full } else { name.to_owned() },
+                        object,
+                        kind,
+                        predicates: members.map_or(Vec::new(), |of| of.predicates.clone()),
+                        default: members.and_then(|of| of.default.clone()),
+                    });
+                }
+            }
+            for (name, _) in state_variables {
+                if let (None, Some(form)) = (self.members.get(&(class, name)), first) {
+                    let expected = format!("(Define_Member_Values ({class} {name}) (…))");
+                    self.notes.refuse(form, expected, "none in the model");
+                }
+            }
+        }
+        let is_bare = self.model.timelines.is_empty() && !self.notes.has_errors();
+        if let (true, Some(form)) = (is_bare, first) {
+            let expected = "a class with state variables, by Define_Object_Class";
+            self.notes
+                .refuse(form, expected, "a model without timelines");
+        }
+    }
+
+    /// The objects of a class, and whether they have names of their own.
+    pub(super) fn objects_of(&self, class: &str) -> (&[Value], bool) {
+        let class = &self.classes[class];
+        (&class.objects, class.named)
+    }
+}
+
+/// A function that gives nothing.
+pub(super) fn unknown_function(name: &str, arguments: usize) -> Function {
+    Function {
+        name: name.to_owned(),
+        arguments,
+        call: |_| None,
+    }
+}

@@ -1,0 +1,476 @@
+//! Iterative repair: a plan is made by putting one conflict right after the other, in any order,
+//! and by taking back whatever stands in the way.
+//!
+//! Section 3.1 of the MISUS paper: conflicts are resolved one by one, by moving, adding or deleting
+//! activities; section 4.2: first a plan with what is mandatory, then goals are added, each the one
+//! that brings most, and the best plan without conflicts is kept. A plan with mandatory goals only
+//! is made shorter by flattening: some of the orders that its end rests on are taken back, and the
+//! over-uses that come are put in another order (A. Cesta, A. Oddi and S. F. Smith, *Iterative
+//! Flattening: A Scalable Method for Solving Multi-Capacity Scheduling Problems*, 2000).
+//!
+//! The database takes no edit that breaks times or values. So a decision that would is refused,
+//! and the refusal says who stands in its way: one of those gives way then, an order that was
+//! decided before, or a goal.
+
+use std::sync::Arc;
+
+use rand_pcg::Pcg32;
+
+use super::choices::{Choices, below};
+use super::complete::{Complete, first_gap, first_open, first_over_use, first_unbound};
+use super::extract::extract;
+use super::schedule::{LoadError, Schedule};
+use super::solve::{Answer, Planner, Settings, most_gain};
+use super::{Counters, Decision, Failure, Flaw, Strategy};
+use crate::Ticks;
+use crate::database::{Cause, Conflict, Database, Owner, Status, TokenId};
+use crate::model::{GoalId, Model, Problem};
+use crate::objective::Objective;
+use crate::plan::Plan;
+use crate::temporal::Constraint;
+
+/// How often a goal is deleted before the plan does without it: three times, as in the reading of
+/// the MISUS paper.
+const DELETIONS: u32 = 3;
+
+/// How many conflicts are put right, for each goal, before a plan is given up for a new start.
+const PATIENCE: u64 = 40;
+
+/// The planner that repairs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Repair {
+    /// What it chooses where there is a choice.
+    pub choices: Choices,
+}
+
+impl Planner for Repair {
+    fn name(&self) -> &'static str {
+        "repair"
+    }
+
+    fn solve(
+        &self,
+        model: &Arc<Model>,
+        problem: &Arc<Problem>,
+        settings: Settings,
+    ) -> Result<Answer, LoadError> {
+        let schedule = Schedule::new(model.clone(), problem.clone())?;
+        let complete = Complete::new(&schedule);
+        let limit = schedule.database.operations() + settings.operations;
+        let mut work = Work {
+            complete,
+            choices: self.choices,
+            random: Pcg32::new(settings.seed, STREAM),
+            posted: Vec::new(),
+            deletions: vec![0; problem.goals.len()],
+            counters: Counters::default(),
+            failure: None,
+            limit,
+            spent: 0,
+            base: schedule.database.clone(),
+            schedule,
+        };
+        let optional = problem.goals.iter().any(|goal| goal.weight.is_some());
+        let plan = if optional {
+            work.by_worth(settings.seed)
+        } else {
+            work.by_makespan(settings.seed)
+        };
+        Ok(Answer {
+            proven: false,
+            operations: work.operations(),
+            counters: work.counters,
+            failure: work.failure.take().filter(|_| plan.is_none()),
+            schedule: work.schedule,
+            plan,
+        })
+    }
+}
+
+/// The stream of the generator that is this planner's.
+const STREAM: u64 = 0x7265_7061_6972;
+
+/// An order that the repair decided, and can take back.
+#[derive(Clone, Copy, Debug)]
+struct Posted {
+    token: TokenId,
+    constraint: Constraint,
+    owner: Owner,
+}
+
+/// What came of a conflict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// There is none.
+    Complete,
+    /// One was put right, or something gave way for it.
+    Repaired,
+    /// Nothing puts it right.
+    Stuck,
+}
+
+/// A repair that goes on.
+struct Work {
+    schedule: Schedule,
+    complete: Complete,
+    choices: Choices,
+    random: Pcg32,
+    posted: Vec<Posted>,
+    /// By goal: how often it was deleted.
+    deletions: Vec<u32>,
+    counters: Counters,
+    failure: Option<Failure>,
+    limit: u64,
+    /// Operations of databases that were given up.
+    spent: u64,
+    /// The problem as it was loaded.
+    base: Database,
+}
+
+impl Work {
+    fn operations(&self) -> u64 {
+        self.spent + self.schedule.database.operations()
+    }
+
+    fn is_over(&self) -> bool {
+        self.operations() > self.limit
+    }
+
+    /// Goes back to a database as it was, and counts what was done since.
+    fn return_to(&mut self, database: &Database, posted: &[Posted]) {
+        self.spent = self.operations() - database.operations();
+        self.schedule.database.clone_from(database);
+        self.posted.clear();
+        self.posted.extend_from_slice(posted);
+    }
+
+    /// A plan with all mandatory goals, as short as can be found.
+    fn by_makespan(&mut self, seed: u64) -> Option<Plan> {
+        let mut best: Option<(Plan, Database, Vec<Posted>)> = None;
+        let patience = PATIENCE * (self.complete.goals().len() as u64 + 1);
+        let mut since_best = 0_u32;
+        while !self.is_over() {
+            if !self.repair(patience) {
+                let base = self.base.clone();
+                self.return_to(&base, &[]);
+                continue;
+            }
+            let makespan = self.makespan();
+            let shorter = best
+                .as_ref()
+                .is_none_or(|(plan, ..)| makespan < plan.makespan);
+            if shorter {
+                let by = ("repair", seed, self.operations());
+                let plan = extract(&self.schedule, |_| String::new(), by);
+                debug_assert_eq!(plan.makespan, makespan);
+                best = Some((plan, self.schedule.database.clone(), self.posted.clone()));
+                since_best = 0;
+            } else {
+                since_best += 1;
+            }
+            if self.posted.is_empty() {
+                // Nothing was in the way of the earliest times: no plan is shorter.
+                break;
+            }
+            // From the best plan, mostly; now and then from where it is, or anew.
+            match since_best % 16 {
+                15 => {
+                    let base = self.base.clone();
+                    self.return_to(&base, &[]);
+                }
+                at if at % 4 == 3 => {
+                    if let Some((_, database, posted)) = &best {
+                        let (database, posted) = (database.clone(), posted.clone());
+                        self.return_to(&database, &posted);
+                    }
+                    self.relax();
+                }
+                _ => self.relax(),
+            }
+        }
+        best.map(|(plan, ..)| plan)
+    }
+
+    /// The latest end of a goal, if each token is as early as it can be.
+    fn makespan(&self) -> Ticks {
+        let database = &self.schedule.database;
+        let goals = self.schedule.goals.iter();
+        let ends = goals.filter(|&&goal| Schedule::is_in(database, goal));
+        ends.map(|&goal| database.finish(goal).min)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Takes back about half of the orders that times rest on.
+    fn relax(&mut self) {
+        let mut at = 0;
+        while at < self.posted.len() {
+            let posted = self.posted[at];
+            let binds = self.schedule.database.is_tight(posted.constraint);
+            let costs = [i64::from(!binds)];
+            let _ = (self.choices.relaxed.pick)(&costs, &mut self.random);
+            let goes = if binds { 2 } else { 6 };
+            if below(&mut self.random, goes) == 0 {
+                self.take_back(at);
+            } else {
+                at += 1;
+            }
+        }
+    }
+
+    fn take_back(&mut self, place: usize) {
+        let posted = self.posted.swap_remove(place);
+        let database = &mut self.schedule.database;
+        database.take_back_order(posted.token, posted.constraint);
+    }
+
+    /// A plan with all mandatory goals and with others by what they bring, as section 4.2 says.
+    fn by_worth(&mut self, seed: u64) -> Option<Plan> {
+        let problem = self.complete.problem().clone();
+        let patience = PATIENCE * (problem.goals.len() as u64 + 1);
+        while !self.repair(patience) {
+            if self.is_over() {
+                return None;
+            }
+            let base = self.base.clone();
+            self.return_to(&base, &[]);
+        }
+        let mut objective = Objective::new(&problem);
+        let goals = 0..problem.goals.len();
+        let mut closed: Vec<bool> = goals.map(|goal| self.complete.wants(goal)).collect();
+        for (goal, &wanted) in closed.iter().enumerate() {
+            objective.set(goal, wanted);
+        }
+        let mut best = (self.schedule.database.clone(), self.posted.clone());
+        let mut reasons = vec!["it was never the goal that brings most".to_owned(); closed.len()];
+        while !self.is_over() {
+            let Some(goal) = most_gain(&objective, &closed) else {
+                break;
+            };
+            if objective.gain(goal) <= 0.0 {
+                for (goal, reason) in reasons.iter_mut().enumerate().filter(|at| !closed[at.0]) {
+                    if objective.gain(goal) <= 0.0 {
+                        "it would be worth nothing more".clone_into(reason);
+                    }
+                }
+                break;
+            }
+            self.complete.want(goal, true);
+            if self.repair(patience) {
+                objective.set(goal, true);
+                closed[goal] = true;
+                best = (self.schedule.database.clone(), self.posted.clone());
+                continue;
+            }
+            self.complete.want(goal, false);
+            let (database, posted) = best.clone();
+            self.return_to(&database, &posted);
+            self.deletions[goal] += 1;
+            if self.deletions[goal] == DELETIONS {
+                closed[goal] = true;
+                reasons[goal] = format!("no plan with it was found in {DELETIONS} attempts");
+            }
+        }
+        let (database, posted) = best;
+        self.return_to(&database, &posted);
+        let by = ("repair", seed, self.operations());
+        Some(extract(&self.schedule, |goal| reasons[goal].clone(), by))
+    }
+
+    /// Puts conflicts right until there are none; not if that takes more than so many, or if
+    /// nothing puts one right.
+    fn repair(&mut self, patience: u64) -> bool {
+        for _ in 0..patience {
+            if self.is_over() {
+                return false;
+            }
+            match self.step() {
+                Progress::Complete => return true,
+                Progress::Repaired => {}
+                Progress::Stuck => return false,
+            }
+        }
+        false
+    }
+
+    /// The conflicts that there are, the first of each kind, with the rank of its kind.
+    fn conflicts(&mut self) -> Vec<(i64, Flaw)> {
+        let database = &mut self.schedule.database;
+        let mut found = Vec::new();
+        if let Some(open) = first_open(database) {
+            found.push((0, Flaw::Open(open)));
+        }
+        let goals = self.complete.goals().iter().enumerate();
+        for (goal, &token) in goals {
+            if self.complete.wants(goal) && !Schedule::is_in(database, token) {
+                found.push((1, Flaw::Goal(token)));
+                break;
+            }
+        }
+        if let Some((resource, over_use)) = first_over_use(database) {
+            let (bound, tick) = (over_use.bound, over_use.worst_tick);
+            found.push((
+                2,
+                Flaw::OverUse {
+                    resource,
+                    bound,
+                    tick,
+                },
+            ));
+        }
+        found.extend(first_unbound(database).map(|flaw| (3, flaw)));
+        found.extend(first_gap(database).map(|flaw| (4, flaw)));
+        found
+    }
+
+    /// Looks at one conflict: a decision puts it right, or something gives way for one.
+    fn step(&mut self) -> Progress {
+        let conflicts = self.conflicts();
+        if conflicts.is_empty() {
+            return Progress::Complete;
+        }
+        let ranks: Vec<i64> = conflicts.iter().map(|at| at.0).collect();
+        let chosen = (self.choices.conflict.pick)(&ranks, &mut self.random);
+        let flaw = conflicts[chosen].1;
+        let mut decisions = Vec::new();
+        self.complete
+            .decisions(&mut self.schedule.database, flaw, &mut decisions);
+        let mut refusals: Vec<Conflict> = Vec::new();
+        while !decisions.is_empty() {
+            let costs: Vec<i64> = (0..).take(decisions.len()).collect();
+            let chosen = (self.choices.decision.pick)(&costs, &mut self.random);
+            let decision = decisions.remove(chosen);
+            match self.carry_out(flaw, decision) {
+                Ok(()) => {
+                    self.counters.decisions += 1;
+                    return Progress::Repaired;
+                }
+                Err(conflict) => {
+                    self.counters.refusals += 1;
+                    refusals.push(conflict);
+                }
+            }
+            if self.is_over() {
+                return Progress::Stuck;
+            }
+        }
+        if self.give_way(flaw, &refusals) {
+            self.counters.backtracks += 1;
+            return Progress::Repaired;
+        }
+        self.failure = Some(Failure {
+            flaw,
+            conflicts: refusals,
+            instance: match flaw {
+                Flaw::Open(open) => Some(open.instance),
+                _ => None,
+            },
+        });
+        Progress::Stuck
+    }
+
+    fn carry_out(&mut self, flaw: Flaw, decision: Decision) -> Result<(), Conflict> {
+        let database = &mut self.schedule.database;
+        let (posted, owner) = self.complete.carry_out(database, flaw, decision)?;
+        if let Some((token, constraint)) = posted {
+            self.posted.push(Posted {
+                token,
+                constraint,
+                owner,
+            });
+        }
+        Ok(())
+    }
+
+    /// Of those who stand in the way of a conflict's decisions one gives way: an order that was
+    /// decided is taken back, or a goal is deleted. Whether there was one.
+    fn give_way(&mut self, flaw: Flaw, refusals: &[Conflict]) -> bool {
+        let mut owners: Vec<Owner> = refusals.iter().flat_map(Conflict::owners).collect();
+        if let Flaw::OverUse {
+            resource, bound, ..
+        } = flaw
+        {
+            let levels = self.schedule.database.levels(resource);
+            let over_use = levels.earliest.first_over_use_of(bound, Ticks::MIN);
+            let contributors = over_use.into_iter().flat_map(|at| at.contributors);
+            owners.extend(contributors.map(|at| at.owner));
+        }
+        owners.sort_unstable();
+        owners.dedup();
+        let mut culprits: Vec<(i64, Culprit)> = Vec::new();
+        for owner in owners {
+            if let Some(place) = self.posted.iter().position(|at| at.owner == owner) {
+                culprits.push((0, Culprit::Order(place)));
+            }
+            let tokens = match owner {
+                Owner::Token(token) | Owner::Merge(token) => vec![token],
+                Owner::Rule { master, .. } => vec![master],
+                Owner::Sequence { first, second } => vec![first, second],
+                _ => Vec::new(),
+            };
+            for token in tokens {
+                if let Some(goal) = self.root(token)
+                    && !self.is_of(flaw, goal)
+                {
+                    let culprit = Culprit::Goal(goal);
+                    if !culprits.iter().any(|at| at.1 == culprit) {
+                        culprits.push((1, culprit));
+                    }
+                }
+            }
+        }
+        if culprits.is_empty() {
+            return false;
+        }
+        let costs: Vec<i64> = culprits.iter().map(|at| at.0).collect();
+        let chosen = (self.choices.culprit.pick)(&costs, &mut self.random);
+        match culprits[chosen].1 {
+            Culprit::Order(place) => self.take_back(place),
+            Culprit::Goal(goal) => self.delete(goal),
+        }
+        true
+    }
+
+    /// The goal for which a token is there, if it is for one.
+    fn root(&self, token: TokenId) -> Option<GoalId> {
+        let mut at = token;
+        // A rule's master was there before the token, so this ends.
+        loop {
+            match self.schedule.database.token(at)?.cause {
+                Cause::Goal(goal) => return Some(goal),
+                Cause::Rule { master, .. } if master != at => at = master,
+                _ => return None,
+            }
+        }
+    }
+
+    /// Whether a flaw is a goal's own.
+    fn is_of(&self, flaw: Flaw, goal: GoalId) -> bool {
+        match flaw {
+            Flaw::Goal(token) => self.complete.goals()[goal] == token,
+            _ => false,
+        }
+    }
+
+    /// Takes a goal out of the plan: it is a conflict again, and is put elsewhere.
+    fn delete(&mut self, goal: GoalId) {
+        let database = &mut self.schedule.database;
+        let token = self.complete.goals()[goal];
+        match database.token(token).map(|at| at.status) {
+            Some(Status::Active) => database.deactivate(token),
+            Some(Status::Merged(_)) => database.unmerge(token),
+            _ => {}
+        }
+        self.posted
+            .retain(|at| database.network().constraint(at.constraint).is_some());
+    }
+}
+
+/// What may give way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Culprit {
+    /// An order, by its place among those that were posted.
+    Order(usize),
+    /// A goal.
+    Goal(GoalId),
+}

@@ -1,0 +1,94 @@
+//! Planners beside the checker, on the models that come with the crate.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::checker;
+use crate::language::{Options, read_model, read_problem};
+use crate::model::{Model, Problem};
+
+fn read(model: (&str, &str), problem: (&str, &str)) -> (Arc<Model>, Arc<Problem>) {
+    let model = read_model(model.0, model.1, &Options::default()).ok();
+    let model = model.unwrap_or_else(|findings| panic!("{findings}"));
+    let problem = read_problem(problem.0, problem.1, &model, &Options::default()).ok();
+    let problem = problem.unwrap_or_else(|findings| panic!("{findings}"));
+    (Arc::new(model), Arc::new(problem))
+}
+
+fn rover() -> (Arc<Model>, Arc<Problem>) {
+    read(
+        ("rover.ddl", include_str!("../../models/rover.ddl")),
+        (
+            "rover-problem.ddl",
+            include_str!("../../models/rover-problem.ddl"),
+        ),
+    )
+}
+
+/// Section 3.1 of the MISUS paper: a rover at the wrong place for an observation gets a drive.
+#[test]
+fn an_observation_elsewhere_brings_a_drive() {
+    let (model, problem) = rover();
+    let settings = Settings {
+        operations: 2_000_000,
+        seed: 1,
+    };
+    let answer = Forward.solve(&model, &problem, settings).expect("it loads");
+    let plan = answer
+        .plan
+        .unwrap_or_else(|| panic!("{:?}", answer.failure));
+    for token in &plan.tokens {
+        println!("{token}");
+    }
+    println!("{:?} {:?}", plan.achieved, plan.left_out);
+    println!("{} operations, {:?}", answer.operations, answer.counters);
+    let violations = checker::check(&model, &problem, &plan);
+    assert!(violations.is_empty(), "{violations:#?}");
+    assert!(plan.tokens.iter().any(|token| token.predicate == "Going"));
+}
+
+fn polling() -> executive::Executive {
+    let text = include_str!("../../models/polling.ddl");
+    let model = read_model("polling.ddl", text, &Options::default()).ok();
+    executive::Executive::new(Arc::new(
+        model.unwrap_or_else(|findings| panic!("{findings}")),
+    ))
+}
+
+/// Section 3.3 of the IDEA paper: the fan is turned on in the cycle in which a temperature above
+/// the threshold is known, and stays as it is while no value comes.
+#[test]
+fn a_fan_is_turned_on_in_the_cycle_that_learns_the_temperature() {
+    let mut executive = polling();
+    assert!(matches!(executive.cycle(0, 10_000), Verdict::Solved));
+    let said = |executive: &executive::Executive, timeline| {
+        let token = executive.present(timeline).expect("it says something");
+        let at = executive.database().token(token).expect("it is there");
+        let model = executive.database().model().clone();
+        let values = at.parameters.iter();
+        let values: Vec<_> = values.map(|&one| executive.database().value(one)).collect();
+        let start = executive.database().start(token).min;
+        (model.predicates[at.predicate].name.clone(), values, start)
+    };
+    assert_eq!(said(&executive, 1), ("Unknown".to_owned(), vec![], 0));
+    for (tick, temperature, fan) in [(1, 290, 0), (2, 301, 1), (3, 299, 0)] {
+        let poll = executive.present(0).expect("there is a poll");
+        let outputs = [i64::from(temperature > 300), temperature, 1];
+        executive
+            .report(poll, &outputs, true, tick)
+            .expect("it ends after a tick");
+        assert!(matches!(executive.cycle(tick, 10_000), Verdict::Solved));
+        let fans = ("DeviceSetFanState".to_owned(), vec![Some(fan)], tick);
+        assert_eq!(said(&executive, 1), fans);
+        assert_eq!(said(&executive, 0).2, tick);
+    }
+    // No value comes: the poll ends by its time, and the rule's guard stays undecided.
+    assert!(matches!(executive.cycle(4, 10_000), Verdict::Solved));
+    assert_eq!(said(&executive, 1).2, 3);
+    assert_eq!(said(&executive, 0).2, 4);
+    assert!(
+        executive.database().len() <= 4,
+        "{}",
+        executive.database().len()
+    );
+}
