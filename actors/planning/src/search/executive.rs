@@ -12,12 +12,17 @@
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
+use super::schedule::LoadError;
 use super::{Counters, Decision, Flaw, Stack, Strategy, Verdict, chronological};
 use crate::Ticks;
 use crate::database::{
     Cause, Conflict, Database, Open, Owner, Slot, Status, Step, Time, TokenId, Wanted,
 };
-use crate::model::{End, Model, PredicateId, Target, TimelineId, TimelineKind, Value};
+use crate::model::{
+    End, Fact, Model, PredicateId, Problem, Target, TimelineId, TimelineKind, Value,
+};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
 
@@ -60,6 +65,44 @@ impl Executive {
             begun: false,
             forgets: true,
         }
+    }
+
+    /// With what a problem says is the case, as it is at the start of the horizon.
+    ///
+    /// # Errors
+    ///
+    /// If a fact cannot be, with those before it.
+    pub fn begin(model: Arc<Model>, problem: &Problem) -> Result<Self, LoadError> {
+        let mut executive = Executive::new(model);
+        for (fact, at) in problem.facts.iter().enumerate() {
+            let put = executive.put_fact(fact, at);
+            put.map_err(|conflict| LoadError::Fact { fact, conflict })?;
+        }
+        Ok(executive)
+    }
+
+    fn put_fact(&mut self, fact: usize, at: &Fact) -> Result<(), Conflict> {
+        let parameters: SmallVec<[Option<Operand>; 4]> = at
+            .values
+            .iter()
+            .map(|value| value.map(Operand::Value))
+            .collect();
+        self.database.attempt(|database| {
+            let known = |span: Span| (span.min == span.max).then_some(Time::At(span.min));
+            let token = database.insert(Wanted {
+                predicate: at.predicate,
+                timeline: Some(at.timeline),
+                parameters: &parameters,
+                start: known(at.start),
+                finish: known(at.finish),
+                cause: Cause::Fact(fact),
+            })?;
+            let owner = Owner::Token(token);
+            database.restrict_time(token, End::Start, at.start, owner)?;
+            database.restrict_time(token, End::Finish, at.finish, owner)?;
+            let (timeline, after) = (at.timeline, database.last(at.timeline));
+            database.activate(token, Slot { timeline, after })
+        })
     }
 
     /// Its database, to be asked.
@@ -386,7 +429,7 @@ fn fill(database: &mut Database, slot: Slot, now: Ticks) -> Result<(), Conflict>
         return Err(Conflict::Mismatch { owner });
     };
     let parameters = default.values.iter().map(|value| value.map(Operand::Value));
-    let parameters: smallvec::SmallVec<[Option<Operand>; 4]> = parameters.collect();
+    let parameters: SmallVec<[Option<Operand>; 4]> = parameters.collect();
     database.attempt(|database| {
         let token = database.insert(Wanted {
             predicate: default.predicate,
