@@ -258,6 +258,11 @@ impl Database {
         self.tokens.is_empty()
     }
 
+    /// How many timelines there are.
+    pub(crate) fn lanes(&self) -> usize {
+        self.lanes.len()
+    }
+
     /// The first token of a timeline.
     pub fn first(&self, timeline: TimelineId) -> Option<TokenId> {
         self.lanes[timeline].first
