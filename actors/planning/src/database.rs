@@ -167,6 +167,10 @@ pub struct Database {
     changed: Vec<parameters::Variable>,
     trail: Vec<Change>,
     levels: Vec<Level>,
+    /// Whether something was retracted that variables may rest on which follow times.
+    loosened: bool,
+    /// Whether an edit goes on.
+    edits: bool,
     /// The number of the next push: what was kept since the last one need not be kept again.
     serial: u64,
     steps: u64,
@@ -217,6 +221,8 @@ impl Database {
             changed: Vec::new(),
             trail: Vec::new(),
             levels: Vec::new(),
+            loosened: false,
+            edits: false,
             serial: 1,
             steps: 0,
         }
@@ -250,6 +256,11 @@ impl Database {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.tokens.is_empty()
+    }
+
+    /// How many timelines there are.
+    pub(crate) fn lanes(&self) -> usize {
+        self.lanes.len()
     }
 
     /// The first token of a timeline.

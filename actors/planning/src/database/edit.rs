@@ -72,6 +72,7 @@ impl Database {
             values: SmallVec::new(),
             instances: SmallVec::new(),
             supported: SmallVec::new(),
+            merged: SmallVec::new(),
             merged_times: SmallVec::new(),
             merged_values: SmallVec::new(),
             kept: self.serial,
@@ -101,7 +102,6 @@ impl Database {
             self.hold(operand);
             self.change(token).parameters.push(operand);
         }
-        self.settle_values()?;
         Ok(token)
     }
 
@@ -207,8 +207,7 @@ impl Database {
                 self.follow_on(Some(token), after)?;
             }
         }
-        self.make_instances(token)?;
-        self.settle_times()
+        self.make_instances(token)
     }
 
     /// Posts that a token starts when the one before it has ended, in place of what was posted
@@ -216,7 +215,7 @@ impl Database {
     fn follow_on(&mut self, first: Option<TokenId>, second: TokenId) -> Result<(), Conflict> {
         if let Some(order) = self.at(second).order {
             self.change(second).order = None;
-            self.network.retract(order);
+            self.retract_time(order);
         }
         let Some(first) = first else {
             return Ok(());
@@ -237,20 +236,18 @@ impl Database {
     /// If it is not active.
     pub fn deactivate(&mut self, token: TokenId) {
         assert_eq!(self.at(token).status, Status::Active, "{token:?} is active");
+        self.take(|database| database.take_off(token));
+    }
+
+    fn take_off(&mut self, token: TokenId) {
         for instance in self.at(token).instances.clone() {
             self.remove_instance(instance);
         }
         for (instance, relation) in self.at(token).supported.clone() {
             self.reopen(instance, relation);
         }
-        let merged: SmallVec<[TokenId; 2]> = self
-            .tokens
-            .iter()
-            .filter(|(_, at)| at.status == Status::Merged(token))
-            .map(|(id, _)| id)
-            .collect();
-        for other in merged {
-            self.unmerge(other);
+        for other in self.at(token).merged.clone() {
+            self.part(other, token);
         }
         self.unlink(token);
         let at = self.change(token);
@@ -259,7 +256,6 @@ impl Database {
         at.supported.clear();
         at.supports = 0;
         self.take_orders_back(token);
-        self.loosen_mirrors();
     }
 
     fn take_orders_back(&mut self, token: TokenId) {
@@ -285,7 +281,7 @@ impl Database {
         self.change_lane(timeline).tokens -= 1;
         if let Some(order) = self.at(token).order {
             self.change(token).order = None;
-            self.network.retract(order);
+            self.retract_time(order);
         }
         if let Some(after) = after
             && self.model.timelines[timeline].kind != TimelineKind::Free
@@ -316,7 +312,9 @@ impl Database {
                 return Err(Conflict::Mismatch { owner });
             }
             database.change(token).status = Status::Merged(into);
-            database.change(into).supports += 1;
+            let at = database.change(into);
+            at.supports += 1;
+            at.merged.push(token);
             let pairs = one.parameters.iter().zip(&other.parameters);
             for (&mine, &its) in pairs.filter(|(mine, its)| mine != its) {
                 if let (Operand::Value(_), Operand::Value(_)) = (mine, its) {
@@ -330,8 +328,7 @@ impl Database {
                 let posted = database.between(mine, its, Span::exactly(0), owner)?;
                 database.change(token).merged_times.extend(posted);
             }
-            database.settle_values()?;
-            database.settle_times()
+            Ok(())
         })
     }
 
@@ -344,19 +341,25 @@ impl Database {
         let Status::Merged(into) = self.at(token).status else {
             panic!("{token:?} is merged");
         };
+        self.take(|database| database.part(token, into));
+    }
+
+    /// A token that is merged into another is free.
+    pub(super) fn part(&mut self, token: TokenId, into: TokenId) {
         let at = self.change(token);
         at.status = Status::Free;
         let values = std::mem::take(&mut at.merged_values);
         let times = std::mem::take(&mut at.merged_times);
         for posted in values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
         for posted in times {
             self.retract_time(posted);
         }
-        self.change(into).supports -= 1;
+        let at = self.change(into);
+        at.supports -= 1;
+        at.merged.retain(|at| *at != token);
         self.take_orders_back(token);
-        self.loosen_mirrors();
     }
 
     /// The plan does without a free token.
@@ -390,9 +393,13 @@ impl Database {
     ///
     /// If it is not there.
     pub fn remove(&mut self, token: TokenId) {
+        self.take(|database| database.delete(token));
+    }
+
+    pub(super) fn delete(&mut self, token: TokenId) {
         match self.at(token).status {
-            Status::Active => self.deactivate(token),
-            Status::Merged(_) => self.unmerge(token),
+            Status::Active => self.take_off(token),
+            Status::Merged(into) => self.part(token, into),
             Status::Free | Status::Rejected => {}
         }
         self.remove_mirrors(token);
@@ -405,8 +412,9 @@ impl Database {
             self.retract_time(posted);
         }
         for posted in values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
+        self.loosened = true;
         for operand in parameters {
             self.release(operand);
         }
@@ -444,8 +452,7 @@ impl Database {
                 let domain = Domain::exactly(value);
                 let posted = database.store.restrict(variable, domain, owner)?;
                 database.change(token).values.push(posted);
-                database.settle_values()?;
-                database.settle_times()
+                Ok(())
             }),
         }
     }

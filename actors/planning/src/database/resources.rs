@@ -161,6 +161,29 @@ impl Database {
         levels.earliest.remove(effected.earliest);
     }
 
+    /// Whether what an effect does has been done at a tick, and how much it was is known.
+    pub(super) fn is_over(&self, effected: Effected, tick: Ticks) -> bool {
+        let levels = &self.levels_by_resource[effected.resource];
+        let over = |profile: &Profile<Owner>, id| {
+            let one = profile.get(id);
+            one.is_some_and(|one| {
+                let known = one.change.min == one.change.max || one.end.is_some();
+                known && one.end.unwrap_or(one.start).max <= tick
+            })
+        };
+        over(&levels.flexible, effected.flexible) && over(&levels.earliest, effected.earliest)
+    }
+
+    /// An effect of the past is a part of the level with which the resource begins.
+    pub(super) fn forget_effect(&mut self, effected: Effected, before: Ticks) {
+        let levels = &mut self.levels_by_resource[effected.resource];
+        let ids = [effected.flexible, effected.earliest];
+        for (profile, id) in levels.each().into_iter().zip(ids) {
+            let gone = profile.forget(id, before);
+            debug_assert!(gone, "what it does is over");
+        }
+    }
+
     /// What an effect is to a profile: at all times that it may have, and at the earliest.
     fn uses_of(&self, instance: InstanceId, effect: u32, resource: ResourceId) -> [Use; 2] {
         let at = self.instance_at(instance);

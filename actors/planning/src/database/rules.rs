@@ -426,7 +426,7 @@ impl Database {
         for &step in &flats[rule].top {
             self.push_open(Open { instance, step });
         }
-        self.settle_values()
+        Ok(())
     }
 
     /// What a term stands for; a variable that nothing stands for yet gets one of the store.
@@ -517,8 +517,11 @@ impl Database {
                     let label = match relation.target {
                         Target::New(_, label) | Target::Label(label) => label,
                     };
-                    let (Some(anchor), Some(target)) = (at.label(relation.anchor), at.label(label))
-                    else {
+                    let here = |label| {
+                        let token = at.label(label);
+                        token.filter(|&token| self.tokens.get(token).is_some())
+                    };
+                    let (Some(anchor), Some(target)) = (here(relation.anchor), here(label)) else {
                         continue;
                     };
                     let bounds = [distance.min, distance.max];
@@ -540,17 +543,17 @@ impl Database {
                 self.change_instance(instance).times[place].constraint = now;
             }
         }
-        self.settle_times()
+        Ok(())
     }
 
     /// What an instance brought goes; tokens that it alone asked for go with it.
     pub(super) fn withdraw(&mut self, instance: InstanceId) {
         let at = self.instance_at(instance).clone();
         for posted in &at.times {
-            self.network.retract(posted.constraint);
+            self.retract_time(posted.constraint);
         }
         for &(_, posted) in &at.values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
         for &effected in &at.effects {
             self.take_effect_back(effected);
@@ -567,7 +570,6 @@ impl Database {
         for label in 1..at.labels.len() {
             self.let_go(instance, label);
         }
-        self.loosen_mirrors();
     }
 
     /// Removes an instance of a token that leaves its timeline.
@@ -611,11 +613,14 @@ impl Database {
 
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
         for &variable in changed {
-            let place = variable.index();
-            let mut at = 0;
-            while let Some(&instance) = self.watchers.get(place).and_then(|all| all.get(at)) {
-                self.reconsider(instance)?;
-                at += 1;
+            // Whoever is told may be gone by what those before it do.
+            let watchers = self.watchers.get(variable.index());
+            let watchers = watchers.map_or(&[][..], |all| all);
+            let watchers: SmallVec<[InstanceId; 8]> = SmallVec::from_slice(watchers);
+            for instance in watchers {
+                if self.instances.get(instance).is_some() {
+                    self.reconsider(instance)?;
+                }
             }
             self.follow_mirrors(variable)?;
         }

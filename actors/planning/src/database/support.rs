@@ -210,7 +210,7 @@ impl Database {
         let changed = self.change(token);
         changed.supports += 1;
         changed.supported.push((instance, relation));
-        self.settle_values()
+        Ok(())
     }
 
     fn stand_or_equal(
@@ -291,7 +291,7 @@ impl Database {
         }
         let step = Step::Relation(relation);
         self.close_open(Open { instance, step });
-        self.settle_values()
+        Ok(())
     }
 
     /// A token fulfils the relation of a label no more: it goes, if nobody else asked for it.
@@ -312,7 +312,7 @@ impl Database {
         changed.supports -= 1;
         let orphan = changed.supports == 0 && matches!(changed.cause, Cause::Rule { .. });
         if orphan && changed.status == Status::Active {
-            self.remove(token);
+            self.delete(token);
         }
     }
 
@@ -397,14 +397,14 @@ impl Database {
         let values = std::mem::take(&mut at.values);
         for posted in times {
             if posted.relation == Some(relation) {
-                self.network.retract(posted.constraint);
+                self.retract_time(posted.constraint);
             } else {
                 self.change_instance(instance).times.push(posted);
             }
         }
         for (of, posted) in values {
             if of == Some(relation) {
-                self.store.retract(posted);
+                self.retract_value(posted);
             } else {
                 self.change_instance(instance).values.push((of, posted));
             }

@@ -164,7 +164,7 @@ impl Database {
             if let Some(posted) = database.between(Time::At(0), time, span, owner)? {
                 database.change(token).times.push(posted);
             }
-            database.settle_times()
+            Ok(())
         })
     }
 
@@ -194,7 +194,7 @@ impl Database {
             if let Some(posted) = database.between(start, finish, span, owner)? {
                 database.change(token).times.push(posted);
             }
-            database.settle_times()
+            Ok(())
         })
     }
 
@@ -217,7 +217,6 @@ impl Database {
             if let Some(posted) = posted {
                 database.change(token).orders.push(posted);
             }
-            database.settle_times()?;
             Ok(posted.map(|posted| (token, posted)))
         })
     }
@@ -238,9 +237,10 @@ impl Database {
             return;
         };
         if let Some(place) = at.orders.iter().position(|&at| at == constraint) {
-            self.change(token).orders.remove(place);
-            self.retract_time(constraint);
-            self.loosen_mirrors();
+            self.take(|database| {
+                database.change(token).orders.remove(place);
+                database.retract_time(constraint);
+            });
         }
     }
 
@@ -248,6 +248,15 @@ impl Database {
     pub(super) fn retract_time(&mut self, constraint: Constraint) {
         if self.network.constraint(constraint).is_some() {
             self.network.retract(constraint);
+            self.loosened = true;
+        }
+    }
+
+    /// Retracts a constraint of values, if it did not go with a variable that it was of.
+    pub(super) fn retract_value(&mut self, constraint: parameters::Constraint) {
+        if self.store.has_constraint(constraint) {
+            self.store.retract(constraint);
+            self.loosened = true;
         }
     }
 
@@ -309,9 +318,13 @@ impl Database {
         }
     }
 
-    /// Times changed: the variables that follow them are told, and what follows from that.
-    pub(super) fn settle_times(&mut self) -> Result<(), Conflict> {
+    /// Times and values changed: whoever follows them is told, until nothing changes any more.
+    pub(super) fn settle(&mut self) -> Result<(), Conflict> {
         loop {
+            self.settle_values()?;
+            if std::mem::take(&mut self.loosened) && !self.mirrors.is_empty() {
+                self.loosen_mirrors();
+            }
             let mut news = false;
             // All of them, before anybody is told: what was loosened is as tight as before then.
             for place in 0..self.mirrors.len() {
@@ -320,7 +333,6 @@ impl Database {
             if !news {
                 return Ok(());
             }
-            self.settle_values()?;
         }
     }
 
@@ -360,12 +372,12 @@ impl Database {
             if let Some(value) = value {
                 self.store.retract(value);
             }
-            if let Some(time) = time {
+            if let Some(time) = time
+                && self.network.constraint(time).is_some()
+            {
                 self.network.retract(time);
             }
         }
-        let settled = self.settle_times();
-        debug_assert!(settled.is_ok(), "less holds than before");
     }
 
     fn change_mirror(&mut self, place: usize) -> &mut Mirror {
@@ -379,10 +391,10 @@ impl Database {
             let mirror = self.mirrors.remove(place);
             self.note(Change::Unmirrored(place, mirror));
             if let Some(value) = mirror.value {
-                self.store.retract(value);
+                self.retract_value(value);
             }
             if let Some(time) = mirror.time {
-                self.network.retract(time);
+                self.retract_time(time);
             }
             self.release(Operand::Variable(mirror.variable));
         }

@@ -73,18 +73,47 @@ impl Database {
         self.levels.len()
     }
 
-    /// Does all of an edit or nothing of it.
+    /// Does all of an edit or nothing of it. Within another edit it is a part of that: if it
+    /// cannot be, neither can the other.
     pub(crate) fn attempt<T>(
         &mut self,
         edit: impl FnOnce(&mut Self) -> Result<T, Conflict>,
     ) -> Result<T, Conflict> {
+        if self.edits {
+            return edit(self);
+        }
         self.push();
-        let outcome = edit(self);
+        let outcome = self.settled(edit);
         match outcome {
             Ok(_) => self.commit(),
             Err(_) => self.pop(),
         }
         outcome
+    }
+
+    /// Does an edit. If it cannot be, a part of it is left, and the caller undoes it with what
+    /// was done before.
+    pub(crate) fn settled<T>(
+        &mut self,
+        edit: impl FnOnce(&mut Self) -> Result<T, Conflict>,
+    ) -> Result<T, Conflict> {
+        let outer = std::mem::replace(&mut self.edits, true);
+        let outcome = edit(self);
+        let settled = match (&outcome, outer) {
+            (Ok(_), false) => self.settle(),
+            _ => Ok(()),
+        };
+        self.edits = outer;
+        settled.and(outcome)
+    }
+
+    /// Does an edit that only takes away.
+    pub(super) fn take(&mut self, edit: impl FnOnce(&mut Self)) {
+        let settled = self.settled(|database| {
+            edit(database);
+            Ok(())
+        });
+        debug_assert!(settled.is_ok(), "less holds than before: {settled:?}");
     }
 
     pub(super) fn note(&mut self, change: Change) {
