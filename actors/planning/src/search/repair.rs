@@ -54,6 +54,32 @@ impl Planner for Repair {
         problem: &Arc<Problem>,
         settings: Settings,
     ) -> Result<Answer, LoadError> {
+        self.run(model, problem, settings, Work::solve)
+    }
+}
+
+impl Repair {
+    /// The first plan that it finds with all mandatory goals.
+    ///
+    /// # Errors
+    ///
+    /// If what is the case cannot be.
+    pub(crate) fn first(
+        &self,
+        model: &Arc<Model>,
+        problem: &Arc<Problem>,
+        settings: Settings,
+    ) -> Result<Answer, LoadError> {
+        self.run(model, problem, settings, Work::first)
+    }
+
+    fn run(
+        &self,
+        model: &Arc<Model>,
+        problem: &Arc<Problem>,
+        settings: Settings,
+        find: fn(&mut Work, u64) -> Option<Plan>,
+    ) -> Result<Answer, LoadError> {
         let schedule = Schedule::new(model.clone(), problem.clone())?;
         let complete = Complete::new(&schedule);
         let limit = schedule.database.operations() + settings.operations;
@@ -70,12 +96,7 @@ impl Planner for Repair {
             base: schedule.database.clone(),
             schedule,
         };
-        let optional = problem.goals.iter().any(|goal| goal.weight.is_some());
-        let plan = if optional {
-            work.by_worth(settings.seed)
-        } else {
-            work.by_makespan(settings.seed)
-        };
+        let plan = find(&mut work, settings.seed);
         Ok(Answer {
             proven: false,
             operations: work.operations(),
@@ -138,10 +159,35 @@ impl Work {
 
     /// Goes back to a database as it was, and counts what was done since.
     fn return_to(&mut self, database: &Database, posted: &[Posted]) {
-        self.spent = self.operations() - database.operations();
+        // A copy is work too: else a start that fails at once would go on for ever.
+        let copied = 1 + database.len() as u64;
+        self.spent = self.operations() - database.operations() + copied;
         self.schedule.database.clone_from(database);
         self.posted.clear();
         self.posted.extend_from_slice(posted);
+    }
+
+    fn solve(&mut self, seed: u64) -> Option<Plan> {
+        let mut goals = self.complete.problem().goals.iter();
+        if goals.any(|goal| goal.weight.is_some()) {
+            self.by_worth(seed)
+        } else {
+            self.by_makespan(seed)
+        }
+    }
+
+    /// A plan with all mandatory goals, the first that is found.
+    fn first(&mut self, seed: u64) -> Option<Plan> {
+        let patience = PATIENCE * (self.complete.goals().len() as u64 + 1);
+        while !self.repair(patience) {
+            if self.is_over() {
+                return None;
+            }
+            let base = self.base.clone();
+            self.return_to(&base, &[]);
+        }
+        let by = ("repair", seed, self.operations());
+        Some(extract(&self.schedule, |_| String::new(), by))
     }
 
     /// A plan with all mandatory goals, as short as can be found.

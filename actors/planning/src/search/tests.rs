@@ -92,3 +92,35 @@ fn a_fan_is_turned_on_in_the_cycle_that_learns_the_temperature() {
         executive.database().len()
     );
 }
+
+#[test]
+fn scratch_rcpsp() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/models/rcpsp_max/");
+    let ans = std::fs::read_to_string(format!("{folder}answers.csv")).unwrap();
+    for row in ans.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let bytes = std::fs::read(format!("{folder}{}", cells[0])).unwrap();
+        let (m, p) = crate::sch::read(cells[0], &bytes).unwrap();
+        let (m, p) = (Arc::new(m), Arc::new(p));
+        let a = Forward
+            .solve(
+                &m,
+                &p,
+                Settings {
+                    operations: 2_000_000,
+                    seed: 1,
+                },
+            )
+            .unwrap();
+        println!(
+            "{} {} {} -> {:?} proven {} ops {} backtracks {}",
+            cells[0],
+            cells[2],
+            cells[3],
+            a.plan.map(|p| p.makespan),
+            a.proven,
+            a.operations,
+            a.counters.backtracks
+        );
+    }
+}
