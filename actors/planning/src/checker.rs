@@ -21,10 +21,9 @@
 //!   says is true. A relationship that only an unbound argument leaves undecided is no violation;
 //!   one that speaks of a token that was not asked for is none either.
 //! - **Resources.** Each effect of a rule that holds is listed with the resource that was taken,
-//!   but for what changes it by 0.
-//!   The level stays within the limits from time 0 to the horizon's end. A use that ends when
-//!   another begins does not meet it. A take of a rate-limited resource counts from when it is
-//!   made until the window is over, a use until the window after its end is.
+//!   but for what changes it by 0. The level stays within the limits from time 0 to the horizon's
+//!   end. A use that ends when another begins does not meet it. What is taken of a rate-limited
+//!   resource, a use when it starts, counts until the window is over, however long the use.
 //! - **Score, makespan, windows** are what the plan's own definitions make them.
 //!
 //! ```

@@ -90,6 +90,15 @@ pub enum Decision {
         /// The tick.
         until: Ticks,
     },
+    /// An effect is done to another of the resources that will do.
+    Assign {
+        /// Whose effect.
+        instance: InstanceId,
+        /// Which of its effects.
+        effect: u32,
+        /// The other resource.
+        resource: ResourceId,
+    },
     /// A parameter has a value.
     Bind(Value),
     /// The two tokens at a gap meet, or the one ends with the horizon.

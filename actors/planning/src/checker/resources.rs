@@ -1,5 +1,7 @@
 //! The levels of resources, by a sweep over the times at which they change.
 
+use std::collections::BTreeMap;
+
 use super::{Kind, Report, Scene};
 use crate::Ticks;
 use crate::model::{EffectKind, End, ResourceId, ResourceKind, Value};
@@ -49,10 +51,10 @@ fn changes(
         (end, amount, None)
     };
     let over = match resource {
-        ResourceKind::Renewable | ResourceKind::Depletable => over,
-        ResourceKind::RateLimited { window_ticks } => {
-            Some(over.unwrap_or(at).saturating_add(window_ticks))
+        ResourceKind::RateLimited { window_ticks } if by < 0 => {
+            Some(at.saturating_add(window_ticks))
         }
+        _ => over,
     };
     [Some((at, by)), over.map(|over| (over, -by))]
 }
@@ -60,120 +62,121 @@ fn changes(
 /// Reports the intervals in which the level is outside the limits.
 fn sweep(scene: &Scene<'_>, resource: ResourceId, events: &mut Vec<Event>, report: &mut Report) {
     let is = PlanResource::of(scene.model, scene.problem, resource);
-    events.extend(
-        is.changes
-            .iter()
-            .map(|&(at, by)| (at, i128::from(by), None)),
-    );
+    let changes = is.changes.iter();
+    events.extend(changes.map(|&(at, by)| (at, i128::from(by), None)));
     // What happens before the horizon has happened when it begins.
     events.iter_mut().for_each(|event| event.0 = event.0.max(0));
     events.sort_by_key(|event| event.0);
-    let limits = scene.model.resources[resource].limits;
-    let (min, max) = (i128::from(limits.min), i128::from(limits.max));
-    let (min, max) = (
-        if limits.min == Value::MIN {
-            i128::MIN
-        } else {
-            min
-        },
-        if limits.max == Value::MAX {
-            i128::MAX
-        } else {
-            max
-        },
-    );
+    let [least, most] = is.limits.map(|limit| limit.map(i128::from));
+    let side = |level: i128| match level {
+        level if least.is_some_and(|least| level < least) => Side::Low,
+        level if most.is_some_and(|most| level > most) => Side::High,
+        _ => Side::Within,
+    };
     let horizon = scene.problem.horizon;
-    let mut level = i128::from(is.initial);
-    let mut wrong: Option<(Ticks, i128, usize)> = None;
-    let (mut next, mut now, mut listed) = (0, 0, 0);
-    loop {
-        while events.get(next).is_some_and(|event| event.0 == now) {
-            level += events[next].1;
-            next += 1;
+    let levels = levels(i128::from(is.initial), events, horizon);
+    let mut rest = &levels[..];
+    let mut listed = 0;
+    while let Some(first) = rest.first() {
+        let at = side(first.level);
+        let same = rest.iter().take_while(|one| side(one.level) == at).count();
+        let (interval, after) = rest.split_at(same);
+        let worst = match at {
+            Side::Within => None,
+            Side::Low => interval.iter().min_by_key(|one| one.level),
+            Side::High => interval.iter().max_by_key(|one| one.level),
+        };
+        let to = after.first().map_or(horizon, |next| next.from);
+        if let Some(worst) = worst.filter(|_| listed < LISTED) {
+            listed += 1;
+            let applied = &events[..worst.applied];
+            overuse(
+                scene,
+                resource,
+                (at, worst.level),
+                applied,
+                [first.from, to],
+                report,
+            );
         }
-        let is_wrong = level < min || level > max;
-        match wrong {
-            // A worse level in the same interval is the one to be told.
-            Some((from, worst, _)) if is_wrong && (worst < min) == (level < min) => {
-                let is_worse = if level < min {
-                    level < worst
-                } else {
-                    level > worst
-                };
-                if is_worse {
-                    wrong = Some((from, level, next));
-                }
-            }
-            _ => {
-                if let Some(found) = wrong.take() {
-                    overuse(
-                        scene,
-                        (resource, limits.min, limits.max),
-                        &events[..],
-                        found,
-                        now,
-                        report,
-                    );
-                    listed += 1;
-                }
-                wrong = is_wrong.then_some((now, level, next));
-            }
-        }
-        match events.get(next) {
-            Some(event) if event.0 <= horizon && listed < LISTED => now = event.0,
-            _ => break,
-        }
-    }
-    if let Some(found) = wrong {
-        overuse(
-            scene,
-            (resource, limits.min, limits.max),
-            &events[..],
-            found,
-            horizon,
-            report,
-        );
+        rest = after;
     }
 }
 
-/// Reports an interval in which the level was wrong, after the first `applied` events at its worst.
+/// Where a level is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Within,
+    Low,
+    High,
+}
+
+/// A level, from when on, and how many events have made it.
+struct Level {
+    from: Ticks,
+    level: i128,
+    applied: usize,
+}
+
+/// The levels from time 0 to the horizon's end. Events of one time happen together.
+fn levels(initial: i128, events: &[Event], horizon: Ticks) -> Vec<Level> {
+    let first = Level {
+        from: 0,
+        level: initial,
+        applied: 0,
+    };
+    let mut levels = vec![first];
+    let within = events.iter().take_while(|event| event.0 <= horizon);
+    for (place, &(at, by, _)) in within.enumerate() {
+        let last = &levels[levels.len() - 1];
+        let next = Level {
+            from: at,
+            level: last.level + by,
+            applied: place + 1,
+        };
+        if last.from == at {
+            levels.pop();
+        }
+        levels.push(next);
+    }
+    levels
+}
+
+/// Reports an interval in which the level is on a wrong side, at its worst after these events.
 fn overuse(
     scene: &Scene<'_>,
-    (resource, min, max): (ResourceId, Value, Value),
-    events: &[Event],
-    (from, level, applied): (Ticks, i128, usize),
-    to: Ticks,
+    resource: ResourceId,
+    (side, level): (Side, i128),
+    applied: &[Event],
+    [from, to]: [Ticks; 2],
     report: &mut Report,
 ) {
-    let is_low = level < i128::from(min);
+    let resource = &scene.model.resources[resource];
     // By token, what it changed and did not give back.
-    let mut held: std::collections::BTreeMap<TokenId, i128> = Default::default();
-    for &(_, by, token) in &events[..applied] {
+    let mut held: BTreeMap<TokenId, i128> = BTreeMap::new();
+    for &(_, by, token) in applied {
         if let Some(token) = token {
             *held.entry(token).or_default() += by;
         }
     }
-    let tokens = held
-        .iter()
-        .filter(|(_, by)| if is_low { **by < 0 } else { **by > 0 });
-    let tokens: Vec<TokenId> = tokens.map(|(&token, _)| token).take(LISTED).collect();
-    let shares = tokens
-        .iter()
-        .map(|token| format!("token {token} {:+}", held[token]));
-    let shares: Vec<String> = shares.collect();
-    let model = scene.model;
-    let name = &model.resources[resource].name;
-    let (side, limit) = match is_low {
-        true => ("below its least", min),
-        false => ("above its greatest", max),
-    };
+    let is_low = side == Side::Low;
+    held.retain(|_, by| if is_low { *by < 0 } else { *by > 0 });
+    let tokens = held.keys().copied().take(LISTED);
+    let shares = held.iter().take(LISTED);
+    let shares: Vec<String> = shares
+        .map(|(token, by)| format!("token {token} {by:+}"))
+        .collect();
     let by = match shares.is_empty() {
-        true => "no token".into(),
+        true => "no token".to_owned(),
         false => shares.join(", "),
     };
+    let (side, limit) = match is_low {
+        true => ("below its least", resource.limits.min),
+        false => ("above its greatest", resource.limits.max),
+    };
+    let name = &resource.name;
     let message =
         format!("{name} is at {level} from {from} to {to}, {side} level of {limit}: by {by}");
-    let place = scene.place(model.resources[resource].position);
     let added = report.add(Kind::Overuse, message).tokens(tokens);
-    added.times(from, to).at(place);
+    added.times(from, to).at(scene.place(resource.position));
 }

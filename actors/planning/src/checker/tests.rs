@@ -303,7 +303,7 @@ fn each_kind_of_violation_is_found_and_told() {
         ),
         (
             Kind::Constraint,
-            "x: from start of token 4 to end of token 5 it is 6 ticks",
+            "x: from the start of token 4 to the end of token 5 it is 6 ticks",
             |_, _, plan| {
                 let at = |token, at| Some(Moment { token, at });
                 plan.constraints = vec![PlanConstraint {

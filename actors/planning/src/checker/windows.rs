@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 use super::{Kind, Report, Scene};
 use crate::Ticks;
-use crate::plan::{Moment, PlanEnd, TokenId};
+use crate::plan::{Moment, PlanConstraint, PlanEnd, TokenId};
 
 pub(super) fn check(scene: &Scene<'_>, report: &mut Report) {
     let fixed = contain_times(scene, report);
@@ -120,27 +120,7 @@ impl Points {
                 && constraint.max.is_none_or(|max| apart <= max);
             if !is_kept {
                 satisfied = false;
-                let named = |moment: Option<Moment>| match moment {
-                    None => "time 0".to_owned(),
-                    Some(Moment {
-                        token,
-                        at: PlanEnd::Start,
-                    }) => format!("start of token {token}"),
-                    Some(Moment {
-                        token,
-                        at: PlanEnd::End,
-                    }) => format!("end of token {token}"),
-                };
-                let message = format!(
-                    "from {} to {} it is {apart} ticks, which a constraint of the plan forbids",
-                    named(constraint.from),
-                    named(constraint.to)
-                );
-                let tokens = [constraint.from, constraint.to].into_iter().flatten();
-                let added = report.add(Kind::Constraint, message);
-                added
-                    .tokens(tokens.map(|moment| moment.token))
-                    .at(constraint.why.clone());
+                violated(constraint, apart, report);
             }
             if let Some(min) = constraint.min {
                 points.add(from, to, min);
@@ -206,4 +186,23 @@ impl Points {
         }
         moves
     }
+}
+
+/// Reports a constraint that the fixed times violate.
+fn violated(constraint: &PlanConstraint, apart: Ticks, report: &mut Report) {
+    let named = |moment: Option<Moment>| match moment {
+        None => "time 0".to_owned(),
+        Some(Moment { token, at }) => match at {
+            PlanEnd::Start => format!("the start of token {token}"),
+            PlanEnd::End => format!("the end of token {token}"),
+        },
+    };
+    let (from, to) = (named(constraint.from), named(constraint.to));
+    let message =
+        format!("from {from} to {to} it is {apart} ticks, which a constraint of the plan forbids");
+    let moments = [constraint.from, constraint.to].into_iter().flatten();
+    let added = report.add(Kind::Constraint, message);
+    added
+        .tokens(moments.map(|moment| moment.token))
+        .at(constraint.why.clone());
 }

@@ -37,12 +37,32 @@ fn scratch_rcpsp_explained() {
     let ans = std::fs::read_to_string(format!("{folder}answers.csv")).unwrap();
     for row in ans.lines().skip(1) {
         let cells: Vec<&str> = row.split(',').collect();
+        let bytes = std::fs::read(format!("{folder}{}", cells[0])).unwrap();
+        let (m, p) = sch::read(cells[0], &bytes).unwrap();
+        let (m, p) = (Arc::new(m), Arc::new(p));
+        use crate::search::{Both, Forward, Planner, Settings};
+        let settings = Settings {
+            operations: 100_000 * p.goals.len() as u64,
+            seed: 1,
+        };
+        let a = Forward.solve(&m, &p, settings).unwrap();
+        let b = Both::default().solve(&m, &p, settings).unwrap();
+        println!(
+            "{} {} {} -> forward {:?} proven {} ops {} backtracks {}; both {:?} {}",
+            cells[0],
+            cells[2],
+            cells[3],
+            a.plan.map(|p| p.makespan),
+            a.proven,
+            a.operations,
+            a.counters.backtracks,
+            b.plan.map(|p| p.makespan),
+            b.proven
+        );
         if cells[2] == "1" {
             continue;
         }
-        let bytes = std::fs::read(format!("{folder}{}", cells[0])).unwrap();
-        let (m, p) = sch::read(cells[0], &bytes).unwrap();
-        let told = missing_plan(&Arc::new(m), &Arc::new(p), REQUEST);
+        let told = missing_plan(&m, &p, REQUEST);
         println!("== {}\n{told}", cells[0]);
         println!("{:?} {}", told.smallest, told.operations);
     }

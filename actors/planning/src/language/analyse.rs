@@ -52,6 +52,15 @@ const PROBLEM_FORMS: [&str; 8] = [
     "Change",
 ];
 
+/// All words that the language gives a meaning to where they start a list.
+#[cfg(test)]
+pub(super) fn words() -> impl Iterator<Item = &'static str> {
+    MODEL_FORMS
+        .into_iter()
+        .chain(PROBLEM_FORMS)
+        .chain(body::relation_words())
+}
+
 /// What everything that resolves names needs.
 struct Scope<'t, 'n> {
     notes: &'n mut Notes,
@@ -61,6 +70,28 @@ struct Scope<'t, 'n> {
     model: &'n Model,
     /// Whether names are taken as they are used, since nothing declares any.
     fragment: bool,
+    /// How much more the text may name.
+    budget: usize,
+}
+
+/// How much a text may name, counted once for every object that it is said of: what keeps a text
+/// of some megabytes from becoming tables of some gigabytes.
+const MOST_NAMED: usize = 1 << 21;
+
+impl Scope<'_, '_> {
+    /// Takes from what the text may name; notes once if there is no more.
+    fn spend(&mut self, at: Position, amount: usize) -> Option<()> {
+        if amount > self.budget {
+            if self.budget > 0 {
+                let expected = format!("at most {MOST_NAMED} names, each counted once an object");
+                self.notes.note(Severity::Error, at, expected, "more");
+            }
+            self.budget = 0;
+            return None;
+        }
+        self.budget -= amount;
+        Some(())
+    }
 }
 
 /// The forms of a text by their first word; what is no form of `known` is noted.
@@ -139,6 +170,7 @@ pub(super) fn model(loaded: &Loaded, functions: &Functions, notes: &mut Notes) -
         names: &names,
         model: &model,
         fragment,
+        budget: MOST_NAMED,
     };
     let control = rule::read(scope, &entries, &mut drafts);
     // Of rules in which something is wrong, nothing can be proved.
@@ -146,7 +178,7 @@ pub(super) fn model(loaded: &Loaded, functions: &Functions, notes: &mut Notes) -
         prove::check(&model, &drafts, notes);
     }
     model.control = control;
-    rule::instantiate(&mut model, &names, drafts, notes);
+    rule::instantiate(&mut model, &names, &drafts);
     model
 }
 
@@ -169,6 +201,7 @@ pub(super) fn problem(loaded: &Loaded, model: &Model, notes: &mut Notes) -> Prob
         names: &names,
         model,
         fragment: false,
+        budget: MOST_NAMED,
     };
     let mut problem = problem::read(scope, &entries);
     problem.files = files;

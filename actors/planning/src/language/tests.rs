@@ -7,6 +7,9 @@ use crate::temporal::Span;
 mod findings;
 mod format;
 mod hostile;
+mod meaning;
+mod proofs;
+mod reference;
 
 const FIGURE_5: &str = include_str!("../../models/figure-5.ddl");
 const ROVER: &str = include_str!("../../models/rover.ddl");

@@ -179,6 +179,11 @@ impl<'t> Form<'t> {
         self.tree.nodes[self.node as usize].kind
     }
 
+    /// How many nodes it has, itself counted.
+    pub(super) fn size(self) -> usize {
+        (self.tree.nodes[self.node as usize].next - self.node) as usize
+    }
+
     pub(super) fn is_list(self) -> bool {
         self.kind() == Kind::List
     }

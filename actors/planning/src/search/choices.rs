@@ -80,7 +80,7 @@ impl Default for Choices {
             conflict: Choice::BEST,
             decision: Choice::MOSTLY_BEST,
             culprit: Choice::MOSTLY_BEST,
-            relaxed: Choice::BEST,
+            relaxed: Choice::MOSTLY_BEST,
         }
     }
 }

@@ -37,6 +37,9 @@ pub struct Complete {
     wanted: Vec<bool>,
     /// How many decisions were numbered: each is an owner of its own.
     decisions: u32,
+    /// Whether an effect may go back to a resource that it was on: a search that takes decisions
+    /// back in turn must not, or it would not end.
+    pub(super) assigns_back: bool,
 }
 
 impl Complete {
@@ -48,6 +51,7 @@ impl Complete {
             goals: schedule.goals.clone(),
             wanted: goals.map(|goal| goal.weight.is_none()).collect(),
             decisions: 0,
+            assigns_back: false,
         }
     }
 
@@ -205,6 +209,8 @@ impl Strategy for Complete {
                 let levels = database.levels(resource);
                 if let Some(over_use) = levels.earliest.first_over_use_of(bound, Ticks::MIN) {
                     over_use_decisions(database, resource, &over_use, into);
+                    let back = self.assigns_back;
+                    assignments(database, resource, &over_use, back, into);
                 }
             }
             Flaw::Unbound { token, parameter } => {
@@ -283,6 +289,14 @@ impl Complete {
         owner: Owner,
     ) -> Result<(), Conflict> {
         match (flaw, decision) {
+            (
+                _,
+                Decision::Assign {
+                    instance,
+                    effect,
+                    resource,
+                },
+            ) => database.assign(instance, effect, resource),
             (Flaw::Unbound { token, parameter }, Decision::Bind(value)) => {
                 database.bind(token, parameter, value, owner)
             }
@@ -529,6 +543,42 @@ pub(super) fn over_use_decisions(
                 && database.start(token).max >= until
             {
                 into.push(Decision::Wait { token, until });
+            }
+        }
+    }
+}
+
+/// Other resources for what contributes, where others will do.
+fn assignments(
+    database: &Database,
+    resource: ResourceId,
+    over_use: &OverUse<Owner>,
+    back: bool,
+    into: &mut Vec<Decision>,
+) {
+    for contributor in &over_use.contributors {
+        let Owner::Rule { master, rule, .. } = contributor.owner else {
+            continue;
+        };
+        let instances = database.token(master).map_or(&[][..], |at| at.instances());
+        let of_rule = |at: &&InstanceId| database.instance(**at).is_some_and(|at| at.rule == rule);
+        let Some(&instance) = instances.iter().find(of_rule) else {
+            continue;
+        };
+        for (effect, is_on) in database.assigned(instance) {
+            let allowed = &database.model().rules[rule].effects[effect as usize].resources;
+            let Some(place) = allowed.iter().position(|&at| at == is_on) else {
+                continue;
+            };
+            let others = allowed.iter().enumerate();
+            let others = others.filter(|&(at, _)| at > place || (back && at < place));
+            let decisions = others.map(|(_, &resource)| Decision::Assign {
+                instance,
+                effect,
+                resource,
+            });
+            if is_on == resource {
+                into.extend(decisions);
             }
         }
     }

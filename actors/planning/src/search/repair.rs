@@ -81,7 +81,8 @@ impl Repair {
         find: fn(&mut Work, u64) -> Option<Plan>,
     ) -> Result<Answer, LoadError> {
         let schedule = Schedule::new(model.clone(), problem.clone())?;
-        let complete = Complete::new(&schedule);
+        let mut complete = Complete::new(&schedule);
+        complete.assigns_back = true;
         let limit = schedule.database.operations() + settings.operations;
         let mut work = Work {
             complete,
@@ -247,20 +248,25 @@ impl Work {
             .unwrap_or(0)
     }
 
-    /// Takes back about half of the orders that times rest on.
+    /// Takes back about half as many orders as times rest on, one at least.
     fn relax(&mut self) {
-        let mut at = 0;
-        while at < self.posted.len() {
-            let posted = self.posted[at];
-            let binds = self.schedule.database.is_tight(posted.constraint);
-            let costs = [i64::from(!binds)];
-            let _ = (self.choices.relaxed.pick)(&costs, &mut self.random);
-            let goes = if binds { 2 } else { 6 };
-            if below(&mut self.random, goes) == 0 {
-                self.take_back(at);
-            } else {
-                at += 1;
-            }
+        let database = &self.schedule.database;
+        let tight = self
+            .posted
+            .iter()
+            .map(|at| database.is_tight(at.constraint));
+        let mut costs: Vec<i64> = tight.map(|tight| i64::from(!tight)).collect();
+        let tight = costs.iter().filter(|&&cost| cost == 0).count();
+        // Options of the same cost come in any order.
+        for last in (1..self.posted.len()).rev() {
+            let other = below(&mut self.random, last + 1);
+            self.posted.swap(last, other);
+            costs.swap(last, other);
+        }
+        for _ in 0..(tight / 2).max(1).min(costs.len()) {
+            let place = (self.choices.relaxed.pick)(&costs, &mut self.random);
+            costs.swap_remove(place);
+            self.take_back(place);
         }
     }
 

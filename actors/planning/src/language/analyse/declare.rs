@@ -1,16 +1,19 @@
 //! What a model declares: types, objects, predicates, timelines, tables and functions.
 
-use std::collections::BTreeMap;
+mod predicates;
+mod tables;
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::entry::Entry;
 use super::literal::{self, Sort};
-use super::resources;
-use crate::language::findings::{Notes, arguments};
+use super::{MOST_NAMED, resources};
+use crate::language::findings::Notes;
 use crate::language::functions::Functions;
 use crate::language::tree::{Form, Kind};
 use crate::model::{
-    Filler, Function, Model, NUMBER, Parameter, Predicate, Profile, TRUTH, Table, Timeline,
-    TimelineKind, Type, TypeId, Value, Values,
+    Filler, Function, Model, NUMBER, Profile, TRUTH, Timeline, TimelineKind, Type, TypeId, Value,
+    Values,
 };
 use crate::temporal::Span;
 
@@ -24,12 +27,13 @@ const KINDS: [(&str, TimelineKind); 6] = [
     ("Executable", TimelineKind::State),
 ];
 
-/// How many timelines, and resources, all objects may have.
-const MOST_TIMELINES: usize = 1 << 20;
+/// How many state variables a class may have, and predicates one of them.
+const MOST_MEMBERS: usize = 4_096;
 
 /// A class of objects.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Class<'t> {
+    form: Option<Form<'t>>,
     objects: Vec<Value>,
     state_variables: Vec<(&'t str, TimelineKind)>,
     named: bool,
@@ -54,6 +58,13 @@ pub(super) struct Declarations<'t, 'n> {
     /// The classes in the order of the text.
     order: Vec<&'t str>,
     members: BTreeMap<(&'t str, &'t str), Members>,
+    tables: BTreeSet<&'t str>,
+    /// The functions that there are, and how many arguments each has.
+    functions: BTreeMap<String, usize>,
+    /// By class: its resources.
+    pub(super) resources: BTreeSet<(&'t str, &'t str)>,
+    /// How much more the text may declare.
+    pub(super) budget: usize,
 }
 
 /// The truth values and the numbers, which every model has.
@@ -105,10 +116,22 @@ pub(super) fn declare<'t>(
         classes: BTreeMap::new(),
         order: Vec::new(),
         members: BTreeMap::new(),
+        tables: BTreeSet::new(),
+        functions: known
+            .iter()
+            .map(|(name, count, _)| (name.to_owned(), count))
+            .collect(),
+        resources: BTreeSet::new(),
+        budget: MOST_NAMED,
     };
     declarations.read(entries);
-    let first = entries.first().map(|entry| entry.form);
-    declarations.timelines(first);
+    declarations.timelines();
+    if let (true, Some(first)) = (declarations.is_bare(), entries.first()) {
+        let expected = "a class with state variables, by Define_Object_Class";
+        declarations
+            .notes
+            .refuse(first.form, expected, "a model without timelines");
+    }
     for entry in entries
         .iter()
         .filter(|entry| entry.head == "Define_Resource")
@@ -195,7 +218,10 @@ impl<'t, 'n> Declarations<'t, 'n> {
             self.twice(name);
             return;
         }
-        let mut class = Class::default();
+        let mut class = Class {
+            form: Some(entry.form),
+            ..Class::default()
+        };
         for form in entry
             .one(":state_variables", self.notes)
             .iter()
@@ -220,6 +246,10 @@ impl<'t, 'n> Declarations<'t, 'n> {
                     .any(|(other, _)| *other == name)
                 {
                     self.twice(word);
+                } else if class.state_variables.len() == MOST_MEMBERS {
+                    self.notes
+                        .error(word, format!("at most {MOST_MEMBERS} state variables"));
+                    return;
                 } else {
                     class.state_variables.push((name, kind));
                 }
@@ -334,83 +364,6 @@ impl<'t, 'n> Declarations<'t, 'n> {
         ))
     }
 
-    /// `(Type ?name)` or `Type`.
-    fn parameter(&mut self, form: Form<'t>) -> Option<Parameter> {
-        let mut parts = form.children();
-        let (of, name) = match form.kind() {
-            Kind::Symbol => (form, ""),
-            Kind::List => match (parts.next(), parts.next(), parts.next()) {
-                (Some(of), Some(name), None) if name.kind() == Kind::Variable => (of, name.word()),
-                _ => {
-                    self.notes.error(form, "a parameter, as (Type ?name)");
-                    return None;
-                }
-            },
-            _ => {
-                self.notes.error(form, "a parameter, as (Type ?name)");
-                return None;
-            }
-        };
-        match self.types.get(of.word()) {
-            Some(&id) => Some(Parameter {
-                name: name.to_owned(),
-                of: id,
-            }),
-            None => {
-                self.notes.unknown(of, "a type", self.types.keys().copied());
-                None
-            }
-        }
-    }
-
-    fn predicate(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[], self.notes);
-        let (name, list) = match *entry.values.as_slice() {
-            [name] => (name, None),
-            [name, list] if list.is_list() => (name, Some(list)),
-            _ => {
-                let expected = "(Define_Predicate Name ((Type ?input) … -> (Type ?output) …))";
-                self.notes.error(entry.form, expected);
-                return;
-            }
-        };
-        let Some(name_text) = self.name(name) else {
-            return;
-        };
-        if self.predicates.contains_key(name_text) {
-            self.twice(name);
-            return;
-        }
-        let (mut parameters, mut inputs) = (Vec::<Parameter>::new(), None);
-        for form in list.iter().flat_map(|list| list.children()) {
-            if form.kind() == Kind::Arrow {
-                if inputs.replace(parameters.len()).is_some() {
-                    self.notes.error(form, "one arrow");
-                }
-                continue;
-            }
-            // An unknown type counts as the numbers, so that the arity is right.
-            let unknown = Parameter {
-                name: String::new(),
-                of: NUMBER,
-            };
-            let parameter = self.parameter(form).unwrap_or(unknown);
-            let same = |other: &Parameter| other.name == parameter.name;
-            if !parameter.name.is_empty() && parameters.iter().any(same) {
-                self.twice(form);
-            }
-            parameters.push(parameter);
-        }
-        let inputs = inputs.unwrap_or(parameters.len());
-        self.predicates
-            .insert(name_text, self.model.predicates.len());
-        self.model.predicates.push(Predicate {
-            name: name_text.to_owned(),
-            parameters,
-            inputs,
-        });
-    }
-
     /// A class and one more name, as `(Rover Position_SV)`.
     pub(super) fn of_class(&mut self, form: Form<'t>, what: &str) -> Option<(&'t str, Form<'t>)> {
         let mut parts = form.children();
@@ -425,93 +378,6 @@ impl<'t, 'n> Declarations<'t, 'n> {
             return None;
         }
         Some((class.word(), name))
-    }
-
-    fn member_values(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[":default"], self.notes);
-        let &[of, list] = entry.values.as_slice() else {
-            let expected = "(Define_Member_Values (Class Name_SV) (Predicate …))";
-            self.notes.error(entry.form, expected);
-            return;
-        };
-        let Some((class, name)) = self.of_class(of, "a state variable") else {
-            return;
-        };
-        let known = &self.classes[class].state_variables;
-        if !known.iter().any(|(known, _)| *known == name.word()) {
-            let known: Vec<&str> = known.iter().map(|(known, _)| *known).collect();
-            self.notes.unknown(
-                name,
-                format!("a state variable of {class}"),
-                known.into_iter(),
-            );
-            return;
-        }
-        let mut predicates = Vec::new();
-        for form in list.children() {
-            match self.predicates.get(form.word()) {
-                Some(id) if predicates.contains(id) => {
-                    self.notes.error(form, "each predicate once")
-                }
-                Some(&id) => predicates.push(id),
-                None => self
-                    .notes
-                    .unknown(form, "a predicate", self.predicates.keys().copied()),
-            }
-        }
-        if list.children().next().is_none() {
-            self.notes
-                .error(list, "one predicate or more, in parentheses");
-        }
-        let default = entry.one(":default", self.notes);
-        let default = default.and_then(|form| self.filler(form, &predicates));
-        let members = Members {
-            predicates,
-            default,
-        };
-        if self.members.insert((class, name.word()), members).is_some() {
-            self.notes
-                .error(of, "member values of each state variable once");
-        }
-    }
-
-    /// `(Predicate (value …))`, with `?any` for values that may be any.
-    fn filler(&mut self, form: Form<'t>, members: &[usize]) -> Option<Filler> {
-        let head = form.children().next();
-        let Some(name) = head.filter(|name| form.is_list() && name.symbol().is_some()) else {
-            self.notes.error(form, "a default, as (Idle ())");
-            return None;
-        };
-        let known = members
-            .iter()
-            .find(|&&id| self.model.predicates[id].name == name.word());
-        let Some(&predicate) = known else {
-            let known: Vec<String> = members
-                .iter()
-                .map(|&id| self.model.predicates[id].name.clone())
-                .collect();
-            let known = known.iter().map(String::as_str);
-            self.notes
-                .unknown(name, "a member of the state variable", known);
-            return None;
-        };
-        let list = form.children().nth(1);
-        let given = list.into_iter().flat_map(|list| list.children());
-        let given: Vec<Form> = given.filter(|form| form.kind() != Kind::Arrow).collect();
-        let parameters = self.model.predicates[predicate].parameters.clone();
-        if list.is_some() && given.len() != parameters.len() {
-            let expected = format!("{} of {}", arguments(parameters.len()), name.word());
-            self.notes
-                .refuse(list.unwrap_or(form), expected, given.len().to_string());
-            return None;
-        }
-        let mut values = vec![None; parameters.len()];
-        for (place, argument) in given.into_iter().enumerate() {
-            if argument.kind() != Kind::Variable {
-                values[place] = Some(self.value_of(argument, parameters[place].of)?);
-            }
-        }
-        Some(Filler { predicate, values })
     }
 
     /// The value of a literal of a type.
@@ -530,144 +396,67 @@ impl<'t, 'n> Declarations<'t, 'n> {
         }
     }
 
-    fn table(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[], self.notes);
-        let (name, columns, rows) = match entry.values.as_slice() {
-            [name, columns, rows @ ..] if columns.is_list() => (*name, *columns, rows),
-            _ => {
-                let expected = "(Define_Table name (Type …) (value …) …)";
-                self.notes.error(entry.form, expected);
-                return;
-            }
-        };
-        let Some(name_text) = self.name(name) else {
-            return;
-        };
-        if self
-            .model
-            .tables
-            .iter()
-            .any(|table| table.name == name_text)
-        {
-            self.twice(name);
-            return;
-        }
-        let types: Vec<TypeId> = columns
-            .children()
-            .map(|form| {
-                self.parameter(form)
-                    .map_or(NUMBER, |parameter| parameter.of)
-            })
-            .collect();
-        let mut found = Vec::new();
-        for &row in rows {
-            let values: Vec<Form> = row.children().collect();
-            if values.len() != types.len() {
-                let expected = format!("as many values as columns, {}", types.len());
-                self.notes.refuse(row, expected, values.len().to_string());
-                continue;
-            }
-            let values = values.into_iter().zip(&types);
-            found.push(
-                values
-                    .filter_map(|(form, &of)| self.value_of(form, of))
-                    .collect::<Vec<_>>(),
-            );
-        }
-        if types.is_empty() {
-            self.notes.error(columns, "one column or more");
-        } else if rows.is_empty() {
-            self.notes
-                .error(entry.form, "one row or more, each in parentheses");
-        }
-        found.sort_unstable();
-        found.dedup();
-        let rows = found.concat();
-        self.model.tables.push(Table {
-            name: name_text.to_owned(),
-            columns: types.len(),
-            rows,
-        });
-    }
-
-    fn function(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[], self.notes);
-        let &[name, number] = entry.values.as_slice() else {
-            self.notes
-                .error(entry.form, "(Define_Function name number_of_arguments)");
-            return;
-        };
-        let Some(name_text) = self.name(name) else {
-            return;
-        };
-        let literal = literal::plain(literal::resolve(number, self.constants));
-        let count = literal.and_then(|(value, _)| usize::try_from(value).ok());
-        let Some(count) = count.filter(|count| (1..=64).contains(count)) else {
-            self.notes
-                .error(number, "how many arguments it has with its output, 1 to 64");
-            return;
-        };
-        // Who gives functions gives their bodies; without one, its output is never known.
-        let known = self
-            .model
-            .functions
-            .iter()
-            .find(|function| function.name == name_text);
-        match known.map(|function| function.arguments) {
-            Some(known) if known != count => {
-                let expected = format!("{}, as {name_text} has", arguments(known));
-                self.notes.error(number, expected);
-            }
-            Some(_) => {}
-            None => self
-                .model
-                .functions
-                .push(unknown_function(name_text, count)),
-        }
-    }
-
     /// Makes the timelines of all objects.
-    fn timelines(&mut self, first: Option<Form<'t>>) {
+    fn timelines(&mut self) {
         for class in self.order.clone() {
-            let Class {
-                objects,
-                state_variables,
-                named,
-            } = &self.classes[class];
-            if self.model.timelines.len() + objects.len() * state_variables.len() > MOST_TIMELINES {
-                if let Some(form) = first {
-                    let expected = format!("at most {MOST_TIMELINES} timelines in all");
-                    self.notes
-                        .refuse(form, expected, format!("more, with those of {class}"));
-                }
-                return;
-            }
-            for &object in objects {
-                for &(name, kind) in state_variables {
-                    let members = self.members.get(&(class, name));
-                    let full = self.model.symbols[object as usize].clone() + "." + name;
-                    self.model.timelines.push(Timeline {
-                        name: if *named { full } else { name.to_owned() },
-                        object,
-                        kind,
-                        predicates: members.map_or(Vec::new(), |of| of.predicates.clone()),
-                        default: members.and_then(|of| of.default.clone()),
-                    });
-                }
-            }
-            for (name, _) in state_variables {
-                if let (None, Some(form)) = (self.members.get(&(class, name)), first) {
-                    let expected = format!("(Define_Member_Values ({class} {name}) (…))");
-                    self.notes.refuse(form, expected, "none in the model");
-                }
+            self.timelines_of(class);
+        }
+    }
+
+    fn timelines_of(&mut self, class: &'t str) {
+        let Class {
+            form,
+            objects,
+            state_variables,
+            named,
+        } = self.classes[class].clone();
+        let members = |name: &'t str| self.members.get(&(class, name));
+        let size = |name: &'t str| 1 + members(name).map_or(0, |of| of.predicates.len());
+        let once: usize = state_variables.iter().map(|(name, _)| size(name)).sum();
+        for (name, _) in &state_variables {
+            if let (None, Some(form)) = (self.members.get(&(class, *name)), form) {
+                let expected = format!("(Define_Member_Values ({class} {name}) (…))");
+                self.notes.refuse(form, expected, "none in the model");
             }
         }
-        let is_bare = self.model.timelines.is_empty() && !self.notes.has_errors();
-        if let (true, Some(form)) = (is_bare, first) {
-            let expected = "a class with state variables, by Define_Object_Class";
-            self.notes
-                .refuse(form, expected, "a model without timelines");
+        if form
+            .and_then(|form| self.spend(form, once.saturating_mul(objects.len())))
+            .is_none()
+        {
+            return;
         }
+        for &object in &objects {
+            for &(name, kind) in &state_variables {
+                let members = self.members.get(&(class, name));
+                let full = self.model.symbols[object as usize].clone() + "." + name;
+                self.model.timelines.push(Timeline {
+                    name: if named { full } else { name.to_owned() },
+                    object,
+                    kind,
+                    predicates: members.map_or(Vec::new(), |of| of.predicates.clone()),
+                    default: members.and_then(|of| of.default.clone()),
+                });
+            }
+        }
+    }
+
+    /// Takes from what the text may declare; notes once if there is no more.
+    pub(super) fn spend(&mut self, form: Form<'t>, amount: usize) -> Option<()> {
+        if amount > self.budget {
+            if self.budget > 0 {
+                let expected = format!("at most {MOST_NAMED} names, each counted once an object");
+                self.notes.refuse(form, expected, "more");
+            }
+            self.budget = 0;
+            return None;
+        }
+        self.budget -= amount;
+        Some(())
+    }
+
+    /// Whether there is no timeline, though nothing is wrong.
+    fn is_bare(&self) -> bool {
+        self.model.timelines.is_empty() && !self.notes.has_errors()
     }
 
     /// The objects of a class, and whether they have names of their own.

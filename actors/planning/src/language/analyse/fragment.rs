@@ -6,7 +6,7 @@
 //! nobody knows has as many arguments as where it is first called, and gives nothing; a constant
 //! that is not defined is a variable. Tables and resources must be declared.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::declare::{functions, unknown_function, usual_types};
 use super::entry::Entry;
@@ -39,6 +39,7 @@ struct Names<'t> {
     timeline_at: BTreeMap<(&'t str, &'t str), usize>,
     predicates: Vec<Used<'t>>,
     predicate_at: BTreeMap<&'t str, usize>,
+    members: BTreeSet<(usize, usize)>,
 }
 
 /// What the rules of a fragment speak of, as a model without rules.
@@ -78,9 +79,10 @@ pub(super) fn declare<'t>(
             "nothing but constants",
         );
     }
+    let mut called_before = known.names().map(str::to_owned).collect();
     for entry in rules {
         for form in entry.option(":parameter_functions") {
-            called(*form, &mut model);
+            called(*form, &mut called_before, &mut model);
         }
     }
     names.to(&mut model);
@@ -88,7 +90,7 @@ pub(super) fn declare<'t>(
 }
 
 /// Adds the functions that `(f (arguments) …)` or `(f argument …)` calls.
-fn called(form: Form, model: &mut Model) {
+fn called(form: Form, known: &mut BTreeSet<String>, model: &mut Model) {
     let parts: Vec<Form> = form.children().collect();
     let pairs: Vec<(Form, usize)> = match parts.as_slice() {
         [_, list, ..] if list.is_list() => {
@@ -101,11 +103,7 @@ fn called(form: Form, model: &mut Model) {
         [] => Vec::new(),
     };
     for (name, arguments) in pairs {
-        let known = model
-            .functions
-            .iter()
-            .any(|function| function.name == name.word());
-        if !known && name.symbol().is_some() {
+        if name.symbol().is_some() && known.insert(name.word().to_owned()) {
             model
                 .functions
                 .push(unknown_function(name.word(), arguments));
@@ -143,9 +141,8 @@ impl<'t> Names<'t> {
         if timeline == count {
             self.timelines.push((class, name, Vec::new()));
         }
-        let members = &mut self.timelines[timeline].2;
-        if !members.contains(&at) {
-            members.push(at);
+        if self.members.insert((timeline, at)) {
+            self.timelines[timeline].2.push(at);
         }
     }
 
@@ -185,7 +182,7 @@ impl<'t> Names<'t> {
     }
 
     fn to(self, model: &mut Model) {
-        let mut symbols: BTreeMap<&str, Value> = BTreeMap::new();
+        let (mut symbols, mut classes) = (BTreeMap::<&str, Value>::new(), BTreeSet::new());
         let mut symbol = |name: &'t str, model: &mut Model| {
             *symbols.entry(name).or_insert_with(|| {
                 model.symbols.push(name.to_owned());
@@ -194,7 +191,7 @@ impl<'t> Names<'t> {
         };
         for (class, name, predicates) in self.timelines {
             let object = symbol(class, model);
-            if !model.types.iter().any(|of| of.name == class) {
+            if classes.insert(class) {
                 let values = Values::Symbols(vec![object]);
                 model.types.push(Type {
                     name: class.to_owned(),

@@ -112,6 +112,9 @@ impl<'t> Scope<'t, '_> {
             );
             return None;
         };
+        if self.budget == 0 {
+            return None;
+        }
         let state_variable = name.word();
         let known = variables.names.get(owner.word()).copied();
         let is_variable = owner.kind() == Kind::Variable;
@@ -123,6 +126,7 @@ impl<'t> Scope<'t, '_> {
                 .map(|&at| self.object_of(at))
                 .collect();
             let timelines = self.timelines_of(objects, name)?;
+            self.spend(form.position(), timelines.len())?;
             return Some(Place {
                 timelines,
                 object,
@@ -134,12 +138,13 @@ impl<'t> Scope<'t, '_> {
             return self.any_object(owner, name, variables);
         }
         let Some(objects) = self.names.objects(self.model, owner.word()) else {
-            let known: Vec<&str> = self.names.owners(self.model).collect();
+            let (names, model) = (self.names, self.model);
             self.notes
-                .unknown(owner, "a class or an object", known.into_iter());
+                .unknown(owner, "a class or an object", names.owners(model));
             return None;
         };
         let timelines = self.timelines_of(objects, name)?;
+        self.spend(form.position(), timelines.len())?;
         Some(Place {
             timelines,
             object: None,
@@ -157,9 +162,8 @@ impl<'t> Scope<'t, '_> {
             .collect::<Option<Vec<_>>>()
             .filter(|found| !found.is_empty());
         if found.is_none() {
-            let known: Vec<&str> = self.names.state_variables_of(&objects).collect();
-            self.notes
-                .unknown(name, "a state variable", known.into_iter());
+            let known = self.names.state_variables_of(&objects);
+            self.notes.unknown(name, "a state variable", known);
         }
         found
     }
@@ -171,7 +175,7 @@ impl<'t> Scope<'t, '_> {
         name: Form<'t>,
         variables: &mut Variables<'t>,
     ) -> Option<Place<'t>> {
-        let all = self.names.timelines(name.word()).to_vec();
+        let all = self.names.timelines(name.word());
         let Some(&first) = all.first() else {
             let known = self.names.all_state_variables();
             self.notes.unknown(name, "a state variable", known);
@@ -191,6 +195,7 @@ impl<'t> Scope<'t, '_> {
         let object_of = |at: &TimelineId| self.model.timelines[*at].object;
         let fits = |at: &TimelineId| objects.binary_search(&object_of(at)).is_ok();
         let timelines: Vec<TimelineId> = all.iter().copied().filter(fits).collect();
+        self.spend(owner.position(), timelines.len())?;
         let complete = known.is_some() || timelines.len() == all.len();
         if timelines.is_empty() || !complete {
             let expected = "a state variable of one class, or a variable whose class is known";

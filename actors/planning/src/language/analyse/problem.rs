@@ -2,7 +2,7 @@
 
 mod goals;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::entry::Entry;
 use super::literal::{self, A_NUMBER};
@@ -20,7 +20,9 @@ pub(super) fn read<'t>(scope: Scope<'t, '_>, entries: &[Entry<'t>]) -> Problem {
         scope,
         problem: Problem::default(),
         goals: BTreeMap::new(),
-        recurring: Vec::new(),
+        recurring: BTreeSet::new(),
+        combinations: BTreeSet::new(),
+        levels: BTreeSet::new(),
     };
     reader.header(entries);
     for entry in entries {
@@ -48,7 +50,11 @@ struct Reader<'t, 'n> {
     problem: Problem,
     goals: BTreeMap<String, GoalId>,
     /// The names of goals that stand for several.
-    recurring: Vec<&'t str>,
+    recurring: BTreeSet<&'t str>,
+    /// The names of combinations.
+    combinations: BTreeSet<&'t str>,
+    /// The resources whose level is given.
+    levels: BTreeSet<ResourceId>,
 }
 
 impl<'t> Reader<'t, '_> {
@@ -167,7 +173,7 @@ impl<'t> Reader<'t, '_> {
     fn goal_named(&mut self, form: Form<'t>) -> Option<GoalId> {
         let known = self.goals.get(form.word()).copied();
         if known.is_none() {
-            let expected = match self.recurring.contains(&form.word()) {
+            let expected = match self.recurring.contains(form.word()) {
                 true => format!("one of its goals, as {}_1", form.word()),
                 false => "a goal".to_owned(),
             };
@@ -190,19 +196,18 @@ impl<'t> Reader<'t, '_> {
             self.scope.notes.error(name, "the combination's name");
             return;
         }
-        let same = |other: &Combination| other.name == name.word();
-        if self.problem.combinations.iter().any(same) {
+        if !self.combinations.insert(name.word()) {
             self.scope
                 .notes
                 .error(name, "a name that no other combination has");
         }
         let weight = self.weight(entry);
-        let mut goals = Vec::new();
+        let (mut goals, mut seen) = (Vec::new(), BTreeSet::new());
         for form in list.children() {
             let Some(goal) = self.goal_named(form) else {
                 return;
             };
-            if goals.contains(&goal) {
+            if !seen.insert(goal) {
                 self.scope.notes.error(form, "each goal once");
                 return;
             }
@@ -338,10 +343,9 @@ impl<'t> Reader<'t, '_> {
         };
         let (names, model) = (self.scope.names, self.scope.model);
         let Some(objects) = names.objects(model, owner.word()) else {
-            let known: Vec<&str> = names.owners(model).collect();
             self.scope
                 .notes
-                .unknown(owner, "a class or an object", known.into_iter());
+                .unknown(owner, "a class or an object", names.owners(model));
             return None;
         };
         let &[object] = objects.as_slice() else {
@@ -376,12 +380,7 @@ impl<'t> Reader<'t, '_> {
             self.scope
                 .notes
                 .error(level, format!("a level within {limits:?}"));
-        } else if self
-            .problem
-            .initial
-            .iter()
-            .any(|(other, _)| *other == resource)
-        {
+        } else if !self.levels.insert(resource) {
             self.scope.notes.error(of, "one level of each resource");
         } else {
             self.problem.initial.push((resource, value));

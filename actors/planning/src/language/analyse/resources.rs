@@ -54,11 +54,15 @@ pub(super) fn declare<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) {
     };
     let (objects, named) = to.objects_of(class);
     let objects = objects.to_vec();
-    let known = |resource: &Resource| {
-        resource.object == objects[0] && super::names::last_part(&resource.name) == word
-    };
-    if to.model.resources.iter().any(known) {
+    if !to.resources.insert((class, word)) {
         to.notes.error(name, "a name that is not defined yet");
+        return;
+    }
+    to.spend(
+        entry.form,
+        objects.len().saturating_mul(1 + resource.changes.len()),
+    );
+    if to.budget == 0 {
         return;
     }
     for object in objects {
@@ -251,6 +255,9 @@ impl<'t> Scope<'t, '_> {
             }
         };
         let same = owner.is_none_or(|owner| draft.master.class.as_deref() == Some(owner.word()));
+        if self.budget == 0 {
+            return None;
+        }
         let objects = match owner.filter(|_| !same) {
             None => draft
                 .master
@@ -261,9 +268,9 @@ impl<'t> Scope<'t, '_> {
             Some(owner) => match self.names.objects(self.model, owner.word()) {
                 Some(objects) => objects,
                 None => {
-                    let known: Vec<&str> = self.names.owners(self.model).collect();
+                    let (names, model) = (self.names, self.model);
                     self.notes
-                        .unknown(owner, "a class or an object", known.into_iter());
+                        .unknown(owner, "a class or an object", names.owners(model));
                     return None;
                 }
             },
@@ -272,10 +279,11 @@ impl<'t> Scope<'t, '_> {
             .iter()
             .map(|&object| self.names.resource(object, name.word()));
         let Some(found) = found.collect::<Option<Vec<_>>>() else {
-            let known: Vec<&str> = self.names.resources_of(&objects).collect();
-            self.notes.unknown(name, "a resource", known.into_iter());
+            let known = self.names.resources_of(&objects);
+            self.notes.unknown(name, "a resource", known);
             return None;
         };
+        self.spend(of.position(), found.len())?;
         Some((found, same.then_some(name.word())))
     }
 

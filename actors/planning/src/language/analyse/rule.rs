@@ -1,12 +1,11 @@
 //! Rules: compatibilities and decompositions, and how a search decides.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Scope;
 use super::entry::Entry;
 use super::names::Names;
 use super::pattern::{Master, Variables};
-use crate::language::findings::{Notes, Severity};
 use crate::language::tree::{Form, Kind};
 use crate::model::{
     Body, Control, Model, Pattern, PredicateId, Rule, SlotOrder, Target, TimelineId, Values,
@@ -24,9 +23,6 @@ const OPTIONS: [&str; 9] = [
     ":compatibility_spec",
     ":into",
 ];
-
-/// How much all rules may say together: what each names, once for every object it holds for.
-const MOST_NAMED: usize = 1 << 23;
 
 /// A rule as its text says it, before it is stored for each object that it holds for.
 pub(super) struct Draft<'t> {
@@ -108,7 +104,22 @@ impl<'t> Scope<'t, '_> {
             }
         }
         draft.rule.variables = std::mem::take(&mut draft.variables.list);
+        self.spend_instances(entry.form, &draft)?;
         Some(draft)
+    }
+
+    /// Takes what the rule names, for each object that it holds for, from what the text may name.
+    fn spend_instances(&mut self, form: Form<'t>, draft: &Draft<'t>) -> Option<()> {
+        let mut once = form.size();
+        look_at_patterns(&draft.rule.body, &mut |pattern, label| {
+            if draft.same_timelines[label].is_none() {
+                once = once.saturating_add(pattern.timelines.len());
+            }
+        });
+        self.spend(
+            form.position(),
+            once.saturating_mul(draft.master.timelines.len()),
+        )
     }
 
     /// A rule that says nothing yet of the tokens of a pattern.
@@ -175,6 +186,7 @@ impl<'t> Scope<'t, '_> {
             self.notes
                 .error(value, "an option of Define_Search_Control");
         }
+        let mut seen: BTreeSet<_> = control.subgoals.iter().copied().collect();
         for &form in entry.option(":subgoal_order") {
             let Some((timelines, predicate, more)) = self.subgoal(form) else {
                 continue;
@@ -182,11 +194,10 @@ impl<'t> Scope<'t, '_> {
             if let Some(more) = more {
                 self.notes.error(more, ") after the predicate");
             }
-            for timeline in timelines {
-                if !control.subgoals.contains(&(timeline, predicate)) {
-                    control.subgoals.push((timeline, predicate));
-                }
-            }
+            let subgoals = timelines.into_iter().map(|timeline| (timeline, predicate));
+            control
+                .subgoals
+                .extend(subgoals.filter(|subgoal| seen.insert(*subgoal)));
         }
         for &form in entry.option(":slot_order") {
             let Some((timelines, predicate, order)) = self.subgoal(form) else {
@@ -249,29 +260,15 @@ impl<'t> Scope<'t, '_> {
 }
 
 /// Stores each rule once for every object that it holds for.
-pub(super) fn instantiate(model: &mut Model, names: &Names, drafts: Vec<Draft>, notes: &mut Notes) {
-    let predicates = model
-        .timelines
-        .iter()
-        .map(|timeline| vec![Vec::new(); timeline.predicates.len()]);
-    model.rules_by_timeline = predicates.collect();
-    let mut named = 0_usize;
+pub(super) fn instantiate(model: &mut Model, names: &Names, drafts: &[Draft]) {
+    let timelines = model.timelines.iter();
+    model.rules_by_timeline = timelines
+        .map(|timeline| vec![Vec::new(); timeline.predicates.len()])
+        .collect();
     for draft in drafts {
-        let mut once = draft.rule.labels + draft.rule.variables.len() + draft.rule.effects.len();
-        look_at_patterns(&draft.rule.body, &mut |pattern, label| {
-            if draft.same_timelines[label].is_none() {
-                once = once.saturating_add(pattern.timelines.len());
-            }
-        });
-        named = named.saturating_add(once.saturating_mul(draft.master.timelines.len()));
-        if named > MOST_NAMED {
-            let expected = format!("rules that name at most {MOST_NAMED} tokens for all objects");
-            notes.note(Severity::Error, draft.rule.position, expected, "more");
-            return;
-        }
         for &timeline in &draft.master.timelines {
             let id = model.rules.len();
-            let rule = instance(&draft, timeline, model, names);
+            let rule = instance(draft, timeline, model, names);
             let predicates = &model.timelines[timeline].predicates;
             let place = predicates
                 .iter()

@@ -282,32 +282,28 @@ pub(super) fn levels_hold(model: &Model, plan: &Plan) -> bool {
                     _ => None,
                 };
                 let is = |kind: EffectKind| effect.does == kind.into();
-                let (from, to, by) = if is(EffectKind::Uses) {
-                    (
-                        token.start,
-                        Some(token.end + window.unwrap_or(0)),
-                        -effect.amount,
-                    )
+                let at_end = [
+                    EffectKind::Consumes(End::Finish),
+                    EffectKind::Produces(End::Finish),
+                ];
+                let produces = [
+                    EffectKind::Produces(End::Start),
+                    EffectKind::Produces(End::Finish),
+                ];
+                let produces = produces.into_iter().any(is);
+                let from = if at_end.into_iter().any(is) {
+                    token.end
                 } else {
-                    let consumes = [
-                        EffectKind::Consumes(End::Start),
-                        EffectKind::Consumes(End::Finish),
-                    ];
-                    let by = if consumes.into_iter().any(is) {
-                        -effect.amount
-                    } else {
-                        effect.amount
-                    };
-                    let starts = [
-                        EffectKind::Consumes(End::Start),
-                        EffectKind::Produces(End::Start),
-                    ];
-                    let at = if starts.into_iter().any(is) {
-                        token.start
-                    } else {
-                        token.end
-                    };
-                    (at, window.map(|window| at + window), by)
+                    token.start
+                };
+                let by = if produces {
+                    effect.amount
+                } else {
+                    -effect.amount
+                };
+                let to = match window {
+                    Some(window) if !produces => Some(from + window),
+                    _ => is(EffectKind::Uses).then_some(token.end),
                 };
                 let in_force = from <= now && to.is_none_or(|to| now < to);
                 level + if in_force { by } else { 0 }

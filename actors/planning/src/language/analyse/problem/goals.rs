@@ -161,7 +161,7 @@ impl<'t> Reader<'t, '_> {
         let Recurrence {
             every, from, to, ..
         } = recurrence;
-        self.recurring.push(name.word());
+        self.recurring.insert(name.word());
         let instants = (0..=(to - from) / every).map(|count| from + count * every);
         for (count, instant) in instants.enumerate() {
             let start = self.shifted(recurrence.start, instant);
@@ -177,7 +177,9 @@ impl<'t> Reader<'t, '_> {
             if recurrence.is_open && count > 0 && !fits(&one) {
                 return;
             }
-            if !self.add(name, one) {
+            let size = name.size() + one.pattern.timelines.len() + one.pattern.arguments.len();
+            let spent = self.scope.spend(name.position(), size);
+            if spent.is_none() || !self.add(name, one) {
                 return;
             }
         }
@@ -236,7 +238,7 @@ impl<'t> Reader<'t, '_> {
 
     /// Adds a goal; whether it can be one.
     fn add(&mut self, name: Form<'t>, goal: Goal) -> bool {
-        if self.goals.contains_key(&goal.name) || self.recurring.contains(&goal.name.as_str()) {
+        if self.goals.contains_key(&goal.name) || self.recurring.contains(goal.name.as_str()) {
             self.scope
                 .notes
                 .refuse(name, "a name that no other goal has", goal.name);

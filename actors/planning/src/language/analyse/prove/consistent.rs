@@ -12,7 +12,7 @@ use crate::model::{
 };
 
 /// The most steps that a check of a rule takes; larger rules are left to the planner.
-const MOST_STEPS: usize = 10_000_000;
+const MOST_STEPS: usize = 2_000_000;
 
 /// That `to - from` is at most `most`.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@
 //! apart: all of a truth value or an enumeration, and of a number those around each literal that it
 //! is compared with.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::consistent::decide;
 use crate::language::analyse::names::last_part;
@@ -20,41 +20,83 @@ use crate::model::{
 /// Types of numbers with at most so many values are gone through one by one.
 const FEW_VALUES: i128 = 64;
 
-/// How many endings are gone through at most; beyond that, nothing is decided.
+/// How many endings are gone through for a predicate at most; beyond that, nothing is decided.
 const MOST_ENDINGS: usize = 1 << 16;
+
+/// How many guards are asked at most for all endings together.
+const MOST_STEPS: usize = 1 << 22;
 
 /// Notes each predicate of a state that can end so that nothing follows.
 pub(super) fn check(model: &Model, drafts: &[Draft], notes: &mut Notes) {
+    let index = Index::of(drafts);
+    // Objects of a class for which the same rules hold are all alike.
     let mut done = BTreeSet::new();
+    let mut steps = 0;
     for (id, timeline) in model.timelines.iter().enumerate() {
-        let is_bare = timeline.kind == TimelineKind::State && timeline.default.is_none();
-        if !is_bare || !done.insert(last_part(&timeline.name)) {
+        if timeline.kind != TimelineKind::State || timeline.default.is_some() {
             continue;
         }
-        let others = drafts.iter().any(|draft| is_put_by_others(draft, id));
+        let is_shared = index.put_by_others.contains(&id);
         for &predicate in &timeline.predicates {
-            let of = Ending {
-                model,
-                timeline: id,
-                predicate,
-            };
-            of.check(drafts, others, notes);
+            let own = index
+                .own
+                .get(&(id, predicate))
+                .map_or(&[][..], Vec::as_slice);
+            if done.insert((last_part(&timeline.name), predicate, own)) {
+                let of = Ending {
+                    model,
+                    timeline: id,
+                    predicate,
+                };
+                let own: Vec<&Draft> = own.iter().map(|&at| &drafts[at]).collect();
+                of.check(&own, is_shared, &mut steps, notes);
+            }
         }
     }
 }
 
-/// Whether a rule of another timeline may put tokens on this one.
-fn is_put_by_others(draft: &Draft, timeline: TimelineId) -> bool {
-    !draft.master.timelines.contains(&timeline) && puts(&draft.rule.body, timeline)
+/// The rules by what they are about.
+#[derive(Default)]
+struct Index {
+    /// By timeline and predicate: the rules of such tokens.
+    own: BTreeMap<(TimelineId, PredicateId), Vec<usize>>,
+    /// The timelines on which rules of other timelines put tokens.
+    put_by_others: BTreeSet<TimelineId>,
 }
 
-fn puts(body: &Body, timeline: TimelineId) -> bool {
+impl Index {
+    fn of(drafts: &[Draft]) -> Index {
+        let mut index = Index::default();
+        for (at, draft) in drafts.iter().enumerate() {
+            let masters: BTreeSet<TimelineId> = draft.master.timelines.iter().copied().collect();
+            for &timeline in &masters {
+                index
+                    .own
+                    .entry((timeline, draft.rule.master.predicate))
+                    .or_default()
+                    .push(at);
+            }
+            look_at_relations(&draft.rule.body, &mut |relation| {
+                if let Target::New(pattern, _) = &relation.target
+                    && !relation.condition
+                {
+                    let others = pattern.timelines.iter().filter(|at| !masters.contains(at));
+                    index.put_by_others.extend(others);
+                }
+            });
+        }
+        index
+    }
+}
+
+fn look_at_relations(body: &Body, look: &mut impl FnMut(&Relation)) {
     match body {
-        Body::All(parts) | Body::Any(parts, _) => parts.iter().any(|part| puts(part, timeline)),
-        Body::Relation(relation) => match &relation.target {
-            Target::New(pattern, _) => !relation.condition && pattern.timelines.contains(&timeline),
-            Target::Label(_) => false,
-        },
+        Body::All(parts) | Body::Any(parts, _) => {
+            for part in parts {
+                look_at_relations(part, look);
+            }
+        }
+        Body::Relation(relation) => look(relation),
     }
 }
 
@@ -75,23 +117,21 @@ struct Guard<'d> {
 }
 
 impl Ending<'_> {
-    fn check(&self, drafts: &[Draft], others: bool, notes: &mut Notes) {
-        let own = drafts.iter().filter(|draft| {
-            let master = &draft.rule.master;
-            master.predicate == self.predicate && draft.master.timelines.contains(&self.timeline)
-        });
-        let position = own.clone().next().map(|draft| draft.rule.position);
+    /// Notes if no rule of `own` holds for some ending.
+    fn check(&self, own: &[&Draft], is_shared: bool, steps: &mut usize, notes: &mut Notes) {
+        let position = own.first().map(|draft| draft.rule.position);
         let position = position.unwrap_or(Position {
             file: 0,
             line: 1,
             column: 1,
         });
-        let following = own.filter(|draft| self.follows(&draft.rule.body, draft));
+        let following = own
+            .iter()
+            .filter(|draft| self.follows(&draft.rule.body, draft));
         let guards: Option<Vec<Guard>> = following.map(|draft| self.guard(draft)).collect();
-        let Some(uncovered) = guards.and_then(|guards| self.uncovered(&guards)) else {
-            return;
-        };
-        let severity = if others {
+        let uncovered = guards.and_then(|guards| self.uncovered(&guards, steps));
+        let Some(uncovered) = uncovered else { return };
+        let severity = if is_shared {
             Severity::Warning
         } else {
             Severity::Error
@@ -158,7 +198,7 @@ impl Ending<'_> {
 
     /// An ending for which no guard holds, in words; none if there is none, or if there are too
     /// many to go through.
-    fn uncovered(&self, guards: &[Guard]) -> Option<String> {
+    fn uncovered(&self, guards: &[Guard], steps: &mut usize) -> Option<String> {
         let predicate = &self.model.predicates[self.predicate];
         let mut choices: Vec<(usize, Vec<Value>)> = Vec::new();
         let mut count = 1_usize;
@@ -170,6 +210,10 @@ impl Ending<'_> {
                     .filter(|count| *count <= MOST_ENDINGS)?;
                 choices.push((place, values));
             }
+        }
+        *steps = steps.saturating_add(count.saturating_mul(guards.len()));
+        if *steps > MOST_STEPS {
+            return None;
         }
         let mut ending = vec![0; predicate.parameters.len()];
         for number in 0..count {

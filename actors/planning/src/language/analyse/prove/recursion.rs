@@ -132,14 +132,18 @@ impl<'m> Graph<'m> {
     fn report(&mut self, notes: &mut Notes) {
         for place in 0..self.edges.len() {
             let edge = self.edges[place];
+            if self.steps > MOST_STEPS {
+                return;
+            }
+            self.steps += self.least.len();
             let beside = |edge: &Edge| edge.direction == Direction::Beside;
-            if edge.renews {
-                if let Some(path) = self.path(edge.to, edge.from, &beside) {
-                    let found = self.show(edge.from, &path);
-                    let expected = "a guard in rules that force each other at the same time";
-                    notes.note(Severity::Error, edge.position, expected, found);
-                    return;
-                }
+            if edge.renews
+                && let Some(path) = self.path(edge.to, edge.from, &beside)
+            {
+                let found = self.show(edge.from, &path);
+                let expected = "a guard in rules that force each other at the same time";
+                notes.note(Severity::Error, edge.position, expected, found);
+                return;
             }
             if edge.direction == Direction::Beside || self.advances(&edge) {
                 continue;
@@ -188,7 +192,7 @@ impl<'m> Graph<'m> {
             for &edge in &self.out[node] {
                 self.steps += 1;
                 let edge = &self.edges[edge];
-                if !seen[edge.to] && along(edge) && self.steps < MOST_STEPS {
+                if !seen[edge.to] && along(edge) {
                     seen[edge.to] = true;
                     before[edge.to] = Some(node);
                     queue.push_back(edge.to);
