@@ -10,6 +10,7 @@
 //! | [`checker`] | whether a plan is valid, and if not, why: shares no code with the planners |
 //! | [`database`] | tokens on timelines, tied by rules, times and parameters |
 //! | [`draw`] | a plan as a Gantt chart |
+//! | [`explain`] | why there is no plan, in sentences and as JSON, and which goals to drop |
 //! | [`language`] | from the text of a model or a problem to its tables, with what is wrong and where |
 //! | [`model`] | what a model and a problem say, with every name resolved |
 //! | [`objective`] | what a plan is worth by the goals that it achieves |
@@ -24,6 +25,7 @@ pub mod arena;
 pub mod checker;
 pub mod database;
 pub mod draw;
+pub mod explain;
 pub mod language;
 pub mod model;
 mod nearest;

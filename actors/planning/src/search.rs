@@ -10,6 +10,7 @@
 //! parts, and never by a clock: the same problem gives the same plan, or the same want of one, on
 //! any machine.
 
+mod both;
 pub mod choices;
 mod chronological;
 pub mod complete;
@@ -26,6 +27,7 @@ use crate::database::{Conflict, Database, InstanceId, Open, Slot, TokenId};
 use crate::model::{End, ResourceId, TimelineId, Value};
 use crate::profile::Bound;
 
+pub use both::Both;
 pub use chronological::{Stack, chronological};
 pub use extract::extract;
 pub use repair::Repair;

@@ -76,6 +76,11 @@ impl Complete {
         &self.goals
     }
 
+    /// How many decisions were numbered.
+    pub(crate) fn numbered(&self) -> u32 {
+        self.decisions
+    }
+
     /// An owner for a new decision.
     pub(super) fn owner(&mut self) -> Owner {
         self.decisions += 1;

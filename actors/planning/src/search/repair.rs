@@ -54,6 +54,32 @@ impl Planner for Repair {
         problem: &Arc<Problem>,
         settings: Settings,
     ) -> Result<Answer, LoadError> {
+        self.run(model, problem, settings, Work::solve)
+    }
+}
+
+impl Repair {
+    /// The first plan that it finds with all mandatory goals.
+    ///
+    /// # Errors
+    ///
+    /// If what is the case cannot be.
+    pub(crate) fn first(
+        &self,
+        model: &Arc<Model>,
+        problem: &Arc<Problem>,
+        settings: Settings,
+    ) -> Result<Answer, LoadError> {
+        self.run(model, problem, settings, Work::first)
+    }
+
+    fn run(
+        &self,
+        model: &Arc<Model>,
+        problem: &Arc<Problem>,
+        settings: Settings,
+        find: fn(&mut Work, u64) -> (Option<Plan>, bool),
+    ) -> Result<Answer, LoadError> {
         let schedule = Schedule::new(model.clone(), problem.clone())?;
         let mut complete = Complete::new(&schedule);
         complete.assigns_back = true;
@@ -71,12 +97,7 @@ impl Planner for Repair {
             base: schedule.database.clone(),
             schedule,
         };
-        let optional = problem.goals.iter().any(|goal| goal.weight.is_some());
-        let (plan, proven) = if optional {
-            (work.by_worth(settings.seed), false)
-        } else {
-            work.by_makespan(settings.seed)
-        };
+        let (plan, proven) = find(&mut work, settings.seed);
         Ok(Answer {
             proven,
             operations: work.operations(),
@@ -145,10 +166,37 @@ impl Work {
 
     /// Goes back to a database as it was, and counts what was done since.
     fn return_to(&mut self, database: &Database, posted: &[Posted]) {
-        self.spent = self.operations() - database.operations();
+        // A copy is work too: else a start that fails at once would go on for ever.
+        let copied = 1 + database.len() as u64;
+        self.spent = self.operations() - database.operations() + copied;
         self.schedule.database.clone_from(database);
         self.posted.clear();
         self.posted.extend_from_slice(posted);
+    }
+
+    /// The best plan that is found, and whether it is proven.
+    fn solve(&mut self, seed: u64) -> (Option<Plan>, bool) {
+        let mut goals = self.complete.problem().goals.iter();
+        if goals.any(|goal| goal.weight.is_some()) {
+            (self.by_worth(seed), false)
+        } else {
+            self.by_makespan(seed)
+        }
+    }
+
+    /// A plan with all mandatory goals, the first that is found.
+    fn first(&mut self, seed: u64) -> (Option<Plan>, bool) {
+        let patience = PATIENCE * (self.complete.goals().len() as u64 + 1);
+        while !self.repair(patience) {
+            if self.is_over() {
+                return (None, false);
+            }
+            let base = self.base.clone();
+            self.return_to(&base, &[]);
+        }
+        let by = ("repair", seed, self.operations());
+        let plan = extract(&self.schedule, |_| String::new(), by);
+        (Some(plan), false)
     }
 
     /// A plan with all mandatory goals, as short as can be found, and whether none is shorter.

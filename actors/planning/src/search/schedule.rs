@@ -56,7 +56,25 @@ impl Schedule {
     ///
     /// If what is the case cannot be, or a goal cannot be of itself.
     pub fn new(model: Arc<Model>, problem: Arc<Problem>) -> Result<Self, LoadError> {
-        let mut database = Database::new(model, Span::new(0, problem.horizon));
+        let mut schedule = Schedule::empty(model, problem);
+        schedule.load()?;
+        Ok(schedule)
+    }
+
+    /// A problem of which nothing is in the database yet.
+    pub(crate) fn empty(model: Arc<Model>, problem: Arc<Problem>) -> Self {
+        Schedule {
+            database: Database::new(model, Span::new(0, problem.horizon)),
+            goals: Vec::with_capacity(problem.goals.len()),
+            facts: Vec::with_capacity(problem.facts.len()),
+            problem,
+        }
+    }
+
+    /// Puts everything into an empty database, up to what is refused.
+    pub(crate) fn load(&mut self) -> Result<(), LoadError> {
+        let problem = self.problem.clone();
+        let database = &mut self.database;
         for &(resource, initial) in &problem.initial {
             let change = initial - database.model().resources[resource].initial;
             let changed = database.change_level(resource, 0, change);
@@ -66,33 +84,27 @@ impl Schedule {
             let changed = database.change_level(resource, tick, change);
             changed.map_err(|conflict| LoadError::Level { conflict })?;
         }
-        let mut schedule = Schedule {
-            database,
-            goals: Vec::with_capacity(problem.goals.len()),
-            facts: Vec::with_capacity(problem.facts.len()),
-            problem: problem.clone(),
-        };
         let mut places: Vec<usize> = (0..problem.facts.len()).collect();
         // On a timeline, facts follow each other in the order of their starts.
         places.sort_by_key(|&place| (problem.facts[place].start.min, place));
         let mut facts: Vec<Option<TokenId>> = vec![None; problem.facts.len()];
         for place in places {
-            let token = schedule.put_fact(place, &problem.facts[place]);
+            let token = self.put_fact(place, &problem.facts[place]);
             facts[place] = Some(token.map_err(|conflict| LoadError::Fact {
                 fact: place,
                 conflict,
             })?);
         }
-        schedule.facts = facts.into_iter().flatten().collect();
+        self.facts = facts.into_iter().flatten().collect();
         for (place, goal) in problem.goals.iter().enumerate() {
-            let token = schedule.want(place, goal);
+            let token = self.want(place, goal);
             let token = token.map_err(|conflict| LoadError::Goal {
                 goal: place,
                 conflict,
             })?;
-            schedule.goals.push(token);
+            self.goals.push(token);
         }
-        Ok(schedule)
+        Ok(())
     }
 
     fn put_fact(&mut self, place: usize, fact: &Fact) -> Result<TokenId, Conflict> {

@@ -152,6 +152,10 @@ impl Run {
     /// Looks for plans that end earlier, until there is none.
     fn shorten(&mut self, mut best: Plan) -> (Plan, bool) {
         loop {
+            // Without goals nothing would be bounded.
+            if best.makespan == 0 {
+                return (best, true);
+            }
             let bound = Span::at_most(best.makespan - 1);
             self.schedule.database.push();
             let mut allowed = true;
