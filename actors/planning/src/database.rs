@@ -166,6 +166,9 @@ pub struct Database {
     /// Kept for its memory.
     changed: Vec<parameters::Variable>,
     trail: Vec<Change>,
+    /// What changes on the trail changed or took away, the last one last.
+    kept_tokens: Vec<Token>,
+    kept_instances: Vec<Instance>,
     levels: Vec<Level>,
     /// Whether something was retracted that variables may rest on which follow times.
     loosened: bool,
@@ -220,6 +223,8 @@ impl Database {
             changed_points: Vec::new(),
             changed: Vec::new(),
             trail: Vec::new(),
+            kept_tokens: Vec::new(),
+            kept_instances: Vec::new(),
             levels: Vec::new(),
             loosened: false,
             edits: false,

@@ -42,8 +42,7 @@ impl Database {
     }
 
     fn insert_free(&mut self, wanted: &Wanted<'_>) -> Result<TokenId, Conflict> {
-        let model = self.model.clone();
-        let predicate = &model.predicates[wanted.predicate];
+        let predicate = &self.model.predicates[wanted.predicate];
         assert_eq!(
             wanted.parameters.len(),
             predicate.parameters.len(),
@@ -82,7 +81,7 @@ impl Database {
         let owner = Owner::Token(token);
         let least = match wanted
             .timeline
-            .map(|timeline| model.timelines[timeline].kind)
+            .map(|timeline| self.model.timelines[timeline].kind)
         {
             Some(TimelineKind::State | TimelineKind::Unary) => 1,
             Some(TimelineKind::Free) | None => 0,
@@ -91,13 +90,14 @@ impl Database {
         if let Some(posted) = self.between(start, finish, lasts, owner)? {
             self.change(token).times.push(posted);
         }
-        for (parameter, &known) in predicate.parameters.iter().zip(wanted.parameters) {
+        for (place, &known) in wanted.parameters.iter().enumerate() {
+            let of = self.model.predicates[wanted.predicate].parameters[place].of;
             let operand = match known {
                 Some(operand) => {
-                    self.keep_to_type(token, parameter.of, operand)?;
+                    self.keep_to_type(token, of, operand)?;
                     operand
                 }
-                None => self.new_variable(parameter.of),
+                None => self.new_variable(of),
             };
             self.hold(operand);
             self.change(token).parameters.push(operand);
@@ -116,7 +116,8 @@ impl Database {
                 if self.token_of_point.len() <= place {
                     self.token_of_point.resize(place + 1, None);
                 }
-                self.token_of_point[place] = Some(token);
+                let old = self.token_of_point[place].replace(token);
+                self.note(Change::Pointed(place, old));
             }
         }
     }
@@ -129,16 +130,16 @@ impl Database {
         operand: Operand,
     ) -> Result<(), Conflict> {
         let owner = Owner::Token(token);
-        let domain = self.domains[of].clone();
+        let domain = &self.domains[of];
         match operand {
             Operand::Value(value) if domain.contains(value) => Ok(()),
             Operand::Value(_) => Err(Conflict::Mismatch { owner }),
             Operand::Variable(variable) => {
                 let now = self.store.domain(variable);
-                if now.intersect(&domain) == *now {
+                if now == domain || now.intersect(domain) == *now {
                     return Ok(());
                 }
-                let posted = self.store.restrict(variable, domain, owner)?;
+                let posted = self.store.restrict(variable, domain.clone(), owner)?;
                 self.change(token).values.push(posted);
                 Ok(())
             }
@@ -160,14 +161,13 @@ impl Database {
 
     pub(super) fn place(&mut self, token: TokenId, slot: Slot) -> Result<(), Conflict> {
         assert_eq!(self.at(token).status, Status::Free, "{token:?} is free");
-        let model = self.model.clone();
-        let timeline = &model.timelines[slot.timeline];
-        let owner = Owner::Token(token);
+        let timeline = &self.model.timelines[slot.timeline];
+        let (kind, owner) = (timeline.kind, Owner::Token(token));
         if !timeline.predicates.contains(&self.at(token).predicate) {
             return Err(Conflict::Mismatch { owner });
         }
         let lane = self.lanes[slot.timeline];
-        let before = match timeline.kind {
+        let before = match kind {
             // Nothing orders the tokens of such a timeline: the last to come is the last.
             TimelineKind::Free => lane.last,
             TimelineKind::State | TimelineKind::Unary => slot.after,
@@ -183,6 +183,12 @@ impl Database {
             Some(before) => self.at(before).after,
             None => lane.first,
         };
+        // A token that was said to be on such a timeline lasts a tick at least already.
+        let said = self
+            .at(token)
+            .timeline
+            .map(|at| self.model.timelines[at].kind);
+        let lasts_a_tick = matches!(said, Some(TimelineKind::State | TimelineKind::Unary));
         let at = self.change(token);
         at.status = Status::Active;
         at.timeline = Some(slot.timeline);
@@ -196,11 +202,13 @@ impl Database {
             None => self.change_lane(slot.timeline).last = Some(token),
         }
         self.change_lane(slot.timeline).tokens += 1;
-        if timeline.kind != TimelineKind::Free {
-            let lasts = Span::at_least(1);
-            let (start, finish) = (self.at(token).start, self.at(token).finish);
-            if let Some(posted) = self.between(start, finish, lasts, owner)? {
-                self.change(token).times.push(posted);
+        if kind != TimelineKind::Free {
+            if !lasts_a_tick {
+                let lasts = Span::at_least(1);
+                let (start, finish) = (self.at(token).start, self.at(token).finish);
+                if let Some(posted) = self.between(start, finish, lasts, owner)? {
+                    self.change(token).times.push(posted);
+                }
             }
             self.follow_on(before, token)?;
             if let Some(after) = after {
@@ -423,8 +431,11 @@ impl Database {
                 self.network.remove_point(point);
             }
         }
-        if let Some(removed) = self.tokens.remove(token) {
-            self.note(Change::TokenRemoved(token, Box::new(removed)));
+        if let Some(removed) = self.tokens.remove(token)
+            && self.depth() > 0
+        {
+            self.kept_tokens.push(removed);
+            self.note(Change::TokenRemoved(token));
         }
     }
 

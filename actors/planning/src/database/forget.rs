@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Database, InstanceId, Owner, Status, Time, TokenId};
+use super::{Database, Guard, InstanceId, Owner, Status, Time, TokenId};
 use crate::Ticks;
 use crate::model::{End, Target};
 use crate::parameters::{Domain, Kind, Operand, Variable};
@@ -93,7 +93,8 @@ impl Database {
             self.delete(other);
         }
         self.freeze_times(token);
-        self.freeze_values(token);
+        let going = self.freeze_values(token);
+        self.store.remove_all(&going);
         for instance in std::mem::take(&mut self.change(token).instances) {
             self.forget_instance(instance, before);
         }
@@ -120,6 +121,9 @@ impl Database {
         now.status = Status::Rejected;
         now.before = None;
         now.after = None;
+        for operand in std::mem::take(&mut now.parameters) {
+            self.drop_holder(operand);
+        }
         self.delete(token);
     }
 
@@ -166,8 +170,9 @@ impl Database {
         }
     }
 
-    /// Variables that others have too keep the values that the past gave them.
-    fn freeze_values(&mut self, token: TokenId) {
+    /// Variables that others have too keep the values that the past gave them; gives those that
+    /// nobody else has.
+    fn freeze_values(&mut self, token: TokenId) -> SmallVec<[Variable; 16]> {
         let mut mine: SmallVec<[Variable; 16]> = SmallVec::new();
         let at = self.at(token);
         let variables = at.instances.iter().flat_map(|&instance| {
@@ -181,12 +186,14 @@ impl Database {
         }
         mine.sort_unstable();
         let mut kept: SmallVec<[Variable; 8]> = SmallVec::new();
+        let mut going: SmallVec<[Variable; 16]> = SmallVec::new();
         for run in mine.chunk_by(|one, other| one == other) {
             let variable = run[0];
             if self.holders[variable.index()] > run.len() as u32 {
                 kept.push(variable);
                 continue;
             }
+            going.push(variable);
             // What it is equal to is somebody else's.
             for constraint in self.store.constraints_of(variable) {
                 if matches!(self.store.kind(constraint), Some(Kind::Equal)) {
@@ -203,6 +210,7 @@ impl Database {
         for variable in kept {
             self.keep_values(variable);
         }
+        going
     }
 
     /// A variable has no values but those that it has now, whoever goes.
@@ -233,11 +241,33 @@ impl Database {
                 at.supports -= 1;
             }
         }
-        let at = self.change_instance(instance);
-        at.labels.truncate(1);
-        for effected in std::mem::take(&mut at.effects) {
+        let Some(at) = self.instances.remove(instance) else {
+            return;
+        };
+        self.steps += 1;
+        for effected in at.effects {
             self.forget_effect(effected, before);
         }
-        self.remove_instance(instance);
+        for variable in at.watched {
+            self.watchers[variable.index()].retain(|&at| at != instance);
+        }
+        // What it says of times and values of others stays with them.
+        for operand in at.variables.into_iter().flatten() {
+            self.drop_holder(operand);
+        }
+        if at.guard == Guard::Holds {
+            for place in (0..self.open.len()).rev() {
+                if self.open[place].instance == instance {
+                    self.open.remove(place);
+                }
+            }
+        }
+    }
+
+    /// Counts one less who has a variable, which is gone already if nobody else has it.
+    fn drop_holder(&mut self, operand: Operand) {
+        if let Operand::Variable(variable) = operand {
+            self.holders[variable.index()] -= 1;
+        }
     }
 }

@@ -118,8 +118,11 @@ impl Database {
 
     /// The rule holds now: its effects are done to the first resources that will do.
     pub(super) fn apply_effects(&mut self, instance: InstanceId) -> Result<(), Conflict> {
-        let model = self.model.clone();
         let rule = self.instance_at(instance).rule;
+        if self.model.rules[rule].effects.is_empty() {
+            return Ok(());
+        }
+        let model = self.model.clone();
         for (place, effect) in model.rules[rule].effects.iter().enumerate() {
             let Some(&resource) = effect.resources.first() else {
                 continue;
@@ -161,6 +164,13 @@ impl Database {
         levels.earliest.remove(effected.earliest);
     }
 
+    /// The profiles are to follow a token's times.
+    pub(super) fn dirty_if_used(&mut self, token: TokenId) {
+        if !self.levels_by_resource.is_empty() {
+            self.dirty.push(token);
+        }
+    }
+
     /// Whether what an effect does has been done at a tick, and how much it was is known.
     pub(super) fn is_over(&self, effected: Effected, tick: Ticks) -> bool {
         let levels = &self.levels_by_resource[effected.resource];
@@ -185,7 +195,12 @@ impl Database {
     }
 
     /// What an effect is to a profile: at all times that it may have, and at the earliest.
-    fn uses_of(&self, instance: InstanceId, effect: u32, resource: ResourceId) -> [Use; 2] {
+    pub(super) fn uses_of(
+        &self,
+        instance: InstanceId,
+        effect: u32,
+        resource: ResourceId,
+    ) -> [Use; 2] {
         let at = self.instance_at(instance);
         let Effect { kind, amount, .. } = self.model.rules[at.rule].effects[effect as usize];
         let amount = self.span(instance, amount, amount, false);

@@ -10,14 +10,14 @@ use crate::temporal::{Constraint, Point, Span};
 /// A variable that is when a token starts or ends, or how long it lasts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mirror {
-    variable: Variable,
+    pub(super) variable: Variable,
     token: TokenId,
     /// Which end; none for the duration.
     end: Option<End>,
     /// That the variable is within the bounds of the time.
-    value: Option<parameters::Constraint>,
+    pub(super) value: Option<parameters::Constraint>,
     /// That the time is within the bounds of the variable.
-    time: Option<Constraint>,
+    pub(super) time: Option<Constraint>,
 }
 
 impl Database {
@@ -168,13 +168,28 @@ impl Database {
         })
     }
 
-    /// Says that a token ends at a tick, as an executive learns it.
+    /// Says that a token ends at a tick, as an executive learns it, and for good.
     ///
     /// # Errors
     ///
     /// If it cannot end then: nothing changes.
     pub fn end(&mut self, token: TokenId, tick: Ticks) -> Result<(), Conflict> {
-        self.restrict_time(token, End::Finish, Span::exactly(tick), Owner::Token(token))
+        let owner = Owner::Token(token);
+        let expected = self.finish(token);
+        if let Time::Point(point) = self.at(token).finish
+            && expected.contains(tick)
+            && self.network.is_apart(point)
+        {
+            // Nothing but known times says when it ends, and now that is one itself.
+            return self.attempt(|database| {
+                database.network.remove_point(point);
+                database.change(token).finish = Time::At(tick);
+                database.dirty_if_used(token);
+                database.loosened = true;
+                Ok(())
+            });
+        }
+        self.restrict_time(token, End::Finish, Span::exactly(tick), owner)
     }
 
     /// Says how long a token lasts, more closely than before.
