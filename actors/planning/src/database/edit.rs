@@ -248,6 +248,8 @@ impl Database {
     }
 
     fn take_off(&mut self, token: TokenId) {
+        // First, so that what its rules asked for does not let it go once more.
+        self.change(token).status = Status::Free;
         for instance in self.at(token).instances.clone() {
             self.remove_instance(instance);
         }
@@ -259,7 +261,6 @@ impl Database {
         }
         self.unlink(token);
         let at = self.change(token);
-        at.status = Status::Free;
         at.instances.clear();
         at.supported.clear();
         at.supports = 0;
