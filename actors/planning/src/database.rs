@@ -166,7 +166,14 @@ pub struct Database {
     /// Kept for its memory.
     changed: Vec<parameters::Variable>,
     trail: Vec<Change>,
+    /// What changes on the trail changed or took away, the last one last.
+    kept_tokens: Vec<Token>,
+    kept_instances: Vec<Instance>,
     levels: Vec<Level>,
+    /// Whether something was retracted that variables may rest on which follow times.
+    loosened: bool,
+    /// Whether an edit goes on.
+    edits: bool,
     /// The number of the next push: what was kept since the last one need not be kept again.
     serial: u64,
     steps: u64,
@@ -216,7 +223,11 @@ impl Database {
             changed_points: Vec::new(),
             changed: Vec::new(),
             trail: Vec::new(),
+            kept_tokens: Vec::new(),
+            kept_instances: Vec::new(),
             levels: Vec::new(),
+            loosened: false,
+            edits: false,
             serial: 1,
             steps: 0,
         }
@@ -250,6 +261,11 @@ impl Database {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.tokens.is_empty()
+    }
+
+    /// How many timelines there are.
+    pub(crate) fn lanes(&self) -> usize {
+        self.lanes.len()
     }
 
     /// The first token of a timeline.

@@ -419,6 +419,23 @@ impl<O: Clone> Store<O> {
         !self.unfinished
     }
 
+    /// The constraints of a variable, the last one first.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn constraints_of(&self, variable: Variable) -> impl Iterator<Item = Constraint> + '_ {
+        let node = self.nodes.get(variable).expect("the variable is there");
+        let after = |link: u32| (link != NONE).then_some(link);
+        let links = std::iter::successors(after(node.first), move |&link| {
+            after(self.links.all[link as usize].next)
+        });
+        links.filter_map(|link| {
+            let constraint = self.links.all[link as usize].constraint;
+            self.edges.id_at(constraint as usize)
+        })
+    }
+
     /// Whether a constraint is there.
     pub fn has_constraint(&self, constraint: Constraint) -> bool {
         self.edges.get(constraint).is_some()

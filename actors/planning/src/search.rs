@@ -139,13 +139,19 @@ pub trait Strategy {
     ///
     /// # Errors
     ///
-    /// If it cannot be: the database is as before.
+    /// If it cannot be: what was done of it is left, and undone with the decision before it.
     fn decide(
         &mut self,
         database: &mut Database,
         flaw: Flaw,
         decision: Decision,
     ) -> Result<(), Conflict>;
+
+    /// Whether a flaw that nothing puts right was asked to see whether the decision for the flaw
+    /// before it is one: a guard, and no choice that is taken back.
+    fn is_guard(&self, _database: &Database, _before: Flaw, _failed: Flaw) -> bool {
+        false
+    }
 
     /// The last decisions were undone: what the strategy keeps of the database is to be so, too.
     fn undone(&mut self, _database: &Database) {}
@@ -181,6 +187,9 @@ pub struct Counters {
     pub decisions: u64,
     /// Decisions that were taken back, since what followed was impossible.
     pub backtracks: u64,
+    /// Alternatives whose leading condition did not hold: they are guards, and nothing was taken
+    /// back.
+    pub guards: u64,
     /// Decisions that the database refused.
     pub refusals: u64,
 }

@@ -222,7 +222,10 @@ pub struct Network<O> {
     halves: Vec<Inequality>,
     scratch: Scratch,
     changed: Changed,
-    trail: Vec<Change<O>>,
+    trail: Vec<Change>,
+    /// What changes on the trail took away, the last one last.
+    retracted: Vec<Retracted<O>>,
+    removed_points: Vec<Node>,
     /// How long the trail was at each push.
     levels: Vec<usize>,
     work: Work,
@@ -255,6 +258,8 @@ impl<O: Clone> Network<O> {
             scratch: Scratch::default(),
             changed: Changed::default(),
             trail: Vec::new(),
+            retracted: Vec::new(),
+            removed_points: Vec::new(),
             levels: Vec::new(),
             work: Work::default(),
         }
@@ -298,11 +303,46 @@ impl<O: Clone> Network<O> {
     /// If it is the origin, or is not there.
     pub fn remove_point(&mut self, point: Point) {
         assert!(point != self.origin, "the origin stays");
-        for constraint in self.constraints_of(point) {
-            self.retract(constraint);
+        let start = self.trail.len();
+        let place = point.index() as u32;
+        for side in [EARLIEST, LATEST] {
+            loop {
+                let half = self.node(place).first[side];
+                if half == NONE {
+                    break;
+                }
+                let constraint = self.edges.id_at(half as usize / 2);
+                self.detach(constraint.expect("a point's constraints are there"), place);
+            }
         }
+        self.settle(start);
         let node = self.nodes.remove(point).expect("the point is there");
-        self.note(Change::PointRemoved(point, Box::new(node)));
+        if self.depth() > 0 {
+            self.removed_points.push(node);
+            self.note(Change::PointRemoved(point));
+        }
+    }
+
+    /// Whether all constraints of a point are with the origin.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn is_apart(&self, point: Point) -> bool {
+        let node = self.nodes.get(point).expect("the point is there");
+        let (me, origin) = (point.index() as u32, self.origin.index() as u32);
+        [EARLIEST, LATEST].into_iter().all(|side| {
+            let mut half = node.first[side];
+            while half != NONE {
+                let inequality = &self.halves[half as usize];
+                let other = inequality.from ^ inequality.to ^ me;
+                if other != origin {
+                    return false;
+                }
+                half = inequality.next[side];
+            }
+            true
+        })
     }
 
     /// The earliest and the latest time of a point.
@@ -436,28 +476,39 @@ impl<O: Clone> Network<O> {
             "the constraint is there"
         );
         let start = self.trail.len();
+        self.detach(constraint, NONE);
+        self.settle(start);
+    }
+
+    /// Takes a constraint away; a point that goes with it need not be less tight than it was.
+    fn detach(&mut self, constraint: Constraint, going: u32) {
+        let kept = self.depth() > 0;
         for half in [
             2 * constraint.index() as u32,
             2 * constraint.index() as u32 + 1,
         ] {
             if self.halves[half as usize].is_linked() {
                 self.unlink(half);
-                self.trail.push(Change::Unlinked(half));
+                if kept {
+                    self.trail.push(Change::Unlinked(half));
+                }
                 for side in [EARLIEST, LATEST] {
-                    self.start_anew(side, half);
+                    if self.halves[half as usize].target(side) != going {
+                        self.start_anew(side, half);
+                    }
                 }
             }
         }
         let place = constraint.index();
         let edge = self.edges.remove(constraint);
-        let retracted = Retracted {
-            edge: edge.expect("the constraint is there"),
-            halves: [self.halves[2 * place], self.halves[2 * place + 1]],
-            owner: self.owners[place].clone(),
-        };
-        self.trail
-            .push(Change::Removed(constraint, Box::new(retracted)));
-        self.settle(start);
+        if kept {
+            self.retracted.push(Retracted {
+                edge: edge.expect("the constraint is there"),
+                halves: [self.halves[2 * place], self.halves[2 * place + 1]],
+                owner: self.owners[place].clone(),
+            });
+            self.trail.push(Change::Removed(constraint));
+        }
     }
 
     /// How much was looked at since the network was made.

@@ -12,7 +12,10 @@ use crate::plan;
 use failure::{Failure, Why};
 
 /// The most steps of a search for one rule of one token.
-const MAX_STEPS: u32 = 1 << 20;
+const MAX_STEPS: u32 = 1 << 18;
+
+/// The most steps for all rules of all tokens.
+const ALL_STEPS: u32 = 1 << 24;
 
 pub(super) fn check(scene: &Scene<'_>, report: &mut Report) {
     let mut rules_by_timeline = vec![Vec::new(); scene.model.timelines.len()];
@@ -21,11 +24,18 @@ pub(super) fn check(scene: &Scene<'_>, report: &mut Report) {
             rules_by_timeline[timeline].push(rule);
         }
     }
+    let mut left = ALL_STEPS;
     for (index, seen) in scene.tokens.iter().enumerate() {
         let mut used = vec![false; seen.token.effects.len()];
         for &rule in &rules_by_timeline[seen.timeline] {
             if rule.master.predicate == seen.predicate {
-                check_rule(scene, rule, index, &mut used, report);
+                let steps = check_rule(scene, rule, index, &mut used, report);
+                left = left.saturating_sub(steps);
+            }
+            if left == 0 {
+                let message = format!("from token {} on, rules were not checked", seen.token);
+                report.add(Kind::Undecided, message).tokens([seen.token.id]);
+                return;
             }
         }
         for (effect, used) in seen.token.effects.iter().zip(used) {
@@ -41,14 +51,15 @@ pub(super) fn check(scene: &Scene<'_>, report: &mut Report) {
     }
 }
 
-/// Checks a rule of a token; `used` says which of its listed effects rules have accounted for.
+/// Checks a rule of a token; `used` says which of its listed effects rules have accounted for. How
+/// many steps it took.
 fn check_rule<'a>(
     scene: &'a Scene<'a>,
     rule: &'a Rule,
     master: usize,
     used: &mut [bool],
     report: &mut Report,
-) {
+) -> u32 {
     let mut search = Search {
         scene,
         rule,
@@ -58,11 +69,11 @@ fn check_rule<'a>(
         best: None,
     };
     let Some(state) = search.guard() else {
-        return;
+        return 1;
     };
     let bodies = Bodies::One(&rule.body);
     if search.step(&state, Some(&Rest { bodies, next: None })) {
-        return;
+        return search.steps + 1;
     }
     let seen = &scene.tokens[master];
     // That the rule does not hold is told once, and not once more for each of its effects.
@@ -73,25 +84,20 @@ fn check_rule<'a>(
             .map(|of| plan::place(scene.model, of.position));
         *used |= places.any(|place| place == listed.place);
     }
-    let place = scene.place(rule.position);
-    if search.steps >= MAX_STEPS {
-        let message = format!("token {}: there are too many ways to try", seen.token);
-        report
-            .add(Kind::Undecided, message)
-            .tokens([seen.token.id])
-            .at(place);
-        return;
-    }
-    match search.best.take() {
+    let aborted = search.steps >= MAX_STEPS;
+    match search.best.take().filter(|_| !aborted) {
         Some(failure) => failure.tell(scene, rule, seen, report),
         None => {
-            let message = format!("token {}: none of the alternatives is there", seen.token);
-            report
-                .add(Kind::Relation, message)
-                .tokens([seen.token.id])
-                .at(place);
+            let (kind, problem) = match aborted {
+                true => (Kind::Undecided, "there are too many ways to try"),
+                false => (Kind::Relation, "none of the alternatives is there"),
+            };
+            let message = format!("token {}: {problem}", seen.token);
+            let added = report.add(kind, message).tokens([seen.token.id]);
+            added.at(scene.place(rule.position));
         }
     }
+    search.steps + 1
 }
 
 /// The search for what a rule speaks of.

@@ -552,3 +552,41 @@ fn what_a_guard_computes_is_known_to_it() {
     };
     assert_eq!(found(near), []);
 }
+
+#[test]
+fn what_takes_too_many_ways_to_try_is_not_decided() {
+    let mut model = rover();
+    model.timelines[CAMERA].kind = TimelineKind::Free;
+    let problem = day();
+    let mut plan = plan(&model, &problem);
+    // The take of the base wants three others, the last of which is nowhere.
+    let take = |argument| pattern(CAMERA, TAKE, &[argument]);
+    let starts = |label, target| relation(60, RelationKind::StartsBefore, target, label);
+    let any = || take(Argument::Any);
+    let base = || take(Argument::Value(BASE));
+    let body = vec![starts(1, any()), starts(2, any()), starts(3, base())];
+    model.rules.push(rule(60, base(), &[], body));
+    let mut token = plan.tokens[3].clone();
+    token.effects.clear();
+    plan.tokens.extend((10..300).map(|id| PlanToken {
+        id,
+        ..token.clone()
+    }));
+    plan.tokens[3].arguments[0].1 = PlanValue::Symbol("base".into());
+    let violations = check(&model, &problem, &plan);
+    let undecided = violations.iter().find(|one| one.kind == Kind::Undecided);
+    let told = "models/rover.ddl:60:1: token 4 Take(base) on k9.Camera [10 12]: there are too many \
+                ways to try";
+    assert_eq!(undecided.map(ToString::to_string).as_deref(), Some(told));
+}
+
+#[test]
+fn masters_may_go_in_circles() {
+    let circle: Change = |_, _, plan| {
+        for (token, master) in [(0, 2), (1, 3), (2, 1), (3, 3)] {
+            let place = String::new();
+            plan.tokens[token].origin = Origin::Rule { place, master };
+        }
+    };
+    assert_eq!(found(circle), []);
+}

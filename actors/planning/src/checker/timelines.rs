@@ -1,6 +1,6 @@
 //! What lies on timelines, and whether it lies in the horizon.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Kind, Report, Scene, Seen};
 use crate::model::{TimelineId, TimelineKind};
@@ -24,57 +24,74 @@ pub(super) fn check(scene: &Scene<'_>, report: &mut Report) {
 /// That tokens lie in the horizon, and so does what they are anchored to.
 fn horizon(scene: &Scene<'_>, report: &mut Report) {
     let horizon = scene.problem.horizon;
-    let is_outside = |seen: &Seen<'_>| seen.token.start < 0 || seen.token.end > horizon;
-    let by_id: BTreeMap<TokenId, &Seen<'_>> = scene
+    let is_outside: Vec<bool> = scene
         .tokens
         .iter()
-        .map(|seen| (seen.token.id, seen))
+        .map(|seen| seen.token.start < 0 || seen.token.end > horizon)
         .collect();
-    for seen in &scene.tokens {
+    let above = outside_above(scene, &is_outside);
+    for (index, seen) in scene.tokens.iter().enumerate() {
         let token = seen.token;
-        if is_outside(seen) {
+        if is_outside[index] {
             let message = format!("token {token} is not in the horizon, 0 to {horizon}");
             let added = report.add(Kind::Horizon, message).tokens([token.id]);
             added.times(token.start, token.end);
-            continue;
-        }
-        // The chain of masters may be a circle, which is no longer than there are tokens.
-        let mut master = token;
-        for _ in 0..scene.tokens.len() {
-            let Origin::Rule { master: id, .. } = master.origin else {
-                break;
-            };
-            let Some(above) = by_id.get(&id) else { break };
-            if is_outside(above) {
-                let message = format!(
-                    "token {token} is anchored to token {}, which is not in the horizon, 0 to \
-                     {horizon}",
-                    above.token
-                );
-                report
-                    .add(Kind::Horizon, message)
-                    .tokens([token.id, above.token.id]);
-                break;
-            }
-            if above.token.id == token.id {
-                break;
-            }
-            master = above.token;
+        } else if let Some(above) = above[index] {
+            let above = scene.tokens[above].token;
+            let message = format!(
+                "token {token} is anchored to token {above}, which is not in the horizon, 0 to \
+                 {horizon}"
+            );
+            report
+                .add(Kind::Horizon, message)
+                .tokens([token.id, above.id]);
         }
     }
 }
 
-/// That masters are there.
+/// By token: the nearest outside the horizon of its master, its master's master, and so on.
+fn outside_above(scene: &Scene<'_>, is_outside: &[bool]) -> Vec<Option<usize>> {
+    let tokens = scene.tokens.iter().enumerate();
+    let by_id: BTreeMap<TokenId, usize> =
+        tokens.map(|(index, seen)| (seen.token.id, index)).collect();
+    let master = |index: usize| match scene.tokens[index].token.origin {
+        Origin::Rule { master, .. } => by_id.get(&master).copied(),
+        _ => None,
+    };
+    let mut above = vec![None; scene.tokens.len()];
+    let mut known = vec![false; scene.tokens.len()];
+    for index in 0..scene.tokens.len() {
+        // Up to what is known, which in a circle of masters is where it was entered.
+        let mut path = Vec::new();
+        let mut next = Some(index);
+        while let Some(at) = next.filter(|&at| !known[at]) {
+            known[at] = true;
+            path.push(at);
+            next = master(at);
+        }
+        for at in path.into_iter().rev() {
+            above[at] = master(at).and_then(|master| match is_outside[master] {
+                true => Some(master),
+                false => above[master],
+            });
+        }
+    }
+    above
+}
+
+/// That masters and goals are there.
 fn origins(scene: &Scene<'_>, report: &mut Report) {
-    let ids: std::collections::BTreeSet<TokenId> =
-        scene.plan.tokens.iter().map(|token| token.id).collect();
-    for token in &scene.plan.tokens {
+    let tokens = &scene.plan.tokens;
+    let ids: BTreeSet<TokenId> = tokens.iter().map(|token| token.id).collect();
+    let goals = scene.problem.goals.iter();
+    let goals: BTreeSet<&str> = goals.map(|goal| goal.name.as_str()).collect();
+    for token in tokens {
         match &token.origin {
             Origin::Rule { master, .. } if !ids.contains(master) => {
                 let message = format!("the master of token {token} is {master}, which is none");
                 report.add(Kind::Origin, message).tokens([token.id]);
             }
-            Origin::Goal(goal) if !scene.problem.goals.iter().any(|one| one.name == *goal) => {
+            Origin::Goal(goal) if !goals.contains(goal.as_str()) => {
                 let message = format!("token {token} is there for {goal:?}, which is no goal");
                 report.add(Kind::Origin, message).tokens([token.id]);
             }

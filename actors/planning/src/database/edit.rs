@@ -42,8 +42,7 @@ impl Database {
     }
 
     fn insert_free(&mut self, wanted: &Wanted<'_>) -> Result<TokenId, Conflict> {
-        let model = self.model.clone();
-        let predicate = &model.predicates[wanted.predicate];
+        let predicate = &self.model.predicates[wanted.predicate];
         assert_eq!(
             wanted.parameters.len(),
             predicate.parameters.len(),
@@ -72,6 +71,7 @@ impl Database {
             values: SmallVec::new(),
             instances: SmallVec::new(),
             supported: SmallVec::new(),
+            merged: SmallVec::new(),
             merged_times: SmallVec::new(),
             merged_values: SmallVec::new(),
             kept: self.serial,
@@ -81,7 +81,7 @@ impl Database {
         let owner = Owner::Token(token);
         let least = match wanted
             .timeline
-            .map(|timeline| model.timelines[timeline].kind)
+            .map(|timeline| self.model.timelines[timeline].kind)
         {
             Some(TimelineKind::State | TimelineKind::Unary) => 1,
             Some(TimelineKind::Free) | None => 0,
@@ -90,18 +90,18 @@ impl Database {
         if let Some(posted) = self.between(start, finish, lasts, owner)? {
             self.change(token).times.push(posted);
         }
-        for (parameter, &known) in predicate.parameters.iter().zip(wanted.parameters) {
+        for (place, &known) in wanted.parameters.iter().enumerate() {
+            let of = self.model.predicates[wanted.predicate].parameters[place].of;
             let operand = match known {
                 Some(operand) => {
-                    self.keep_to_type(token, parameter.of, operand)?;
+                    self.keep_to_type(token, of, operand)?;
                     operand
                 }
-                None => self.new_variable(parameter.of),
+                None => self.new_variable(of),
             };
             self.hold(operand);
             self.change(token).parameters.push(operand);
         }
-        self.settle_values()?;
         Ok(token)
     }
 
@@ -116,7 +116,8 @@ impl Database {
                 if self.token_of_point.len() <= place {
                     self.token_of_point.resize(place + 1, None);
                 }
-                self.token_of_point[place] = Some(token);
+                let old = self.token_of_point[place].replace(token);
+                self.note(Change::Pointed(place, old));
             }
         }
     }
@@ -129,16 +130,16 @@ impl Database {
         operand: Operand,
     ) -> Result<(), Conflict> {
         let owner = Owner::Token(token);
-        let domain = self.domains[of].clone();
+        let domain = &self.domains[of];
         match operand {
             Operand::Value(value) if domain.contains(value) => Ok(()),
             Operand::Value(_) => Err(Conflict::Mismatch { owner }),
             Operand::Variable(variable) => {
                 let now = self.store.domain(variable);
-                if now.intersect(&domain) == *now {
+                if now == domain || now.intersect(domain) == *now {
                     return Ok(());
                 }
-                let posted = self.store.restrict(variable, domain, owner)?;
+                let posted = self.store.restrict(variable, domain.clone(), owner)?;
                 self.change(token).values.push(posted);
                 Ok(())
             }
@@ -160,14 +161,13 @@ impl Database {
 
     pub(super) fn place(&mut self, token: TokenId, slot: Slot) -> Result<(), Conflict> {
         assert_eq!(self.at(token).status, Status::Free, "{token:?} is free");
-        let model = self.model.clone();
-        let timeline = &model.timelines[slot.timeline];
-        let owner = Owner::Token(token);
+        let timeline = &self.model.timelines[slot.timeline];
+        let (kind, owner) = (timeline.kind, Owner::Token(token));
         if !timeline.predicates.contains(&self.at(token).predicate) {
             return Err(Conflict::Mismatch { owner });
         }
         let lane = self.lanes[slot.timeline];
-        let before = match timeline.kind {
+        let before = match kind {
             // Nothing orders the tokens of such a timeline: the last to come is the last.
             TimelineKind::Free => lane.last,
             TimelineKind::State | TimelineKind::Unary => slot.after,
@@ -183,6 +183,12 @@ impl Database {
             Some(before) => self.at(before).after,
             None => lane.first,
         };
+        // A token that was said to be on such a timeline lasts a tick at least already.
+        let said = self
+            .at(token)
+            .timeline
+            .map(|at| self.model.timelines[at].kind);
+        let lasts_a_tick = matches!(said, Some(TimelineKind::State | TimelineKind::Unary));
         let at = self.change(token);
         at.status = Status::Active;
         at.timeline = Some(slot.timeline);
@@ -196,19 +202,20 @@ impl Database {
             None => self.change_lane(slot.timeline).last = Some(token),
         }
         self.change_lane(slot.timeline).tokens += 1;
-        if timeline.kind != TimelineKind::Free {
-            let lasts = Span::at_least(1);
-            let (start, finish) = (self.at(token).start, self.at(token).finish);
-            if let Some(posted) = self.between(start, finish, lasts, owner)? {
-                self.change(token).times.push(posted);
+        if kind != TimelineKind::Free {
+            if !lasts_a_tick {
+                let lasts = Span::at_least(1);
+                let (start, finish) = (self.at(token).start, self.at(token).finish);
+                if let Some(posted) = self.between(start, finish, lasts, owner)? {
+                    self.change(token).times.push(posted);
+                }
             }
             self.follow_on(before, token)?;
             if let Some(after) = after {
                 self.follow_on(Some(token), after)?;
             }
         }
-        self.make_instances(token)?;
-        self.settle_times()
+        self.make_instances(token)
     }
 
     /// Posts that a token starts when the one before it has ended, in place of what was posted
@@ -216,7 +223,7 @@ impl Database {
     fn follow_on(&mut self, first: Option<TokenId>, second: TokenId) -> Result<(), Conflict> {
         if let Some(order) = self.at(second).order {
             self.change(second).order = None;
-            self.network.retract(order);
+            self.retract_time(order);
         }
         let Some(first) = first else {
             return Ok(());
@@ -237,20 +244,18 @@ impl Database {
     /// If it is not active.
     pub fn deactivate(&mut self, token: TokenId) {
         assert_eq!(self.at(token).status, Status::Active, "{token:?} is active");
+        self.take(|database| database.take_off(token));
+    }
+
+    fn take_off(&mut self, token: TokenId) {
         for instance in self.at(token).instances.clone() {
             self.remove_instance(instance);
         }
         for (instance, relation) in self.at(token).supported.clone() {
             self.reopen(instance, relation);
         }
-        let merged: SmallVec<[TokenId; 2]> = self
-            .tokens
-            .iter()
-            .filter(|(_, at)| at.status == Status::Merged(token))
-            .map(|(id, _)| id)
-            .collect();
-        for other in merged {
-            self.unmerge(other);
+        for other in self.at(token).merged.clone() {
+            self.part(other, token);
         }
         self.unlink(token);
         let at = self.change(token);
@@ -259,7 +264,6 @@ impl Database {
         at.supported.clear();
         at.supports = 0;
         self.take_orders_back(token);
-        self.loosen_mirrors();
     }
 
     fn take_orders_back(&mut self, token: TokenId) {
@@ -285,7 +289,7 @@ impl Database {
         self.change_lane(timeline).tokens -= 1;
         if let Some(order) = self.at(token).order {
             self.change(token).order = None;
-            self.network.retract(order);
+            self.retract_time(order);
         }
         if let Some(after) = after
             && self.model.timelines[timeline].kind != TimelineKind::Free
@@ -316,7 +320,9 @@ impl Database {
                 return Err(Conflict::Mismatch { owner });
             }
             database.change(token).status = Status::Merged(into);
-            database.change(into).supports += 1;
+            let at = database.change(into);
+            at.supports += 1;
+            at.merged.push(token);
             let pairs = one.parameters.iter().zip(&other.parameters);
             for (&mine, &its) in pairs.filter(|(mine, its)| mine != its) {
                 if let (Operand::Value(_), Operand::Value(_)) = (mine, its) {
@@ -330,8 +336,7 @@ impl Database {
                 let posted = database.between(mine, its, Span::exactly(0), owner)?;
                 database.change(token).merged_times.extend(posted);
             }
-            database.settle_values()?;
-            database.settle_times()
+            Ok(())
         })
     }
 
@@ -344,19 +349,25 @@ impl Database {
         let Status::Merged(into) = self.at(token).status else {
             panic!("{token:?} is merged");
         };
+        self.take(|database| database.part(token, into));
+    }
+
+    /// A token that is merged into another is free.
+    pub(super) fn part(&mut self, token: TokenId, into: TokenId) {
         let at = self.change(token);
         at.status = Status::Free;
         let values = std::mem::take(&mut at.merged_values);
         let times = std::mem::take(&mut at.merged_times);
         for posted in values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
         for posted in times {
             self.retract_time(posted);
         }
-        self.change(into).supports -= 1;
+        let at = self.change(into);
+        at.supports -= 1;
+        at.merged.retain(|at| *at != token);
         self.take_orders_back(token);
-        self.loosen_mirrors();
     }
 
     /// The plan does without a free token.
@@ -390,9 +401,13 @@ impl Database {
     ///
     /// If it is not there.
     pub fn remove(&mut self, token: TokenId) {
+        self.take(|database| database.delete(token));
+    }
+
+    pub(super) fn delete(&mut self, token: TokenId) {
         match self.at(token).status {
-            Status::Active => self.deactivate(token),
-            Status::Merged(_) => self.unmerge(token),
+            Status::Active => self.take_off(token),
+            Status::Merged(into) => self.part(token, into),
             Status::Free | Status::Rejected => {}
         }
         self.remove_mirrors(token);
@@ -405,8 +420,9 @@ impl Database {
             self.retract_time(posted);
         }
         for posted in values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
+        self.loosened = true;
         for operand in parameters {
             self.release(operand);
         }
@@ -415,8 +431,11 @@ impl Database {
                 self.network.remove_point(point);
             }
         }
-        if let Some(removed) = self.tokens.remove(token) {
-            self.note(Change::TokenRemoved(token, Box::new(removed)));
+        if let Some(removed) = self.tokens.remove(token)
+            && self.depth() > 0
+        {
+            self.kept_tokens.push(removed);
+            self.note(Change::TokenRemoved(token));
         }
     }
 
@@ -444,8 +463,7 @@ impl Database {
                 let domain = Domain::exactly(value);
                 let posted = database.store.restrict(variable, domain, owner)?;
                 database.change(token).values.push(posted);
-                database.settle_values()?;
-                database.settle_times()
+                Ok(())
             }),
         }
     }

@@ -1,89 +1,118 @@
 //! The past is deleted: section 4 of the IDEA paper found that cycles grow without it.
 
-use super::{Database, Owner, Status, Time, TokenId};
+use smallvec::SmallVec;
+
+use super::{Database, Guard, InstanceId, Owner, Status, Time, TokenId};
 use crate::Ticks;
-use crate::model::End;
-use crate::parameters::{Domain, Operand};
-use crate::temporal::Point;
+use crate::model::{End, Target};
+use crate::parameters::{Domain, Kind, Operand, Variable};
+use crate::temporal::{Point, Span};
 
 impl Database {
     /// Deletes what ended before a tick, or at it, keeping on each timeline the token that lasts
     /// then, or starts then, and the one before it. What later tokens know from it they know
-    /// still: bounds of times and values that rested on it stay, owned by [`Owner::Past`].
+    /// still: bounds of times and values that rested on it stay, owned by [`Owner::Past`], and
+    /// levels of resources from that tick on are as before.
     ///
-    /// Deletes only tokens whose times are known; gives how many it deleted.
+    /// Deletes only tokens whose times are known, and whose effects are; gives how many it
+    /// deleted.
     ///
     /// # Panics
     ///
     /// If a push is not undone or committed.
     pub fn forget(&mut self, before: Ticks) -> usize {
         assert_eq!(self.depth(), 0, "no push is left");
+        self.refresh();
         let mut forgotten = 0;
-        for timeline in 0..self.lanes.len() {
-            while let Some(first) = self.lanes[timeline].first {
-                if !self.is_past(first, before) {
-                    break;
+        self.take(|database| {
+            for timeline in 0..database.lanes.len() {
+                while let Some(first) = database.next_past(timeline, before) {
+                    database.delete_past(first, before);
+                    forgotten += 1;
                 }
-                // The one before the token that lasts now stays.
-                let Some(second) = self.at(first).after else {
-                    break;
-                };
-                let second_is_past =
-                    self.is_past(second, before) && self.at(second).after.is_some();
-                if !second_is_past {
-                    break;
-                }
-                self.delete_past(first);
-                forgotten += 1;
             }
-        }
+        });
         forgotten
+    }
+
+    /// The first token of a timeline, if it and the one after it are past.
+    fn next_past(&self, timeline: usize, before: Ticks) -> Option<TokenId> {
+        let first = self.lanes[timeline].first?;
+        // The one before the token that lasts now stays, and so does the last one.
+        let second = self.at(first).after?;
+        self.at(second).after?;
+        let past = self.is_past(first, before) && self.is_past(second, before);
+        (past && self.may_go(first, before)).then_some(first)
     }
 
     /// Whether a token ended at a tick or before, for certain, and when it did.
     fn is_past(&self, token: TokenId, tick: Ticks) -> bool {
-        let (start, finish) = (self.start(token), self.finish(token));
-        finish.max <= tick && finish.min == finish.max && start.min == start.max
+        let finish = self.finish(token);
+        finish.max <= tick && finish.min == finish.max && {
+            let start = self.start(token);
+            start.min == start.max
+        }
+    }
+
+    /// Whether nothing of the past of a token is still to come: what it does to resources is over,
+    /// and no relation that waits speaks of it.
+    fn may_go(&self, token: TokenId, before: Ticks) -> bool {
+        let at = self.at(token);
+        let over = |&instance: &InstanceId| {
+            let effects = &self.instance_at(instance).effects;
+            effects
+                .iter()
+                .all(|&effected| self.is_over(effected, before))
+        };
+        let speaks = |&(instance, relation): &(InstanceId, u32)| {
+            let relations = &self.flats[self.instance_at(instance).rule].relations;
+            let Target::New(_, mine) = relations[relation as usize].target else {
+                return false;
+            };
+            let of_it = |open: &super::Open| {
+                let super::Step::Relation(at) = open.step else {
+                    return open.instance == instance;
+                };
+                let said = &relations[at as usize];
+                let target = matches!(said.target, Target::Label(label) if label == mine);
+                open.instance == instance && (said.anchor == mine || target)
+            };
+            let nested = relations.iter().any(|said| {
+                said.anchor == mine || matches!(said.target, Target::Label(label) if label == mine)
+            });
+            nested && self.open.iter().any(of_it)
+        };
+        at.instances.iter().all(over) && !at.supported.iter().any(speaks)
     }
 
     /// Deletes a token of the past: later ones keep what rested on it.
-    fn delete_past(&mut self, token: TokenId) {
-        let times = [End::Start, End::Finish].map(|end| self.time(token, end));
-        for time in times {
-            if let Time::Point(point) = time {
-                self.freeze_neighbours(point);
-            }
+    fn delete_past(&mut self, token: TokenId, before: Ticks) {
+        for other in self.at(token).merged.clone() {
+            self.freeze_times(other);
+            self.part(other, token);
+            self.delete(other);
         }
-        let at = self.at(token).clone();
-        for &instance in &at.instances {
-            self.freeze_values(instance);
-            self.forget_instance(instance);
+        self.freeze_times(token);
+        let going = self.freeze_values(token);
+        self.store.remove_all(&going);
+        for instance in std::mem::take(&mut self.change(token).instances) {
+            self.forget_instance(instance, before);
         }
-        for &(instance, _) in &at.supported {
-            // Who asked for it has it: the label is of a token that was.
-            let step = self
-                .instance_at(instance)
-                .labels
-                .iter()
-                .position(|&at| at == Some(token));
-            debug_assert!(step.is_some(), "the label was given to the token");
-        }
-        self.change(token).instances.clear();
+        // Who asked for it has it: the label is of a token that was.
         self.change(token).supported.clear();
-        if let Some(order) = self.at(token).order {
-            self.change(token).order = None;
-            self.network.retract(order);
+        if let Some(order) = self.change(token).order.take() {
+            self.retract_time(order);
         }
         // The next one is the first: what held it after this one is in its own bounds.
-        let (Some(timeline), after) = (at.timeline, at.after) else {
+        let (Some(timeline), after) = (self.at(token).timeline, self.at(token).after) else {
             return;
         };
         if let Some(after) = after {
-            if let Some(order) = self.at(after).order {
-                self.change(after).order = None;
-                self.network.retract(order);
+            let next = self.change(after);
+            next.before = None;
+            if let Some(order) = next.order.take() {
+                self.retract_time(order);
             }
-            self.change(after).before = None;
         }
         let lane = self.change_lane(timeline);
         lane.first = after;
@@ -92,10 +121,21 @@ impl Database {
         now.status = Status::Rejected;
         now.before = None;
         now.after = None;
-        self.remove(token);
+        for operand in std::mem::take(&mut now.parameters) {
+            self.drop_holder(operand);
+        }
+        self.delete(token);
     }
 
-    /// Points that are bound to one whose time is known are bound to that time instead.
+    /// Points that are bound to a token whose times are known are bound to these times instead.
+    fn freeze_times(&mut self, token: TokenId) {
+        for end in [End::Start, End::Finish] {
+            if let Time::Point(point) = self.time(token, end) {
+                self.freeze_neighbours(point);
+            }
+        }
+    }
+
     fn freeze_neighbours(&mut self, point: Point) {
         let tick = self.network.bounds(point).min;
         let origin = self.network.origin();
@@ -103,51 +143,131 @@ impl Database {
             let Some((from, to, span)) = self.network.constraint(constraint) else {
                 continue;
             };
-            let (other, from, to) = match (from == point, to == point) {
-                (true, false) => (to, Time::At(tick), Time::Point(to)),
-                (false, true) => (from, Time::Point(from), Time::At(tick)),
+            let (other, span) = match (from == point, to == point) {
+                (true, false) => (to, span),
+                (false, true) => (from, span.negated()),
                 _ => continue,
             };
             if other == origin {
                 continue;
             }
-            let kept = self.between(from, to, span, Owner::Past);
+            let later = |bound: Ticks| match bound {
+                Ticks::MIN | Ticks::MAX => bound,
+                bound => bound.saturating_add(tick),
+            };
+            let span = Span::new(later(span.min), later(span.max));
+            // One constraint of a point is of the past, however much of it there was.
+            let past = self.network.constraints_of(other).into_iter();
+            let past = past.filter(|&at| self.network.owner(at) == Some(&Owner::Past));
+            let kept = match past.min() {
+                Some(past) => self.network.tighten(past, span),
+                None => {
+                    let kept = self.network.constrain(origin, other, span, Owner::Past);
+                    kept.map(|_| ())
+                }
+            };
             debug_assert!(kept.is_ok(), "it held before");
         }
     }
 
-    /// Variables that others have too keep the values that rules of the past gave them.
-    fn freeze_values(&mut self, instance: super::InstanceId) {
-        let at = self.instance_at(instance).clone();
-        for operand in at.variables.iter().copied().flatten() {
-            let Operand::Variable(variable) = operand else {
+    /// Variables that others have too keep the values that the past gave them; gives those that
+    /// nobody else has.
+    fn freeze_values(&mut self, token: TokenId) -> SmallVec<[Variable; 16]> {
+        let mut mine: SmallVec<[Variable; 16]> = SmallVec::new();
+        let at = self.at(token);
+        let variables = at.instances.iter().flat_map(|&instance| {
+            let at = self.instance_at(instance);
+            at.variables.iter().copied().flatten()
+        });
+        for operand in at.parameters.iter().copied().chain(variables) {
+            if let Operand::Variable(variable) = operand {
+                mine.push(variable);
+            }
+        }
+        mine.sort_unstable();
+        let mut kept: SmallVec<[Variable; 8]> = SmallVec::new();
+        let mut going: SmallVec<[Variable; 16]> = SmallVec::new();
+        for run in mine.chunk_by(|one, other| one == other) {
+            let variable = run[0];
+            if self.holders[variable.index()] > run.len() as u32 {
+                kept.push(variable);
                 continue;
-            };
-            let mine = at.variables.iter().flatten().filter(|&&at| at == operand);
-            let mine = mine.count() as u32;
-            let master = self.at(at.master).parameters.iter();
-            let masters = master.filter(|&&at| at == operand).count() as u32;
-            if self.holders[variable.index()] > mine + masters {
-                let domain: Domain = self.store.domain(variable).clone();
-                let kept = self.store.restrict(variable, domain, Owner::Past);
-                debug_assert!(kept.is_ok(), "these are its values");
+            }
+            going.push(variable);
+            // What it is equal to is somebody else's.
+            for constraint in self.store.constraints_of(variable) {
+                if matches!(self.store.kind(constraint), Some(Kind::Equal)) {
+                    let others = self.store.operands(constraint);
+                    kept.extend(others.filter_map(|other| match other {
+                        Operand::Variable(other) if mine.binary_search(&other).is_err() => {
+                            Some(other)
+                        }
+                        _ => None,
+                    }));
+                }
+            }
+        }
+        for variable in kept {
+            self.keep_values(variable);
+        }
+        going
+    }
+
+    /// A variable has no values but those that it has now, whoever goes.
+    fn keep_values(&mut self, variable: Variable) {
+        let domain: Domain = self.store.domain(variable).clone();
+        let is_past = |&at: &_| self.store.owner(at) == Some(&Owner::Past);
+        let past = self.store.constraints_of(variable).find(is_past);
+        if let Some(past) = past {
+            if matches!(self.store.kind(past), Some(Kind::In(kept)) if *kept == domain) {
+                return;
+            }
+            self.store.retract(past);
+        }
+        let kept = self.store.restrict(variable, domain, Owner::Past);
+        debug_assert!(kept.is_ok(), "these are its values");
+    }
+
+    /// An instance of the past goes; tokens that it asked for stay.
+    fn forget_instance(&mut self, instance: InstanceId, before: Ticks) {
+        for label in 1..self.instance_at(instance).labels.len() {
+            let token = self.instance_at(instance).labels[label];
+            if let Some(token) = token
+                && let Some(at) = self.tokens.get(token)
+                && let Some(place) = at.supported.iter().position(|at| at.0 == instance)
+            {
+                let at = self.change(token);
+                at.supported.remove(place);
+                at.supports -= 1;
+            }
+        }
+        let Some(at) = self.instances.remove(instance) else {
+            return;
+        };
+        self.steps += 1;
+        for effected in at.effects {
+            self.forget_effect(effected, before);
+        }
+        for variable in at.watched {
+            self.watchers[variable.index()].retain(|&at| at != instance);
+        }
+        // What it says of times and values of others stays with them.
+        for operand in at.variables.into_iter().flatten() {
+            self.drop_holder(operand);
+        }
+        if at.guard == Guard::Holds {
+            for place in (0..self.open.len()).rev() {
+                if self.open[place].instance == instance {
+                    self.open.remove(place);
+                }
             }
         }
     }
 
-    /// An instance of the past goes; tokens that it asked for stay.
-    fn forget_instance(&mut self, instance: super::InstanceId) {
-        let at = self.instance_at(instance).clone();
-        for label in at.labels.iter().skip(1).copied().flatten() {
-            if let Some(token) = self.tokens.get(label)
-                && let Some(place) = token.supported.iter().position(|at| at.0 == instance)
-            {
-                let token = self.change(label);
-                token.supported.remove(place);
-                token.supports -= 1;
-            }
+    /// Counts one less who has a variable, which is gone already if nobody else has it.
+    fn drop_holder(&mut self, operand: Operand) {
+        if let Operand::Variable(variable) = operand {
+            self.holders[variable.index()] -= 1;
         }
-        self.change_instance(instance).labels.truncate(1);
-        self.remove_instance(instance);
     }
 }

@@ -118,8 +118,11 @@ impl Database {
 
     /// The rule holds now: its effects are done to the first resources that will do.
     pub(super) fn apply_effects(&mut self, instance: InstanceId) -> Result<(), Conflict> {
-        let model = self.model.clone();
         let rule = self.instance_at(instance).rule;
+        if self.model.rules[rule].effects.is_empty() {
+            return Ok(());
+        }
+        let model = self.model.clone();
         for (place, effect) in model.rules[rule].effects.iter().enumerate() {
             let Some(&resource) = effect.resources.first() else {
                 continue;
@@ -161,8 +164,43 @@ impl Database {
         levels.earliest.remove(effected.earliest);
     }
 
+    /// The profiles are to follow a token's times.
+    pub(super) fn dirty_if_used(&mut self, token: TokenId) {
+        if !self.levels_by_resource.is_empty() {
+            self.dirty.push(token);
+        }
+    }
+
+    /// Whether what an effect does has been done at a tick, and how much it was is known.
+    pub(super) fn is_over(&self, effected: Effected, tick: Ticks) -> bool {
+        let levels = &self.levels_by_resource[effected.resource];
+        let over = |profile: &Profile<Owner>, id| {
+            let one = profile.get(id);
+            one.is_some_and(|one| {
+                let known = one.change.min == one.change.max || one.end.is_some();
+                known && one.end.unwrap_or(one.start).max <= tick
+            })
+        };
+        over(&levels.flexible, effected.flexible) && over(&levels.earliest, effected.earliest)
+    }
+
+    /// An effect of the past is a part of the level with which the resource begins.
+    pub(super) fn forget_effect(&mut self, effected: Effected, before: Ticks) {
+        let levels = &mut self.levels_by_resource[effected.resource];
+        let ids = [effected.flexible, effected.earliest];
+        for (profile, id) in levels.each().into_iter().zip(ids) {
+            let gone = profile.forget(id, before);
+            debug_assert!(gone, "what it does is over");
+        }
+    }
+
     /// What an effect is to a profile: at all times that it may have, and at the earliest.
-    fn uses_of(&self, instance: InstanceId, effect: u32, resource: ResourceId) -> [Use; 2] {
+    pub(super) fn uses_of(
+        &self,
+        instance: InstanceId,
+        effect: u32,
+        resource: ResourceId,
+    ) -> [Use; 2] {
         let at = self.instance_at(instance);
         let Effect { kind, amount, .. } = self.model.rules[at.rule].effects[effect as usize];
         let amount = self.span(instance, amount, amount, false);

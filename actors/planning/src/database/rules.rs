@@ -179,27 +179,28 @@ impl Database {
         assert!(self.open.contains(&open), "{open:?} is open");
         self.close_open(open);
         self.change_instance(instance).chosen[choice as usize] = Some(alternative);
-        let flats = self.flats.clone();
         let rule = self.instance_at(instance).rule;
-        for &step in &flats[rule].choices[choice as usize][alternative as usize] {
+        let (choice, alternative) = (choice as usize, alternative as usize);
+        for place in 0..self.flats[rule].choices[choice][alternative].len() {
+            let step = self.flats[rule].choices[choice][alternative][place];
             self.push_open(Open { instance, step });
         }
     }
 
     /// Makes the instances of a token that is active now.
     pub(super) fn make_instances(&mut self, token: TokenId) -> Result<(), Conflict> {
-        let model = self.model.clone();
         let at = self.at(token);
-        let Some(timeline) = at.timeline else {
+        let (Some(timeline), predicate) = (at.timeline, at.predicate) else {
             return Ok(());
         };
-        for &rule in model.rules_of(timeline, at.predicate) {
-            let labels = model.rules[rule].labels.max(1);
+        for place in 0..self.model.rules_of(timeline, predicate).len() {
+            let rule = self.model.rules_of(timeline, predicate)[place];
+            let labels = self.model.rules[rule].labels.max(1);
             let mut instance = Instance {
                 rule,
                 master: token,
                 guard: Guard::Waiting,
-                variables: SmallVec::from_elem(None, model.rules[rule].variables.len()),
+                variables: SmallVec::from_elem(None, self.model.rules[rule].variables.len()),
                 labels: SmallVec::from_elem(None, labels),
                 chosen: SmallVec::from_elem(None, self.flats[rule].choices.len()),
                 times: SmallVec::new(),
@@ -221,22 +222,22 @@ impl Database {
 
     /// The variables among the master's arguments stand for its parameters.
     fn adopt_master(&mut self, instance: InstanceId) {
-        let model = self.model.clone();
         let rule = self.instance_at(instance).rule;
         let master = self.instance_at(instance).master;
-        let pattern = &model.rules[rule].master;
-        for (place, argument) in pattern.arguments.iter().enumerate() {
-            if let Argument::Variable(variable) = *argument
+        for place in 0..self.model.rules[rule].master.arguments.len() {
+            let argument = self.model.rules[rule].master.arguments[place];
+            if let Argument::Variable(variable) = argument
                 && self.instance_at(instance).variables[variable].is_none()
             {
                 let operand = self.at(master).parameters[place];
                 self.stand_for(instance, variable, operand);
             }
         }
-        if let (Some(variable), Some(timeline)) = (pattern.object, self.at(master).timeline)
+        let object = self.model.rules[rule].master.object;
+        if let (Some(variable), Some(timeline)) = (object, self.at(master).timeline)
             && self.instance_at(instance).variables[variable].is_none()
         {
-            let object = Operand::Value(model.timelines[timeline].object);
+            let object = Operand::Value(self.model.timelines[timeline].object);
             self.stand_for(instance, variable, object);
         }
     }
@@ -321,7 +322,7 @@ impl Database {
     }
 
     /// What is known of a guard.
-    fn guard(&self, instance: InstanceId) -> Guard {
+    pub(super) fn guard(&self, instance: InstanceId) -> Guard {
         let at = self.instance_at(instance);
         if self.flats[at.rule].unguarded {
             return Guard::Holds;
@@ -391,7 +392,6 @@ impl Database {
 
     /// The rule holds now: what it says of the master is posted, what it asks for is open.
     fn apply(&mut self, instance: InstanceId) -> Result<(), Conflict> {
-        let model = self.model.clone();
         let at = self.instance_at(instance);
         let (rule, master) = (at.rule, at.master);
         let owner = Owner::Rule {
@@ -399,17 +399,17 @@ impl Database {
             rule,
             relation: None,
         };
-        let said = &model.rules[rule];
-        for relationship in &said.relationships {
+        for place in 0..self.model.rules[rule].relationships.len() {
             let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
-            for term in &relationship.operands {
-                operands.push(self.operand(instance, *term)?);
+            for at in 0..self.model.rules[rule].relationships[place].operands.len() {
+                let term = self.model.rules[rule].relationships[place].operands[at];
+                operands.push(self.operand(instance, term)?);
             }
-            let kind = self.kind(relationship);
+            let kind = self.kind(&self.model.rules[rule].relationships[place]);
             let posted = self.store.post(kind, &operands, owner)?;
             self.change_instance(instance).values.push((None, posted));
         }
-        if let Some([min, max]) = said.duration {
+        if let Some([min, max]) = self.model.rules[rule].duration {
             self.watch_bounds(instance, [min, max]);
             let span = self.span(instance, min, max, false);
             let (start, finish) = (self.at(master).start, self.at(master).finish);
@@ -422,11 +422,11 @@ impl Database {
             }
         }
         self.apply_effects(instance)?;
-        let flats = self.flats.clone();
-        for &step in &flats[rule].top {
+        for place in 0..self.flats[rule].top.len() {
+            let step = self.flats[rule].top[place];
             self.push_open(Open { instance, step });
         }
-        self.settle_values()
+        Ok(())
     }
 
     /// What a term stands for; a variable that nothing stands for yet gets one of the store.
@@ -517,8 +517,11 @@ impl Database {
                     let label = match relation.target {
                         Target::New(_, label) | Target::Label(label) => label,
                     };
-                    let (Some(anchor), Some(target)) = (at.label(relation.anchor), at.label(label))
-                    else {
+                    let here = |label| {
+                        let token = at.label(label);
+                        token.filter(|&token| self.tokens.get(token).is_some())
+                    };
+                    let (Some(anchor), Some(target)) = (here(relation.anchor), here(label)) else {
                         continue;
                     };
                     let bounds = [distance.min, distance.max];
@@ -540,17 +543,17 @@ impl Database {
                 self.change_instance(instance).times[place].constraint = now;
             }
         }
-        self.settle_times()
+        Ok(())
     }
 
     /// What an instance brought goes; tokens that it alone asked for go with it.
     pub(super) fn withdraw(&mut self, instance: InstanceId) {
         let at = self.instance_at(instance).clone();
         for posted in &at.times {
-            self.network.retract(posted.constraint);
+            self.retract_time(posted.constraint);
         }
         for &(_, posted) in &at.values {
-            self.store.retract(posted);
+            self.retract_value(posted);
         }
         for &effected in &at.effects {
             self.take_effect_back(effected);
@@ -567,7 +570,6 @@ impl Database {
         for label in 1..at.labels.len() {
             self.let_go(instance, label);
         }
-        self.loosen_mirrors();
     }
 
     /// Removes an instance of a token that leaves its timeline.
@@ -586,9 +588,11 @@ impl Database {
         for operand in at.variables.into_iter().flatten() {
             self.release(operand);
         }
-        if let Some(removed) = self.instances.remove(instance) {
-            let removed = Box::new(removed);
-            self.note(Change::InstanceRemoved(instance, removed));
+        if let Some(removed) = self.instances.remove(instance)
+            && self.depth() > 0
+        {
+            self.kept_instances.push(removed);
+            self.note(Change::InstanceRemoved(instance));
         }
     }
 
@@ -611,11 +615,14 @@ impl Database {
 
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
         for &variable in changed {
-            let place = variable.index();
-            let mut at = 0;
-            while let Some(&instance) = self.watchers.get(place).and_then(|all| all.get(at)) {
-                self.reconsider(instance)?;
-                at += 1;
+            // Whoever is told may be gone by what those before it do.
+            let watchers = self.watchers.get(variable.index());
+            let watchers = watchers.map_or(&[][..], |all| all);
+            let watchers: SmallVec<[InstanceId; 8]> = SmallVec::from_slice(watchers);
+            for instance in watchers {
+                if self.instances.get(instance).is_some() {
+                    self.reconsider(instance)?;
+                }
             }
             self.follow_mirrors(variable)?;
         }

@@ -179,8 +179,7 @@ impl Database {
             rule,
             relation: Some(relation),
         };
-        let flats = self.flats.clone();
-        let Target::New(pattern, label) = &flats[rule].relations[relation as usize].target else {
+        let Some(pattern) = self.asked(instance, relation) else {
             return Err(Conflict::Mismatch { owner });
         };
         let is = self.at(token);
@@ -190,9 +189,11 @@ impl Database {
         {
             return Err(Conflict::Mismatch { owner });
         }
-        for (place, argument) in pattern.arguments.iter().enumerate() {
+        let object = pattern.object;
+        for place in 0..self.at(token).parameters.len() {
             let operand = self.at(token).parameters[place];
-            match *argument {
+            let pattern = self.asked(instance, relation);
+            match pattern.map_or(Argument::Any, |pattern| pattern.arguments[place]) {
                 Argument::Any => {}
                 Argument::Value(value) => {
                     self.make_equal(instance, relation, Operand::Value(value), operand)?;
@@ -202,15 +203,17 @@ impl Database {
                 }
             }
         }
-        if let (Some(variable), Some(timeline)) = (pattern.object, timeline) {
+        if let (Some(variable), Some(timeline)) = (object, timeline) {
             let object = Operand::Value(self.model.timelines[timeline].object);
             self.stand_or_equal(instance, relation, variable, object)?;
         }
-        self.change_instance(instance).labels[*label] = Some(token);
+        if let Target::New(_, label) = self.relation(instance, relation).target {
+            self.change_instance(instance).labels[label] = Some(token);
+        }
         let changed = self.change(token);
         changed.supports += 1;
         changed.supported.push((instance, relation));
-        self.settle_values()
+        Ok(())
     }
 
     fn stand_or_equal(
@@ -272,11 +275,11 @@ impl Database {
             rule,
             relation: Some(relation),
         };
-        let flats = self.flats.clone();
-        let said = &flats[rule].relations[relation as usize];
+        let said = &self.flats[rule].relations[relation as usize];
         let anchor = at.label(said.anchor);
         let anchor = anchor.ok_or(Conflict::Mismatch { owner })?;
-        for (place, distance) in said.distances.iter().enumerate() {
+        for place in 0..said.distances.len() {
+            let distance = self.flats[rule].relations[relation as usize].distances[place];
             self.watch_bounds(instance, [distance.min, distance.max]);
             let span = self.span(instance, distance.min, distance.max, distance.backward);
             let from = self.time(anchor, distance.from);
@@ -291,7 +294,7 @@ impl Database {
         }
         let step = Step::Relation(relation);
         self.close_open(Open { instance, step });
-        self.settle_values()
+        Ok(())
     }
 
     /// A token fulfils the relation of a label no more: it goes, if nobody else asked for it.
@@ -312,7 +315,7 @@ impl Database {
         changed.supports -= 1;
         let orphan = changed.supports == 0 && matches!(changed.cause, Cause::Rule { .. });
         if orphan && changed.status == Status::Active {
-            self.remove(token);
+            self.delete(token);
         }
     }
 
@@ -397,14 +400,14 @@ impl Database {
         let values = std::mem::take(&mut at.values);
         for posted in times {
             if posted.relation == Some(relation) {
-                self.network.retract(posted.constraint);
+                self.retract_time(posted.constraint);
             } else {
                 self.change_instance(instance).times.push(posted);
             }
         }
         for (of, posted) in values {
             if of == Some(relation) {
-                self.store.retract(posted);
+                self.retract_value(posted);
             } else {
                 self.change_instance(instance).values.push((of, posted));
             }

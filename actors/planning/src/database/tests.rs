@@ -1,1 +1,223 @@
-//! Tests.
+//! Random edits of random models: after each one everything is as a look at all tokens says, and
+//! what is undone is as it was.
+
+mod check;
+mod models;
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::model::{End, Target};
+use check::{check, digest};
+use models::Dice;
+
+/// Does one random edit; refusals are edits too.
+fn edit(database: &mut Database, dice: &mut Dice) {
+    let tokens: Vec<TokenId> = database.tokens().map(|at| at.0).collect();
+    let of = |database: &Database, status: fn(Status) -> bool| -> Vec<TokenId> {
+        let all = database.tokens().filter(|at| status(at.1.status));
+        all.map(|at| at.0).collect()
+    };
+    let free = of(database, |status| status == Status::Free);
+    let active = of(database, |status| status == Status::Active);
+    match dice.below(14) {
+        0 | 1 if tokens.len() < 14 => drop(insert(database, dice)),
+        2 | 3 => {
+            if let Some(token) = dice.pick(&free) {
+                let timeline = dice.below(3);
+                let on: Vec<TokenId> = database.on(timeline).collect();
+                let after = if dice.one_in(3) { None } else { dice.pick(&on) };
+                drop(database.activate(token, Slot { timeline, after }));
+            }
+        }
+        4 => {
+            if let Some(token) = dice.pick(&active) {
+                database.deactivate(token);
+            }
+        }
+        5 => {
+            if let (Some(token), Some(into)) = (dice.pick(&free), dice.pick(&active)) {
+                drop(database.merge(token, into));
+            }
+        }
+        6 => {
+            let merged = of(database, |status| matches!(status, Status::Merged(_)));
+            let rejected = of(database, |status| status == Status::Rejected);
+            match dice.below(3) {
+                0 => dice
+                    .pick(&merged)
+                    .into_iter()
+                    .for_each(|at| database.unmerge(at)),
+                1 => dice
+                    .pick(&free)
+                    .into_iter()
+                    .for_each(|at| database.reject(at)),
+                _ => {
+                    let token = dice.pick(&rejected).into_iter();
+                    token.for_each(|at| database.reconsider_rejected(at));
+                }
+            }
+        }
+        7 => {
+            if let Some(token) = dice.pick(&tokens) {
+                let parameters = database.at(token).parameters.len();
+                if parameters > 0 {
+                    let (place, value) = (dice.below(parameters), dice.below(5) as i64);
+                    drop(database.bind(token, place, value, Owner::Token(token)));
+                }
+            }
+        }
+        8 => {
+            if let Some(token) = dice.pick(&tokens) {
+                times(database, dice, token);
+            }
+        }
+        9 => {
+            if let Some(token) = dice.pick(&tokens) {
+                database.remove(token);
+            }
+        }
+        10 => assign(database, dice),
+        _ => open(database, dice, &active),
+    }
+}
+
+fn insert(database: &mut Database, dice: &mut Dice) -> Result<TokenId, Conflict> {
+    let predicate = dice.below(3);
+    let mut parameters = Vec::new();
+    for _ in 0..predicate {
+        parameters.push(match dice.below(3) {
+            0 => Some(parameters::Operand::Value(dice.below(5) as i64)),
+            _ => None,
+        });
+    }
+    let timeline = (!dice.one_in(3)).then(|| dice.below(3));
+    let start = dice.one_in(4).then(|| Time::At(dice.below(20) as i64));
+    database.insert(Wanted {
+        predicate,
+        timeline,
+        parameters: &parameters,
+        start,
+        finish: None,
+        cause: Cause::User,
+    })
+}
+
+fn times(database: &mut Database, dice: &mut Dice, token: TokenId) {
+    let least = dice.below(20) as i64;
+    let span = Span::new(least, least + dice.below(25) as i64);
+    let owner = Owner::Token(token);
+    match dice.below(5) {
+        0 => drop(database.restrict_time(token, End::Start, span, owner)),
+        1 => drop(database.restrict_duration(token, Span::at_least(least / 4), owner)),
+        2 => drop(database.end(token, least + 5)),
+        3 if database.at(token).status == Status::Active => {
+            let other = database.tokens().map(|at| at.0).next().unwrap_or(token);
+            let times = [
+                database.time(other, End::Start),
+                database.time(token, End::Finish),
+            ];
+            let owner = Owner::Decision(1);
+            drop(database.order_for(token, times, Span::at_least(1), owner));
+        }
+        _ => {
+            if let Some(&order) = database.at(token).orders.first() {
+                database.take_back_order(token, order);
+            }
+        }
+    }
+}
+
+fn assign(database: &mut Database, dice: &mut Dice) {
+    let with_effects = database
+        .instances
+        .iter()
+        .filter(|at| !at.1.effects.is_empty());
+    let with_effects: Vec<InstanceId> = with_effects.map(|at| at.0).collect();
+    if let Some(instance) = dice.pick(&with_effects) {
+        let (effect, _) = database.assigned(instance)[0];
+        let rule = database.instance_at(instance).rule;
+        let all = database.model.rules[rule].effects[effect as usize]
+            .resources
+            .clone();
+        if let Some(resource) = dice.pick(&all) {
+            drop(database.assign(instance, effect, resource));
+        }
+    }
+}
+
+fn open(database: &mut Database, dice: &mut Dice, active: &[TokenId]) {
+    let all = database.open().to_vec();
+    let Some(Open { instance, step }) = dice.pick(&all) else {
+        return;
+    };
+    let relation = match step {
+        Step::Choice(choice) => {
+            let alternatives = database.alternatives(instance, choice).len();
+            database.choose(instance, choice, dice.below(alternatives) as u32);
+            return;
+        }
+        Step::Relation(relation) => relation,
+    };
+    let said = database.relation(instance, relation).clone();
+    let Target::New(pattern, _) = said.target else {
+        return;
+    };
+    if dice.one_in(2) {
+        if let Some(token) = dice.pick(active) {
+            drop(database.support(instance, relation, token));
+        }
+    } else {
+        let timeline = pattern.timelines[0];
+        let on: Vec<TokenId> = database.on(timeline).collect();
+        let after = if dice.one_in(3) { None } else { dice.pick(&on) };
+        drop(database.insert_for(instance, relation, Slot { timeline, after }, None));
+    }
+}
+
+fn database(dice: &mut Dice) -> Database {
+    Database::new(Arc::new(models::random(dice)), Span::new(0, 60))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn after_every_edit_all_is_as_tokens_say(seed in any::<u64>()) {
+        let mut dice = Dice::new(seed);
+        let mut database = database(&mut dice);
+        for _ in 0..60 {
+            edit(&mut database, &mut dice);
+            check(&mut database);
+        }
+    }
+
+    #[test]
+    fn what_is_undone_is_as_it_was(seed in any::<u64>()) {
+        let mut dice = Dice::new(seed);
+        let mut database = database(&mut dice);
+        for _ in 0..6 {
+            for _ in 0..8 {
+                edit(&mut database, &mut dice);
+            }
+            let before = digest(&mut database);
+            database.push();
+            for _ in 0..1 + dice.below(6) {
+                edit(&mut database, &mut dice);
+            }
+            database.push();
+            let within = digest(&mut database);
+            for _ in 0..dice.below(6) {
+                edit(&mut database, &mut dice);
+            }
+            database.pop();
+            prop_assert_eq!(digest(&mut database), within);
+            check(&mut database);
+            database.pop();
+            prop_assert_eq!(digest(&mut database), before);
+            check(&mut database);
+        }
+    }
+}

@@ -10,14 +10,14 @@ use crate::temporal::{Constraint, Point, Span};
 /// A variable that is when a token starts or ends, or how long it lasts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mirror {
-    variable: Variable,
+    pub(super) variable: Variable,
     token: TokenId,
     /// Which end; none for the duration.
     end: Option<End>,
     /// That the variable is within the bounds of the time.
-    value: Option<parameters::Constraint>,
+    pub(super) value: Option<parameters::Constraint>,
     /// That the time is within the bounds of the variable.
-    time: Option<Constraint>,
+    pub(super) time: Option<Constraint>,
 }
 
 impl Database {
@@ -164,17 +164,32 @@ impl Database {
             if let Some(posted) = database.between(Time::At(0), time, span, owner)? {
                 database.change(token).times.push(posted);
             }
-            database.settle_times()
+            Ok(())
         })
     }
 
-    /// Says that a token ends at a tick, as an executive learns it.
+    /// Says that a token ends at a tick, as an executive learns it, and for good.
     ///
     /// # Errors
     ///
     /// If it cannot end then: nothing changes.
     pub fn end(&mut self, token: TokenId, tick: Ticks) -> Result<(), Conflict> {
-        self.restrict_time(token, End::Finish, Span::exactly(tick), Owner::Token(token))
+        let owner = Owner::Token(token);
+        let expected = self.finish(token);
+        if let Time::Point(point) = self.at(token).finish
+            && expected.contains(tick)
+            && self.network.is_apart(point)
+        {
+            // Nothing but known times says when it ends, and now that is one itself.
+            return self.attempt(|database| {
+                database.network.remove_point(point);
+                database.change(token).finish = Time::At(tick);
+                database.dirty_if_used(token);
+                database.loosened = true;
+                Ok(())
+            });
+        }
+        self.restrict_time(token, End::Finish, Span::exactly(tick), owner)
     }
 
     /// Says how long a token lasts, more closely than before.
@@ -194,7 +209,7 @@ impl Database {
             if let Some(posted) = database.between(start, finish, span, owner)? {
                 database.change(token).times.push(posted);
             }
-            database.settle_times()
+            Ok(())
         })
     }
 
@@ -217,7 +232,6 @@ impl Database {
             if let Some(posted) = posted {
                 database.change(token).orders.push(posted);
             }
-            database.settle_times()?;
             Ok(posted.map(|posted| (token, posted)))
         })
     }
@@ -238,9 +252,10 @@ impl Database {
             return;
         };
         if let Some(place) = at.orders.iter().position(|&at| at == constraint) {
-            self.change(token).orders.remove(place);
-            self.retract_time(constraint);
-            self.loosen_mirrors();
+            self.take(|database| {
+                database.change(token).orders.remove(place);
+                database.retract_time(constraint);
+            });
         }
     }
 
@@ -248,6 +263,15 @@ impl Database {
     pub(super) fn retract_time(&mut self, constraint: Constraint) {
         if self.network.constraint(constraint).is_some() {
             self.network.retract(constraint);
+            self.loosened = true;
+        }
+    }
+
+    /// Retracts a constraint of values, if it did not go with a variable that it was of.
+    pub(super) fn retract_value(&mut self, constraint: parameters::Constraint) {
+        if self.store.has_constraint(constraint) {
+            self.store.retract(constraint);
+            self.loosened = true;
         }
     }
 
@@ -309,9 +333,13 @@ impl Database {
         }
     }
 
-    /// Times changed: the variables that follow them are told, and what follows from that.
-    pub(super) fn settle_times(&mut self) -> Result<(), Conflict> {
+    /// Times and values changed: whoever follows them is told, until nothing changes any more.
+    pub(super) fn settle(&mut self) -> Result<(), Conflict> {
         loop {
+            self.settle_values()?;
+            if std::mem::take(&mut self.loosened) && !self.mirrors.is_empty() {
+                self.loosen_mirrors();
+            }
             let mut news = false;
             // All of them, before anybody is told: what was loosened is as tight as before then.
             for place in 0..self.mirrors.len() {
@@ -320,7 +348,6 @@ impl Database {
             if !news {
                 return Ok(());
             }
-            self.settle_values()?;
         }
     }
 
@@ -360,12 +387,12 @@ impl Database {
             if let Some(value) = value {
                 self.store.retract(value);
             }
-            if let Some(time) = time {
+            if let Some(time) = time
+                && self.network.constraint(time).is_some()
+            {
                 self.network.retract(time);
             }
         }
-        let settled = self.settle_times();
-        debug_assert!(settled.is_ok(), "less holds than before");
     }
 
     fn change_mirror(&mut self, place: usize) -> &mut Mirror {
@@ -379,10 +406,10 @@ impl Database {
             let mirror = self.mirrors.remove(place);
             self.note(Change::Unmirrored(place, mirror));
             if let Some(value) = mirror.value {
-                self.store.retract(value);
+                self.retract_value(value);
             }
             if let Some(time) = mirror.time {
-                self.network.retract(time);
+                self.retract_time(time);
             }
             self.release(Operand::Variable(mirror.variable));
         }

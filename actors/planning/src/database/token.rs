@@ -137,6 +137,8 @@ pub struct Token {
     pub(super) instances: SmallVec<[InstanceId; 2]>,
     /// The relations that count on it.
     pub(super) supported: SmallVec<[(InstanceId, u32); 2]>,
+    /// The tokens that are merged into it.
+    pub(super) merged: SmallVec<[TokenId; 1]>,
     /// What makes it equal to the token that it is merged into.
     pub(super) merged_times: SmallVec<[Constraint; 2]>,
     pub(super) merged_values: SmallVec<[parameters::Constraint; 2]>,

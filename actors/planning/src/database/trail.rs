@@ -9,16 +9,19 @@ use crate::model::TimelineId;
 #[derive(Clone, Debug)]
 pub(super) enum Change {
     TokenAdded(TokenId),
-    TokenChanged(TokenId, Box<Token>),
-    TokenRemoved(TokenId, Box<Token>),
+    /// What it was is the last of the tokens that were kept; so with the others.
+    TokenChanged(TokenId),
+    TokenRemoved(TokenId),
     InstanceAdded(InstanceId),
-    InstanceChanged(InstanceId, Box<Instance>),
-    InstanceRemoved(InstanceId, Box<Instance>),
+    InstanceChanged(InstanceId),
+    InstanceRemoved(InstanceId),
     Lane(TimelineId, Lane),
     Opened,
     /// What was open is not: at which place it stood.
     Closed(usize, Open),
     Held(usize, u32),
+    /// Whose time the point in a place was.
+    Pointed(usize, Option<TokenId>),
     Watched(usize),
     Unwatched(usize, usize, InstanceId),
     Mirrored,
@@ -62,6 +65,8 @@ impl Database {
         self.levels.pop();
         if self.levels.is_empty() {
             self.trail.clear();
+            self.kept_tokens.clear();
+            self.kept_instances.clear();
         }
         self.commit_levels();
         self.network.commit();
@@ -73,13 +78,17 @@ impl Database {
         self.levels.len()
     }
 
-    /// Does all of an edit or nothing of it.
+    /// Does all of an edit or nothing of it. Within another edit it is a part of that: if it
+    /// cannot be, neither can the other.
     pub(crate) fn attempt<T>(
         &mut self,
         edit: impl FnOnce(&mut Self) -> Result<T, Conflict>,
     ) -> Result<T, Conflict> {
+        if self.edits {
+            return edit(self);
+        }
         self.push();
-        let outcome = edit(self);
+        let outcome = self.settled(edit);
         match outcome {
             Ok(_) => self.commit(),
             Err(_) => self.pop(),
@@ -87,6 +96,32 @@ impl Database {
         outcome
     }
 
+    /// Does an edit. If it cannot be, a part of it is left, and the caller undoes it with what
+    /// was done before.
+    pub(crate) fn settled<T>(
+        &mut self,
+        edit: impl FnOnce(&mut Self) -> Result<T, Conflict>,
+    ) -> Result<T, Conflict> {
+        let outer = std::mem::replace(&mut self.edits, true);
+        let outcome = edit(self);
+        let settled = match (&outcome, outer) {
+            (Ok(_), false) => self.settle(),
+            _ => Ok(()),
+        };
+        self.edits = outer;
+        settled.and(outcome)
+    }
+
+    /// Does an edit that only takes away.
+    pub(super) fn take(&mut self, edit: impl FnOnce(&mut Self)) {
+        let settled = self.settled(|database| {
+            edit(database);
+            Ok(())
+        });
+        debug_assert!(settled.is_ok(), "less holds than before: {settled:?}");
+    }
+
+    #[inline]
     pub(super) fn note(&mut self, change: Change) {
         self.steps += 1;
         if !self.levels.is_empty() {
@@ -101,8 +136,8 @@ impl Database {
         if let Some(level) = self.levels.last()
             && at.kept <= level.serial
         {
-            let before = Box::new(at.clone());
-            self.trail.push(Change::TokenChanged(token, before));
+            self.kept_tokens.push(at.clone());
+            self.trail.push(Change::TokenChanged(token));
             at.kept = self.serial;
         }
         at
@@ -116,8 +151,8 @@ impl Database {
         if let Some(level) = self.levels.last()
             && at.kept <= level.serial
         {
-            let before = Box::new(at.clone());
-            self.trail.push(Change::InstanceChanged(instance, before));
+            self.kept_instances.push(at.clone());
+            self.trail.push(Change::InstanceChanged(instance));
             at.kept = self.serial;
         }
         at
@@ -145,25 +180,32 @@ impl Database {
     fn undo(&mut self, change: Change) {
         match change {
             Change::TokenAdded(token) => drop(self.tokens.undo_insert(token)),
-            Change::TokenChanged(token, before) => {
+            Change::TokenChanged(token) => {
+                let before = self.kept_tokens.pop().expect("kept with its change");
                 if let Some(at) = self.tokens.get_mut(token) {
-                    *at = *before;
+                    *at = before;
                 }
             }
-            Change::TokenRemoved(token, before) => self.tokens.undo_remove(token, *before),
+            Change::TokenRemoved(token) => {
+                let before = self.kept_tokens.pop().expect("kept with its change");
+                self.tokens.undo_remove(token, before);
+            }
             Change::InstanceAdded(instance) => drop(self.instances.undo_insert(instance)),
-            Change::InstanceChanged(instance, before) => {
+            Change::InstanceChanged(instance) => {
+                let before = self.kept_instances.pop().expect("kept with its change");
                 if let Some(at) = self.instances.get_mut(instance) {
-                    *at = *before;
+                    *at = before;
                 }
             }
-            Change::InstanceRemoved(instance, before) => {
-                self.instances.undo_remove(instance, *before);
+            Change::InstanceRemoved(instance) => {
+                let before = self.kept_instances.pop().expect("kept with its change");
+                self.instances.undo_remove(instance, before);
             }
             Change::Lane(timeline, lane) => self.lanes[timeline] = lane,
             Change::Opened => drop(self.open.pop()),
             Change::Closed(place, open) => self.open.insert(place, open),
             Change::Held(place, count) => self.holders[place] = count,
+            Change::Pointed(place, token) => self.token_of_point[place] = token,
             Change::Watched(place) => drop(self.watchers[place].pop()),
             Change::Unwatched(place, at, instance) => self.watchers[place].insert(at, instance),
             Change::Mirrored => drop(self.mirrors.pop()),

@@ -4,11 +4,12 @@ use std::fmt;
 
 use super::tree::Form;
 use crate::model::Position;
+use crate::nearest::nearest;
 
 /// How many findings are reported of one reading.
 pub const MOST_FINDINGS: usize = 20;
 
-/// Longer names are cut in messages, and get no nearest name.
+/// Longer names are cut in messages.
 const LONGEST_NAME: usize = 60;
 
 /// How bad a finding is.
@@ -137,7 +138,7 @@ impl Notes {
             position: at.position(),
             expected: expected.into(),
             found: at.show(),
-            nearest,
+            nearest: nearest.map(str::to_owned),
         });
     }
 
@@ -198,26 +199,6 @@ pub(super) fn show(text: &str) -> String {
     shown
 }
 
-/// The name that is nearest to one, if it is near enough to have been meant.
-pub(super) fn nearest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<String> {
-    if name.len() > LONGEST_NAME {
-        return None;
-    }
-    let lower = name.to_lowercase();
-    let near = known
-        .filter(|known| known.len() <= LONGEST_NAME)
-        .map(|known| {
-            let of = known.to_lowercase();
-            // The begin of a name is near it, however long the rest is.
-            let begins = lower.chars().count() > 2 && of.starts_with(&lower);
-            let distance = strsim::osa_distance(&lower, &of);
-            (if begins { distance.min(1) } else { distance }, known)
-        });
-    // Of equally near names the first in the alphabet, whatever the order of the known ones.
-    let (distance, best) = near.min()?;
-    (distance <= 1 + name.chars().count() / 3).then(|| best.to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -252,15 +233,5 @@ mod tests {
             list.iter()
                 .all(|finding| finding.severity == Severity::Error)
         );
-    }
-
-    #[test]
-    fn the_nearest_name_is_one_that_may_have_been_meant() {
-        let known = ["TakeImage", "TakeSpectrum", "Going"];
-        let nearest = |name| nearest(name, known.into_iter());
-        assert_eq!(nearest("TakeImge").as_deref(), Some("TakeImage"));
-        assert_eq!(nearest("takeimage").as_deref(), Some("TakeImage"));
-        assert_eq!(nearest("Idle"), None);
-        assert_eq!(nearest(&"x".repeat(1_000_000)), None);
     }
 }

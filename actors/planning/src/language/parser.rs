@@ -121,7 +121,13 @@ impl Parser<'_> {
     }
 
     fn begin(&mut self, kind: Kind, start: usize) {
-        if !self.open.is_empty() && starts_form(start, &self.source.text) {
+        if let Some(&outer) = self.open.first()
+            && starts_form(
+                self.nodes[outer as usize].start as usize,
+                start,
+                &self.source.text,
+            )
+        {
             while let Some(list) = self.open.pop() {
                 if self.open.is_empty() {
                     self.unclosed(list, start, "a form that starts a line");
@@ -226,11 +232,12 @@ impl Parser<'_> {
     }
 }
 
-/// Whether a line starts here with a form that stands only at the top.
-fn starts_form(start: usize, text: &str) -> bool {
+/// Whether a line starts here with a form that stands only at the top, within one that starts at
+/// `outer`.
+fn starts_form(outer: usize, start: usize, text: &str) -> bool {
     let begins = start == 0 || text.as_bytes()[start - 1] == b'\n';
-    begins
-        && AT_THE_TOP
-            .iter()
-            .any(|head| text[start..].starts_with(head))
+    let is_one = |head: &str| text[start..].starts_with(head);
+    // `Goal` is a word of classes too, whose forms begin with `Define_`.
+    let is_goal = is_one("(Goal ") && !text[outer..].starts_with("(Define_");
+    begins && (is_goal || AT_THE_TOP.iter().any(|head| is_one(head)))
 }

@@ -10,6 +10,7 @@ mod hostile;
 mod meaning;
 mod proofs;
 mod reference;
+mod solved;
 
 const FIGURE_5: &str = include_str!("../../models/figure-5.ddl");
 const ROVER: &str = include_str!("../../models/rover.ddl");

@@ -41,10 +41,10 @@ impl Choice {
         pick: |costs, random| below(random, costs.len()),
     };
 
-    /// Four times of five the least cost, else any.
+    /// Two times of three the least cost, else any.
     pub const MOSTLY_BEST: Choice = Choice {
         name: "mostly best",
-        pick: |costs, random| match below(random, 5) {
+        pick: |costs, random| match below(random, 3) {
             0 => below(random, costs.len()),
             _ => best(costs),
         },

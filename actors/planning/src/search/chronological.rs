@@ -112,7 +112,10 @@ fn go_on<S: Strategy>(
                 database.push();
                 frame.pushed = true;
             }
-            match strategy.decide(database, frame.flaw, decision) {
+            let flaw = frame.flaw;
+            // What a refused decision leaves is undone with the one before it that has an
+            // alternative, or with all.
+            match database.settled(|database| strategy.decide(database, flaw, decision)) {
                 Ok(()) => {
                     stack.counters.decisions += 1;
                     return true;
@@ -139,8 +142,14 @@ fn go_on<S: Strategy>(
             });
         }
         fresh = false;
-        stack.frames.pop();
-        stack.counters.backtracks += u64::from(!stack.frames.is_empty());
+        let failed = stack.frames.pop().map(|frame| frame.flaw);
+        if let (Some(before), Some(failed)) = (stack.frames.last(), failed) {
+            if strategy.is_guard(database, before.flaw, failed) {
+                stack.counters.guards += 1;
+            } else {
+                stack.counters.backtracks += 1;
+            }
+        }
     }
     false
 }

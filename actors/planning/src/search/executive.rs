@@ -12,12 +12,18 @@
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
+use super::schedule::LoadError;
 use super::{Counters, Decision, Flaw, Stack, Strategy, Verdict, chronological};
 use crate::Ticks;
 use crate::database::{
-    Cause, Conflict, Database, Open, Owner, Slot, Status, Step, Time, TokenId, Wanted,
+    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Status, Step, Time, Token, TokenId,
+    Wanted,
 };
-use crate::model::{End, Model, PredicateId, Target, TimelineId, TimelineKind, Value};
+use crate::model::{
+    End, Fact, Model, PredicateId, Problem, Target, TimelineId, TimelineKind, Value, Values,
+};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
 
@@ -47,19 +53,68 @@ struct Now {
     tick: Ticks,
     /// By timeline: by place of a predicate on it: how early its subgoals come.
     order: Vec<Vec<u32>>,
+    /// By predicate: what its statuses say if no status comes.
+    endings: Vec<Endings>,
+    /// Alternatives whose leading condition did not hold.
+    guards: u64,
 }
 
 impl Executive {
     /// With nothing on its timelines yet: the first cycle puts their defaults there.
     pub fn new(model: Arc<Model>) -> Self {
         let order = subgoal_order(&model);
+        let predicates = 0..model.predicates.len();
+        let endings = predicates.map(|at| Endings::of(&model, at)).collect();
         Executive {
             database: Database::new(model, Span::new(0, FURTHEST)),
-            now: Now { tick: 0, order },
+            now: Now {
+                tick: 0,
+                order,
+                endings,
+                guards: 0,
+            },
             stack: Stack::default(),
             begun: false,
             forgets: true,
         }
+    }
+
+    /// With what a problem says is the case, as it is at the start of the horizon.
+    ///
+    /// # Errors
+    ///
+    /// If a fact cannot be, with those before it.
+    pub fn begin(model: Arc<Model>, problem: &Problem) -> Result<Self, LoadError> {
+        let mut executive = Executive::new(model);
+        for (fact, at) in problem.facts.iter().enumerate() {
+            let put = executive.put_fact(fact, at);
+            put.map_err(|conflict| LoadError::Fact { fact, conflict })?;
+        }
+        Ok(executive)
+    }
+
+    fn put_fact(&mut self, fact: usize, at: &Fact) -> Result<(), Conflict> {
+        let parameters: SmallVec<[Option<Operand>; 4]> = at
+            .values
+            .iter()
+            .map(|value| value.map(Operand::Value))
+            .collect();
+        self.database.attempt(|database| {
+            let known = |span: Span| (span.min == span.max).then_some(Time::At(span.min));
+            let token = database.insert(Wanted {
+                predicate: at.predicate,
+                timeline: Some(at.timeline),
+                parameters: &parameters,
+                start: known(at.start),
+                finish: known(at.finish),
+                cause: Cause::Fact(fact),
+            })?;
+            let owner = Owner::Token(token);
+            database.restrict_time(token, End::Start, at.start, owner)?;
+            database.restrict_time(token, End::Finish, at.finish, owner)?;
+            let (timeline, after) = (at.timeline, database.last(at.timeline));
+            database.activate(token, Slot { timeline, after })
+        })
     }
 
     /// Its database, to be asked.
@@ -69,7 +124,9 @@ impl Executive {
 
     /// What its searches did.
     pub fn counters(&self) -> Counters {
-        self.stack.counters
+        let mut counters = self.stack.counters;
+        counters.guards += self.now.guards;
+        counters
     }
 
     /// The token that a timeline says now.
@@ -94,9 +151,9 @@ impl Executive {
             .iter()
             .map(|value| value.map(Operand::Value))
             .collect();
-        let now = tick;
+        let (now, endings) = (tick, &self.now.endings);
         self.database.attempt(|database| {
-            let after = make_room(database, timeline, now)?;
+            let after = make_room(database, endings, timeline, now)?;
             let token = database.insert(Wanted {
                 predicate,
                 timeline: Some(timeline),
@@ -154,14 +211,21 @@ impl Executive {
         verdict
     }
 
-    /// Tokens whose time is over have ended.
+    /// Tokens whose time is over have ended, and no status came for them.
     fn expire(&mut self) {
-        for timeline in 0..self.database.model().timelines.len() {
+        for timeline in 0..self.database.lanes() {
             let Some(last) = self.database.last(timeline) else {
                 continue;
             };
             let finish = self.database.finish(last);
-            if finish.max <= self.now.tick && finish.min != finish.max {
+            if finish.max > self.now.tick {
+                continue;
+            }
+            let endings = &self.now.endings;
+            // A model may say otherwise what it is when no status comes.
+            let said = say_ending(&mut self.database, endings, last, Ending::TimedOut);
+            drop(said);
+            if finish.min != finish.max {
                 let ended = self.database.end(last, finish.max);
                 debug_assert!(ended.is_ok(), "it can last as long as it can");
             }
@@ -188,9 +252,72 @@ fn subgoal_order(model: &Model) -> Vec<Vec<u32>> {
         .collect()
 }
 
+/// How a token ends of which no status says how.
+#[derive(Clone, Copy, Debug)]
+enum Ending {
+    TimedOut,
+    Preempted,
+}
+
+/// The outputs of a predicate that say how a token ended, and what they say then: values of their
+/// types that are named so.
+#[derive(Clone, Debug, Default)]
+struct Endings {
+    timed_out: SmallVec<[(usize, Value); 1]>,
+    preempted: SmallVec<[(usize, Value); 1]>,
+}
+
+impl Endings {
+    fn of(model: &Model, predicate: PredicateId) -> Endings {
+        let predicate = &model.predicates[predicate];
+        let named = |name: &str| {
+            let symbol = model.symbols.iter().position(|at| at == name);
+            let outputs = predicate.parameters.iter().enumerate();
+            let outputs = outputs
+                .skip(predicate.inputs)
+                .filter_map(|(place, output)| {
+                    let symbol = symbol? as Value;
+                    match &model.types[output.of].values {
+                        Values::Symbols(all) if all.contains(&symbol) => Some((place, symbol)),
+                        _ => None,
+                    }
+                });
+            outputs.collect()
+        };
+        Endings {
+            timed_out: named("TIMEOUT"),
+            preempted: named("PREEMPTED"),
+        }
+    }
+}
+
+/// Binds the outputs of a token that say how it ended, if no status did.
+fn say_ending(
+    database: &mut Database,
+    endings: &[Endings],
+    token: TokenId,
+    ending: Ending,
+) -> Result<(), Conflict> {
+    let Some(at) = database.token(token) else {
+        return Ok(());
+    };
+    let outputs = match ending {
+        Ending::TimedOut => &endings[at.predicate].timed_out,
+        Ending::Preempted => &endings[at.predicate].preempted,
+    };
+    for &(place, value) in outputs {
+        let is = database.token(token).map(|at| at.parameters[place]);
+        if is.is_some_and(|is| database.value(is).is_none()) {
+            database.bind(token, place, value, Owner::Token(token))?;
+        }
+    }
+    Ok(())
+}
+
 /// Ends the present token of a timeline, if it is not over: the token after which a new one comes.
 fn make_room(
     database: &mut Database,
+    endings: &[Endings],
     timeline: TimelineId,
     now: Ticks,
 ) -> Result<Option<TokenId>, Conflict> {
@@ -203,6 +330,7 @@ fn make_room(
     let finish = database.finish(last);
     if finish.max > now || finish.min != finish.max {
         database.end(last, now)?;
+        say_ending(database, endings, last, Ending::Preempted)?;
     }
     Ok(Some(last))
 }
@@ -270,6 +398,65 @@ impl Now {
     }
 }
 
+impl Now {
+    /// Whether a token can be what a relation asks for, as far as its times and each of its
+    /// parameters, taken alone, say.
+    fn fits(&self, database: &Database, open: (InstanceId, u32), token: TokenId) -> bool {
+        let (instance, relation) = open;
+        let said = database.relation(instance, relation);
+        let Some(at) = database.instance(instance) else {
+            return false;
+        };
+        let Some(anchor) = at.label(said.anchor) else {
+            return false;
+        };
+        let in_time = said.distances.iter().all(|distance| {
+            let from = database.bounds_of(database.time(anchor, distance.from));
+            let to = database.bounds_of(database.time(token, distance.to));
+            let span = database.span(instance, distance.min, distance.max, distance.backward);
+            to.max.saturating_sub(from.min) >= span.min
+                && to.min.saturating_sub(from.max) <= span.max
+        });
+        in_time && database.fits(instance, relation, token)
+    }
+
+    /// The tokens that may fulfil a relation: the present one, and for a condition those before it
+    /// that are still known.
+    fn candidates<'a>(
+        &'a self,
+        database: &'a Database,
+        open: (InstanceId, u32),
+    ) -> impl Iterator<Item = TokenId> + 'a {
+        let said = database.relation(open.0, open.1);
+        let timelines: &[TimelineId] = match &said.target {
+            Target::New(pattern, _) => &pattern.timelines,
+            Target::Label(_) => &[],
+        };
+        let before = move |&token: &TokenId| {
+            let known = database.token(token).filter(|_| said.condition);
+            known.and_then(Token::before)
+        };
+        let all = timelines
+            .iter()
+            .flat_map(move |&timeline| std::iter::successors(database.last(timeline), before));
+        all.filter(move |&token| self.fits(database, open, token))
+    }
+
+    /// Whether the leading condition of an alternative, if it has one, may hold.
+    fn may_begin(&self, database: &Database, instance: InstanceId, steps: &[Step]) -> bool {
+        match steps.first() {
+            Some(&Step::Relation(relation)) => {
+                !database.relation(instance, relation).condition
+                    || self
+                        .candidates(database, (instance, relation))
+                        .next()
+                        .is_some()
+            }
+            _ => true,
+        }
+    }
+}
+
 impl Strategy for Now {
     fn next(&mut self, database: &mut Database) -> Option<Flaw> {
         let mut first: Option<(u32, Open)> = None;
@@ -298,7 +485,13 @@ impl Strategy for Now {
         let relation = match open.step {
             Step::Choice(choice) => {
                 let alternatives = database.alternatives(open.instance, choice);
-                into.extend((0..alternatives.len() as u32).map(Decision::Alternative));
+                for (place, steps) in (0..).zip(alternatives) {
+                    if self.may_begin(database, open.instance, steps) {
+                        into.push(Decision::Alternative(place));
+                    } else {
+                        self.guards += 1;
+                    }
+                }
                 return;
             }
             Step::Relation(relation) => relation,
@@ -308,20 +501,8 @@ impl Strategy for Now {
             into.push(Decision::Relate);
             return;
         };
-        for &timeline in &pattern.timelines {
-            let mut at = database.last(timeline);
-            // The present token, and for a condition those before it that are still known.
-            while let Some(token) = at {
-                if database.fits(open.instance, relation, token) {
-                    into.push(Decision::Support(token));
-                }
-                let known = database.token(token);
-                at = known.and_then(|known| known.before());
-                if !said.condition {
-                    break;
-                }
-            }
-        }
+        let candidates = self.candidates(database, (open.instance, relation));
+        into.extend(candidates.map(Decision::Support));
         if said.condition {
             return;
         }
@@ -357,7 +538,7 @@ impl Strategy for Now {
                 }
                 (Step::Relation(relation), Decision::Insert(slot)) => {
                     database.attempt(|database| {
-                        let after = make_room(database, slot.timeline, self.tick)?;
+                        let after = make_room(database, &self.endings, slot.timeline, self.tick)?;
                         let slot = Slot { after, ..slot };
                         database.insert_for(instance, relation, slot, now)?;
                         Ok(())
@@ -370,6 +551,21 @@ impl Strategy for Now {
             },
             (Flaw::Gap { .. }, Decision::Insert(slot)) => fill(database, slot, self.tick),
             _ => unreachable!("the decision is one for the flaw"),
+        }
+    }
+
+    fn is_guard(&self, database: &Database, before: Flaw, failed: Flaw) -> bool {
+        match (before, failed) {
+            (Flaw::Open(before), Flaw::Open(failed)) => {
+                let is_choice = matches!(before.step, Step::Choice(_));
+                let Step::Relation(relation) = failed.step else {
+                    return false;
+                };
+                is_choice
+                    && before.instance == failed.instance
+                    && database.relation(failed.instance, relation).condition
+            }
+            _ => false,
         }
     }
 }
@@ -386,7 +582,7 @@ fn fill(database: &mut Database, slot: Slot, now: Ticks) -> Result<(), Conflict>
         return Err(Conflict::Mismatch { owner });
     };
     let parameters = default.values.iter().map(|value| value.map(Operand::Value));
-    let parameters: smallvec::SmallVec<[Option<Operand>; 4]> = parameters.collect();
+    let parameters: SmallVec<[Option<Operand>; 4]> = parameters.collect();
     database.attempt(|database| {
         let token = database.insert(Wanted {
             predicate: default.predicate,

@@ -24,10 +24,10 @@ use super::solve::{Answer, Planner, Settings, most_gain};
 use super::{Counters, Decision, Failure, Flaw, Strategy};
 use crate::Ticks;
 use crate::database::{Cause, Conflict, Database, Owner, Status, TokenId};
-use crate::model::{GoalId, Model, Problem};
+use crate::model::{End, GoalId, Model, Problem};
 use crate::objective::Objective;
 use crate::plan::Plan;
-use crate::temporal::Constraint;
+use crate::temporal::{Constraint, Span};
 
 /// How often a goal is deleted before the plan does without it: three times, as in the reading of
 /// the MISUS paper.
@@ -78,7 +78,7 @@ impl Repair {
         model: &Arc<Model>,
         problem: &Arc<Problem>,
         settings: Settings,
-        find: fn(&mut Work, u64) -> Option<Plan>,
+        find: fn(&mut Work, u64) -> (Option<Plan>, bool),
     ) -> Result<Answer, LoadError> {
         let schedule = Schedule::new(model.clone(), problem.clone())?;
         let mut complete = Complete::new(&schedule);
@@ -97,9 +97,9 @@ impl Repair {
             base: schedule.database.clone(),
             schedule,
         };
-        let plan = find(&mut work, settings.seed);
+        let (plan, proven) = find(&mut work, settings.seed);
         Ok(Answer {
-            proven: false,
+            proven,
             operations: work.operations(),
             counters: work.counters,
             failure: work.failure.take().filter(|_| plan.is_none()),
@@ -108,6 +108,12 @@ impl Repair {
         })
     }
 }
+
+/// The same where there is a plan already, and a shorter one is looked for.
+const LESS_PATIENCE: u64 = 4;
+
+/// How many attempts from the best plan there are for one from the problem as it was loaded.
+const ANEW: u32 = 3;
 
 /// The stream of the generator that is this planner's.
 const STREAM: u64 = 0x7265_7061_6972;
@@ -168,87 +174,88 @@ impl Work {
         self.posted.extend_from_slice(posted);
     }
 
-    fn solve(&mut self, seed: u64) -> Option<Plan> {
+    /// The best plan that is found, and whether it is proven.
+    fn solve(&mut self, seed: u64) -> (Option<Plan>, bool) {
         let mut goals = self.complete.problem().goals.iter();
         if goals.any(|goal| goal.weight.is_some()) {
-            self.by_worth(seed)
+            (self.by_worth(seed), false)
         } else {
             self.by_makespan(seed)
         }
     }
 
     /// A plan with all mandatory goals, the first that is found.
-    fn first(&mut self, seed: u64) -> Option<Plan> {
+    fn first(&mut self, seed: u64) -> (Option<Plan>, bool) {
         let patience = PATIENCE * (self.complete.goals().len() as u64 + 1);
         while !self.repair(patience) {
             if self.is_over() {
-                return None;
+                return (None, false);
             }
             let base = self.base.clone();
             self.return_to(&base, &[]);
         }
         let by = ("repair", seed, self.operations());
-        Some(extract(&self.schedule, |_| String::new(), by))
+        let plan = extract(&self.schedule, |_| String::new(), by);
+        (Some(plan), false)
     }
 
-    /// A plan with all mandatory goals, as short as can be found.
-    fn by_makespan(&mut self, seed: u64) -> Option<Plan> {
+    /// A plan with all mandatory goals, as short as can be found, and whether none is shorter.
+    ///
+    /// Each plan must end earlier than the best one. So what is tried is a repair of the best one,
+    /// some of whose orders are taken back, or now and then of the problem as it was loaded.
+    fn by_makespan(&mut self, seed: u64) -> (Option<Plan>, bool) {
         let mut best: Option<(Plan, Database, Vec<Posted>)> = None;
-        let patience = PATIENCE * (self.complete.goals().len() as u64 + 1);
-        let mut since_best = 0_u32;
+        let goals = self.complete.goals().len() as u64 + 1;
+        let mut attempts = 0_u32;
         while !self.is_over() {
-            if !self.repair(patience) {
+            let patience = if best.is_none() {
+                PATIENCE
+            } else {
+                LESS_PATIENCE
+            };
+            if self.repair(patience * goals) {
+                let by = ("repair", seed, self.operations());
+                let plan = extract(&self.schedule, |_| String::new(), by);
+                best = Some((plan, self.schedule.database.clone(), self.posted.clone()));
+                attempts = 0;
+            }
+            attempts += 1;
+            let Some((plan, database, posted)) = &best else {
                 let base = self.base.clone();
                 self.return_to(&base, &[]);
                 continue;
-            }
-            let makespan = self.makespan();
-            let shorter = best
-                .as_ref()
-                .is_none_or(|(plan, ..)| makespan < plan.makespan);
-            if shorter {
-                let by = ("repair", seed, self.operations());
-                let plan = extract(&self.schedule, |_| String::new(), by);
-                debug_assert_eq!(plan.makespan, makespan);
-                best = Some((plan, self.schedule.database.clone(), self.posted.clone()));
-                since_best = 0;
-            } else {
-                since_best += 1;
-            }
-            if self.posted.is_empty() {
-                // Nothing was in the way of the earliest times: no plan is shorter.
-                break;
-            }
-            // From the best plan, mostly; now and then from where it is, or anew.
-            match since_best % 16 {
-                15 => {
-                    let base = self.base.clone();
-                    self.return_to(&base, &[]);
+            };
+            let bound = plan.makespan - 1;
+            if attempts % ANEW == 0 || posted.is_empty() {
+                let base = self.base.clone();
+                self.return_to(&base, &[]);
+                if !self.end_by(bound) {
+                    // Not even without resources.
+                    return (best.map(|(plan, ..)| plan), true);
                 }
-                at if at % 4 == 3 => {
-                    if let Some((_, database, posted)) = &best {
-                        let (database, posted) = (database.clone(), posted.clone());
-                        self.return_to(&database, &posted);
-                    }
-                    self.relax();
-                }
-                _ => self.relax(),
+                continue;
+            }
+            let (database, posted) = (database.clone(), posted.clone());
+            self.return_to(&database, &posted);
+            self.relax();
+            while !self.end_by(bound) && !self.posted.is_empty() {
+                self.relax();
             }
         }
-        best.map(|(plan, ..)| plan)
+        (best.map(|(plan, ..)| plan), false)
     }
 
-    /// The latest end of a goal, if each token is as early as it can be.
-    fn makespan(&self) -> Ticks {
-        let database = &self.schedule.database;
-        let goals = self.schedule.goals.iter();
-        let ends = goals.filter(|&&goal| Schedule::is_in(database, goal));
-        ends.map(|&goal| database.finish(goal).min)
-            .max()
-            .unwrap_or(0)
+    /// Says that all goals end by a tick; whether they can, as far as times say.
+    fn end_by(&mut self, bound: Ticks) -> bool {
+        let database = &mut self.schedule.database;
+        self.complete.goals().iter().all(|&token| {
+            let by = Span::at_most(bound);
+            let bounded = database.restrict_time(token, End::Finish, by, Owner::Given);
+            bounded.is_ok()
+        })
     }
 
-    /// Takes back about half as many orders as times rest on, one at least.
+    /// Takes back as many orders as times rest on, or fewer, one at least.
     fn relax(&mut self) {
         let database = &self.schedule.database;
         let tight = self
@@ -263,7 +270,8 @@ impl Work {
             self.posted.swap(last, other);
             costs.swap(last, other);
         }
-        for _ in 0..(tight / 2).max(1).min(costs.len()) {
+        let goes = 1 + below(&mut self.random, tight.max(1));
+        for _ in 0..goes.min(costs.len()) {
             let place = (self.choices.relaxed.pick)(&costs, &mut self.random);
             costs.swap_remove(place);
             self.take_back(place);

@@ -1,17 +1,19 @@
 //! What edits changed, so that they can be undone: all since a push, or one that was refused.
 
 use super::{
-    Constraint, EARLIEST, Edge, Half, Inequality, LATEST, NONE, Network, Node, Point, Side, Span,
+    Constraint, EARLIEST, Edge, Half, Inequality, LATEST, NONE, Network, Point, Side, Span,
 };
 use crate::Ticks;
 
 /// A change, with what was there before.
-#[derive(Clone, Debug)]
-pub(super) enum Change<O> {
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
     PointAdded(Point),
-    PointRemoved(Point, Box<Node>),
+    /// Its node is the last of those that were removed.
+    PointRemoved(Point),
     Added(Constraint),
-    Removed(Constraint, Box<Retracted<O>>),
+    /// What it was is the last of what was retracted.
+    Removed(Constraint),
     Span(Constraint, Span),
     Linked(Half),
     Unlinked(Half),
@@ -62,6 +64,8 @@ impl<O: Clone> Network<O> {
         self.levels.pop();
         if self.levels.is_empty() {
             self.trail.clear();
+            self.retracted.clear();
+            self.removed_points.clear();
         }
     }
 
@@ -71,7 +75,7 @@ impl<O: Clone> Network<O> {
     }
 
     /// Remembers a change that cannot be refused.
-    pub(super) fn note(&mut self, change: Change<O>) {
+    pub(super) fn note(&mut self, change: Change) {
         if !self.levels.is_empty() {
             self.trail.push(change);
         }
@@ -93,21 +97,24 @@ impl<O: Clone> Network<O> {
         }
     }
 
-    fn undo(&mut self, change: Change<O>) {
+    fn undo(&mut self, change: Change) {
         match change {
             Change::PointAdded(point) => drop(self.nodes.undo_insert(point)),
-            Change::PointRemoved(point, node) => self.nodes.undo_remove(point, *node),
+            Change::PointRemoved(point) => {
+                let node = self.removed_points.pop().expect("kept with its change");
+                self.nodes.undo_remove(point, node);
+            }
             Change::Added(constraint) => {
                 self.edges.undo_insert(constraint);
                 self.owners.truncate(self.edges.places());
                 self.halves.truncate(2 * self.edges.places());
             }
-            Change::Removed(constraint, retracted) => {
+            Change::Removed(constraint) => {
                 let Retracted {
                     edge,
                     halves,
                     owner,
-                } = *retracted;
+                } = self.retracted.pop().expect("kept with its change");
                 let place = constraint.index();
                 self.edges.undo_remove(constraint, edge);
                 self.halves[2 * place..2 * place + 2].copy_from_slice(&halves);

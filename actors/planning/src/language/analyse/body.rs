@@ -47,12 +47,7 @@ impl<'t> Scope<'t, '_> {
                 ))
             }
             Some("OR") => {
-                let parts = form.children().skip(1);
-                let parts: Vec<Body> = parts.filter_map(|part| self.body(part, draft)).collect();
-                if form.children().nth(1).is_none() {
-                    self.notes.error(form, "one alternative or more in OR");
-                }
-                Some(Body::Any(parts, form.position()))
+                Some(self.alternatives(form, draft, |scope, part, draft| scope.body(part, draft)))
             }
             Some("temporaldistance") => self.distance(form, draft),
             Some(word) => match relation_kind(word) {
@@ -235,6 +230,7 @@ impl<'t> Scope<'t, '_> {
                 return None;
             }
             draft.labels.insert(name.word(), label);
+            draft.labelled.push(name.word());
         }
         Some(Target::New(found.pattern, label))
     }
@@ -244,11 +240,30 @@ impl<'t> Scope<'t, '_> {
         if !form.is_form("OR") {
             return self.one_decomposition(form, draft);
         }
-        let parts = form.children().skip(1);
-        let parts: Vec<Body> = parts
-            .filter_map(|part| self.one_decomposition(part, draft))
-            .collect();
-        Some(Body::Any(parts, form.position()))
+        let read =
+            |scope: &mut Self, part, draft: &mut Draft<'t>| scope.one_decomposition(part, draft);
+        Some(self.alternatives(form, draft, read))
+    }
+
+    /// The alternatives of an `OR`. A label that one of them gives is known within it alone.
+    fn alternatives(
+        &mut self,
+        form: Form<'t>,
+        draft: &mut Draft<'t>,
+        read: impl Fn(&mut Self, Form<'t>, &mut Draft<'t>) -> Option<Body>,
+    ) -> Body {
+        let mut parts = Vec::new();
+        for part in form.children().skip(1) {
+            let known = draft.labelled.len();
+            parts.extend(read(self, part, draft));
+            for name in draft.labelled.drain(known..) {
+                draft.labels.remove(name);
+            }
+        }
+        if form.children().nth(1).is_none() {
+            self.notes.error(form, "one alternative or more in OR");
+        }
+        Body::Any(parts, form.position())
     }
 
     fn one_decomposition(&mut self, form: Form<'t>, draft: &mut Draft<'t>) -> Option<Body> {

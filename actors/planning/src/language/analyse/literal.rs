@@ -59,28 +59,55 @@ pub(super) fn plain(form: Form) -> Option<(Value, Sort)> {
     }
 }
 
-/// A whole number, or no bound where `inf` stands: `Err` if it is neither.
+/// Which end of bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Least,
+    Greatest,
+}
+
+/// A number as an end of bounds, rounded inwards to a whole one; or no bound where `inf` stands:
+/// `Err` if it is neither.
 pub(super) fn bound<'t>(
     form: Form<'t>,
+    side: Side,
     constants: &BTreeMap<&'t str, Form<'t>>,
 ) -> Result<Option<Value>, ()> {
     let literal = resolve(form, constants);
-    match literal.word() {
-        "inf" | "+inf" | "-inf" => Ok(None),
-        _ => match plain(literal) {
-            Some((value, Sort::Number)) => Ok(Some(value)),
-            _ => Err(()),
-        },
+    match (literal.kind(), literal.word()) {
+        (_, "inf" | "+inf" | "-inf") => Ok(None),
+        (Kind::Decimal, word) => {
+            let value: f64 = word.parse().map_err(drop)?;
+            let whole = match side {
+                Side::Least => value.ceil(),
+                Side::Greatest => value.floor(),
+            };
+            // Beyond 2^53, a fraction is not told from a whole number.
+            if whole.abs() <= (1_i64 << 53) as f64 {
+                Ok(Some(whole as Value))
+            } else {
+                Err(())
+            }
+        }
+        _ => whole(form, constants).map(Some).ok_or(()),
+    }
+}
+
+/// A whole number.
+pub(super) fn whole<'t>(form: Form<'t>, constants: &BTreeMap<&'t str, Form<'t>>) -> Option<Value> {
+    match plain(resolve(form, constants)) {
+        Some((value, Sort::Number)) => Some(value),
+        _ => None,
     }
 }
 
 /// What a number must be, in words.
 pub(super) const A_NUMBER: &str = "a whole number, at most 2^56";
 
-/// The two ends of a span; the number itself twice, if `one` allows that.
-pub(super) fn ends<'t>(form: Form<'t>, one: bool, notes: &mut Notes) -> Option<[Form<'t>; 2]> {
+/// The two ends of bounds; of a number, itself twice.
+pub(super) fn ends<'t>(form: Form<'t>, notes: &mut Notes) -> Option<[Form<'t>; 2]> {
     if form.kind() != Kind::Span {
-        if one && !form.word().is_empty() {
+        if !form.word().is_empty() {
             return Some([form, form]);
         }
         notes.error(form, "bounds, as [0 10]");
@@ -102,17 +129,21 @@ pub(super) fn span<'t>(
     constants: &BTreeMap<&'t str, Form<'t>>,
     notes: &mut Notes,
 ) -> Option<Span> {
-    let [min, max] = ends(form, true, notes)?;
-    let side = |form: Form<'t>, wrong: &str, usual: Value, notes: &mut Notes| {
-        let value = bound(form, constants);
+    let [min, max] = ends(form, notes)?;
+    let side = |form: Form<'t>, side: Side, notes: &mut Notes| {
+        let (wrong, usual) = match side {
+            Side::Least => ("inf", Value::MIN),
+            Side::Greatest => ("-inf", Value::MAX),
+        };
+        let value = bound(form, side, constants);
         if value.is_err() || resolve(form, constants).word() == wrong {
             notes.error(form, A_NUMBER);
             return None;
         }
         value.ok().map(|value| value.unwrap_or(usual))
     };
-    let low = side(min, "inf", Value::MIN, notes);
-    let high = side(max, "-inf", Value::MAX, notes);
+    let low = side(min, Side::Least, notes);
+    let high = side(max, Side::Greatest, notes);
     let span = Span::new(low?, high?);
     if span.is_empty() {
         notes.error(form, "bounds of which the first is at most the second");

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Scope;
-use super::literal::{self, Sort, describe};
+use super::literal::{self, Side, Sort, describe};
 use crate::language::findings::arguments;
 use crate::language::tree::{Form, Kind};
 use crate::model::{
@@ -373,6 +373,7 @@ impl<'t> Scope<'t, '_> {
     pub(super) fn bound(
         &mut self,
         form: Form<'t>,
+        side: Side,
         least: Option<Value>,
         variables: &mut Variables<'t>,
     ) -> Option<Bound> {
@@ -381,7 +382,7 @@ impl<'t> Scope<'t, '_> {
                 .variable(form, Some(NUMBER), variables)
                 .map(Bound::Variable);
         }
-        match literal::bound(form, self.constants) {
+        match literal::bound(form, side, self.constants) {
             Ok(None) => Some(Bound::None),
             Ok(Some(value)) if least.is_none_or(|least| value >= least) => {
                 Some(Bound::Value(value))
@@ -391,7 +392,7 @@ impl<'t> Scope<'t, '_> {
                 None
             }
             Err(()) => {
-                self.notes.error(form, "a whole number, a variable or inf");
+                self.notes.error(form, "a number, a variable or inf");
                 None
             }
         }
@@ -404,9 +405,9 @@ impl<'t> Scope<'t, '_> {
         least: Option<Value>,
         variables: &mut Variables<'t>,
     ) -> Option<[Bound; 2]> {
-        let [min, max] = literal::ends(form, true, self.notes)?;
-        let low = self.bound(min, least, variables);
-        let high = self.bound(max, least, variables);
+        let [min, max] = literal::ends(form, self.notes)?;
+        let low = self.bound(min, Side::Least, least, variables);
+        let high = self.bound(max, Side::Greatest, least, variables);
         let (low, high) = (low?, high?);
         let word = |form| literal::resolve(form, self.constants).word();
         let endless = matches!(word(min), "inf" | "+inf") || word(max) == "-inf";

@@ -76,6 +76,22 @@ pub(super) fn declare<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) {
     }
 }
 
+/// Notes options that resources of a kind do not have.
+fn check_options_of<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>, kind: &str) {
+    let allowed: &[&str] = match kind {
+        "unary" => &[":kind", ":changes"],
+        "renewable" => &[":kind", ":changes", ":capacity"],
+        "rate_limited" => &[":kind", ":changes", ":capacity", ":window"],
+        _ => &[":kind", ":changes", ":capacity", ":initial", ":limits"],
+    };
+    for option in OPTIONS.iter().filter(|option| !allowed.contains(option)) {
+        if let Some(keyword) = entry.keyword(option) {
+            to.notes
+                .error(keyword, format!("an option of a {kind} resource"));
+        }
+    }
+}
+
 /// What a declaration says of kind and levels; name, object and position are still to be given.
 fn levels<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Option<Resource> {
     let Some(kind) = entry.one(":kind", to.notes) else {
@@ -87,21 +103,10 @@ fn levels<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Option<Resour
         to.notes.unknown(kind, expected, KINDS.into_iter());
         return None;
     }
-    let allowed: &[&str] = match kind.word() {
-        "unary" => &[":kind", ":changes"],
-        "renewable" => &[":kind", ":changes", ":capacity"],
-        "rate_limited" => &[":kind", ":changes", ":capacity", ":window"],
-        _ => &[":kind", ":changes", ":capacity", ":initial", ":limits"],
-    };
-    for option in OPTIONS.iter().filter(|option| !allowed.contains(option)) {
-        if let Some(keyword) = entry.keyword(option) {
-            to.notes
-                .error(keyword, format!("an option of a {} resource", kind.word()));
-        }
-    }
+    check_options_of(to, entry, kind.word());
     let mut value = |name: &str, least: Value| {
         let form = entry.one(name, to.notes)?;
-        let value = literal::bound(form, to.constants).ok().flatten();
+        let value = literal::whole(form, to.constants);
         let value = value.filter(|value| *value >= least);
         if value.is_none() {
             to.notes
@@ -162,8 +167,7 @@ fn changes<'t>(to: &mut Declarations<'t, '_>, entry: &Entry<'t>) -> Vec<(Ticks, 
     let mut changes = Vec::new();
     for pair in list.into_iter().flat_map(|list| list.children()) {
         let mut parts = pair.children();
-        let numbers = [parts.next(), parts.next()]
-            .map(|form| literal::bound(form?, to.constants).ok().flatten());
+        let numbers = [parts.next(), parts.next()].map(|form| literal::whole(form?, to.constants));
         match (numbers, parts.next()) {
             ([Some(tick), Some(delta)], None) if tick >= 0 => changes.push((tick, delta)),
             _ => to

@@ -8,7 +8,8 @@ use super::names::Names;
 use super::pattern::{Master, Variables};
 use crate::language::tree::{Form, Kind};
 use crate::model::{
-    Body, Control, Model, Pattern, PredicateId, Rule, SlotOrder, Target, TimelineId, Values,
+    Argument, Body, Control, Model, Operand, Pattern, PredicateId, Relationship, Rule, SlotOrder,
+    Target, TimelineId, Values,
 };
 
 /// The options of rules. A decomposition has `:into` besides.
@@ -35,6 +36,8 @@ pub(super) struct Draft<'t> {
     pub(super) same_resources: Vec<Option<&'t str>>,
     /// The numbers of the tokens that have names.
     pub(super) labels: BTreeMap<&'t str, usize>,
+    /// Their names, in the order of the text.
+    pub(super) labelled: Vec<&'t str>,
 }
 
 /// Reads all rules to `drafts`, and how a search decides.
@@ -95,7 +98,7 @@ impl<'t> Scope<'t, '_> {
             draft.rule.relationships.extend(found);
         }
         for &form in entry.option(":when") {
-            let found = self.relationship(form, &mut draft);
+            let found = self.guard(form, &mut draft);
             draft.rule.when.extend(found);
         }
         for option in [":uses", ":consumes", ":produces"] {
@@ -106,6 +109,26 @@ impl<'t> Scope<'t, '_> {
         draft.rule.variables = std::mem::take(&mut draft.variables.list);
         self.spend_instances(entry.form, &draft)?;
         Some(draft)
+    }
+
+    /// A constraint that speaks of the master alone, since there is nothing else yet when it is
+    /// asked for.
+    fn guard(&mut self, form: Form<'t>, draft: &mut Draft<'t>) -> Option<Relationship> {
+        let guard = self.relationship(form, draft)?;
+        let master = &draft.rule.master;
+        let is_of_master = |operand: &Operand| match *operand {
+            Operand::Value(_) => true,
+            Operand::Variable(id) => {
+                master.object == Some(id) || master.arguments.contains(&Argument::Variable(id))
+            }
+            Operand::Start(label) | Operand::Finish(label) | Operand::Duration(label) => label == 0,
+        };
+        if !guard.operands.iter().all(is_of_master) {
+            self.notes
+                .error(form, "a guard of the master's variables and times");
+            return None;
+        }
+        Some(guard)
     }
 
     /// Takes what the rule names, for each object that it holds for, from what the text may name.
@@ -157,6 +180,7 @@ impl<'t> Scope<'t, '_> {
             same_timelines: vec![None],
             same_resources: Vec::new(),
             labels: BTreeMap::from([("master", 0)]),
+            labelled: Vec::new(),
         })
     }
 

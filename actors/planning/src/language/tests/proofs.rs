@@ -87,7 +87,7 @@ proptest! {
     fn endings_that_nothing_follows_are_found(
         rules in prop::collection::vec(
             (
-                prop::array::uniform3(prop::option::weighted(0.3, 0..2_i64)),
+                prop::array::uniform3(prop::option::weighted(0.1, 0..2_i64)),
                 prop::option::of(comparisons(&["=", "!=", "<", "<=", ">", ">="], 8)),
             ),
             0..7,

@@ -4,7 +4,7 @@ use super::{Declarations, MOST_MEMBERS, Members};
 use crate::language::analyse::entry::Entry;
 use crate::language::findings::arguments;
 use crate::language::tree::{Form, Kind};
-use crate::model::{Filler, NUMBER, Parameter, Predicate};
+use crate::model::{Filler, NUMBER, Parameter, Predicate, TimelineKind};
 
 /// How many parameters a predicate, and columns a table, may have.
 const MOST_PARAMETERS: usize = 256;
@@ -103,7 +103,11 @@ impl<'t> Declarations<'t, '_> {
             return;
         };
         let known = &self.classes[class].state_variables;
-        if !known.iter().any(|(known, _)| *known == name.word()) {
+        let kind = known
+            .iter()
+            .find(|(known, _)| *known == name.word())
+            .map(|(_, kind)| *kind);
+        let Some(kind) = kind else {
             let known: Vec<&str> = known.iter().map(|(known, _)| *known).collect();
             self.notes.unknown(
                 name,
@@ -111,7 +115,8 @@ impl<'t> Declarations<'t, '_> {
                 known.into_iter(),
             );
             return;
-        }
+        };
+        let is_state = kind == TimelineKind::State;
         let mut predicates = Vec::new();
         for form in list.children() {
             match self.predicates.get(form.word()) {
@@ -134,6 +139,9 @@ impl<'t> Declarations<'t, '_> {
                 .error(list, "one predicate or more, in parentheses");
         }
         let default = entry.one(":default", self.notes);
+        if let (Some(form), false) = (default, is_state) {
+            self.notes.refuse(form, "no default, but of a State", "one");
+        }
         let default = default.and_then(|form| self.filler(form, &predicates));
         let members = Members {
             predicates,
