@@ -248,21 +248,22 @@ impl Database {
     }
 
     fn take_off(&mut self, token: TokenId) {
-        for instance in self.at(token).instances.clone() {
+        // What goes takes others along, and they must not take this token again.
+        self.change(token).status = Status::Free;
+        while let Some(&instance) = self.at(token).instances.first() {
+            self.change(token).instances.remove(0);
             self.remove_instance(instance);
         }
-        for (instance, relation) in self.at(token).supported.clone() {
+        while let Some(&(instance, relation)) = self.at(token).supported.first() {
+            let at = self.change(token);
+            at.supported.remove(0);
+            at.supports -= 1;
             self.reopen(instance, relation);
         }
         for other in self.at(token).merged.clone() {
             self.part(other, token);
         }
         self.unlink(token);
-        let at = self.change(token);
-        at.status = Status::Free;
-        at.instances.clear();
-        at.supported.clear();
-        at.supports = 0;
         self.take_orders_back(token);
     }
 
