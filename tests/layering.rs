@@ -39,6 +39,7 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 9] = [
             "farside-logs",
             "farside-actors",
             "farside-network",
+            "farside-planning",
             "farside-traffic",
         ],
         &["kameo", "tokio"],

@@ -9,7 +9,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, recover, report,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, plan, recover, report,
     reproduce, run, study, verify,
 };
 use crate::registry::Registry;
@@ -73,6 +73,8 @@ enum Command {
     Report(report::Args),
     /// Save what can be saved of a cut or damaged log
     Recover(recover::Args),
+    /// Check, solve, validate and draw problems of planning
+    Plan(plan::Args),
     /// Print completions for a shell
     Completions {
         /// The shell
@@ -191,6 +193,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args, registry),
         Command::Recover(args) => recover::run(&args, registry),
+        Command::Plan(args) => plan::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             let name = registry.program();

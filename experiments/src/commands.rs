@@ -10,6 +10,7 @@ pub(crate) mod info;
 mod interrupt;
 mod kinds;
 mod output;
+pub(crate) mod plan;
 mod progress;
 pub(crate) mod recover;
 pub(crate) mod report;
@@ -82,6 +83,9 @@ pub(crate) enum CommandError {
     /// A figure that is not to be had as this kind of file.
     #[error(transparent)]
     Export(#[from] crate::export::ExportError),
+    /// A file of planning, or what a planner made of it.
+    #[error(transparent)]
+    Plan(#[from] plan::PlanError),
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
@@ -115,7 +119,9 @@ impl CommandError {
                 Exit::Failed
             }
             CommandError::Log(error) if error.is_of_output() => Exit::Failed,
-            CommandError::Study(_)
+            CommandError::Plan(plan::PlanError::Planner { .. }) => Exit::Failed,
+            CommandError::Plan(_)
+            | CommandError::Study(_)
             | CommandError::Store(_)
             | CommandError::Scenario(_)
             | CommandError::Log(_)

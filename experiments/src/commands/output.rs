@@ -1,7 +1,7 @@
 //! Files that commands write: never over what the same command reads, nor over what is there and of
 //! another kind.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use farside_actors::figure::Figure;
@@ -25,6 +25,8 @@ pub(super) enum Format {
     Pdf,
     /// A figure for slides.
     Png,
+    /// A plan in JSON: all are alike up to the version of their format.
+    Plan,
 }
 
 impl Format {
@@ -35,6 +37,7 @@ impl Format {
             Format::Page => b"<title>",
             Format::Table => b",",
             Format::Junit => b"name=",
+            Format::Plan => b"/",
             Format::Pdf => return &bytes[..bytes.len().min(5)],
             Format::Png => return &bytes[..bytes.len().min(8)],
         };
@@ -49,6 +52,7 @@ impl Format {
             Format::Page => "report",
             Format::Table => "table of this kind",
             Format::Junit => "JUnit file",
+            Format::Plan => "plan",
         }
     }
 }
@@ -86,15 +90,80 @@ pub(super) fn write_bytes(
     format: Format,
     inputs: &[PathBuf],
 ) -> Result<String, CommandError> {
-    refuse_input(&path, inputs)?;
-    if is_in_the_way(&path, format.beginning(bytes)) {
-        let what = format.name();
-        return Err(CommandError::InTheWay { path, what });
-    }
+    may_write(&path, bytes, format, inputs)?;
     match std::fs::write(&path, bytes) {
         Ok(()) => Ok(path.display().to_string()),
         Err(source) => Err(CommandError::Write { path, source }),
     }
+}
+
+/// That a file may be written: it is none of the inputs by any name, and of the same kind if it is
+/// there. `bytes` begin as what is to be written.
+///
+/// # Errors
+/// If it may not.
+pub(super) fn may_write(
+    path: &Path,
+    bytes: &[u8],
+    format: Format,
+    inputs: &[PathBuf],
+) -> Result<(), CommandError> {
+    refuse_input(path, inputs)?;
+    match is_in_the_way(path, format.beginning(bytes)) {
+        true => Err(CommandError::InTheWay {
+            path: path.to_owned(),
+            what: format.name(),
+        }),
+        false => Ok(()),
+    }
+}
+
+/// Writes a file that is there once it is whole: a reader never sees a part of it.
+///
+/// # Errors
+/// Those of [`may_write`], and if it cannot be written.
+pub(super) fn write_whole(
+    path: &Path,
+    bytes: &[u8],
+    format: Format,
+    inputs: &[PathBuf],
+) -> Result<(), CommandError> {
+    may_write(path, bytes, format, inputs)?;
+    replace(path, bytes)
+}
+
+/// Puts bytes in the place of a file, all at once: they are written beside it, and then renamed. A
+/// device or a pipe is written to as it is.
+///
+/// # Errors
+/// If it cannot be written: the file is as it was.
+pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<(), CommandError> {
+    let failed = |source| CommandError::Write {
+        path: path.to_owned(),
+        source,
+    };
+    // What a link leads to is replaced, and not the link.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let found = std::fs::metadata(&target).ok();
+    if found.as_ref().is_some_and(|found| !found.is_file()) {
+        return std::fs::write(&target, bytes).map_err(failed);
+    }
+    let mut name = target.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let beside = target.with_file_name(name);
+    let written = std::fs::File::create_new(&beside).and_then(|mut file| {
+        file.write_all(bytes)?;
+        match found {
+            Some(found) => file.set_permissions(found.permissions()),
+            None => Ok(()),
+        }
+    });
+    let done = written.and_then(|()| std::fs::rename(&beside, &target));
+    done.map_err(|error| {
+        // What is left beside it is of no use; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&beside);
+        failed(error)
+    })
 }
 
 /// Writes a figure as one of the kinds that there are, and says where. What the file is lacking, as

@@ -506,7 +506,7 @@ fn next_places(places: &mut [usize], count: usize) -> bool {
 }
 
 /// The problem with some of its goals only.
-fn only(problem: &Problem, kept: &[bool]) -> Problem {
+pub(super) fn only(problem: &Problem, kept: &[bool]) -> Problem {
     let mut places = Vec::with_capacity(kept.len());
     let mut next = 0;
     for &kept in kept {
