@@ -86,6 +86,10 @@ pub struct Explanation {
     /// Goals that cannot all be, with what is the case, as a complete search has proven: without
     /// any one of them no proof was found. Empty if no such set is known.
     pub together: Vec<ToldGoal>,
+    /// The goal that was to be added to a plan with those that are not to be dropped, if that is what
+    /// the reasons are of; none if they are of a search of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub added: Option<ToldGoal>,
     /// Whether the reasons are all that there is: no search had a choice where it failed.
     pub only_way: bool,
     /// Where the way that got furthest ended.

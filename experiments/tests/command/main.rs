@@ -9,6 +9,7 @@ mod layouts;
 mod logs;
 mod outputs;
 mod pictures;
+mod plan;
 mod report;
 mod running;
 mod scenarios;

@@ -48,6 +48,10 @@ fn the_help_of_every_command() {
         let help = said(folder.path(), &[command, "--help"]);
         insta::assert_snapshot!(format!("help_{command}"), help);
     }
+    for command in ["check", "format", "solve", "validate", "draw"] {
+        let help = said(folder.path(), &["plan", command, "--help"]);
+        insta::assert_snapshot!(format!("help_plan_{command}"), help);
+    }
 }
 
 /// Four rovers on a line of six vertices with two pockets.

@@ -118,7 +118,7 @@ impl<'a> Tries<'a> {
             self.impossible.push(question.clone());
             Tried::Impossible
         } else {
-            self.attempt(&question, self.share(8))
+            self.attempt(&question, self.share(4))
         };
         told.proven = all == Tried::Impossible || !self.hopeless.is_empty();
         if all == Tried::Found && self.hopeless.is_empty() {
@@ -132,8 +132,9 @@ impl<'a> Tries<'a> {
             }),
             _ => self.mend(&question, &alone, all == Tried::Impossible),
         };
+        let goals = dropped.as_ref().map(|at| at.goals.clone());
         self.tell_goals(&mut told, dropped);
-        self.tell_reasons(&question, &alone, &mut told);
+        self.tell_reasons(&question, &alone, &goals.unwrap_or_default(), &mut told);
         self.finish(told)
     }
 
@@ -148,7 +149,13 @@ impl<'a> Tries<'a> {
     }
 
     /// The reasons, and goals that cannot all be.
-    fn tell_reasons(&mut self, question: &[bool], alone: &[bool], told: &mut Explanation) {
+    fn tell_reasons(
+        &mut self,
+        question: &[bool],
+        alone: &[bool],
+        dropped: &[GoalId],
+        told: &mut Explanation,
+    ) {
         if let Some((goal, reason)) = self.hopeless.first() {
             told.together = vec![goal.clone()];
             told.reasons = vec![reason.clone()];
@@ -160,6 +167,8 @@ impl<'a> Tries<'a> {
             stand = self.core(alone);
             let members = (0..stand.len()).filter(|&goal| stand[goal]);
             told.together = members.map(|goal| told_goal(&self.problem, goal)).collect();
+        } else if self.record_added(question, dropped, told) {
+            return;
         }
         self.record(&stand, told);
     }
@@ -173,6 +182,7 @@ impl<'a> Tries<'a> {
             to_drop: Vec::new(),
             smallest: None,
             together: Vec::new(),
+            added: None,
             only_way: false,
             reasons: Vec::new(),
             operations: 0,
@@ -477,12 +487,50 @@ impl<'a> Tries<'a> {
         core
     }
 
+    /// Searches a plan with the goals that are kept, adds the first of those to drop, and tells
+    /// where that ended; whether there is anything to tell.
+    fn record_added(
+        &mut self,
+        question: &[bool],
+        dropped: &[GoalId],
+        told: &mut Explanation,
+    ) -> bool {
+        let Some(&added) = dropped.first() else {
+            return false;
+        };
+        let mut kept = question.to_vec();
+        for &goal in dropped {
+            kept[goal] = false;
+        }
+        let mut recorder = Recorder::new(&self.schedule, &kept);
+        let mut stack = Stack::default();
+        let budget = self.left() / 4;
+        let database = &mut self.schedule.database;
+        database.push();
+        let begun = chronological(database, &mut recorder, &mut stack, budget);
+        let mut is_told = false;
+        if matches!(begun, Verdict::Solved) {
+            recorder.begin_again();
+            recorder.complete.want(added, true);
+            let verdict = chronological(database, &mut recorder, &mut stack, budget);
+            is_told = !matches!(verdict, Verdict::Solved);
+        }
+        database.pop();
+        let reasons = recorder.reasons();
+        if is_told && !reasons.is_empty() {
+            told.added = Some(told_goal(&self.problem, added));
+            told.reasons = reasons;
+            return true;
+        }
+        false
+    }
+
     /// Searches once more and tells where the way that got furthest ended.
     fn record(&mut self, wanted: &[bool], told: &mut Explanation) {
         let mut recorder = Recorder::new(&self.schedule, wanted);
         let mut stack = Stack::default();
         // There is something to tell after a few operations already.
-        let budget = self.share(16).max(1_000);
+        let budget = (self.left() / 4).max(1_000);
         let database = &mut self.schedule.database;
         database.push();
         let verdict = chronological(database, &mut recorder, &mut stack, budget);

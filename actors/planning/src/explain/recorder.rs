@@ -20,6 +20,9 @@ pub(super) struct Recorder {
     current: Option<Current>,
     /// How far the search got, and why not further.
     furthest: Option<(usize, Vec<Reason>)>,
+    /// The same of ways that ended with a resource of which there is not enough: where all goals
+    /// are in the plan, that is mostly what is to be known.
+    over_used: Option<(usize, Vec<Reason>)>,
 }
 
 /// A flaw further on than any before, while all its decisions are refused.
@@ -42,17 +45,39 @@ impl Recorder {
             decided: Vec::new(),
             current: None,
             furthest: None,
+            over_used: None,
         }
+    }
+
+    /// What ended until now is not told; what was decided stays known.
+    pub(super) fn begin_again(&mut self) {
+        (self.current, self.furthest, self.over_used) = (None, None, None);
     }
 
     /// Where the way that got furthest ended.
     pub(super) fn reasons(self) -> Vec<Reason> {
-        self.furthest.map(|at| at.1).unwrap_or_default()
+        let mut reasons = self.furthest.map(|at| at.1).unwrap_or_default();
+        let over_used = self.over_used.map(|at| at.1).unwrap_or_default();
+        if let Some(mut other) = over_used.into_iter().next()
+            && !reasons.contains(&other)
+        {
+            other.message = format!("on another way, {}", other.message);
+            reasons.push(other);
+        }
+        reasons
     }
 
     /// The last decision of a flaw was refused.
     fn end(&mut self) {
-        if let Some(current) = self.current.take() {
+        let Some(current) = self.current.take() else {
+            return;
+        };
+        let is_further =
+            |at: &Option<(usize, _)>| at.as_ref().is_none_or(|at| current.depth > at.0);
+        if matches!(current.flaw, Flaw::OverUse { .. }) && is_further(&self.over_used) {
+            self.over_used = Some((current.depth, current.reasons.clone()));
+        }
+        if is_further(&self.furthest) {
             self.furthest = Some((current.depth, current.reasons));
         }
     }
@@ -67,7 +92,11 @@ impl Strategy for Recorder {
         self.complete.decisions(database, flaw, into);
         // Constraints of times come with each decision: the more there are, the further it got.
         let depth = database.network().constraints();
-        let is_further = self.furthest.as_ref().is_none_or(|at| depth > at.0);
+        let kept = match flaw {
+            Flaw::OverUse { .. } => &self.over_used,
+            _ => &self.furthest,
+        };
+        let is_further = kept.as_ref().is_none_or(|at| depth > at.0);
         self.current = is_further.then(|| {
             let problem = self.complete.problem().clone();
             let told = Teller::flaw(database, &problem, &self.decided, flaw);

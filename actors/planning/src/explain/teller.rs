@@ -493,7 +493,7 @@ impl<'a> Teller<'a> {
                             timelines.join(" or ")
                         )
                     }
-                    Target::Label(_) => "a token that it names twice".to_owned(),
+                    Target::Label(_) => "two of its tokens in order".to_owned(),
                 };
                 let relation = snake(&format!("{:?}", said.kind));
                 let there = if said.condition { " to be there" } else { "" };

@@ -38,9 +38,17 @@ impl fmt::Display for Explanation {
             }
         }
         if !self.reasons.is_empty() {
-            match self.only_way {
-                true => writeln!(f, "Why:")?,
-                false => writeln!(f, "Of several ways, the one that got furthest ended here:")?,
+            match (&self.added, self.only_way) {
+                (Some(added), _) => writeln!(
+                    f,
+                    "When {} was to be added to a plan with the others, the way that got furthest \
+                     ended here:",
+                    added.name
+                )?,
+                (None, true) => writeln!(f, "Why:")?,
+                (None, false) => {
+                    writeln!(f, "Of several ways, the one that got furthest ended here:")?;
+                }
             }
         }
         for reason in &self.reasons {

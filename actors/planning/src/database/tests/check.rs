@@ -1,6 +1,6 @@
 //! What holds of a database after every edit, seen from its tokens and instances alone.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
@@ -213,7 +213,7 @@ fn constraints(database: &Database, forgot: bool) {
 /// Bounds of times are those of a network with the same constraints.
 fn bounds(database: &Database) {
     let mut rebuilt = Network::new(database.horizon());
-    let mut points = HashMap::from([(database.network.origin(), rebuilt.origin())]);
+    let mut points = BTreeMap::from([(database.network.origin(), rebuilt.origin())]);
     for (point, _) in database.network.all_bounds() {
         points.entry(point).or_insert_with(|| rebuilt.add_point());
     }
