@@ -157,3 +157,43 @@ fn small_projects_are_decided_as_cp_sat_decides_them() {
     }
     assert_eq!(decided, 30);
 }
+
+/// The complete planner proves what it can in its part of the operations; else repair has the rest.
+#[test]
+fn one_planner_proves_and_else_the_other_repairs() {
+    let (model, problem) = project("psp2.sch", include_bytes!("../../models/psp2.sch"));
+    let solve = |operations| {
+        let settings = Settings {
+            operations,
+            seed: 1,
+        };
+        let answer = Both::default().solve(&model, &problem, settings);
+        let answer = answer.expect("it loads");
+        assert!(answer.operations <= operations + operations / 4);
+        let plan = answer.plan.expect("there is a plan");
+        assert!(checker::check(&model, &problem, &plan).is_empty());
+        (plan.planner, plan.makespan, answer.proven)
+    };
+    assert_eq!(solve(1_000_000), ("forward".to_owned(), 45, true));
+    let (_, makespan, proven) = solve(40_000);
+    assert!(makespan >= 45 && !proven);
+}
+
+#[test]
+fn a_problem_without_goals_has_the_empty_plan() {
+    let (model, _) = rover();
+    let problem = Arc::new(Problem {
+        horizon: 0,
+        ..Problem::default()
+    });
+    let settings = Settings {
+        operations: 10_000,
+        seed: 1,
+    };
+    let planners: [&dyn Planner; 3] = [&Forward, &Repair::default(), &Both::default()];
+    for planner in planners {
+        let answer = planner.solve(&model, &problem, settings).expect("it loads");
+        assert_eq!(answer.plan.map(|plan| plan.tokens.len()), Some(0));
+        assert!(answer.operations < 10_000, "{}", planner.name());
+    }
+}
