@@ -226,6 +226,9 @@ impl Work {
                 continue;
             };
             let bound = plan.makespan - 1;
+            if bound < 0 {
+                return (best.map(|(plan, ..)| plan), true);
+            }
             if attempts.is_multiple_of(ANEW) || posted.is_empty() {
                 let base = self.base.clone();
                 self.return_to(&base, &[]);
