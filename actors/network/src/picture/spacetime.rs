@@ -468,7 +468,9 @@ impl Diagram<'_> {
                 let [left, top, right, bottom] = box_at(**y);
                 let apart =
                     |b: &[f64; 4]| right < b[0] || b[2] < left || bottom < b[1] || b[3] < top;
-                right <= self.area.x(1.0) && taken.iter().all(apart)
+                // Below the line the axis has its numbers.
+                let within = right <= self.area.x(1.0) && bottom <= self.area.y(0.0) + 2.0;
+                within && taken.iter().all(apart)
             };
             if let Some(y) = [up, down].iter().find(free).copied() {
                 taken.push(box_at(y));

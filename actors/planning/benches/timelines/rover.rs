@@ -21,11 +21,14 @@ pub(crate) struct Rover {
     predicates: Predicates,
     ok: Value,
     failed: Value,
+    /// Whether an alarm came at this tick.
+    alarm: bool,
     random: u64,
 }
 
 struct Timelines {
     goal: TimelineId,
+    monitor: TimelineId,
     polls: [TimelineId; 4],
     commands: [TimelineId; 3],
 }
@@ -33,6 +36,7 @@ struct Timelines {
 struct Predicates {
     no_goal: PredicateId,
     image: PredicateId,
+    nominal: PredicateId,
     polls: [PredicateId; 4],
 }
 
@@ -68,12 +72,14 @@ impl Rover {
         Rover {
             timelines: Timelines {
                 goal: timeline("Goal_SV"),
+                monitor: timeline("MotionMonitor_SV"),
                 polls: ["Tilt_SV", "Roll_SV", "Temperature_SV", "Power_SV"].map(timeline),
                 commands: ["Location_SV", "Camera_SV", "PanTilt_SV"].map(timeline),
             },
             predicates: Predicates {
                 no_goal: predicate("NoGoal"),
                 image: predicate("ImageAt"),
+                nominal: predicate("Nominal"),
                 polls: [
                     "TiltMeasure",
                     "RollMeasure",
@@ -84,6 +90,7 @@ impl Rover {
             },
             ok: symbol("ok"),
             failed: symbol("failed"),
+            alarm: false,
             random: seed,
             executive: Executive::begin(model, &problem).expect("the facts can be"),
         }
@@ -109,6 +116,7 @@ impl Rover {
     }
 
     fn answer_polls(&mut self, tick: Ticks) {
+        self.alarm = false;
         for (place, timeline) in self.timelines.polls.into_iter().enumerate() {
             // Now and then an answer is lost.
             if self.below(50) == 0 {
@@ -129,6 +137,7 @@ impl Rover {
             };
             let at = self.executive.database().token(token);
             if at.is_some_and(|at| at.predicate == self.predicates.polls[place]) {
+                self.alarm |= place < 2 && alarm == 1;
                 let reported = self.executive.report(token, &[alarm, value, 1], true, tick);
                 reported.expect("an answer can be what it is");
             }
@@ -162,19 +171,20 @@ impl Rover {
     fn give_goal(&mut self, tick: Ticks) {
         let wanted = self.below(30) == 0;
         let place = [self.below(100), self.below(100), self.below(90)];
-        let Some(token) = self.executive.present(self.timelines.goal) else {
-            return;
+        let says = |timeline, predicate| {
+            let token = self.executive.present(timeline);
+            let at = token.and_then(|token| self.executive.database().token(token));
+            at.is_some_and(|at| at.predicate == predicate)
         };
-        let at = self.executive.database().token(token);
-        if wanted && at.is_some_and(|at| at.predicate == self.predicates.no_goal) {
+        // While the rover recovers, or begins to, nobody lets it drive.
+        let free = says(self.timelines.goal, self.predicates.no_goal)
+            && says(self.timelines.monitor, self.predicates.nominal);
+        if wanted && free && !self.alarm {
             let [x, y, pan] = place.map(Some);
             let goal = [x, y, pan, None];
-            // It cannot be started where the rover recovers: the cycle would have no plan.
-            let image = self.predicates.image;
-            drop(
-                self.executive
-                    .start(self.timelines.goal, image, &goal, tick),
-            );
+            let (timeline, image) = (self.timelines.goal, self.predicates.image);
+            let started = self.executive.start(timeline, image, &goal, tick);
+            started.expect("a goal can start");
         }
     }
 }

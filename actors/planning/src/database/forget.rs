@@ -70,12 +70,15 @@ impl Database {
                 return false;
             };
             let of_it = |open: &super::Open| {
-                let super::Step::Relation(at) = open.step else {
-                    return open.instance == instance;
-                };
-                let said = &relations[at as usize];
-                let target = matches!(said.target, Target::Label(label) if label == mine);
-                open.instance == instance && (said.anchor == mine || target)
+                open.instance == instance
+                    && match open.step {
+                        super::Step::Choice(_) => true,
+                        super::Step::Relation(at) => {
+                            let said = &relations[at as usize];
+                            said.anchor == mine
+                                || matches!(said.target, Target::Label(label) if label == mine)
+                        }
+                    }
             };
             let nested = relations.iter().any(|said| {
                 said.anchor == mine || matches!(said.target, Target::Label(label) if label == mine)
@@ -87,13 +90,18 @@ impl Database {
 
     /// Deletes a token of the past: later ones keep what rested on it.
     fn delete_past(&mut self, token: TokenId, before: Ticks) {
-        for other in self.at(token).merged.clone() {
+        // All that rests on what goes is kept before anything of it does.
+        let merged = self.at(token).merged.clone();
+        self.freeze_times(token);
+        let going = self.freeze_values(token);
+        for &other in &merged {
             self.freeze_times(other);
+            self.freeze_values(other);
+        }
+        for other in merged {
             self.part(other, token);
             self.delete(other);
         }
-        self.freeze_times(token);
-        let going = self.freeze_values(token);
         self.store.remove_all(&going);
         for instance in std::mem::take(&mut self.change(token).instances) {
             self.forget_instance(instance, before);

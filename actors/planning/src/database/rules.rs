@@ -92,7 +92,7 @@ pub enum Guard {
 }
 
 /// A rule as it holds for one token, or waits to.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Instance {
     /// The rule.
     pub rule: RuleId,
@@ -113,9 +113,25 @@ pub struct Instance {
     /// What it does to resources.
     pub(super) effects: SmallVec<[Effected; 1]>,
     /// The variables that it asked to be told of.
-    pub(super) watched: SmallVec<[parameters::Variable; 2]>,
+    pub(super) watched: SmallVec<[parameters::Variable; 4]>,
     /// Since which edit the trail need not keep it again.
     pub(super) kept: u64,
+}
+
+// As that of a token.
+impl Clone for Instance {
+    fn clone(&self) -> Self {
+        Instance {
+            variables: SmallVec::from_slice(&self.variables),
+            labels: SmallVec::from_slice(&self.labels),
+            chosen: SmallVec::from_slice(&self.chosen),
+            times: SmallVec::from_slice(&self.times),
+            values: SmallVec::from_slice(&self.values),
+            effects: SmallVec::from_slice(&self.effects),
+            watched: SmallVec::from_slice(&self.watched),
+            ..*self
+        }
+    }
 }
 
 /// A constraint of times that an instance brought.
@@ -308,7 +324,11 @@ impl Database {
                 }
                 return self.follow_bounds(instance);
             }
-            (Guard::Holds, _) => self.withdraw(instance),
+            (Guard::Holds, _) => {
+                self.change_instance(instance).guard = now;
+                self.withdraw(instance);
+                return Ok(());
+            }
             (_, Guard::Holds) => {
                 self.change_instance(instance).guard = now;
                 return self.apply(instance);
@@ -342,8 +362,7 @@ impl Database {
             if wanted == operand {
                 continue;
             }
-            let equal = [wanted, operand];
-            match self.store.entailed(&parameters::Kind::Equal, &equal) {
+            match self.are_equal(wanted, operand) {
                 Some(true) => {}
                 Some(false) => return Guard::Void,
                 None => all = Guard::Waiting,
@@ -357,6 +376,24 @@ impl Database {
             }
         }
         all
+    }
+
+    /// Whether two operands are certainly equal, certainly not, or neither.
+    pub(super) fn are_equal(&self, one: Operand, other: Operand) -> Option<bool> {
+        match (one, other) {
+            (Operand::Value(value), Operand::Variable(variable))
+            | (Operand::Variable(variable), Operand::Value(value)) => {
+                let domain = self.store.domain(variable);
+                match domain.value() {
+                    Some(is) => Some(is == value),
+                    None => (!domain.contains(value)).then_some(false),
+                }
+            }
+            _ => {
+                let equal = [one, other];
+                self.store.entailed(&parameters::Kind::Equal, &equal)
+            }
+        }
     }
 
     /// Whether a relationship certainly holds, certainly does not, or neither.
@@ -577,7 +614,9 @@ impl Database {
         if self.instance_at(instance).guard == Guard::Holds {
             self.withdraw(instance);
         }
-        let at = self.instance_at(instance).clone();
+        let Some(at) = self.instances.get(instance).cloned() else {
+            return;
+        };
         for &variable in &at.watched {
             let place = variable.index();
             if let Some(at) = self.watchers[place].iter().position(|&at| at == instance) {
@@ -614,17 +653,24 @@ impl Database {
     }
 
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
+        // Each once, however many of its variables changed.
+        let mut watchers: SmallVec<[InstanceId; 16]> = SmallVec::new();
         for &variable in changed {
-            // Whoever is told may be gone by what those before it do.
-            let watchers = self.watchers.get(variable.index());
-            let watchers = watchers.map_or(&[][..], |all| all);
-            let watchers: SmallVec<[InstanceId; 8]> = SmallVec::from_slice(watchers);
-            for instance in watchers {
-                if self.instances.get(instance).is_some() {
-                    self.reconsider(instance)?;
+            let all = self.watchers.get(variable.index());
+            for &instance in all.map_or(&[][..], |all| all) {
+                if !watchers.contains(&instance) {
+                    watchers.push(instance);
                 }
             }
-            self.follow_mirrors(variable)?;
+            if !self.mirrors.is_empty() {
+                self.follow_mirrors(variable)?;
+            }
+        }
+        for instance in watchers {
+            // It may be gone by what those before it do.
+            if self.instances.get(instance).is_some() {
+                self.reconsider(instance)?;
+            }
         }
         Ok(())
     }

@@ -59,8 +59,7 @@ impl Database {
                             None => return true,
                         },
                     };
-                    wish == is
-                        || self.store.entailed(&parameters::Kind::Equal, &[wish, is]) != Some(false)
+                    wish == is || self.are_equal(wish, is) != Some(false)
                 })
     }
 
@@ -299,7 +298,9 @@ impl Database {
 
     /// A token fulfils the relation of a label no more: it goes, if nobody else asked for it.
     pub(super) fn let_go(&mut self, instance: InstanceId, label: usize) {
-        let Some(token) = self.instance_at(instance).label(label) else {
+        // It may have gone with a token that was let go before.
+        let at = self.instances.get(instance);
+        let Some(token) = at.and_then(|at| at.label(label)) else {
             return;
         };
         self.change_instance(instance).labels[label] = None;
@@ -322,7 +323,11 @@ impl Database {
     /// A relation that a token fulfilled is open again, with all relations that count on the
     /// token's label.
     pub(super) fn reopen(&mut self, instance: InstanceId, relation: u32) {
-        let rule = self.instance_at(instance).rule;
+        // It may have gone with a token that was let go before.
+        let Some(at) = self.instances.get(instance) else {
+            return;
+        };
+        let rule = at.rule;
         let flats = self.flats.clone();
         let relations = &flats[rule].relations;
         let Target::New(_, label) = relations[relation as usize].target else {
@@ -358,6 +363,9 @@ impl Database {
         self.change_instance(instance).labels[label] = None;
         for &other in labels.iter().filter(|&&other| other != label) {
             self.let_go(instance, other);
+        }
+        if self.instances.get(instance).is_none() {
+            return;
         }
         for &at in &fulfilled {
             let step = Step::Relation(at);

@@ -2,6 +2,7 @@
 //! what is undone is as it was.
 
 mod check;
+mod mistakes;
 mod models;
 
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::model::{End, Target};
-use check::{check, digest};
+use check::{check, check_after, digest};
 use models::Dice;
 
 /// Does one random edit; refusals are edits too.
@@ -220,4 +221,134 @@ proptest! {
             check(&mut database);
         }
     }
+}
+
+/// What later tokens know of the past is the same when it is forgotten.
+fn forget(database: &mut Database, tick: i64) -> usize {
+    let know = |database: &mut Database| {
+        let mut tokens = std::collections::BTreeMap::new();
+        for (token, at) in database.tokens() {
+            let values: Vec<Span> = at
+                .parameters
+                .iter()
+                .map(|&at| database.values(at))
+                .collect();
+            let guards = at.instances.iter();
+            let guards: Vec<Guard> = guards.map(|&at| database.instance_at(at).guard).collect();
+            let known = (
+                database.start(token),
+                database.finish(token),
+                values,
+                guards,
+            );
+            tokens.insert(token, known);
+        }
+        let resources = 0..database.model.resources.len();
+        let mut levels = Vec::new();
+        for resource in resources {
+            let now = database.levels(resource);
+            for at in tick..=60 {
+                levels.push((now.flexible.level(at), now.earliest.level(at)));
+            }
+        }
+        (tokens, levels)
+    };
+    let before = know(database);
+    let forgotten = database.forget(tick);
+    let after = know(database);
+    for (token, known) in &after.0 {
+        assert_eq!(Some(known), before.0.get(token), "{token:?}");
+    }
+    assert_eq!(after.1, before.1);
+    forgotten
+}
+
+#[test]
+fn what_is_left_knows_the_same_when_the_past_is_forgotten() {
+    let mut forgotten = 0;
+    for seed in 0..6_000 {
+        let mut dice = Dice::new(seed);
+        let mut database = database(&mut dice);
+        for round in 1..4 {
+            for _ in 0..12 {
+                edit(&mut database, &mut dice);
+            }
+            // What could start and end by now did.
+            let tick = 15 * round;
+            for timeline in 0..3 {
+                for token in database.on(timeline).collect::<Vec<_>>() {
+                    let (start, finish) = (database.start(token), database.finish(token));
+                    if finish.min <= tick {
+                        let owner = Owner::Token(token);
+                        let at = Span::exactly(start.min);
+                        drop(database.restrict_time(token, End::Start, at, owner));
+                        drop(database.end(token, finish.min));
+                    }
+                }
+            }
+            forgotten += forget(&mut database, tick);
+            check_after(&mut database, true);
+        }
+    }
+    assert!(forgotten > 200, "{forgotten} tokens were forgotten");
+}
+
+/// A push, some edits and their undoing cost as much in a large plan as in a small one.
+#[test]
+fn undoing_costs_what_the_edits_cost() {
+    let cost = |tokens: usize| {
+        let mut dice = Dice::new(3);
+        let model = Arc::new(models::random(&mut dice));
+        let mut database = Database::new(model, Span::new(0, 1_000_000));
+        let free = |database: &mut Database| {
+            let wanted = Wanted {
+                predicate: 2,
+                timeline: None,
+                parameters: &[None; 2],
+                start: None,
+                finish: None,
+                cause: Cause::User,
+            };
+            database.insert(wanted).expect("it can be")
+        };
+        let mut last = None;
+        for at in 0..tokens {
+            let token = free(&mut database);
+            let timeline = at % 3;
+            let after = database.last(timeline);
+            database
+                .activate(token, Slot { timeline, after })
+                .expect("it can be there");
+            // Each has its time, so that an edit moves no other.
+            let start = Span::exactly(at as i64 * 50);
+            let owner = Owner::Token(token);
+            database
+                .restrict_time(token, End::Start, start, owner)
+                .expect("it can start then");
+            database
+                .end(token, at as i64 * 50 + 9)
+                .expect("it can end then");
+            last = Some(token);
+        }
+        let before = database.operations();
+        database.push();
+        let token = free(&mut database);
+        database
+            .bind(token, 0, 1, Owner::Token(token))
+            .expect("it can be");
+        let (timeline, after) = ((tokens - 1) % 3, last);
+        database
+            .activate(token, Slot { timeline, after })
+            .expect("it can be there");
+        database.deactivate(token);
+        let merged = database.merge(token, last.expect("there is one"));
+        assert!(merged.is_err() || database.at(token).status != Status::Free);
+        database.remove(token);
+        database.pop();
+        database.operations() - before
+    };
+    let costs = [10, 100, 1_000, 10_000].map(cost);
+    let (least, most) = (costs.iter().min(), costs.iter().max());
+    let (least, most) = (least.expect("some"), most.expect("some"));
+    assert!(most * 10 <= least * 12, "{costs:?}");
 }

@@ -1,7 +1,7 @@
 //! Times of tokens: known ticks and points of the network, and variables that follow them.
 
 use super::trail::Change;
-use super::{Conflict, Database, Owner, Time, TokenId};
+use super::{Conflict, Database, Guard, Owner, Time, TokenId};
 use crate::Ticks;
 use crate::model::End;
 use crate::parameters::{self, Domain, Operand, Variable};
@@ -50,6 +50,18 @@ impl Database {
     /// The earliest and the latest end of a token \[ticks\].
     pub fn finish(&self, token: TokenId) -> Span {
         self.bounds_of(self.at(token).finish)
+    }
+
+    /// How long the rules that hold for a token let it last at most \[ticks\]; none, if they do not
+    /// say.
+    pub(crate) fn longest(&self, token: TokenId) -> Option<Ticks> {
+        let instances = self.at(token).instances.iter();
+        let bounds = instances.filter_map(|&instance| {
+            let at = self.instance_at(instance);
+            let [min, max] = self.model.rules[at.rule].duration?;
+            (at.guard == Guard::Holds).then(|| self.span(instance, min, max, false).max)
+        });
+        bounds.min()
     }
 
     /// Posts that `to - from` lies within a span; between known times nothing is posted.

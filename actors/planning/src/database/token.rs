@@ -105,7 +105,7 @@ impl Owner {
 }
 
 /// A token: a predicate with parameters, over a time.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Token {
     /// What it says.
     pub predicate: PredicateId,
@@ -134,7 +134,7 @@ pub struct Token {
     /// Constraints of parameters that go with it.
     pub(super) values: SmallVec<[parameters::Constraint; 2]>,
     /// The rules that hold for it, or may.
-    pub(super) instances: SmallVec<[InstanceId; 2]>,
+    pub(super) instances: SmallVec<[InstanceId; 4]>,
     /// The relations that count on it.
     pub(super) supported: SmallVec<[(InstanceId, u32); 2]>,
     /// The tokens that are merged into it.
@@ -144,6 +144,25 @@ pub struct Token {
     pub(super) merged_values: SmallVec<[parameters::Constraint; 2]>,
     /// Since which edit the trail need not keep it again.
     pub(super) kept: u64,
+}
+
+// Each change of a token keeps what it was: lists of what can be copied are copied as a whole, which
+// a derived clone does not do.
+impl Clone for Token {
+    fn clone(&self) -> Self {
+        Token {
+            parameters: SmallVec::from_slice(&self.parameters),
+            orders: SmallVec::from_slice(&self.orders),
+            times: SmallVec::from_slice(&self.times),
+            values: SmallVec::from_slice(&self.values),
+            instances: SmallVec::from_slice(&self.instances),
+            supported: SmallVec::from_slice(&self.supported),
+            merged: SmallVec::from_slice(&self.merged),
+            merged_times: SmallVec::from_slice(&self.merged_times),
+            merged_values: SmallVec::from_slice(&self.merged_values),
+            ..*self
+        }
+    }
 }
 
 impl Token {

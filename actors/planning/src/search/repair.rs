@@ -226,7 +226,7 @@ impl Work {
                 continue;
             };
             let bound = plan.makespan - 1;
-            if attempts % ANEW == 0 || posted.is_empty() {
+            if attempts.is_multiple_of(ANEW) || posted.is_empty() {
                 let base = self.base.clone();
                 self.return_to(&base, &[]);
                 if !self.end_by(bound) {

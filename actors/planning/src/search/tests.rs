@@ -1,5 +1,7 @@
 //! Planners beside the checker, on the models that come with the crate.
 
+mod same;
+
 use std::sync::Arc;
 
 use super::*;

@@ -115,14 +115,27 @@ impl<O: Clone> Network<O> {
         let inequality = self.halves[half as usize];
         let (source, target) = (inequality.source(side), inequality.target(side));
         let by = self.growth(side, half);
-        self.scratch.begin(self.nodes.places());
-        if by > 0 {
-            self.scratch.offer(Growth {
-                by,
-                point: target,
-                half: Some(half),
-            });
+        if by <= 0 {
+            return Ok(());
         }
+        if self.ends_at(side, target) {
+            // Most often nothing follows: the order of what does is not asked then.
+            self.set(side, target, by, Some(half));
+            if target == source {
+                return Err(self.around(side, target, half));
+            }
+            let node = self.node(target);
+            if node.value[EARLIEST] > -node.value[LATEST] {
+                return Err(self.crossed(side, target, half));
+            }
+            return Ok(());
+        }
+        self.scratch.begin(self.nodes.places());
+        self.scratch.offer(Growth {
+            by,
+            point: target,
+            half: Some(half),
+        });
         while let Some(growth) = self.scratch.take() {
             let point = growth.point;
             self.set(side, point, growth.by, growth.half);
@@ -150,6 +163,24 @@ impl<O: Clone> Network<O> {
             }
         }
         Ok(())
+    }
+
+    /// Whether a point passes its value on to the origin alone, which does not move.
+    fn ends_at(&mut self, side: Side, point: u32) -> bool {
+        let origin = self.origin().index() as u32;
+        let mut next = self.node(point).first[side];
+        let mut looked_at = 0;
+        while next != NONE {
+            looked_at += 1;
+            let inequality = &self.halves[next as usize];
+            if inequality.target(side) != origin {
+                // The pass that follows looks at them, and counts them.
+                return false;
+            }
+            next = inequality.next[side];
+        }
+        self.work.inequalities += looked_at;
+        true
     }
 
     /// An inequality is gone: what rested on it on a side is less tight now, if nothing else holds

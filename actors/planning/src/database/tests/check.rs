@@ -1,20 +1,26 @@
 //! What holds of a database after every edit, seen from its tokens and instances alone.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 use crate::database::rules::{Guard, Instance, Step};
 use crate::database::*;
-use crate::model::{End, Target, TimelineKind};
+use crate::model::{Target, TimelineKind};
 use crate::parameters::Operand;
 use crate::profile::Profile;
 
 /// Panics where something does not hold.
 pub(super) fn check(database: &mut Database) {
+    check_after(database, false);
+}
+
+/// The same where the past may have been forgotten: what tokens that are gone said of others is
+/// nobody's then.
+pub(super) fn check_after(database: &mut Database, forgot: bool) {
     timelines(database);
     relations(database);
-    constraints(database);
+    constraints(database, forgot);
     variables(database);
     levels(database);
 }
@@ -150,7 +156,7 @@ fn fulfilled(database: &Database, id: InstanceId, relation: u32) {
 }
 
 /// All constraints are somebody's, and each that somebody has is there or went with a point.
-fn constraints(database: &Database) {
+fn constraints(database: &Database, forgot: bool) {
     let mut times = BTreeSet::new();
     let mut values = BTreeSet::new();
     for (_, at) in database.tokens() {
@@ -167,12 +173,13 @@ fn constraints(database: &Database) {
         values.extend(mirror.value);
     }
     let past = |owner: Option<&Owner>| {
-        let owner = *owner.expect("it has an owner");
-        let token = match owner {
-            Owner::Rule { master, .. } => master,
-            _ => return owner == Owner::Past,
-        };
-        database.token(token).is_none()
+        let gone = |token| database.token(token).is_none();
+        forgot
+            && match *owner.expect("it has an owner") {
+                Owner::Rule { master, .. } => gone(master),
+                Owner::Token(token) => gone(token),
+                owner => matches!(owner, Owner::Past | Owner::Decision(_)),
+            }
     };
     for (constraint, ..) in database.network.all_constraints() {
         let owner = database.network.owner(constraint);
@@ -206,7 +213,7 @@ fn constraints(database: &Database) {
 /// Bounds of times are those of a network with the same constraints.
 fn bounds(database: &Database) {
     let mut rebuilt = Network::new(database.horizon());
-    let mut points = HashMap::from([(database.network.origin(), rebuilt.origin())]);
+    let mut points = BTreeMap::from([(database.network.origin(), rebuilt.origin())]);
     for (point, _) in database.network.all_bounds() {
         points.entry(point).or_insert_with(|| rebuilt.add_point());
     }
@@ -282,7 +289,6 @@ fn levels(database: &mut Database) {
 pub(super) fn digest(database: &mut Database) -> u64 {
     let mut hasher = DefaultHasher::new();
     let mut text = String::new();
-    let _ = database.levels.len();
     database.refresh();
     let mut say = |part: &dyn std::fmt::Debug| {
         text.clear();
@@ -322,6 +328,5 @@ pub(super) fn digest(database: &mut Database) -> u64 {
             }
         }
     }
-    let _ = End::Start;
     hasher.finish()
 }

@@ -1,0 +1,328 @@
+//! How an executive decides what each timeline says now.
+
+use smallvec::SmallVec;
+
+use super::endings::{Endings, close, make_room};
+use crate::Ticks;
+use crate::database::{
+    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Step, Time, Token, TokenId, Wanted,
+};
+use crate::model::{End, Model, PredicateId, Target, TimelineId, TimelineKind};
+use crate::parameters::Operand;
+use crate::search::{Decision, Flaw, Strategy};
+use crate::temporal::Span;
+
+/// How an executive decides: all relations that are due, then the gaps.
+#[derive(Clone, Debug)]
+pub(super) struct Now {
+    pub(super) tick: Ticks,
+    /// By timeline: by place of a predicate on it: how early its subgoals come.
+    order: Vec<Vec<u32>>,
+    /// By predicate: what its statuses say if no status comes.
+    pub(super) endings: Vec<Endings>,
+    /// Alternatives whose leading condition did not hold.
+    pub(super) guards: u64,
+}
+
+/// By timeline: by place of a predicate: how early its subgoals come, as the model's search control
+/// says; those that it does not name come last, all alike.
+fn subgoal_order(model: &Model) -> Vec<Vec<u32>> {
+    let subgoals = &model.control.subgoals;
+    let early = |timeline: TimelineId, predicate: PredicateId| {
+        let named = subgoals.iter().position(|&at| at == (timeline, predicate));
+        named.unwrap_or(subgoals.len()) as u32
+    };
+    let timelines = model.timelines.iter().enumerate();
+    timelines
+        .map(|(timeline, at)| {
+            let predicates = at.predicates.iter();
+            predicates
+                .map(|&predicate| early(timeline, predicate))
+                .collect()
+        })
+        .collect()
+}
+
+impl Now {
+    /// For a model, at tick 0.
+    pub(super) fn of(model: &Model) -> Self {
+        let predicates = 0..model.predicates.len();
+        Now {
+            tick: 0,
+            order: subgoal_order(model),
+            endings: predicates.map(|at| Endings::of(model, at)).collect(),
+            guards: 0,
+        }
+    }
+
+    /// How early a subgoal comes; none, if it is not due.
+    fn urgency(&self, database: &Database, open: Open) -> Option<u32> {
+        let at = match open.step {
+            Step::Relation(at) => at,
+            // A choice is due with the first relation that it could ask for.
+            Step::Choice(choice) => {
+                let alternatives = database.alternatives(open.instance, choice);
+                let steps = alternatives.iter().flatten();
+                let dues = steps.filter_map(|&step| self.urgency(database, Open { step, ..open }));
+                return dues.min();
+            }
+        };
+        let relation = database.relation(open.instance, at);
+        let instance = database.instance(open.instance)?;
+        let anchor = instance.label(relation.anchor)?;
+        for distance in &relation.distances {
+            // That the target ends in some relation to the anchor does not say when it starts.
+            if distance.to == End::Finish && relation.distances.len() > 1 {
+                continue;
+            }
+            let from = database.bounds_of(database.time(anchor, distance.from));
+            if from.min != from.max || from.max > self.tick {
+                return None;
+            }
+            let span = database.span(open.instance, distance.min, distance.max, distance.backward);
+            if span.min != Ticks::MIN && from.min.saturating_add(span.min) > self.tick {
+                return None;
+            }
+        }
+        let early = match &relation.target {
+            Target::New(pattern, _) => {
+                let timeline = pattern.timelines.first().copied()?;
+                let predicates = &database.model().timelines[timeline].predicates;
+                let place = predicates.iter().position(|&at| at == pattern.predicate)?;
+                self.order[timeline][place]
+            }
+            Target::Label(_) => 0,
+        };
+        // Conditions are asked before anything new is made at the same rank.
+        Some(2 * early + u32::from(!relation.condition))
+    }
+
+    /// A timeline of states whose last token is over, and nothing follows.
+    fn gap(&self, database: &Database) -> Option<Flaw> {
+        let timelines = database.model().timelines.iter().enumerate();
+        for (timeline, at) in timelines {
+            if at.kind != TimelineKind::State {
+                continue;
+            }
+            let after = database.last(timeline);
+            let over = match after {
+                Some(last) => database.finish(last).max <= self.tick,
+                None => true,
+            };
+            if over {
+                return Some(Flaw::Gap { timeline, after });
+            }
+        }
+        None
+    }
+
+    /// Whether a token can be what a relation asks for, as far as its times and each of its
+    /// parameters, taken alone, say.
+    fn fits(&self, database: &Database, open: (InstanceId, u32), token: TokenId) -> bool {
+        let (instance, relation) = open;
+        let said = database.relation(instance, relation);
+        let Some(at) = database.instance(instance) else {
+            return false;
+        };
+        let Some(anchor) = at.label(said.anchor) else {
+            return false;
+        };
+        let in_time = said.distances.iter().all(|distance| {
+            let from = database.bounds_of(database.time(anchor, distance.from));
+            let to = database.bounds_of(database.time(token, distance.to));
+            let span = database.span(instance, distance.min, distance.max, distance.backward);
+            to.max.saturating_sub(from.min) >= span.min
+                && to.min.saturating_sub(from.max) <= span.max
+        });
+        in_time && database.fits(instance, relation, token)
+    }
+
+    /// The tokens that may fulfil a relation: the present one, and for a condition those before it
+    /// that are still known.
+    fn candidates<'a>(
+        &'a self,
+        database: &'a Database,
+        open: (InstanceId, u32),
+    ) -> impl Iterator<Item = TokenId> + 'a {
+        let said = database.relation(open.0, open.1);
+        let timelines: &[TimelineId] = match &said.target {
+            Target::New(pattern, _) => &pattern.timelines,
+            Target::Label(_) => &[],
+        };
+        let before = move |&token: &TokenId| {
+            let known = database.token(token).filter(|_| said.condition);
+            known.and_then(Token::before)
+        };
+        let all = timelines
+            .iter()
+            .flat_map(move |&timeline| std::iter::successors(database.last(timeline), before));
+        all.filter(move |&token| self.fits(database, open, token))
+    }
+
+    /// Whether the leading condition of an alternative, if it has one, may hold.
+    fn may_begin(&self, database: &Database, instance: InstanceId, steps: &[Step]) -> bool {
+        match steps.first() {
+            Some(&Step::Relation(relation)) => {
+                !database.relation(instance, relation).condition
+                    || self
+                        .candidates(database, (instance, relation))
+                        .next()
+                        .is_some()
+            }
+            _ => true,
+        }
+    }
+}
+
+impl Strategy for Now {
+    fn next(&mut self, database: &mut Database) -> Option<Flaw> {
+        let mut first: Option<(u32, Open)> = None;
+        for &open in database.open() {
+            if let Some(early) = self.urgency(database, open)
+                && first.is_none_or(|(best, _)| early < best)
+            {
+                first = Some((early, open));
+            }
+        }
+        match first {
+            Some((_, open)) => Some(Flaw::Open(open)),
+            None => self.gap(database),
+        }
+    }
+
+    fn decisions(&mut self, database: &mut Database, flaw: Flaw, into: &mut Vec<Decision>) {
+        let open = match flaw {
+            Flaw::Open(open) => open,
+            Flaw::Gap { timeline, after } => {
+                into.push(Decision::Insert(Slot { timeline, after }));
+                return;
+            }
+            _ => return,
+        };
+        let relation = match open.step {
+            Step::Choice(choice) => {
+                let alternatives = database.alternatives(open.instance, choice);
+                for (place, steps) in (0..).zip(alternatives) {
+                    if self.may_begin(database, open.instance, steps) {
+                        into.push(Decision::Alternative(place));
+                    } else {
+                        self.guards += 1;
+                    }
+                }
+                return;
+            }
+            Step::Relation(relation) => relation,
+        };
+        let said = database.relation(open.instance, relation);
+        let Target::New(pattern, _) = &said.target else {
+            into.push(Decision::Relate);
+            return;
+        };
+        let candidates = self.candidates(database, (open.instance, relation));
+        into.extend(candidates.map(Decision::Support));
+        if said.condition {
+            return;
+        }
+        for &timeline in &pattern.timelines {
+            let last = database.last(timeline);
+            // What started now was decided now.
+            let fresh = |last| database.start(last) == Span::exactly(self.tick);
+            let free = database.model().timelines[timeline].kind == TimelineKind::Free;
+            if free || !last.is_some_and(fresh) {
+                into.push(Decision::Insert(Slot {
+                    timeline,
+                    after: last,
+                }));
+            }
+        }
+    }
+
+    fn decide(
+        &mut self,
+        database: &mut Database,
+        flaw: Flaw,
+        decision: Decision,
+    ) -> Result<(), Conflict> {
+        let now = Some(Time::At(self.tick));
+        match (flaw, decision) {
+            (Flaw::Open(Open { instance, step }), decision) => match (step, decision) {
+                (Step::Choice(choice), Decision::Alternative(alternative)) => {
+                    database.choose(instance, choice, alternative);
+                    Ok(())
+                }
+                (Step::Relation(relation), Decision::Support(token)) => {
+                    database.support(instance, relation, token)
+                }
+                (Step::Relation(relation), Decision::Insert(slot)) => {
+                    database.attempt(|database| {
+                        let after = make_room(database, &self.endings, slot.timeline, self.tick)?;
+                        let slot = Slot { after, ..slot };
+                        database.insert_for(instance, relation, slot, now)?;
+                        Ok(())
+                    })
+                }
+                (Step::Relation(relation), Decision::Relate) => {
+                    database.relate_labels(instance, relation)
+                }
+                _ => unreachable!("the decision is one for the flaw"),
+            },
+            (Flaw::Gap { .. }, Decision::Insert(slot)) => {
+                fill(database, &self.endings, slot, self.tick)
+            }
+            _ => unreachable!("the decision is one for the flaw"),
+        }
+    }
+
+    fn is_guard(&self, database: &Database, before: Flaw, failed: Flaw) -> bool {
+        match (before, failed) {
+            (Flaw::Open(before), Flaw::Open(failed)) => {
+                let is_choice = matches!(before.step, Step::Choice(_));
+                let Step::Relation(relation) = failed.step else {
+                    return false;
+                };
+                is_choice
+                    && before.instance == failed.instance
+                    && database.relation(failed.instance, relation).condition
+            }
+            _ => false,
+        }
+    }
+}
+
+/// A timeline says its default from now on.
+fn fill(
+    database: &mut Database,
+    endings: &[Endings],
+    slot: Slot,
+    now: Ticks,
+) -> Result<(), Conflict> {
+    // What ended by what was decided in this cycle says so, and what follows from that may be
+    // another token than the default.
+    if let Some(after) = slot.after
+        && close(database, endings, after, now)?
+    {
+        return Ok(());
+    }
+    let model = database.model().clone();
+    let timeline = &model.timelines[slot.timeline];
+    let Some(default) = &timeline.default else {
+        let owner = match slot.after {
+            Some(after) => Owner::Token(after),
+            None => Owner::Past,
+        };
+        return Err(Conflict::Mismatch { owner });
+    };
+    let parameters = default.values.iter().map(|value| value.map(Operand::Value));
+    let parameters: SmallVec<[Option<Operand>; 4]> = parameters.collect();
+    database.attempt(|database| {
+        let token = database.insert(Wanted {
+            predicate: default.predicate,
+            timeline: Some(slot.timeline),
+            parameters: &parameters,
+            start: Some(Time::At(now)),
+            finish: None,
+            cause: Cause::Filler,
+        })?;
+        database.activate(token, slot)
+    })
+}
