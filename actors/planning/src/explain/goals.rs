@@ -77,7 +77,7 @@ impl<'a> Tries<'a> {
     ) -> Explanation {
         let goal = fixed.map(|goal| told_goal(&self.problem, goal));
         if let Err(told) = self.load(&mut question, &mut fixed) {
-            return told;
+            return *told;
         }
         let mut told = self.blank(Outcome::Goals);
         if goal.is_some() && fixed.is_none() {
@@ -216,7 +216,7 @@ impl<'a> Tries<'a> {
         &mut self,
         question: &mut Vec<bool>,
         fixed: &mut Option<GoalId>,
-    ) -> Result<(), Explanation> {
+    ) -> Result<(), Box<Explanation>> {
         loop {
             let Err(error) = self.schedule.load() else {
                 return Ok(());
@@ -238,15 +238,14 @@ impl<'a> Tries<'a> {
                     goal
                 }
                 LoadError::Fact { fact, conflict } => {
-                    let told = self.fact(fact, &conflict);
-                    return Err(told);
+                    return Err(Box::new(self.fact(fact, &conflict)));
                 }
                 LoadError::Level { .. } => {
                     let mut told = self.blank(Outcome::Facts);
                     let message = error.to_string();
                     told.reasons = vec![reason(ReasonKind::Amount, message, Vec::new())];
                     (told.proven, told.only_way) = (true, true);
-                    return Err(self.finish(told));
+                    return Err(Box::new(self.finish(told)));
                 }
             };
             let mut kept = vec![true; question.len()];
@@ -535,7 +534,7 @@ impl<'a> Tries<'a> {
         database.push();
         let verdict = chronological(database, &mut recorder, &mut stack, budget);
         database.pop();
-        told.only_way = matches!(verdict, Verdict::Impossible(_)) && stack.counters.backtracks == 0;
+        told.only_way = matches!(verdict, Verdict::Impossible(_)) && !recorder.had_choice;
         told.reasons = recorder.reasons();
     }
 }

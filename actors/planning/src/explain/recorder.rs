@@ -23,6 +23,8 @@ pub(super) struct Recorder {
     /// The same of ways that ended with a resource of which there is not enough: where all goals
     /// are in the plan, that is mostly what is to be known.
     over_used: Option<(usize, Vec<Reason>)>,
+    /// Whether anything could be decided in more than one way.
+    pub(super) had_choice: bool,
 }
 
 /// A flaw further on than any before, while all its decisions are refused.
@@ -46,6 +48,7 @@ impl Recorder {
             current: None,
             furthest: None,
             over_used: None,
+            had_choice: false,
         }
     }
 
@@ -107,6 +110,7 @@ impl Strategy for Recorder {
                 reasons: vec![told],
             }
         });
+        self.had_choice |= into.len() > 1;
         if into.is_empty() {
             self.end();
         }

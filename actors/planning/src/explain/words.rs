@@ -9,88 +9,95 @@ const MOST_PARTS: usize = 20;
 
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let operations = self.operations;
-        match (self.outcome, self.proven) {
-            (Outcome::Facts, _) => writeln!(
-                f,
-                "What is the case cannot be, whatever is wanted: no goal need be dropped for that."
-            )?,
-            (Outcome::FactsUndecided, _) => writeln!(
-                f,
-                "No plan was found even without goals, within {operations} operations. That there \
-                 is none is not proven."
-            )?,
-            (Outcome::Possible, _) => {
-                writeln!(f, "There is a plan: the explanation came upon one.")?;
-            }
-            (Outcome::Goals, true) => writeln!(f, "{}: that is proven.", self.what("There is no"))?,
-            (Outcome::Goals, false) => writeln!(
-                f,
-                "{}. That there is none is not proven.",
-                self.what("No plan was found, within the budget:")
-            )?,
+        self.outcome(f)?;
+        match self.together.as_slice() {
+            [] => {}
+            [one] => writeln!(f, "This goal cannot be, whatever the others are: {one}.")?,
+            all => writeln!(f, "These goals cannot all be: {}.", list(all))?,
         }
-        if !self.together.is_empty() {
-            let names = list(&self.together);
-            match self.together.len() {
-                1 => writeln!(f, "This goal cannot be, whatever the others are: {names}.")?,
-                _ => writeln!(f, "These goals cannot all be: {names}.")?,
-            }
-        }
-        if !self.reasons.is_empty() {
-            match (&self.added, self.only_way) {
-                (Some(added), _) => writeln!(
-                    f,
-                    "When {} was to be added to a plan with the others, the way that got furthest \
-                     ended here:",
-                    added.name
-                )?,
-                (None, true) => writeln!(f, "Why:")?,
-                (None, false) => {
-                    writeln!(f, "Of several ways, the one that got furthest ended here:")?;
-                }
+        match (&self.added, self.only_way) {
+            _ if self.reasons.is_empty() => {}
+            (Some(added), _) => writeln!(
+                f,
+                "When {} was to be added to a plan with the others, the way that got furthest \
+                 ended here:",
+                added.name
+            )?,
+            (None, true) => writeln!(f, "Why:")?,
+            (None, false) => {
+                writeln!(f, "Of several ways, the one that got furthest ended here:")?;
             }
         }
         for reason in &self.reasons {
             write!(f, "{reason}")?;
         }
-        if !self.to_drop.is_empty() {
-            let names = list(&self.to_drop);
-            let with = match &self.goal {
-                Some(goal) => format!(" with {}", goal.name),
-                None => String::new(),
-            };
-            write!(f, "Without {names} there is a plan{with}. ")?;
-            let known = match (self.smallest, self.to_drop.len()) {
-                (Some(Smallest::Proven), _) => "No smaller set of goals will do: that is proven.",
-                (Some(Smallest::Irreducible), _) => {
-                    "With any one of them back there is none: that is proven. Another set may be \
-                     smaller."
-                }
-                (_, 1) => "Whether it must be dropped is not proven.",
-                _ => "Whether fewer will do is not known.",
-            };
-            writeln!(f, "{known}")?;
-        } else if self.outcome == Outcome::Goals {
-            writeln!(
-                f,
-                "Which goals to drop was not found within {operations} operations."
-            )?;
-        }
-        Ok(())
+        self.what_to_drop(f)
     }
 }
 
 impl Explanation {
-    fn what(&self, begins: &str) -> String {
-        let plan = if begins.ends_with("no") { " plan" } else { "" };
-        match &self.goal {
-            Some(goal) => format!("{begins}{plan} with {goal} and what the plan achieves"),
-            None => match plan.is_empty() {
-                true => format!("{begins} none with all mandatory goals"),
-                false => format!("{begins}{plan} with all mandatory goals"),
-            },
+    fn outcome(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let operations = self.operations;
+        let with = match &self.goal {
+            Some(goal) => format!("{goal} and all that the plan achieves"),
+            None => "all mandatory goals".to_owned(),
+        };
+        match (self.outcome, self.proven) {
+            (Outcome::Facts, true) => writeln!(
+                f,
+                "What is the case cannot be, whatever is wanted: to drop goals does not help."
+            ),
+            (Outcome::Facts, false) => writeln!(
+                f,
+                "What is the case cannot be in the order in which it may begin; that another order \
+                 is none either is not proven."
+            ),
+            (Outcome::FactsUndecided, _) => writeln!(
+                f,
+                "No plan was found even without goals, within {operations} operations; that there \
+                 is none is not proven."
+            ),
+            (Outcome::Possible, _) => {
+                writeln!(f, "There is a plan: the explanation came upon one.")
+            }
+            (Outcome::Goals, true) => {
+                writeln!(f, "There is no plan with {with}: that is proven.")
+            }
+            (Outcome::Goals, false) => writeln!(
+                f,
+                "No plan with {with} was found; that there is none is not proven."
+            ),
         }
+    }
+
+    fn what_to_drop(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_alone = self.goal.is_some() && self.together.len() == 1;
+        if self.to_drop.is_empty() {
+            return match self.outcome {
+                Outcome::Goals if is_alone => writeln!(f, "To drop other goals does not help."),
+                Outcome::Goals => writeln!(
+                    f,
+                    "Which goals to drop was not found within {} operations.",
+                    self.operations
+                ),
+                _ => Ok(()),
+            };
+        }
+        let with = match &self.goal {
+            Some(goal) => format!(" with {}", goal.name),
+            None => String::new(),
+        };
+        let names = list(&self.to_drop);
+        let known = match (self.smallest, self.to_drop.len()) {
+            (Some(Smallest::Proven), _) => "No smaller set of goals will do: that is proven.",
+            (Some(Smallest::Irreducible), _) => {
+                "With any one of them back there is none: that is proven. Another set may be \
+                 smaller."
+            }
+            (_, 1) => "Whether it must be dropped is not proven.",
+            _ => "Whether fewer will do is not known.",
+        };
+        writeln!(f, "Without {names} there is a plan{with}. {known}")
     }
 }
 

@@ -194,6 +194,8 @@ fn a_problem_without_goals_has_the_empty_plan() {
     for planner in planners {
         let answer = planner.solve(&model, &problem, settings).expect("it loads");
         assert_eq!(answer.plan.map(|plan| plan.tokens.len()), Some(0));
-        assert!(answer.operations < 10_000, "{}", planner.name());
     }
+    let answer = Both::default().solve(&model, &problem, settings);
+    let answer = answer.expect("it loads");
+    assert!(answer.proven && answer.operations < 1_000);
 }
