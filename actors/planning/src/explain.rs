@@ -38,6 +38,7 @@
 
 mod goals;
 mod recorder;
+mod sets;
 mod teller;
 #[cfg(test)]
 mod tests;

@@ -10,10 +10,11 @@
 use std::sync::Arc;
 
 use super::recorder::Recorder;
+use super::sets::{is_only_in_the_way, next_places, only};
 use super::teller::{Teller, reason, told_goal};
 use super::{Explanation, Outcome, Reason, ReasonKind, Request, Smallest, ToldGoal};
 use crate::database::Owner;
-use crate::model::{Body, EffectKind, GoalId, Model, Problem, TimelineKind};
+use crate::model::{GoalId, Model, Problem};
 use crate::plan::place;
 use crate::search::complete::Complete;
 use crate::search::schedule::{LoadError, Schedule};
@@ -537,65 +538,4 @@ impl<'a> Tries<'a> {
         told.only_way = matches!(verdict, Verdict::Impossible(_)) && !recorder.had_choice;
         told.reasons = recorder.reasons();
     }
-}
-
-/// The next places in rising order, each below `count`; whether there are any.
-fn next_places(places: &mut [usize], count: usize) -> bool {
-    let size = places.len();
-    let Some(at) = (0..size).rev().find(|&at| places[at] < count - size + at) else {
-        return false;
-    };
-    places[at] += 1;
-    for next in at + 1..size {
-        places[next] = places[next - 1] + 1;
-    }
-    true
-}
-
-/// The problem with some of its goals only.
-pub(super) fn only(problem: &Problem, kept: &[bool]) -> Problem {
-    let mut places = Vec::with_capacity(kept.len());
-    let mut next = 0;
-    for &kept in kept {
-        places.push(kept.then_some(next));
-        next += usize::from(kept);
-    }
-    let mut less = problem.clone();
-    let mut at = kept.iter();
-    less.goals.retain(|_| *at.next().unwrap_or(&false));
-    less.combinations.retain_mut(|combination| {
-        let goals = combination.goals.iter().map(|&goal| places[goal]);
-        match goals.collect::<Option<Vec<GoalId>>>() {
-            Some(goals) => combination.goals = goals,
-            None => return false,
-        }
-        true
-    });
-    less.orders.retain_mut(|order| {
-        let (Some(from), Some(to)) = (places[order.from], places[order.to]) else {
-            return false;
-        };
-        (order.from, order.to) = (from, to);
-        true
-    });
-    less
-}
-
-/// Whether what a token needs and does can only stand in the way of others.
-fn is_only_in_the_way(model: &Model) -> bool {
-    fn has_condition(body: &Body) -> bool {
-        match body {
-            Body::All(parts) | Body::Any(parts, _) => parts.iter().any(has_condition),
-            Body::Relation(relation) => relation.condition,
-        }
-    }
-    // On other timelines a token also fills time, or does what another asks for.
-    let free = model
-        .timelines
-        .iter()
-        .all(|at| at.kind == TimelineKind::Free);
-    free && model.rules.iter().all(|rule| {
-        let produces = |kind| matches!(kind, EffectKind::Produces(_));
-        !rule.effects.iter().any(|effect| produces(effect.kind)) && !has_condition(&rule.body)
-    })
 }

@@ -140,7 +140,7 @@ fn solves_without(model: &Arc<Model>, problem: &Arc<Problem>, dropped: &[String]
         .goals
         .iter()
         .map(|goal| !dropped.contains(&goal.name));
-    let less = Arc::new(goals::only(problem, &kept.collect::<Vec<bool>>()));
+    let less = Arc::new(sets::only(problem, &kept.collect::<Vec<bool>>()));
     let settings = Settings {
         operations: 2_000_000,
         seed: 1,
@@ -355,4 +355,29 @@ fn explanations_are_the_same_each_time() {
     let (model, problem) = read(arm(true), &digging(&works));
     let [one, other] = [0, 1].map(|_| missing_plan(&model, &problem, REQUEST));
     assert_eq!(one, other);
+}
+
+/// What has no plan may have one with more goals, if one of those produces what others consume.
+#[test]
+fn a_goal_that_helps_others_is_kept_for_them() {
+    let model = "(Define_Object_Class Rover :state_variables ((Free Arm_SV)))
+        (Define_Predicate Dig ())
+        (Define_Predicate Charge ())
+        (Define_Member_Values (Rover Arm_SV) (Dig Charge))
+        (Define_Resource (Rover battery) :kind depletable :limits [0 20] :initial 10)
+        (Define_Compatibility (SINGLE ((Rover Arm_SV) ((Dig ()))))
+         :duration_bounds [1 1] :consumes ((Rover battery) 8))
+        (Define_Compatibility (SINGLE ((Rover Arm_SV) ((Charge ()))))
+         :duration_bounds [1 1] :produces ((Rover battery) 8))";
+    let mut problem = "(Define_Problem day :horizon [0 100])\n".to_owned();
+    for name in ["a", "b", "c", "d"] {
+        problem += &format!("(Goal {name} (SINGLE ((Rover Arm_SV) ((Dig ())))) :mandatory)\n");
+    }
+    problem += "(Goal charge (SINGLE ((Rover Arm_SV) ((Charge ())))) :mandatory)\n";
+    let (model, problem) = read(model, &problem);
+    let told = missing_plan(&model, &problem, REQUEST);
+    assert_eq!(told.goals.len(), 2, "{told}");
+    assert!(!told.goals.contains(&"charge".to_owned()), "{told}");
+    assert_eq!(told.smallest, Some(Smallest::Proven), "{told}");
+    solves_without(&model, &problem, &told.goals);
 }
