@@ -20,6 +20,7 @@
 
 mod edit;
 mod forget;
+mod guards;
 mod resources;
 mod rules;
 mod support;

@@ -263,154 +263,6 @@ impl Database {
         self.change_instance(instance).variables[variable] = Some(operand);
     }
 
-    /// Asks to be told of all that the guard speaks of.
-    fn watch_guard(&mut self, instance: InstanceId) -> Result<(), Conflict> {
-        let rule = self.instance_at(instance).rule;
-        if self.flats[rule].unguarded {
-            return Ok(());
-        }
-        let model = self.model.clone();
-        let rule = &model.rules[rule];
-        let master = self.instance_at(instance).master;
-        for (place, argument) in rule.master.arguments.iter().enumerate() {
-            if *argument != Argument::Any {
-                let operand = self.at(master).parameters[place];
-                self.watch(instance, operand);
-            }
-        }
-        for term in rule.when.iter().flat_map(|when| &when.operands) {
-            let operand = match *term {
-                Term::Value(_) => continue,
-                Term::Variable(variable) => self.instance_at(instance).variables[variable],
-                // Only the master is there when the guard is asked.
-                Term::Start(0) => Some(self.mirror(master, Some(End::Start))?),
-                Term::Finish(0) => Some(self.mirror(master, Some(End::Finish))?),
-                Term::Duration(0) => Some(self.mirror(master, None)?),
-                Term::Start(_) | Term::Finish(_) | Term::Duration(_) => None,
-            };
-            if let Some(operand) = operand {
-                self.watch(instance, operand);
-            }
-        }
-        Ok(())
-    }
-
-    fn watch(&mut self, instance: InstanceId, operand: Operand) {
-        let Operand::Variable(variable) = operand else {
-            return;
-        };
-        if self.instance_at(instance).watched.contains(&variable) {
-            return;
-        }
-        let place = variable.index();
-        if self.watchers.len() <= place {
-            self.watchers.resize_with(place + 1, Vec::new);
-        }
-        self.watchers[place].push(instance);
-        self.note(Change::Watched(place));
-        self.change_instance(instance).watched.push(variable);
-    }
-
-    /// A rule that holds, or may, is told that variables changed: its guard is asked again, and
-    /// bounds of times follow their variables.
-    pub(super) fn reconsider(&mut self, instance: InstanceId) -> Result<(), Conflict> {
-        let now = self.guard(instance);
-        let before = self.instance_at(instance).guard;
-        match (before, now) {
-            (Guard::Holds, Guard::Holds) => {
-                let at = self.instance_at(instance);
-                if !at.effects.is_empty() {
-                    self.dirty.push(at.master);
-                }
-                return self.follow_bounds(instance);
-            }
-            (Guard::Holds, _) => {
-                self.change_instance(instance).guard = now;
-                self.withdraw(instance);
-                return Ok(());
-            }
-            (_, Guard::Holds) => {
-                self.change_instance(instance).guard = now;
-                return self.apply(instance);
-            }
-            _ => {}
-        }
-        if before != now {
-            self.change_instance(instance).guard = now;
-        }
-        Ok(())
-    }
-
-    /// What is known of a guard.
-    pub(super) fn guard(&self, instance: InstanceId) -> Guard {
-        let at = self.instance_at(instance);
-        if self.flats[at.rule].unguarded {
-            return Guard::Holds;
-        }
-        let rule = &self.model.rules[at.rule];
-        let parameters = &self.at(at.master).parameters;
-        let mut all = Guard::Holds;
-        for (argument, &operand) in rule.master.arguments.iter().zip(parameters) {
-            let wanted = match *argument {
-                Argument::Any => continue,
-                Argument::Value(value) => Operand::Value(value),
-                Argument::Variable(variable) => match at.variables[variable] {
-                    Some(wanted) => wanted,
-                    None => continue,
-                },
-            };
-            if wanted == operand {
-                continue;
-            }
-            match self.are_equal(wanted, operand) {
-                Some(true) => {}
-                Some(false) => return Guard::Void,
-                None => all = Guard::Waiting,
-            }
-        }
-        for when in &rule.when {
-            match self.is_certain(at, when) {
-                Some(true) => {}
-                Some(false) => return Guard::Void,
-                None => all = Guard::Waiting,
-            }
-        }
-        all
-    }
-
-    /// Whether two operands are certainly equal, certainly not, or neither.
-    pub(super) fn are_equal(&self, one: Operand, other: Operand) -> Option<bool> {
-        match (one, other) {
-            (Operand::Value(value), Operand::Variable(variable))
-            | (Operand::Variable(variable), Operand::Value(value)) => {
-                let domain = self.store.domain(variable);
-                match domain.value() {
-                    Some(is) => Some(is == value),
-                    None => (!domain.contains(value)).then_some(false),
-                }
-            }
-            _ => {
-                let equal = [one, other];
-                self.store.entailed(&parameters::Kind::Equal, &equal)
-            }
-        }
-    }
-
-    /// Whether a relationship certainly holds, certainly does not, or neither.
-    fn is_certain(&self, at: &Instance, when: &Relationship) -> Option<bool> {
-        let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
-        for term in &when.operands {
-            operands.push(match *term {
-                Term::Value(value) => Operand::Value(value),
-                Term::Variable(variable) => at.variables[variable]?,
-                Term::Start(label) => self.mirrored_by(at.label(label)?, Some(End::Start))?,
-                Term::Finish(label) => self.mirrored_by(at.label(label)?, Some(End::Finish))?,
-                Term::Duration(label) => self.mirrored_by(at.label(label)?, None)?,
-            });
-        }
-        self.store.entailed(&self.kind(when), &operands)
-    }
-
     /// What a relationship is for the store.
     pub(super) fn kind(&self, relationship: &Relationship) -> parameters::Kind {
         use crate::model::RelationshipKind as Said;
@@ -428,7 +280,7 @@ impl Database {
     }
 
     /// The rule holds now: what it says of the master is posted, what it asks for is open.
-    fn apply(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+    pub(super) fn apply(&mut self, instance: InstanceId) -> Result<(), Conflict> {
         let at = self.instance_at(instance);
         let (rule, master) = (at.rule, at.master);
         let owner = Owner::Rule {
@@ -531,7 +383,7 @@ impl Database {
     }
 
     /// Bounds of times follow their variables.
-    fn follow_bounds(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+    pub(super) fn follow_bounds(&mut self, instance: InstanceId) -> Result<(), Conflict> {
         let flats = self.flats.clone();
         for place in 0..self.instance_at(instance).times.len() {
             let at = self.instance_at(instance);
@@ -633,45 +485,5 @@ impl Database {
             self.kept_instances.push(removed);
             self.note(Change::InstanceRemoved(instance));
         }
-    }
-
-    /// Variables changed: whoever watches them is told, until nothing changes any more.
-    pub(super) fn settle_values(&mut self) -> Result<(), Conflict> {
-        let mut changed = std::mem::take(&mut self.changed);
-        let outcome = loop {
-            changed.clear();
-            self.store.take_changed(&mut changed);
-            if changed.is_empty() {
-                break Ok(());
-            }
-            if let Err(conflict) = self.tell(&changed) {
-                break Err(conflict);
-            }
-        };
-        self.changed = changed;
-        outcome
-    }
-
-    fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
-        // Each once, however many of its variables changed.
-        let mut watchers: SmallVec<[InstanceId; 16]> = SmallVec::new();
-        for &variable in changed {
-            let all = self.watchers.get(variable.index());
-            for &instance in all.map_or(&[][..], |all| all) {
-                if !watchers.contains(&instance) {
-                    watchers.push(instance);
-                }
-            }
-            if !self.mirrors.is_empty() {
-                self.follow_mirrors(variable)?;
-            }
-        }
-        for instance in watchers {
-            // It may be gone by what those before it do.
-            if self.instances.get(instance).is_some() {
-                self.reconsider(instance)?;
-            }
-        }
-        Ok(())
     }
 }
