@@ -247,6 +247,23 @@ impl Database {
         self.take(|database| database.take_off(token));
     }
 
+    /// Moves an active token elsewhere: it leaves its timeline, with all that its rules brought,
+    /// and goes where the slot is.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be there: nothing changes.
+    ///
+    /// # Panics
+    ///
+    /// If it is not active, or the slot's token is not on the slot's timeline or goes with it.
+    pub fn relocate(&mut self, token: TokenId, slot: Slot) -> Result<(), Conflict> {
+        self.attempt(|database| {
+            database.deactivate(token);
+            database.activate(token, slot)
+        })
+    }
+
     fn take_off(&mut self, token: TokenId) {
         // What goes takes others along, and they must not take this token again.
         self.change(token).status = Status::Free;

@@ -272,10 +272,15 @@ impl Database {
         }
     }
 
-    /// Counts one less who has a variable, which is gone already if nobody else has it.
+    /// Counts one less who has a variable. If nobody else has it, it is gone already, but for one
+    /// whose other holders went with this one.
     fn drop_holder(&mut self, operand: Operand) {
         if let Operand::Variable(variable) = operand {
-            self.holders[variable.index()] -= 1;
+            let holders = &mut self.holders[variable.index()];
+            *holders -= 1;
+            if *holders == 0 && self.store.has(variable) {
+                self.store.remove(variable);
+            }
         }
     }
 }

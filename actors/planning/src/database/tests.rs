@@ -35,7 +35,13 @@ fn edit(database: &mut Database, dice: &mut Dice) {
         }
         4 => {
             if let Some(token) = dice.pick(&active) {
-                database.deactivate(token);
+                if dice.one_in(2) {
+                    database.deactivate(token);
+                } else {
+                    let timeline = dice.below(3);
+                    let after = None;
+                    drop(database.relocate(token, Slot { timeline, after }));
+                }
             }
         }
         5 => {
