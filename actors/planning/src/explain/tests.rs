@@ -348,6 +348,30 @@ fn without_operations_nothing_is_said_that_is_not_known() {
     }
 }
 
+/// What can be is never said to be proven impossible, however few operations there are.
+#[test]
+fn what_can_be_is_never_called_impossible() {
+    let works = [
+        (10, 0, 60),
+        (11, 0, 60),
+        (12, 0, 60),
+        (13, 0, 60),
+        (14, 0, 60),
+    ];
+    let (model, problem) = read(arm(true), &digging(&works));
+    for operations in [1, 20, 50, 100, 200, 400, 800] {
+        let request = Request {
+            operations,
+            ..REQUEST
+        };
+        let told = missing_plan(&model, &problem, request);
+        assert!(
+            !told.proven && told.smallest != Some(Smallest::Proven),
+            "{told}"
+        );
+    }
+}
+
 /// The same request, the same words.
 #[test]
 fn explanations_are_the_same_each_time() {
