@@ -164,6 +164,8 @@ pub struct Database {
     /// Tokens whose effects may have changed.
     dirty: Vec<TokenId>,
     changed_points: Vec<Point>,
+    /// Variables that are equal to others now, or were: to be told of.
+    equalities: Vec<parameters::Variable>,
     /// Kept for its memory.
     changed: Vec<parameters::Variable>,
     trail: Vec<Change>,
@@ -222,6 +224,7 @@ impl Database {
             token_of_point: Vec::new(),
             dirty: Vec::new(),
             changed_points: Vec::new(),
+            equalities: Vec::new(),
             changed: Vec::new(),
             trail: Vec::new(),
             kept_tokens: Vec::new(),

@@ -347,7 +347,7 @@ impl Database {
                     return Err(Conflict::Mismatch { owner });
                 }
                 let both = [mine, its];
-                let posted = database.store.post(parameters::Kind::Equal, &both, owner)?;
+                let posted = database.post_value(parameters::Kind::Equal, &both, owner)?;
                 database.change(token).merged_values.push(posted);
             }
             for (mine, its) in [(one.start, other.start), (one.finish, other.finish)] {

@@ -195,6 +195,7 @@ impl Database {
         mine.sort_unstable();
         let mut kept: SmallVec<[Variable; 8]> = SmallVec::new();
         let mut going: SmallVec<[Variable; 16]> = SmallVec::new();
+        let mut equal: SmallVec<[[Operand; 2]; 4]> = SmallVec::new();
         for run in mine.chunk_by(|one, other| one == other) {
             let variable = run[0];
             if self.holders[variable.index()] > run.len() as u32 {
@@ -203,6 +204,7 @@ impl Database {
             }
             going.push(variable);
             // What it is equal to is somebody else's.
+            let first = kept.len();
             for constraint in self.store.constraints_of(variable) {
                 if matches!(self.store.kind(constraint), Some(Kind::Equal)) {
                     let others = self.store.operands(constraint);
@@ -214,6 +216,15 @@ impl Database {
                     }));
                 }
             }
+            // And they are equal without it.
+            if self.store.value(variable).is_none() {
+                let pairs = kept[first..].windows(2);
+                equal.extend(pairs.map(|pair| [pair[0].into(), pair[1].into()]));
+            }
+        }
+        for pair in equal {
+            let kept = self.store.post(Kind::Equal, &pair, Owner::Past);
+            debug_assert!(kept.is_ok(), "they were equal before");
         }
         for variable in kept {
             self.keep_values(variable);

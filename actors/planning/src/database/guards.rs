@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use super::rules::{Guard, Instance};
 use super::trail::Change;
-use super::{Conflict, Database, InstanceId};
+use super::{Conflict, Database, InstanceId, Owner};
 use crate::model::{Argument, End, Operand as Term, Relationship};
 use crate::parameters::{self, Operand};
 
@@ -163,6 +163,7 @@ impl Database {
         let outcome = loop {
             changed.clear();
             self.store.take_changed(&mut changed);
+            changed.append(&mut self.equalities);
             if changed.is_empty() {
                 break Ok(());
             }
@@ -172,6 +173,58 @@ impl Database {
         };
         self.changed = changed;
         outcome
+    }
+
+    /// Posts a constraint of values.
+    pub(super) fn post_value(
+        &mut self,
+        kind: parameters::Kind,
+        operands: &[Operand],
+        owner: Owner,
+    ) -> Result<parameters::Constraint, Conflict> {
+        let equal = matches!(kind, parameters::Kind::Equal);
+        let posted = self.store.post(kind, operands, owner)?;
+        if equal {
+            self.note_equality(posted);
+        }
+        Ok(posted)
+    }
+
+    /// Whether two variables are equal can change while none of their values does: who watches one
+    /// that an equality makes equal to others, or did, is told too.
+    pub(super) fn note_equality(&mut self, constraint: parameters::Constraint) {
+        if self.watchers.is_empty()
+            || !matches!(self.store.kind(constraint), Some(parameters::Kind::Equal))
+        {
+            return;
+        }
+        let mut told = std::mem::take(&mut self.equalities);
+        let mut at = told.len();
+        let add = |operand: Operand, told: &mut Vec<parameters::Variable>| {
+            if let Operand::Variable(variable) = operand
+                && !told.contains(&variable)
+            {
+                told.push(variable);
+            }
+        };
+        for operand in self.store.operands(constraint) {
+            add(operand, &mut told);
+        }
+        while at < told.len() {
+            // What has a value tells by that.
+            if self.store.value(told[at]).is_none() {
+                for other in self.store.constraints_of(told[at]) {
+                    if matches!(self.store.kind(other), Some(parameters::Kind::Equal)) {
+                        for operand in self.store.operands(other) {
+                            add(operand, &mut told);
+                        }
+                    }
+                }
+            }
+            at += 1;
+        }
+        self.steps += told.len() as u64;
+        self.equalities = told;
     }
 
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {

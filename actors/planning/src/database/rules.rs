@@ -295,7 +295,7 @@ impl Database {
                 operands.push(self.operand(instance, term)?);
             }
             let kind = self.kind(&self.model.rules[rule].relationships[place]);
-            let posted = self.store.post(kind, &operands, owner)?;
+            let posted = self.post_value(kind, &operands, owner)?;
             self.change_instance(instance).values.push((None, posted));
         }
         if let Some([min, max]) = self.model.rules[rule].duration {

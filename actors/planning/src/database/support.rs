@@ -252,9 +252,7 @@ impl Database {
         if let (Operand::Value(_), Operand::Value(_)) = (one, other) {
             return Err(Conflict::Mismatch { owner });
         }
-        let posted = self
-            .store
-            .post(parameters::Kind::Equal, &[one, other], owner)?;
+        let posted = self.post_value(parameters::Kind::Equal, &[one, other], owner)?;
         let at = self.change_instance(instance);
         at.values.push((Some(relation), posted));
         Ok(())

@@ -282,6 +282,7 @@ impl Database {
     /// Retracts a constraint of values, if it did not go with a variable that it was of.
     pub(super) fn retract_value(&mut self, constraint: parameters::Constraint) {
         if self.store.has_constraint(constraint) {
+            self.note_equality(constraint);
             self.store.retract(constraint);
             self.loosened = true;
         }

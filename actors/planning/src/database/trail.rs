@@ -57,6 +57,7 @@ impl Database {
         }
         self.network.pop();
         self.store.pop();
+        self.equalities.clear();
         self.pop_levels();
     }
 
