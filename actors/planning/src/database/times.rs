@@ -350,13 +350,19 @@ impl Database {
     pub(super) fn settle(&mut self) -> Result<(), Conflict> {
         loop {
             self.settle_values()?;
-            if std::mem::take(&mut self.loosened) && !self.mirrors.is_empty() {
+            let loosened = std::mem::take(&mut self.loosened) && !self.mirrors.is_empty();
+            if loosened {
                 self.loosen_mirrors();
             }
             let mut news = false;
             // All of them, before anybody is told: what was loosened is as tight as before then.
             for place in 0..self.mirrors.len() {
                 news |= self.reflect(place)?;
+            }
+            // What other constraints say of their variables holds for times as before.
+            for place in (0..self.mirrors.len()).filter(|_| loosened) {
+                self.follow_mirrors(self.mirrors[place].variable)?;
+                news = true;
             }
             if !news {
                 return Ok(());
