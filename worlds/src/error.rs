@@ -362,3 +362,17 @@ fn names(vertices: &[VertexId]) -> String {
     let texts: Vec<String> = vertices.iter().map(|v| v.0.to_string()).collect();
     texts.join(", ")
 }
+
+/// A figure of the sky that is outside its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{name} must be within {least} and {most}; it is {actual}")]
+pub struct SkyError {
+    /// Which figure, with its unit.
+    pub name: &'static str,
+    /// What it is.
+    pub actual: f64,
+    /// The least that it can be.
+    pub least: f64,
+    /// The most that it can be.
+    pub most: f64,
+}

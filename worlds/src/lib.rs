@@ -28,14 +28,16 @@ pub mod movingai;
 pub mod roadmap;
 pub mod rocks;
 pub mod sensors;
+pub mod sky;
 pub mod terrain;
 
 pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, ContactWindow};
 pub use crater::{Crater, CraterSettings, Hazard};
-pub use error::{RoadmapError, SensorError, TerrainError, WorldError};
+pub use error::{RoadmapError, SensorError, SkyError, TerrainError, WorldError};
 pub use ids::{NodeId, VertexId};
 pub use movingai::{GridError, GridMap, GridTask, GridWorld, TaskList};
 pub use roadmap::{Blocked, DistancesTo, Endpoints, Roadmap, RoadmapTable, well_formed};
 pub use rocks::{Rock, RockAbundance};
 pub use sensors::{Ownership, SensorNetwork};
+pub use sky::{Sky, SolWindow};
 pub use terrain::HeightField;
