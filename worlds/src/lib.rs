@@ -3,8 +3,9 @@
 //! A world is what rovers drive on and what radio nodes stand in: it holds no time, sends no
 //! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
 //! a [`SensorNetwork`] over it. Both lie in a generated [`Crater`], whose [`HeightField`] tells a
-//! radio link what the ground hides. [`contacts`] reads when which node hears which, as ION, HDTN
-//! and mahimahi write it down; [`sky`] where the Sun stands over Mars; [`movingai`] reads grid maps and tasks of path-finding benchmarks.
+//! radio link what the ground hides. [`sky`] says where the Sun stands over Mars. [`contacts`] reads
+//! when which node hears which, as ION, HDTN and mahimahi write it down; [`movingai`] reads grid maps
+//! and tasks of path-finding benchmarks.
 //!
 //! ```
 //! use farside_worlds::{Roadmap, SensorNetwork};

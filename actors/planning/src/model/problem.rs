@@ -11,7 +11,7 @@ use crate::temporal::Span;
 pub struct Problem {
     /// Its name.
     pub name: String,
-    /// Its files, as [`Model::files`].
+    /// Its files, as [`Model::files`](super::Model::files).
     pub files: Vec<String>,
     /// The times in which everything lies \[ticks\]; it begins at 0.
     pub horizon: Ticks,
