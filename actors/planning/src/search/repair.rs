@@ -20,7 +20,7 @@ use super::choices::{Choices, below};
 use super::complete::{Complete, first_gap, first_open, first_over_use, first_unbound};
 use super::extract::extract;
 use super::schedule::{LoadError, Schedule};
-use super::solve::{Answer, Planner, Settings, most_gain};
+use super::solve::{Answer, OF_ITSELF, Planner, Settings, most_gain};
 use super::{Counters, Decision, Failure, Flaw, Strategy};
 use crate::Ticks;
 use crate::database::{Cause, Conflict, Database, Owner, Status, TokenId};
@@ -306,6 +306,12 @@ impl Work {
         }
         let mut best = (self.schedule.database.clone(), self.posted.clone());
         let mut reasons = vec!["it was never the goal that brings most".to_owned(); closed.len()];
+        for (goal, refused) in self.schedule.refused.iter().enumerate() {
+            if refused.is_some() {
+                closed[goal] = true;
+                OF_ITSELF.clone_into(&mut reasons[goal]);
+            }
+        }
         while !self.is_over() {
             let Some(goal) = most_gain(&objective, &closed) else {
                 break;

@@ -20,6 +20,8 @@ pub struct Schedule {
     pub goals: Vec<TokenId>,
     /// By fact: its token.
     pub facts: Vec<TokenId>,
+    /// By goal: why it cannot be of itself, if it cannot and need not: its token is rejected.
+    pub refused: Vec<Option<Conflict>>,
 }
 
 /// Why a problem is none: what is the case cannot be.
@@ -33,7 +35,7 @@ pub enum LoadError {
         /// Why.
         conflict: Conflict,
     },
-    /// A goal whose own bounds leave no time or value.
+    /// A mandatory goal whose own bounds leave no time or value.
     #[error("goal {goal} cannot be: {conflict}")]
     Goal {
         /// Its place in the problem.
@@ -54,7 +56,7 @@ impl Schedule {
     ///
     /// # Errors
     ///
-    /// If what is the case cannot be, or a goal cannot be of itself.
+    /// If what is the case cannot be, or a mandatory goal cannot be of itself.
     pub fn new(model: Arc<Model>, problem: Arc<Problem>) -> Result<Self, LoadError> {
         let mut schedule = Schedule::empty(model, problem);
         schedule.load()?;
@@ -67,6 +69,7 @@ impl Schedule {
             database: Database::new(model, Span::new(0, problem.horizon)),
             goals: Vec::with_capacity(problem.goals.len()),
             facts: Vec::with_capacity(problem.facts.len()),
+            refused: Vec::with_capacity(problem.goals.len()),
             problem,
         }
     }
@@ -97,11 +100,20 @@ impl Schedule {
         }
         self.facts = facts.into_iter().flatten().collect();
         for (place, goal) in problem.goals.iter().enumerate() {
-            let token = self.want(place, goal);
-            let token = token.map_err(|conflict| LoadError::Goal {
+            let refused = |conflict| LoadError::Goal {
                 goal: place,
                 conflict,
-            })?;
+            };
+            let (token, why_not) = match self.want(place, goal, true) {
+                Ok(token) => (token, None),
+                Err(conflict) if goal.weight.is_none() => return Err(refused(conflict)),
+                Err(conflict) => {
+                    let token = self.want(place, goal, false).map_err(refused)?;
+                    self.database.reject(token);
+                    (token, Some(conflict))
+                }
+            };
+            self.refused.push(why_not);
             self.goals.push(token);
         }
         Ok(())
@@ -129,8 +141,8 @@ impl Schedule {
         })
     }
 
-    /// A goal's token, free.
-    fn want(&mut self, place: GoalId, goal: &Goal) -> Result<TokenId, Conflict> {
+    /// A goal's token, free; `bounded` by what the goal says of its times.
+    fn want(&mut self, place: GoalId, goal: &Goal, bounded: bool) -> Result<TokenId, Conflict> {
         self.database.attempt(|database| {
             let mut variables: SmallVec<[Option<Operand>; 4]> =
                 SmallVec::from_elem(None, goal.variables.len());
@@ -158,10 +170,12 @@ impl Schedule {
                 finish: None,
                 cause: Cause::Goal(place),
             })?;
-            let owner = Owner::Token(token);
-            database.restrict_time(token, End::Start, goal.start, owner)?;
-            database.restrict_time(token, End::Finish, goal.finish, owner)?;
-            database.restrict_duration(token, goal.duration, owner)?;
+            if bounded {
+                let owner = Owner::Token(token);
+                database.restrict_time(token, End::Start, goal.start, owner)?;
+                database.restrict_time(token, End::Finish, goal.finish, owner)?;
+                database.restrict_duration(token, goal.duration, owner)?;
+            }
             Ok(token)
         })
     }

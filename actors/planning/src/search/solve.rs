@@ -191,6 +191,9 @@ impl Run {
             if self.complete.wants(goal) {
                 objective.set(goal, true);
                 tried[goal] = true;
+            } else if self.schedule.refused[goal].is_some() {
+                OF_ITSELF.clone_into(&mut self.reasons[goal]);
+                tried[goal] = true;
             }
         }
         let mut left = tried.iter().filter(|tried| !**tried).count() as u64;
@@ -228,6 +231,9 @@ impl Run {
         best
     }
 }
+
+/// Why a goal is left out whose own bounds leave no time or value.
+pub(super) const OF_ITSELF: &str = "what it says of times and values cannot be";
 
 /// The goal not yet tried that brings most; of equals, the first.
 pub(super) fn most_gain(objective: &Objective, tried: &[bool]) -> Option<GoalId> {

@@ -8,6 +8,7 @@ use super::*;
 use crate::checker;
 use crate::language::{Options, read_model, read_problem};
 use crate::model::{Model, Problem};
+use crate::temporal::Span;
 
 fn read(model: (&str, &str), problem: (&str, &str)) -> (Arc<Model>, Arc<Problem>) {
     let model = read_model(model.0, model.1, &Options::default()).ok();
@@ -198,4 +199,35 @@ fn a_problem_without_goals_has_the_empty_plan() {
     let answer = Both::default().solve(&model, &problem, settings);
     let answer = answer.expect("it loads");
     assert!(answer.proven && answer.operations < 1_000);
+}
+
+/// A goal that leaves itself no time is left out by name, and the others are planned.
+#[test]
+fn a_goal_that_cannot_be_of_itself_is_left_out() {
+    let (model, mut problem) = rover();
+    // The language would refuse it: a program's problem need not come from a text.
+    let changed = Arc::make_mut(&mut problem);
+    let mut never = changed.goals[2].clone();
+    "never".clone_into(&mut never.name);
+    never.weight = Some(50.0);
+    never.start = Span::new(10, 20);
+    never.finish = Span::new(100, 110);
+    never.duration = Span::new(5, 10);
+    changed.goals.push(never);
+    let settings = Settings {
+        operations: 500_000,
+        seed: 1,
+    };
+    let planners: [&dyn Planner; 2] = [&Forward, &Repair::default()];
+    for planner in planners {
+        let answer = planner
+            .solve(&model, &problem, settings)
+            .expect("it need not be");
+        let plan = answer.plan.expect("there is one");
+        assert!(checker::check(&model, &problem, &plan).is_empty());
+        let left = plan.left_out.iter().find(|at| at.goal == "never");
+        let left = left.unwrap_or_else(|| panic!("{}", planner.name()));
+        assert_eq!(left.reason, "what it says of times and values cannot be");
+        assert!(plan.achieved.len() >= 3, "{}", planner.name());
+    }
 }
