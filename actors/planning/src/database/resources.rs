@@ -141,11 +141,7 @@ impl Database {
         resource: ResourceId,
     ) -> Result<Effected, Conflict> {
         let at = self.instance_at(instance);
-        let owner = Owner::Rule {
-            master: at.master,
-            rule: at.rule,
-            relation: None,
-        };
+        let owner = at.owner(None);
         let [flexible, earliest] = self.uses_of(instance, effect, resource);
         let levels = &mut self.levels_by_resource[resource];
         let amount = |_| Conflict::Amount { owner };

@@ -155,6 +155,15 @@ impl Instance {
         self.variables.get(variable).copied().flatten()
     }
 
+    /// Whose constraints are that it brings: its own, or one of its relations'.
+    pub(super) fn owner(&self, relation: Option<u32>) -> Owner {
+        Owner::Rule {
+            master: self.master,
+            rule: self.rule,
+            relation,
+        }
+    }
+
     /// The alternative of a choice that was chosen.
     pub fn chosen(&self, choice: usize) -> Option<u32> {
         self.chosen.get(choice).copied().flatten()
@@ -328,11 +337,7 @@ impl Database {
             Term::Duration(label) => (label, None),
         };
         let at = self.instance_at(instance);
-        let owner = Owner::Rule {
-            master: at.master,
-            rule: at.rule,
-            relation: None,
-        };
+        let owner = at.owner(None);
         let Some(token) = at.label(label) else {
             return Err(Conflict::Mismatch { owner });
         };
@@ -389,11 +394,7 @@ impl Database {
             let at = self.instance_at(instance);
             let posted = at.times[place];
             let master = self.at(at.master);
-            let owner = Owner::Rule {
-                master: at.master,
-                rule: at.rule,
-                relation: posted.relation,
-            };
+            let owner = at.owner(posted.relation);
             let ([min, max], backward, from, to) = match posted.relation {
                 None => {
                     let bounds = self.model.rules[at.rule].duration;

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use super::edit::Wanted;
 use super::rules::{Open, Posted, Step, Wishes};
-use super::{Cause, Conflict, Database, InstanceId, Owner, Status, Time, TokenId};
+use super::{Cause, Conflict, Database, InstanceId, Status, Time, TokenId};
 use crate::model::{Argument, Pattern, Target, TimelineId, VariableId};
 use crate::parameters::{self, Operand};
 
@@ -172,12 +172,7 @@ impl Database {
         token: TokenId,
     ) -> Result<(), Conflict> {
         let at = self.instance_at(instance);
-        let rule = at.rule;
-        let owner = Owner::Rule {
-            master: at.master,
-            rule,
-            relation: Some(relation),
-        };
+        let owner = at.owner(Some(relation));
         let Some(pattern) = self.asked(instance, relation) else {
             return Err(Conflict::Mismatch { owner });
         };
@@ -244,11 +239,7 @@ impl Database {
             return Ok(());
         }
         let at = self.instance_at(instance);
-        let owner = Owner::Rule {
-            master: at.master,
-            rule: at.rule,
-            relation: Some(relation),
-        };
+        let owner = at.owner(Some(relation));
         if let (Operand::Value(_), Operand::Value(_)) = (one, other) {
             return Err(Conflict::Mismatch { owner });
         }
@@ -267,11 +258,7 @@ impl Database {
     ) -> Result<(), Conflict> {
         let at = self.instance_at(instance);
         let rule = at.rule;
-        let owner = Owner::Rule {
-            master: at.master,
-            rule,
-            relation: Some(relation),
-        };
+        let owner = at.owner(Some(relation));
         let said = &self.flats[rule].relations[relation as usize];
         let anchor = at.label(said.anchor);
         let anchor = anchor.ok_or(Conflict::Mismatch { owner })?;

@@ -304,6 +304,13 @@ impl<O: Clone> Store<O> {
     /// Takes a link out of its variable's list. It keeps its neighbours.
     #[inline]
     pub(super) fn unlink(&mut self, link: u32) {
+        let Link { next, before, .. } = self.links.all[link as usize];
+        self.join_neighbours(link, next, before);
+    }
+
+    /// Says what the neighbours of a link have next and before them.
+    #[inline]
+    fn join_neighbours(&mut self, link: u32, then: u32, earlier: u32) {
         let Link {
             variable,
             next,
@@ -314,11 +321,11 @@ impl<O: Clone> Store<O> {
             return;
         }
         match before {
-            NONE => self.node_mut(variable).first = next,
-            before => self.links.all[before as usize].next = next,
+            NONE => self.node_mut(variable).first = then,
+            before => self.links.all[before as usize].next = then,
         }
         if next != NONE {
-            self.links.all[next as usize].before = before;
+            self.links.all[next as usize].before = earlier;
         }
     }
 
@@ -326,22 +333,7 @@ impl<O: Clone> Store<O> {
     /// all neighbours are as they were.
     fn link_again(&mut self, place: u32) {
         for link in self.links_of(place) {
-            let Link {
-                variable,
-                next,
-                before,
-                ..
-            } = self.links.all[link as usize];
-            if variable == NONE {
-                continue;
-            }
-            match before {
-                NONE => self.node_mut(variable).first = link,
-                before => self.links.all[before as usize].next = link,
-            }
-            if next != NONE {
-                self.links.all[next as usize].before = link;
-            }
+            self.join_neighbours(link, link, link);
         }
     }
 }
