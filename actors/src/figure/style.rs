@@ -3,17 +3,19 @@
 //! Rules are written once, with variables as colours. Browsers get them as they are, within
 //! `@supports`. Programs that draw SVG without being browsers (rsvg, resvg, CairoSVG, Inkscape)
 //! know no variables, and draw what they do not understand black: they skip `@supports`, and read
-//! the same rules before it, with the light colours in place of the variables.
+//! the same rules before it, with the light colours in place of the variables. Inkscape does not
+//! skip it: it leaves out all of a `style` element that it does not understand. So there are two.
 
 use std::collections::BTreeMap;
 
 /// A rule outside of `@media`: selectors, and what they set.
 type Rule<'a> = (&'a str, &'a str);
 
-/// The style of a figure that is a file of its own. `css` has only rules, `@media` and, at `:root`,
-/// variables.
-pub(super) fn standalone(css: &str) -> String {
-    format!("{}@supports (color: var(--ink)) {{\n{css}}}\n", plain(css))
+/// The style of a figure that is a file of its own, as two `style` elements: for all programs, and
+/// for browsers. `css` has only rules, `@media` and, at `:root`, variables.
+pub(super) fn standalone(css: &str) -> [String; 2] {
+    let themed = format!("@supports (color: var(--ink)) {{\n{css}}}\n");
+    [plain(css), themed]
 }
 
 /// The rules for light paper, with colours in place of variables and the least of selectors, so
@@ -78,8 +80,9 @@ mod tests {
                    svg .a, svg text.b { fill: var(--ink); stroke: var(--soft); }";
         let rules = ".a, text.b { fill: #111111; stroke: #222222; }\n";
         assert_eq!(plain(css), rules);
-        let all = standalone(css);
-        assert!(all.starts_with(rules) && all.contains("@supports"), "{all}");
+        let [plain, themed] = standalone(css);
+        assert_eq!(plain, rules);
+        assert!(themed.starts_with("@supports"), "{themed}");
     }
 
     #[test]

@@ -54,12 +54,14 @@ impl Figure {
     /// programs in those for light paper.
     pub fn standalone(&self) -> String {
         let css = format!("{}{}", super::STYLE, self.style);
+        let [plain, themed] = super::style::standalone(&css);
         let markup = html! {
             svg xmlns="http://www.w3.org/2000/svg" viewBox=(self.view_box()) role="img"
                 width=(Px(self.width)) height=(Px(self.height)) class="figure" {
                 title { (self.title) }
                 desc { (self.description) }
-                style { (PreEscaped(super::style::standalone(&css))) }
+                style { (PreEscaped(plain)) }
+                style { (PreEscaped(themed)) }
                 rect class="paper" width=(Px(self.width)) height=(Px(self.height)) {}
                 (self.body)
             }
