@@ -1,3 +1,5 @@
+//! What plans drawn as charts look like, in numbers and in texts that do not collide.
+
 use super::*;
 use crate::plan::{
     Achieved, LeftOut, Origin, PlanEffect, PlanEffectKind, PlanEnd, PlanResource, PlanResourceKind,

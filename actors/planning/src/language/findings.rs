@@ -9,9 +9,6 @@ use crate::nearest::nearest;
 /// How many findings are reported of one reading.
 pub const MOST_FINDINGS: usize = 20;
 
-/// Longer names are cut in messages.
-const LONGEST_NAME: usize = 60;
-
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Severity {
@@ -184,19 +181,6 @@ pub(super) fn arguments(count: usize) -> String {
         1 => "1 argument".to_owned(),
         _ => format!("{count} arguments"),
     }
-}
-
-/// A piece of text as a message shows it.
-pub(super) fn show(text: &str) -> String {
-    let mut shown: String = text
-        .chars()
-        .take(LONGEST_NAME)
-        .flat_map(char::escape_debug)
-        .collect();
-    if text.chars().nth(LONGEST_NAME).is_some() {
-        shown.push('…');
-    }
-    shown
 }
 
 #[cfg(test)]

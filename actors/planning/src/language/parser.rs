@@ -1,8 +1,8 @@
 //! From tokens to a tree, going on after a mistake.
 
-use super::findings::{Notes, Severity, show};
+use super::findings::{Notes, Severity};
 use super::lexer::{Lexeme, Lexer, Token};
-use super::tree::{Comment, Kind, Node, Source, Tree};
+use super::tree::{Comment, Kind, Node, Source, Tree, show};
 
 /// How many lists and spans may be in one another.
 pub(super) const MOST_DEPTH: usize = 100;

@@ -3,8 +3,10 @@
 //! A tree is one vector in the order of the text, so that a list of any depth is made and dropped
 //! without recursion.
 
-use super::findings::show;
 use crate::model::Position;
+
+/// Longer names are cut in messages.
+const LONGEST_NAME: usize = 60;
 
 /// What a node is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -270,4 +272,17 @@ impl<'t> Iterator for Children<'t> {
         self.at = self.tree.nodes[self.at as usize].next;
         Some(form)
     }
+}
+
+/// A piece of text as a message shows it.
+pub(super) fn show(text: &str) -> String {
+    let mut shown: String = text
+        .chars()
+        .take(LONGEST_NAME)
+        .flat_map(char::escape_debug)
+        .collect();
+    if text.chars().nth(LONGEST_NAME).is_some() {
+        shown.push('…');
+    }
+    shown
 }

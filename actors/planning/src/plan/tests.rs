@@ -1,3 +1,5 @@
+//! Plans as JSON, there and back, and bytes that are none.
+
 use super::*;
 use proptest::prelude::*;
 

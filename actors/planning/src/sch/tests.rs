@@ -1,3 +1,5 @@
+//! Project files that are right, and those that are not.
+
 use super::*;
 use crate::checker::{Kind, check};
 use crate::model::Argument;
