@@ -20,6 +20,7 @@ import json
 import pathlib
 import random
 import shlex
+import shutil
 import subprocess
 import sys
 
@@ -218,6 +219,18 @@ def generate(folder, check):
     return 0
 
 
+def farside():
+    """The command that is installed, else the one that was built here, else what builds it."""
+    root = pathlib.Path(__file__).resolve().parents[2]
+    built = root / "target" / "release" / "farside"
+    if shutil.which("farside"):
+        return "farside"
+    if built.exists():
+        return shlex.quote(str(built))
+    manifest = shlex.quote(str(root / "Cargo.toml"))
+    return f"cargo run --release --quiet --manifest-path {manifest} --"
+
+
 def asked(command, path):
     """What Farside says of a file."""
     words = [word.replace("{file}", str(path)) for word in shlex.split(command)]
@@ -295,8 +308,9 @@ def main():
     parser.add_argument("--check", action="store_true", help="generate: write nothing, compare")
     parser.add_argument(
         "--command",
-        default="farside plan solve {file} --json",
-        help="what solves a file; {file} is its path",
+        default=f"{farside()} plan solve {{file}} --json",
+        help="what solves a file; {file} is its path (default: the farside that is installed, "
+        "else the one that this folder makes)",
     )
     arguments = parser.parse_args()
     if arguments.what == "generate":
