@@ -41,6 +41,8 @@ pub struct Complete {
     /// Whether an effect may go back to a resource that it was on: a search that takes decisions
     /// back in turn must not, or it would not end.
     pub(super) assigns_back: bool,
+    /// Whether values of a parameter were left out: what failed then proves nothing.
+    pub(super) left_out: bool,
 }
 
 impl Complete {
@@ -53,6 +55,7 @@ impl Complete {
             wanted: goals.map(|goal| goal.weight.is_none()).collect(),
             decisions: 0,
             assigns_back: false,
+            left_out: false,
         }
     }
 
@@ -128,7 +131,9 @@ impl Strategy for Complete {
             Flaw::Unbound { token, parameter } => {
                 let operand = database.token(token).map(|at| at.parameters[parameter]);
                 if let Some(Operand::Variable(variable)) = operand {
-                    let values = database.store().domain(variable).values();
+                    let domain = database.store().domain(variable);
+                    self.left_out |= domain.len() > VALUES as u64;
+                    let values = domain.values();
                     into.extend(values.take(VALUES).map(Decision::Bind));
                 }
             }

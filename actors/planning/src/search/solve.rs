@@ -143,7 +143,10 @@ impl Run {
     /// A plan with all mandatory goals, or why there is none, and whether that is proven.
     fn first(&mut self) -> (Option<Plan>, Option<Failure>, bool) {
         match self.attempt(u64::MAX) {
-            (Verdict::Impossible(failure), _) => (None, Some(failure), true),
+            (Verdict::Impossible(failure), _) => {
+                let proven = !self.complete.left_out;
+                (None, Some(failure), proven)
+            }
             (Verdict::OverBudget, _) => (None, None, false),
             (Verdict::Solved, plan) => (plan, None, true),
         }
@@ -176,7 +179,7 @@ impl Run {
             self.schedule.database.pop();
             match found {
                 (_, Some(plan)) => best = plan,
-                (Verdict::Impossible(_), None) => return (best, true),
+                (Verdict::Impossible(_), None) => return (best, !self.complete.left_out),
                 (_, None) => return (best, false),
             }
         }
@@ -216,6 +219,9 @@ impl Run {
                     self.complete.want(goal, false);
                     self.reasons[goal] = match verdict {
                         Verdict::OverBudget => "no plan with it was found in time".to_owned(),
+                        _ if self.complete.left_out => {
+                            "no plan with it was found among the values that were tried".to_owned()
+                        }
                         _ => "there is no plan with it and those that are worth more".to_owned(),
                     };
                 }

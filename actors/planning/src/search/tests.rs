@@ -231,3 +231,26 @@ fn a_goal_that_cannot_be_of_itself_is_left_out() {
         assert!(plan.achieved.len() >= 3, "{}", planner.name());
     }
 }
+
+/// A parameter has more values than are tried, and the only one that will do is not among them:
+/// that there is no plan is not called proven.
+#[test]
+fn values_that_were_not_tried_prove_nothing() {
+    let model = "
+        (Define_Object_Class Rover :state_variables ((Free Work_SV)))
+        (Define_Type Size [0 1000])
+        (Define_Predicate Dig ((Size ?depth)))
+        (Define_Member_Values (Rover Work_SV) (Dig))
+        (Define_Compatibility (SINGLE ((Rover Work_SV) ((Dig (?depth)))))
+         :parameter_functions (remainder (?depth 997 ?rest) exceeds (?rest 995 ?fits))
+         :constraints (= ?fits True))";
+    let problem = "(Define_Problem day :horizon [0 100])
+        (Goal one (SINGLE ((Rover Work_SV) ((Dig (?depth))))) :mandatory)";
+    let (model, problem) = read(("m.ddl", model), ("p.ddl", problem));
+    let settings = Settings {
+        operations: 100_000,
+        seed: 1,
+    };
+    let answer = Forward.solve(&model, &problem, settings).expect("it loads");
+    assert!(answer.plan.is_none() && !answer.proven);
+}
