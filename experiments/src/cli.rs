@@ -82,11 +82,18 @@ enum Command {
     },
 }
 
+/// The command whose options depend on which systems there are: a picture's name is one.
+const DRAW: &str = "draw";
+
 /// The command line of a binary that knows these systems.
 pub fn main(registry: Registry) -> ExitCode {
     // On wrong usage clap prints what is wrong and exits with 2, as we do.
     let matches = command_line(&registry).get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let mut cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    if let (Command::Draw(args), Some(given)) = (&mut cli.command, matches.subcommand_matches(DRAW))
+    {
+        args.name_picture(given, &registry);
+    }
     say_on_stderr(cli.verbose);
     match dispatch(cli.command, &registry) {
         Ok(exit) => exit.into(),
@@ -109,7 +116,8 @@ pub fn main(registry: Registry) -> ExitCode {
 
 /// The command line, under the name and with the version of the binary.
 fn command_line(registry: &Registry) -> clap::Command {
-    let mut command = Cli::command();
+    let mut command =
+        Cli::command().mut_subcommand(DRAW, |command| draw::with_pictures(command, registry));
     if registry.scenario(run::DEFAULT_SCENARIO).is_none() {
         // Without the system that the examples are of, they would not run.
         command = command.after_help(EXIT_CODES);

@@ -74,6 +74,57 @@ struct Document<'a> {
     description: &'a str,
 }
 
+/// The pictures of all systems, each name once.
+fn all_pictures(registry: &Registry) -> Vec<PictureInfo> {
+    let mut all: Vec<PictureInfo> = registry
+        .systems()
+        .flat_map(|system| system.pictures().iter().copied())
+        .collect();
+    all.sort_by_key(|picture| picture.name);
+    all.dedup_by_key(|picture| picture.name);
+    all
+}
+
+/// The command with each picture's name as an option too: `--corridor 12,40` is `corridor --along
+/// 12,40`.
+pub(crate) fn with_pictures(command: clap::Command, registry: &Registry) -> clap::Command {
+    all_pictures(registry)
+        .into_iter()
+        .fold(command, |command, picture| {
+            let option = clap::Arg::new(picture.name)
+                .long(picture.name)
+                .help(format!("The picture {}: {}", picture.name, picture.about))
+                .conflicts_with_all(["picture", "list"])
+                .help_heading("Pictures");
+            command.arg(match picture.takes.contains(&PictureOption::Along) {
+                true => option
+                    .value_name("WHAT")
+                    .num_args(0..=1)
+                    .default_missing_value("")
+                    .conflicts_with("along"),
+                false => option.action(clap::ArgAction::SetTrue),
+            })
+        })
+}
+
+impl Args {
+    /// Takes over a picture that was named as an option, with what it is drawn along.
+    pub(crate) fn name_picture(&mut self, given: &clap::ArgMatches, registry: &Registry) {
+        let typed = |name: &str| {
+            given.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
+        };
+        let named = all_pictures(registry);
+        let Some(picture) = named.iter().find(|picture| typed(picture.name)) else {
+            return;
+        };
+        self.picture = Some(picture.name.to_owned());
+        if picture.takes.contains(&PictureOption::Along) {
+            let along = given.get_one::<String>(picture.name);
+            self.along = along.filter(|along| !along.is_empty()).cloned();
+        }
+    }
+}
+
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let by_ending = |out: &PathBuf| {
         let ending = out.extension()?.to_str()?;
