@@ -1,0 +1,16 @@
+//! Data analysis: from readings of rocks to a model of the field, and from the model to goals.
+//!
+//! Data flows one way:
+//!
+//! ```text
+//! spectrum ─► features ─► reading ─► exchange ─► rocks ─► mixture ─► objective ─► prioritiser
+//!                                   (rows of all          (classes)  (what to    (goals, weights,
+//!                                    rovers)                          find out)   combinations)
+//! ```
+//!
+//! Everything here is a pure function or a plain value: no actor, no clock, no message is sent.
+//! Rovers that hold equal sets of rows have bit-equal models.
+
+pub mod exchange;
+pub mod goals;
+pub mod reading;
