@@ -7,6 +7,7 @@ pub mod link;
 pub mod prelude;
 pub mod processor;
 pub mod radio;
+pub mod rover;
 pub mod system;
 pub mod team;
 pub mod units;
