@@ -1,0 +1,122 @@
+//! MISUS as scenarios see it: `[world]`, `[team]`, `[rover]`, `[learn]`.
+
+use farside::Report;
+use farside_actors::figure::Figure;
+use farside_actors::rover::RoverConfig;
+use farside_actors::system::settings::Table;
+use farside_actors::system::{
+    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
+    Settings, Setup, SetupError, System,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::assemble::{Parts, assemble};
+use crate::config::{FieldConfig, LearnConfig, TeamConfig};
+use crate::place::{Place, story};
+use crate::{builtin, metrics, picture};
+
+/// The multi-rover integrated science understanding system.
+pub struct MisusSystem;
+
+/// The tables that it reads.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct MisusScenario {
+    pub(crate) world: FieldConfig,
+    pub(crate) team: TeamConfig,
+    pub(crate) rover: RoverConfig,
+    pub(crate) learn: LearnConfig,
+}
+
+impl System for MisusSystem {
+    fn name(&self) -> &str {
+        "misus"
+    }
+
+    fn about(&self) -> &str {
+        "rovers read rocks, exchange what they read, and learn which classes of rock there are"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        [
+            FieldConfig::sections("world"),
+            TeamConfig::sections("team"),
+            RoverConfig::sections("rover"),
+            LearnConfig::sections("learn"),
+        ]
+        .concat()
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        metrics::all()
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &builtin::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        &builtin::STUDIES
+    }
+
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(MisusScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for MisusScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        self.world.check("world")?;
+        story(&self.world)?;
+        self.team.check("team")?;
+        self.rover.check("rover")?;
+        self.learn.check("learn")
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        let Some(until) = setup.until else {
+            let message = "missing: rovers go on sol after sol, so a run needs an end";
+            return Err(SetupError::value("until", message));
+        };
+        let place = Place::of(&self.world, setup)?;
+        let parts = Parts {
+            place: &place,
+            team: &self.team,
+            rover: &self.rover,
+            learn: &self.learn,
+            seed: setup.run_seed,
+            until,
+        };
+        let team = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
+        let field = place.field.clone();
+        let assembly = Assembly::new(move |report: &Report| {
+            let metrics = metrics::of(&team, &field, report.end_time);
+            metrics::results(&metrics)
+        });
+        let faults = self.rover.faults.iter().enumerate();
+        Ok(faults.fold(assembly, |assembly, (index, fault)| {
+            assembly.with_planned(format!("rover.fault.{index}"), fault.at)
+        }))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        setup: &mut Setup<'_>,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, setup)
+    }
+}
