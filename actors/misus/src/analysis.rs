@@ -12,5 +12,9 @@
 //! Rovers that hold equal sets of rows have bit-equal models.
 
 pub mod exchange;
+pub mod features;
 pub mod goals;
+pub mod mixture;
 pub mod reading;
+pub mod rocks;
+pub mod scores;

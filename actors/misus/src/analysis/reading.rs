@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub const SPECTRAL: usize = 4;
 
 /// How many statistics an image of a rock's surface becomes.
-pub const TEXTURAL: usize = 3;
+pub const TEXTURAL: usize = 4;
 
 /// Who made a reading: a rover between two restarts. A rover that restarts without its memory counts
 /// its readings from 0 again, so it has to call itself something new.
@@ -62,8 +62,9 @@ pub struct Textural {
 ///     rock: 7,
 ///     position_m: [12.0, 3.5],
 ///     position_sd_m: 0.2,
+///     diameter_m: 0.4,
 ///     spectral: None,
-///     textural: Some(Textural { features: [0.3, 0.1, 0.8], noise_sd: 0.02 }),
+///     textural: Some(Textural { features: [0.3, 0.1, 0.8, 0.2], noise_sd: 0.02 }),
 /// };
 /// assert!(image.check().is_ok());
 /// let broken = Reading { position_m: [f32::NAN, 0.0], ..image };
@@ -78,6 +79,8 @@ pub struct Reading {
     pub position_m: [f32; 2],
     /// The standard deviation of either coordinate \[m\]. Finite, at least 0.
     pub position_sd_m: f32,
+    /// How large the rock looks \[m\]. Finite, at least 0.
+    pub diameter_m: f32,
     /// From a spectrometer.
     pub spectral: Option<Spectral>,
     /// From a camera.
@@ -97,12 +100,12 @@ pub enum ReadingError {
         /// What it is.
         actual: f32,
     },
-    /// A standard deviation is not one.
+    /// A standard deviation or a length is not one.
     #[error("the reading of rock {rock} has the {what} {actual}, must be finite and at least 0")]
     Noise {
         /// The rock's number.
         rock: u32,
-        /// `position_sd_m` or `noise_sd`.
+        /// `position_sd_m`, `diameter_m` or `noise_sd`.
         what: &'static str,
         /// What it is.
         actual: f32,
@@ -113,7 +116,7 @@ impl Reading {
     /// Whether all numbers are such that they can be averaged.
     ///
     /// # Errors
-    /// Names the first number that is not finite, or a standard deviation below 0.
+    /// Names the first number that is not finite, or a standard deviation or a length below 0.
     pub fn check(&self) -> Result<(), ReadingError> {
         let rock = self.rock;
         let finite = |what, values: &[f32]| match values.iter().find(|v| !v.is_finite()) {
@@ -126,6 +129,7 @@ impl Reading {
         };
         finite("position", &self.position_m)?;
         noise("position_sd_m", self.position_sd_m)?;
+        noise("diameter_m", self.diameter_m)?;
         if let Some(spectral) = &self.spectral {
             finite("spectral feature", &spectral.features)?;
             noise("noise_sd", spectral.noise_sd)?;
@@ -157,7 +161,8 @@ impl Reading {
                 .as_ref()
                 .map(|t| (&t.features[..], t.noise_sd));
             let [east, north] = reading.position_m.map(f32::to_bits);
-            [reading.rock, east, north, reading.position_sd_m.to_bits()]
+            let [sd, diameter] = [reading.position_sd_m, reading.diameter_m].map(f32::to_bits);
+            [reading.rock, east, north, sd, diameter]
                 .into_iter()
                 .chain(part(spectral.is_some(), spectral))
                 .chain(part(textural.is_some(), textural))
