@@ -5,6 +5,7 @@
 
 pub mod colours;
 pub mod numbers;
+pub mod relief;
 pub mod scale;
 mod style;
 pub mod svg;

@@ -1,6 +1,7 @@
-//! What systems of actors share, for Farside: links, radios, processors, units, teams, invariants,
-//! figures, and what a system is.
+//! What systems of actors share, for Farside: links, radios, rover hardware, processors, units,
+//! teams, invariants, figures, what viewers draw with, and what a system is.
 
+pub mod drawing;
 pub mod figure;
 pub mod invariants;
 pub mod link;

@@ -76,7 +76,7 @@ pub(crate) fn assemble(
         sky: parts.place.sky,
         starts_s: parts.place.starts_s,
         instruments: Instruments::of(parts.rover),
-        renew_every: (!lease.is_zero()).then(|| lease / 3),
+        renew_every: (!lease.is_zero()).then(|| SimDuration::from_nanos(lease.as_nanos() / 3)),
     });
     let hosts: Vec<HostId> = site.rovers.iter().map(|name| sim.host(name)).collect();
     let mut wiring = Wiring::default();

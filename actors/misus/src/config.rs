@@ -2,9 +2,7 @@
 //! hardware is `[rover]`, as [`farside_actors::rover`] declares it.
 
 use farside::SimDuration;
-use farside_actors::rover::RoverConfig;
-use farside_actors::system::settings::{Table, if_set, in_unit, one_of, over, such_that};
-use farside_actors::system::{Section, SetupError};
+use farside_actors::system::settings::{if_set, in_unit, one_of, over};
 use farside_actors::{settings, units};
 use serde::{Deserialize, Serialize};
 

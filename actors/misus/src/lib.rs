@@ -2,6 +2,29 @@
 //! lie on the ground, and choose by that what to look at next.
 //!
 //! After T. Estlin, D. Gaines, F. Fisher and R. Castano, "Coordinating Multiple Rovers with
-//! Interdependent Science Objectives", AAMAS 2005.
+//! Interdependent Science Objectives", AAMAS 2005. Built so far: its environment (section 2), as
+//! rock fields of [`farside_worlds`] and rover hardware of [`farside_actors::rover`], and its data
+//! [`analysis`], which runs distributed over the rovers. Tours are fixed; planners follow.
+//!
+//! On each rover there are two actors: the hardware, and the scientist, who sends the rover from rock
+//! to rock, exchanges what is read with the other scientists, and learns from all of it.
 
 pub mod analysis;
+mod assemble;
+mod builtin;
+mod config;
+mod learning;
+mod messages;
+mod metrics;
+mod monitor;
+mod picture;
+mod place;
+mod scientist;
+mod site;
+mod system;
+pub mod tour;
+
+pub use config::{FieldConfig, LearnConfig, Objective, TeamConfig, Tour};
+pub use messages::{Learned, RockLabel, Stop};
+pub use metrics::MisusMetrics;
+pub use system::MisusSystem;

@@ -53,8 +53,10 @@ pub struct RockLabel {
     pub class: u32,
     /// How likely it is, 0 to 1.
     pub confidence: f32,
-    /// Whether there is a reading of it; if not, its place alone speaks.
-    pub read: bool,
+    /// Whether it knows an image of it.
+    pub image: bool,
+    /// Whether it knows a spectrum of it. Without either its place alone speaks.
+    pub spectrum: bool,
 }
 
 /// A state sample: what a rover does next.

@@ -102,7 +102,7 @@ impl Settings for MisusScenario {
         let field = place.field.clone();
         let assembly = Assembly::new(move |report: &Report| {
             let metrics = metrics::of(&team, &field, report.end_time);
-            metrics::results(&metrics)
+            metrics::results(metrics)
         });
         let faults = self.rover.faults.iter().enumerate();
         Ok(faults.fold(assembly, |assembly, (index, fault)| {

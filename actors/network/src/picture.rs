@@ -8,7 +8,6 @@ pub(crate) mod colouring;
 pub(crate) mod corridor;
 mod ground;
 mod map;
-mod relief;
 mod site;
 mod spacetime;
 

@@ -14,23 +14,17 @@ use crate::safety::messages::RoverState;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
 use farside::{RunInfo, SimDuration};
-use farside_worlds::{HeightField, NodeId, Roadmap, SensorNetwork, VertexId};
+use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
+
+use farside_actors::drawing::{self, MAP, base_link, layered, poses, shape, text};
 
 use crate::picture::colouring;
 use crate::picture::coordinated;
 use crate::world::crater;
 
-/// The frame that everything is placed in.
-const MAP: &str = "map";
-
 /// What the coordination graph is called.
 const COORDINATION: &str = "coordination";
 const COORDINATED: [f64; 4] = [0.9, 0.9, 0.9, 0.25];
-const GROUND: [f64; 4] = [0.6, 0.5, 0.4, 0.35];
-/// How many points the ground is drawn by, each way.
-const GROUND_POINTS: usize = 25;
-const ROVERS: [f64; 4] = [0.95, 0.55, 0.1, 1.0];
-const NAMES: [f64; 4] = [1.0, 1.0, 1.0, 1.0];
 
 pub(super) struct NetworkScene {
     roadmap: Arc<Roadmap>,
@@ -136,49 +130,6 @@ impl NetworkScene {
         }
     }
 
-    /// The ground that the roadmap lies on, as a net; for viewers that draw no entities, its knots.
-    fn ground(&self, terrain: &HeightField) -> [Drawing; 2] {
-        let last = GROUND_POINTS - 1;
-        let sample = |at: usize, of: usize| at * (of - 1) / last;
-        let knot = |row: usize, column: usize| {
-            let (column, row) = (
-                sample(column, terrain.columns()),
-                sample(row, terrain.rows()),
-            );
-            let at = terrain.sample_position_m(column, row);
-            [
-                at.x,
-                at.y,
-                terrain.heights_m()[row * terrain.columns() + column],
-            ]
-        };
-        let rows = 0..GROUND_POINTS;
-        let all = rows.flat_map(|row| (0..GROUND_POINTS).map(move |column| (row, column)));
-        let points_m: Vec<[f64; 3]> = all.clone().map(|(row, column)| knot(row, column)).collect();
-        let number = |row: usize, column: usize| (row * GROUND_POINTS + column) as u32;
-        let mut indices = Vec::new();
-        for (row, column) in all {
-            if column < last {
-                indices.extend([number(row, column), number(row, column + 1)]);
-            }
-            if row < last {
-                indices.extend([number(row, column), number(row + 1, column)]);
-            }
-        }
-        let knots = points_m.iter().copied().map(Pose::at).collect();
-        let lines = Form::Lines {
-            points_m,
-            indices,
-            thickness_m: 0.02 * self.scale_m,
-        };
-        let net = Drawing::Entity {
-            id: layered("map", "crater"),
-            frame: MAP.to_owned(),
-            shapes: vec![shape(lines, [0.0; 3], GROUND)],
-        };
-        [net, poses("crater", knots)]
-    }
-
     /// The vertices of each node, for viewers that draw no entities: a topic each, because they
     /// colour by topic.
     fn territories(&self) -> impl Iterator<Item = Drawing> {
@@ -259,29 +210,7 @@ impl NetworkScene {
         Drawing::Entity {
             id: layered("nodes", name),
             frame: MAP.to_owned(),
-            shapes: vec![ball, self.label(name, [x, y, z + diameter_m])],
-        }
-    }
-
-    fn label(&self, name: &str, position_m: [f64; 3]) -> Shape {
-        let label = Form::Label {
-            text: name.to_owned(),
-            height_m: 0.5 * self.scale_m,
-        };
-        shape(label, position_m, NAMES)
-    }
-
-    /// A rover, in its own frame: it is drawn once, and its frame moves.
-    fn rover(&self, name: &str) -> Drawing {
-        let size_m = [0.5, 0.35, 0.25].map(|part| part * self.scale_m);
-        let above = |height: f64| [0.0, 0.0, height * self.scale_m];
-        Drawing::Entity {
-            id: layered("rovers", name),
-            frame: base_link(name),
-            shapes: vec![
-                shape(Form::Cube { size_m }, above(0.125), ROVERS),
-                self.label(name, above(0.4)),
-            ],
+            shapes: vec![ball, drawing::label(name, [x, y, z + diameter_m], 0.5 * self.scale_m)],
         }
     }
 
@@ -319,7 +248,7 @@ impl NetworkScene {
         });
         if !drawn.on_the_map {
             drawn.on_the_map = true;
-            out.push(self.rover(name));
+            out.push(drawing::rover(name, self.scale_m));
         }
         out.push(poses(name, vec![pose]));
     }
@@ -347,7 +276,7 @@ impl Scene for NetworkScene {
         };
         self.rovers = run.entities.iter().map(drawn).collect();
         if let Some(crater) = self.in_crater.then(crater).and_then(Result::ok) {
-            out.extend(self.ground(crater.terrain()));
+            out.extend(drawing::net(crater.terrain(), "crater", 0.02 * self.scale_m));
         }
         out.push(self.roads());
         let posts = self.posts();
@@ -388,40 +317,6 @@ impl Scene for NetworkScene {
             }
             _ => {}
         }
-    }
-}
-
-/// An entity's id on one of the layers map, nodes, rovers and coordination, which viewers show or
-/// hide.
-fn layered(layer: &str, name: &str) -> String {
-    format!("{layer}/{name}")
-}
-
-fn base_link(name: &str) -> String {
-    format!("{name}/base_link")
-}
-
-fn shape(form: Form, position_m: [f64; 3], colour: [f64; 4]) -> Shape {
-    Shape {
-        form,
-        position_m,
-        colour,
-    }
-}
-
-fn poses(name: &str, poses: Vec<Pose>) -> Drawing {
-    Drawing::Poses {
-        topic: format!("/poses/{name}"),
-        frame: MAP.to_owned(),
-        poses,
-    }
-}
-
-fn text(level: Level, name: &str, message: &str) -> Drawing {
-    Drawing::Text {
-        level,
-        name: name.to_owned(),
-        message: message.to_owned(),
     }
 }
 

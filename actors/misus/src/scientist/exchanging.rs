@@ -4,8 +4,9 @@ use farside::prelude::*;
 use farside_actors::rover::{CommandReport, Reading as Measured};
 
 use super::{Instrument, Scientist};
-use crate::analysis::exchange::Statistics;
+use crate::analysis::exchange::{ExchangeError, Statistics};
 use crate::analysis::reading::{Reading, TEXTURAL, Textural};
+use crate::learning::Lesson;
 use crate::messages::ExchangeDue;
 
 impl Handler<ExchangeDue> for Scientist {
@@ -36,6 +37,11 @@ impl Handler<Statistics> for Scientist {
     }
 }
 
+/// A reading that was checked is refused for no reason but a bug.
+fn refused(error: ExchangeError) -> HandlerError {
+    HandlerError::new(error.to_string())
+}
+
 impl Scientist {
     /// How many exchanges there were before, counted by the clock.
     fn round(&self, now: SimTime) -> u32 {
@@ -61,10 +67,10 @@ impl Scientist {
             let id = match self.kept.get(&key).copied() {
                 Some((_, before)) if before <= noise => continue,
                 Some((id, _)) => {
-                    self.exchange.revise(id, reading).map_err(HandlerError::new)?;
+                    self.exchange.revise(id, reading).map_err(refused)?;
                     id
                 }
-                None => self.exchange.record(reading).map_err(HandlerError::new)?,
+                None => self.exchange.record(reading).map_err(refused)?,
             };
             self.kept.insert(key, (id, noise));
             self.is_to_learn = true;
@@ -102,5 +108,22 @@ impl Scientist {
         };
         reading.check().ok()?;
         Some((instrument, reading))
+    }
+}
+
+impl Scientist {
+    /// Learns from all readings, if there are new ones, and records what it thinks then.
+    pub(super) fn learn(&mut self, ctx: &mut Context<'_, Self>) {
+        if !std::mem::take(&mut self.is_to_learn) {
+            return;
+        }
+        let lesson = Lesson::of(&self.site, self.exchange.rows());
+        if let Some(lesson) = &lesson {
+            ctx.sample(&lesson.learned(self.exchange.rows().len()));
+        }
+    }
+
+    pub(super) fn most_wanted(&self, left: &[u32]) -> Option<u32> {
+        left.first().copied()
     }
 }

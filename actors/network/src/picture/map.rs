@@ -9,15 +9,14 @@ use std::f64::consts::PI;
 
 use farside::SimDuration;
 use farside_actors::invariants::Place;
-use farside_worlds::{HeightField, NodeId, VertexId};
+use farside_worlds::{NodeId, VertexId};
 use maud::{Markup, html};
 
 use super::colouring;
-use super::relief::contours;
 use super::{Drawn, Surroundings, counted};
 use crate::tracks::Sighting;
 use crate::waits::{Waits, nearer};
-use farside_actors::figure::Figure;
+use farside_actors::figure::{Figure, relief};
 use farside_actors::figure::svg::{Px, over_lines, path};
 
 /// The middle length of an edge, in pixels; a map too large for that is drawn smaller.
@@ -179,24 +178,7 @@ impl<'a> Sheet<'a> {
                 html! { path class="wall" d=(data) {} }
             }
             Surroundings::Heights(terrain) => {
-                let (low_m, high_m) = heights_m(terrain);
-                let step_m = contour_step_m(terrain);
-                let first = libm::ceil(low_m / step_m);
-                let levels = libm::floor(high_m / step_m) - first;
-                // Finer than two pixels nobody sees.
-                let stride = (2.0 / (terrain.resolution_m() * self.px_per_m)).max(2.0) as usize;
-                html! {
-                    @for level in 0..=levels.clamp(0.0, 40.0) as u32 {
-                        @let height_m = (first + f64::from(level)) * step_m;
-                        @let class = if height_m < 0.0 { "relief low" } else { "relief" };
-                        @let lines = contours(terrain, height_m, stride);
-                        @let px = lines.iter().map(|line| line.iter().map(|p| self.px(*p)));
-                        @let data: String = px.map(|line| parts(line, inside)).collect();
-                        @if !data.is_empty() {
-                            path class=(class) d=(data) { title { (height_m) " m" } }
-                        }
-                    }
-                }
+                relief::draw(terrain, self.px_per_m, |at_m| self.px(at_m), inside)
             }
         }
     }
@@ -481,46 +463,6 @@ fn direction(from: (f64, f64), to: (f64, f64)) -> Option<(f64, f64)> {
     let (x, y) = (to.0 - from.0, to.1 - from.1);
     let length = (x * x + y * y).sqrt();
     (length > 0.0).then(|| (x / length, y / length))
-}
-
-/// The parts of a line that are inside.
-fn parts(line: impl Iterator<Item = (f64, f64)>, inside: impl Fn(&(f64, f64)) -> bool) -> String {
-    let (mut data, mut part) = (String::new(), Vec::new());
-    for point in line {
-        if inside(&point) {
-            part.push(point);
-        } else if !part.is_empty() {
-            data.push_str(&path(part.drain(..)));
-        }
-    }
-    data.push_str(&path(part));
-    data
-}
-
-/// The lowest and the highest ground.
-fn heights_m(terrain: &HeightField) -> (f64, f64) {
-    let heights_m = terrain.heights_m().iter().copied();
-    let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
-    (low_m, heights_m.fold(f64::NEG_INFINITY, f64::max))
-}
-
-/// From contour to contour.
-fn contour_step_m(terrain: &HeightField) -> f64 {
-    let (low_m, high_m) = heights_m(terrain);
-    step((high_m - low_m) / 12.0)
-}
-
-/// 1, 2 or 5 times a power of ten, at least `rough`.
-fn step(rough: f64) -> f64 {
-    if rough <= 0.0 || !rough.is_finite() {
-        return 1.0;
-    }
-    let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
-    steps
-        .into_iter()
-        .find(|step| *step >= rough)
-        .unwrap_or(10.0 * power)
 }
 
 fn entry_mark((x, y): (f64, f64)) -> String {

@@ -3,7 +3,8 @@
 use farside_actors::figure::svg::{Px, path};
 use maud::{Markup, html};
 
-use super::{Sheet, arrow, contour_step_m, ends_of, entry_mark, exit_mark, nose, step};
+use super::{Sheet, arrow, ends_of, entry_mark, exit_mark, nose};
+use farside_actors::figure::relief::{contour_step_m, step};
 use crate::picture::Surroundings;
 
 /// The most that it is high.

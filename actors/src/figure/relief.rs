@@ -1,15 +1,102 @@
-//! Contour lines.
+//! The shape of the ground as contour lines.
 
 use std::collections::BTreeMap;
 
 use farside_worlds::HeightField;
+use maud::{Markup, html};
+
+use super::svg::path;
+
+/// The most lines' heights that are drawn.
+const MOST_LEVELS: f64 = 40.0;
+
+/// Contour lines of a terrain, a path of class `relief` for each height, `relief low` below 0.
+///
+/// `px` places a point (x, y) \[m\] in the figure, `px_per_m` is its scale, and nothing is drawn that
+/// is not `inside`, in pixels.
+///
+/// ```
+/// use farside_actors::figure::relief;
+/// use farside_worlds::HeightField;
+/// use nalgebra::Point2;
+/// let bump_m = (0..49).map(|i| if i == 24 { 3.0 } else { 0.0 }).collect();
+/// let terrain = HeightField::new(Point2::origin(), 1.0, 7, bump_m)?;
+/// let drawn = relief::draw(&terrain, 10.0, |[x, y]| (10.0 * x, 10.0 * y), |_| true);
+/// assert!(drawn.into_string().contains("class=\"relief\""));
+/// # Ok::<(), farside_worlds::TerrainError>(())
+/// ```
+pub fn draw(
+    terrain: &HeightField,
+    px_per_m: f64,
+    px: impl Fn([f64; 2]) -> (f64, f64),
+    inside: impl Fn(&(f64, f64)) -> bool,
+) -> Markup {
+    let (low_m, high_m) = heights_m(terrain);
+    let step_m = contour_step_m(terrain);
+    let first = libm::ceil(low_m / step_m);
+    let levels = libm::floor(high_m / step_m) - first;
+    // Finer than two pixels nobody sees.
+    let stride = (2.0 / (terrain.resolution_m() * px_per_m)).max(2.0) as usize;
+    html! {
+        @for level in 0..=levels.clamp(0.0, MOST_LEVELS) as u32 {
+            @let height_m = (first + f64::from(level)) * step_m;
+            @let class = if height_m < 0.0 { "relief low" } else { "relief" };
+            @let lines = contours(terrain, height_m, stride);
+            @let lines = lines.iter().map(|line| line.iter().map(|p| px(*p)));
+            @let data: String = lines.map(|line| parts(line, &inside)).collect();
+            @if !data.is_empty() {
+                path class=(class) d=(data) { title { (height_m) " m" } }
+            }
+        }
+    }
+}
+
+/// The height from contour to contour \[m\].
+pub fn contour_step_m(terrain: &HeightField) -> f64 {
+    let (low_m, high_m) = heights_m(terrain);
+    step((high_m - low_m) / 12.0)
+}
+
+/// The parts of a line that are inside, as a path's data.
+fn parts(line: impl Iterator<Item = (f64, f64)>, inside: impl Fn(&(f64, f64)) -> bool) -> String {
+    let (mut data, mut part) = (String::new(), Vec::new());
+    for point in line {
+        if inside(&point) {
+            part.push(point);
+        } else if !part.is_empty() {
+            data.push_str(&path(part.drain(..)));
+        }
+    }
+    data.push_str(&path(part));
+    data
+}
+
+/// The lowest and the highest ground \[m\].
+fn heights_m(terrain: &HeightField) -> (f64, f64) {
+    let heights_m = terrain.heights_m().iter().copied();
+    let low_m = heights_m.clone().fold(f64::INFINITY, f64::min);
+    (low_m, heights_m.fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// 1, 2 or 5 times a power of ten, at least `rough`; 1 if that is not over 0.
+pub fn step(rough: f64) -> f64 {
+    if rough <= 0.0 || !rough.is_finite() {
+        return 1.0;
+    }
+    let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
+    let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
+    steps
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(10.0 * power)
+}
 
 /// A place on the edge of a cell: the sample it begins at, and whether it goes north.
 type Crossing = (usize, usize, bool);
 
 /// The lines at one height \[m\], each a chain of points (x, y) \[m\], found by marching over
 /// squares of `stride` samples. Closed lines end where they begin.
-pub(super) fn contours(terrain: &HeightField, height_m: f64, stride: usize) -> Vec<Vec<[f64; 2]>> {
+fn contours(terrain: &HeightField, height_m: f64, stride: usize) -> Vec<Vec<[f64; 2]>> {
     let (columns, rows) = (terrain.columns() / stride, terrain.rows() / stride);
     let heights_m = terrain.heights_m();
     // A level that a sample is exactly on would be met twice.

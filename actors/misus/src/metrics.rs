@@ -1,0 +1,156 @@
+//! What a run of MISUS amounts to: how well the classes of rocks were learnt, and at what cost.
+
+mod catalogue;
+
+use std::sync::{OnceLock, PoisonError};
+
+use farside::SimTime;
+use farside_actors::system::{Metric, Results, Series, with_about};
+use farside_worlds::RockField;
+use farside_worlds::sky::SOL_S;
+use serde::Serialize;
+
+use crate::analysis::scores::adjusted_rand_index;
+use crate::assemble::Team;
+use crate::messages::Learned;
+use crate::monitor::{RoverTally, Tally};
+
+/// What runs can be measured by, each with what its field says.
+pub(crate) fn all() -> &'static [Metric] {
+    static ALL: OnceLock<Vec<Metric>> = OnceLock::new();
+    ALL.get_or_init(|| with_about(&catalogue::ALL, MisusMetrics::about))
+}
+
+farside_actors::documented! {
+    /// What came of a run.
+    #[derive(Clone, Debug, Default, Serialize)]
+    pub struct MisusMetrics {
+        /// How well the classes that rovers learnt match those that there are: the adjusted Rand index
+        /// over all rocks of which some rover took a spectrum, mean over rovers. A rover that knows no
+        /// reading of such a rock tells its class from its place.
+        pub class_ari: Option<f64>,
+        /// The same of the rover for which it is least.
+        pub class_ari_least: Option<f64>,
+        /// How many classes rovers tell apart, mean over rovers.
+        pub k: Option<f64>,
+        /// Whether all rovers tell equally many classes apart.
+        pub k_agrees: bool,
+        /// How far the learnt shares of the classes are from the true ones over the whole field: the
+        /// total variation distance after the best assignment of learnt classes to true ones, mean over
+        /// rovers; 0 is perfect.
+        pub distribution_error: Option<f64>,
+        /// The mean entropy of the class of a rock that was read, mean over rovers \[nat\].
+        pub posterior_entropy: Option<f64>,
+        /// The log-likelihood of the readings under the learnt classes, mean over rovers.
+        pub log_likelihood: Option<f64>,
+        /// The objective function, which learning maximises: the penalised log-likelihood, mean over
+        /// rovers.
+        pub objective: Option<f64>,
+        /// Readings that a rover knows at the end, its own and those of others, mean over rovers.
+        pub readings: f64,
+        /// Rocks of which some rover took a spectrum.
+        pub rocks_read: u32,
+        /// Rocks that rovers set out for.
+        pub stops: u32,
+        /// Messages of the exchange of readings.
+        pub exchange_messages: u64,
+        /// Their bytes \[byte\].
+        pub exchange_bytes: u64,
+    }
+}
+
+/// What came of a run that ended at `end`.
+pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> (MisusMetrics, Series) {
+    let tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
+    let metrics = figures(&tally, field);
+    (metrics, over_sols(&tally, field, end))
+}
+
+fn figures(tally: &Tally, field: &RockField) -> MisusMetrics {
+    let last: Vec<&Learned> = tally.rovers.iter().filter_map(latest).collect();
+    let read = read_by_some(&last);
+    let aris: Vec<f64> = last.iter().map(|one| ari(one, field, &read)).collect();
+    let mean_of = |value: &dyn Fn(&Learned) -> f64| mean(last.iter().map(|one| value(one)));
+    let errors = last.iter().map(|one| distribution_error(one, field));
+    MisusMetrics {
+        class_ari: mean(aris.iter().copied()),
+        class_ari_least: aris.iter().copied().min_by(f64::total_cmp),
+        k: mean_of(&|one| f64::from(one.classes)),
+        k_agrees: last.windows(2).all(|two| two[0].classes == two[1].classes),
+        distribution_error: mean(errors),
+        posterior_entropy: mean_of(&|one| one.posterior_entropy),
+        log_likelihood: mean_of(&|one| one.log_likelihood),
+        objective: mean_of(&|one| one.objective),
+        readings: mean_of(&|one| f64::from(one.readings)).unwrap_or(0.0),
+        rocks_read: read.iter().filter(|read| **read).count() as u32,
+        stops: tally.rovers.iter().map(|rover| rover.stops).sum(),
+        exchange_messages: tally.exchanged,
+        exchange_bytes: tally.exchanged_bytes,
+    }
+}
+
+fn latest(rover: &RoverTally) -> Option<&Learned> {
+    rover.lessons.last().map(|(_, learned)| learned)
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Which rocks some rover knows a spectrum of.
+fn read_by_some(last: &[&Learned]) -> Vec<bool> {
+    let rocks = last.first().map_or(0, |one| one.rocks.len());
+    let read = |rock: usize| last.iter().any(|one| one.rocks[rock].spectrum);
+    (0..rocks).map(read).collect()
+}
+
+/// The adjusted Rand index of a rover's classes over some rocks.
+fn ari(learned: &Learned, field: &RockField, over: &[bool]) -> f64 {
+    let truth = field.truth();
+    let chosen = |rock: &usize| over[*rock];
+    let rocks: Vec<usize> = (0..over.len()).filter(chosen).collect();
+    let own: Vec<usize> = rocks.iter().map(|&rock| learned.rocks[rock].class as usize).collect();
+    let true_of = |&rock: &usize| usize::from(truth.classes()[rock]);
+    let true_classes: Vec<usize> = rocks.iter().map(true_of).collect();
+    adjusted_rand_index(&own, &true_classes)
+}
+
+/// How a team's knowledge grew: at the end of each sol, the mean over rovers of the adjusted Rand index
+/// of all rocks that some rover has a spectrum of at the end of the run.
+fn over_sols(tally: &Tally, field: &RockField, end: SimTime) -> Series {
+    let last: Vec<&Learned> = tally.rovers.iter().filter_map(latest).collect();
+    let read = read_by_some(&last);
+    let sols = libm::floor(end.as_secs_f64() / SOL_S) as u32;
+    let at = |sol: u32| {
+        let until_s = f64::from(sol) * SOL_S;
+        let by_then = tally.rovers.iter().filter_map(|rover| {
+            let lessons = rover.lessons.iter();
+            let before = lessons.take_while(|(at, _)| at.as_secs_f64() <= until_s);
+            before.last().map(|(_, learned)| learned)
+        });
+        mean(by_then.map(|learned| ari(learned, field, &read)))
+    };
+    let index = (1..=sols).map(f64::from).collect();
+    Series::new(index, (1..=sols).map(at).collect()).unwrap_or_default()
+}
+
+/// The results of a run.
+pub(crate) fn results((metrics, over_sols): (MisusMetrics, Series)) -> Results {
+    let mut results = Results::of(&metrics).metric("class_ari_by_sol", over_sols);
+    let figure = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+    results.line("rocks with a spectrum", metrics.rocks_read.to_string());
+    results.line("classes told apart", figure(metrics.k));
+    results.line("adjusted Rand index", figure(metrics.class_ari));
+    results.line("error of the distribution", figure(metrics.distribution_error));
+    results.line("entropy of a rock's class", figure(metrics.posterior_entropy));
+    results
+}
+
+fn distribution_error(_learned: &Learned, _field: &RockField) -> f64 {
+    f64::NAN
+}

@@ -1,0 +1,52 @@
+//! What runs of MISUS can be measured by.
+
+use farside_actors::system::Better::{Higher, Lower, Neither};
+use farside_actors::system::Metric;
+use farside_actors::system::MetricKind::{Number, Rate, Series};
+use farside_actors::system::SeriesIndex;
+
+/// Sorted by name.
+pub(crate) const ALL: [Metric; 14] = [
+    Metric::new("class_ari", "adjusted Rand index of classes", "", Number, Higher),
+    Metric::new(
+        "class_ari_by_sol",
+        "adjusted Rand index of classes",
+        "",
+        Series(SeriesIndex::new("sol", "")),
+        Higher,
+    )
+    .about(
+        "class_ari as it was at the end of each sol, over the rocks of which some rover has a \
+         spectrum at the end of the run.",
+    ),
+    Metric::new("class_ari_least", "the same of the worst rover", "", Number, Higher),
+    Metric::new(
+        "distribution_error",
+        "error of the distribution of classes",
+        "",
+        Number,
+        Lower,
+    ),
+    Metric::new("exchange_bytes", "bytes of the exchange", "B", Number, Lower),
+    Metric::new(
+        "exchange_messages",
+        "messages of the exchange",
+        "messages",
+        Number,
+        Lower,
+    ),
+    Metric::new("k", "classes told apart", "classes", Number, Neither),
+    Metric::new("k_agrees", "all rovers tell equally many apart", "", Rate, Higher),
+    Metric::new("log_likelihood", "log-likelihood of readings", "", Number, Neither),
+    Metric::new("objective", "objective function", "", Number, Neither),
+    Metric::new(
+        "posterior_entropy",
+        "entropy of a rock's class",
+        "nat",
+        Number,
+        Lower,
+    ),
+    Metric::new("readings", "readings that a rover knows", "readings", Number, Higher),
+    Metric::new("rocks_read", "rocks with a spectrum", "rocks", Number, Higher),
+    Metric::new("stops", "rocks that rovers set out for", "rocks", Number, Higher),
+];

@@ -1,0 +1,112 @@
+//! The monitor: keeps what rovers recorded of themselves, for the results. It sees committed records
+//! only, and never an actor.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::{RunInfo, SimTime};
+use farside_actors::rover::hardware_name;
+
+use crate::messages::Learned;
+use crate::site::SharedSite;
+
+/// What is known of a team.
+#[derive(Default)]
+pub(crate) struct Tally {
+    /// By the rover's number.
+    pub(crate) rovers: Vec<RoverTally>,
+    /// Exchange messages and their bytes, as they were delivered or lost.
+    pub(crate) exchanged: u64,
+    pub(crate) exchanged_bytes: u64,
+}
+
+/// What is known of a rover.
+#[derive(Default)]
+pub(crate) struct RoverTally {
+    /// What it learnt, and when, in order.
+    pub(crate) lessons: Vec<(SimTime, Learned)>,
+    /// Rocks that it set out for.
+    pub(crate) stops: u32,
+}
+
+/// Which rover an actor belongs to, and what it is.
+#[derive(Clone, Copy)]
+enum Role {
+    Other,
+    Scientist(usize),
+    Hardware(usize),
+}
+
+/// Watches a run.
+pub(crate) struct Monitor {
+    site: SharedSite,
+    tally: Arc<Mutex<Tally>>,
+    roles: Vec<Role>,
+}
+
+impl Monitor {
+    /// A monitor, and what it will write to.
+    pub(crate) fn new(site: SharedSite) -> (Monitor, Arc<Mutex<Tally>>) {
+        let rovers = site.rovers.iter().map(|_| RoverTally::default()).collect();
+        let tally = Arc::new(Mutex::new(Tally {
+            rovers,
+            ..Tally::default()
+        }));
+        let monitor = Monitor {
+            site,
+            tally: tally.clone(),
+            roles: Vec::new(),
+        };
+        (monitor, tally)
+    }
+
+    fn role(&self, name: &str) -> Role {
+        let rovers = || self.site.rovers.iter();
+        let scientist = rovers().position(|rover| rover == name);
+        let hardware = || rovers().position(|rover| hardware_name(rover) == name);
+        match scientist {
+            Some(rover) => Role::Scientist(rover),
+            None => hardware().map_or(Role::Other, Role::Hardware),
+        }
+    }
+}
+
+impl Observer for Monitor {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: false,
+        }
+    }
+
+    fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        self.roles = run.entities.iter().map(|one| self.role(&one.name)).collect();
+        Ok(())
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let Some(kind) = record.kind else {
+            return Ok(Flow::Continue);
+        };
+        let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
+        let role = self.roles[record.sender.index()];
+        let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
+        match (record.class, role, kind.name()) {
+            (class, Role::Scientist(_), "Statistics") if class.is_fate() => {
+                tally.exchanged += 1;
+                tally.exchanged_bytes += record.body.len() as u64;
+            }
+            (RecordClass::Sample, Role::Scientist(rover), "Learned") => {
+                let learned = kind.schema().decode(record.body).map_err(failed)?;
+                tally.rovers[rover].lessons.push((record.time(), learned));
+            }
+            (RecordClass::Sample, Role::Scientist(rover), "Stop") => {
+                tally.rovers[rover].stops += 1;
+            }
+            (RecordClass::Sample, Role::Hardware(_), _) => {}
+            _ => {}
+        }
+        Ok(Flow::Continue)
+    }
+}

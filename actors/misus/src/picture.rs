@@ -1,0 +1,100 @@
+//! Pictures of a run, drawn from its log alone: the field with what is known of it, and a rover's
+//! resources over time. The same log gives the same bytes.
+
+mod classes;
+mod field;
+mod history;
+mod profiles;
+
+use farside::SimDuration;
+use farside::suggest::{did_you_mean, nearest};
+use farside_actors::figure::Figure;
+use farside_actors::system::{
+    PictureError, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
+};
+
+use crate::assemble::names;
+use crate::place::Place;
+use crate::system::MisusScenario;
+use history::History;
+
+/// The style of pictures, beside that of all figures.
+const STYLE: &str = include_str!("picture/picture.css");
+
+/// The pictures that there are.
+pub(crate) const ALL: [PictureInfo; 2] = [
+    PictureInfo {
+        name: "field",
+        about: "rocks by what they are and by what a rover thinks they are, readings and tracks at an \
+                instant: --along names the rover, the first unless given",
+        takes: &[PictureOption::At, PictureOption::Along],
+        extras: &[],
+    },
+    PictureInfo {
+        name: "profiles",
+        about: "a rover's battery, power and memory over time, with nights and faults: --along names \
+                the rover, the first unless given",
+        takes: &[PictureOption::At, PictureOption::From, PictureOption::Along],
+        extras: &[],
+    },
+];
+
+/// Draws one of them.
+pub(crate) fn draw(
+    scenario: &MisusScenario,
+    picture: &str,
+    run: &dyn Recording,
+    request: &PictureRequest,
+    setup: &mut Setup<'_>,
+) -> Result<Figure, PictureError> {
+    let place = Place::of(&scenario.world, setup)?;
+    let history = History::read(run, names(&scenario.team))?;
+    let rover = rover(&history.names, request.along.as_deref())?;
+    let to_ns = time_ns(&history, request.at)?;
+    match picture {
+        "field" => Ok(field::figure(&history, &place.field, rover, to_ns)),
+        "profiles" => {
+            let from = request.from.unwrap_or(SimDuration::ZERO);
+            let from_ns = time_ns(&history, Some(from))?;
+            if from_ns >= to_ns {
+                let to = SimDuration::from_nanos(to_ns);
+                let message = format!("from {from} to {to}: expected a time span");
+                return Err(PictureError::NotDrawn(message));
+            }
+            let capacity = [scenario.rover.battery_j, scenario.rover.memory_bytes as f64];
+            let span = (from_ns, to_ns);
+            Ok(profiles::figure(&history, &place, capacity, rover, span))
+        }
+        other => Err(PictureError::Unknown {
+            picture: other.to_owned(),
+        }),
+    }
+}
+
+/// Which rover is meant.
+fn rover(names: &[String], wanted: Option<&str>) -> Result<usize, PictureError> {
+    let Some(wanted) = wanted else {
+        return Ok(0);
+    };
+    let found = names.iter().position(|name| name == wanted);
+    found.ok_or_else(|| {
+        let hint = nearest(wanted, names.iter().map(String::as_str));
+        let hint = did_you_mean(hint.as_deref());
+        let known = names.join(", ");
+        PictureError::NotDrawn(format!(
+            "along {wanted:?}: expected a rover, one of {known}{hint}"
+        ))
+    })
+}
+
+/// A time within the run; its end unless given.
+fn time_ns(history: &History, at: Option<SimDuration>) -> Result<u64, PictureError> {
+    let end = SimDuration::from_nanos(history.end_ns);
+    match at {
+        None => Ok(history.end_ns),
+        Some(at) if at > end => Err(PictureError::NotDrawn(format!(
+            "at {at}: the run ended at {end}"
+        ))),
+        Some(at) => Ok(at.as_nanos()),
+    }
+}

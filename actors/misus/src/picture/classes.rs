@@ -1,0 +1,60 @@
+//! How classes of rock are told apart in pictures: by colour, and by shape for who sees no colours;
+//! and which true class a learnt one is drawn as.
+
+use farside_actors::figure::svg::path;
+use farside_worlds::RockField;
+
+use crate::messages::Learned;
+
+/// How many colours there are.
+pub(super) const COLOURS: usize = 8;
+
+/// The outline of a rock of a class.
+pub(super) fn shape(class: usize, (x, y): (f64, f64), radius: f64) -> String {
+    let corners = |sides: u32, turned: f64, wide: f64, high: f64| {
+        let corner = |i: u32| {
+            let angle = (f64::from(i) + turned) / f64::from(sides) * std::f64::consts::TAU;
+            (
+                x + wide * radius * libm::sin(angle),
+                y - high * radius * libm::cos(angle),
+            )
+        };
+        format!("{}Z", path((0..sides).map(corner)))
+    };
+    match class % COLOURS {
+        0 => corners(20, 0.0, 1.0, 1.0),
+        1 => corners(4, 0.5, 1.25, 1.25),
+        2 => corners(3, 0.0, 1.3, 1.3),
+        3 => corners(4, 0.0, 1.3, 1.3),
+        4 => corners(3, 0.5, 1.3, 1.3),
+        5 => corners(6, 0.0, 1.15, 1.15),
+        6 => corners(4, 0.5, 1.7, 0.8),
+        _ => corners(4, 0.5, 0.8, 1.7),
+    }
+}
+
+/// For each learnt class the true class that it is drawn as: the one that most of its rocks are of. Of
+/// several learnt classes that are mostly of one, the one with most of its rocks has it; the others
+/// get those that are left.
+pub(super) fn matched(learned: &Learned, field: &RockField) -> Vec<usize> {
+    let truth = field.truth();
+    let (own, all) = (learned.classes as usize, field.classes().len());
+    let mut shared = vec![0_u32; own * all];
+    for (label, class) in learned.rocks.iter().zip(truth.classes()) {
+        shared[label.class as usize * all + usize::from(*class)] += 1;
+    }
+    let mut drawn: Vec<Option<usize>> = vec![None; own];
+    let mut is_taken = vec![false; all];
+    for _ in 0..own.min(all) {
+        let free = (0..own * all)
+            .filter(|cell| drawn[cell / all].is_none() && !is_taken[cell % all])
+            .max_by_key(|cell| (shared[*cell], std::cmp::Reverse(*cell)));
+        if let Some(cell) = free {
+            drawn[cell / all] = Some(cell % all);
+            is_taken[cell % all] = true;
+        }
+    }
+    let mut others = all..;
+    let other = |class: Option<usize>| class.or_else(|| others.next()).unwrap_or(0);
+    drawn.into_iter().map(other).collect()
+}

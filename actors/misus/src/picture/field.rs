@@ -1,0 +1,273 @@
+//! The field at an instant: rocks by what they are, and by what a rover thinks they are, with what was
+//! read of them, where rovers are and where they believe to be.
+
+use farside::SimDuration;
+use farside_actors::figure::relief;
+use farside_actors::figure::svg::{Px, over_lines, path, shortened};
+use farside_actors::figure::Figure;
+use farside_worlds::RockField;
+use maud::{Markup, html};
+
+use super::classes::{COLOURS, matched, shape};
+use super::history::History;
+use crate::messages::Learned;
+
+/// The side of a panel, in pixels.
+const PANEL: f64 = 560.0;
+/// Above the panels: title, a line below it, and what each panel shows.
+const TOP: f64 = 96.0;
+const SIDE: f64 = 16.0;
+/// Between the panels.
+const GAP: f64 = 24.0;
+/// Right of the panels: the legend.
+const LEGEND: f64 = 250.0;
+/// From row to row of the legend.
+const ROW: f64 = 22.0;
+/// The least radius of a rock, in pixels: smaller ones would have no shape.
+const LEAST: f64 = 4.0;
+
+/// A square of ground in the figure.
+struct Panel<'a> {
+    field: &'a RockField,
+    history: &'a History,
+    left: f64,
+    px_per_m: f64,
+}
+
+/// The picture of a field at a time, as the rover of this number thinks it is.
+pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: u64) -> Figure {
+    let learned = history.learned(rover, at_ns);
+    let name = &history.names[rover];
+    let px_per_m = PANEL / field.settings().side_m;
+    let panel = |left| Panel {
+        field,
+        history,
+        left,
+        px_per_m,
+    };
+    let (truth, thought) = (panel(SIDE), panel(SIDE + PANEL + GAP));
+    let at = SimDuration::from_nanos(at_ns);
+    let title = format!("{}, seed {}, at {at}", history.scenario, history.seed);
+    let says = says(history, field, learned, name, at_ns);
+    let colours = learned.map(|learned| matched(learned, field));
+    let right = SIDE + 2.0 * PANEL + GAP + 20.0;
+    let body = html! {
+        text class="title" x=(Px(SIDE)) y="28" { (title) }
+        text class="tick" x=(Px(SIDE)) y="50" { (says) }
+        text class="facet" x=(Px(truth.left)) y=(Px(TOP - 12.0)) { "What the rocks are" }
+        text class="facet" x=(Px(thought.left)) y=(Px(TOP - 12.0)) { "What " (name) " thinks they are" }
+        (truth.ground())
+        (truth.true_rocks())
+        (truth.tracks(at_ns))
+        (thought.ground())
+        (thought.learned_rocks(learned, colours.as_deref()))
+        (thought.readings(learned))
+        (thought.tracks(at_ns))
+        (legend(field, (right, TOP + 10.0)))
+    };
+    Figure {
+        file: "field.svg".to_owned(),
+        title: format!("Field of {title}"),
+        description: says,
+        width: right + LEGEND,
+        height: TOP + PANEL + SIDE,
+        body,
+        facet: String::new(),
+        style: super::STYLE,
+    }
+}
+
+/// The figure in a sentence or two.
+fn says(
+    history: &History,
+    field: &RockField,
+    learned: Option<&Learned>,
+    name: &str,
+    at_ns: u64,
+) -> String {
+    let story = field.story().name();
+    let rocks = field.rocks().len();
+    let faults = history.faults_until(at_ns);
+    let faults = match faults {
+        0 => String::new(),
+        1 => " One fault so far.".to_owned(),
+        more => format!(" {more} faults so far."),
+    };
+    match learned {
+        None => format!("{rocks} rocks ({story}). {name} has learnt nothing yet.{faults}"),
+        Some(learned) => format!(
+            "{rocks} rocks of {} classes ({story}). {name} knows {} readings of {} rocks and tells {} \
+             classes apart.{faults}",
+            field.classes().len(),
+            learned.readings,
+            learned.rocks_read,
+            learned.classes
+        ),
+    }
+}
+
+impl Panel<'_> {
+    fn px(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+        let half_m = 0.5 * self.field.settings().side_m;
+        (
+            self.left + (x_m + half_m) * self.px_per_m,
+            TOP + (half_m - y_m) * self.px_per_m,
+        )
+    }
+
+    fn is_inside(&self, (x, y): (f64, f64)) -> bool {
+        (self.left..=self.left + PANEL).contains(&x) && (TOP..=TOP + PANEL).contains(&y)
+    }
+
+    /// Contours and the edge of the field.
+    fn ground(&self) -> Markup {
+        let inside = |at: &(f64, f64)| self.is_inside(*at);
+        html! {
+            (relief::draw(self.field.terrain(), self.px_per_m, |at_m| self.px(at_m), inside))
+            rect class="frame" x=(Px(self.left)) y=(Px(TOP)) width=(Px(PANEL)) height=(Px(PANEL)) {}
+        }
+    }
+
+    /// Where a rock is in the figure, and how large.
+    fn rock(&self, rock: usize) -> ((f64, f64), f64) {
+        let one = self.field.rocks()[rock];
+        let radius = 0.5 * one.diameter_m * self.px_per_m;
+        (self.px(one.position_m.into()), radius.max(LEAST))
+    }
+
+    fn true_rocks(&self) -> Markup {
+        let classes = self.field.classes();
+        html! {
+            @for (rock, class) in self.field.truth().classes().iter().enumerate() {
+                @let (at, radius) = self.rock(rock);
+                @let class = usize::from(*class);
+                @let name = classes.get(class).map_or("", |class| class.name.as_str());
+                g class={ "n" (class % COLOURS) } {
+                    path class="rock" d=(shape(class, at, radius)) {
+                        title { "rock " (rock) ": " (name) }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Rocks by learnt class: the surer, the fuller; those that nobody has read are hollow.
+    fn learned_rocks(&self, learned: Option<&Learned>, colours: Option<&[usize]>) -> Markup {
+        let label = |rock: usize| learned.map(|learned| learned.rocks[rock]);
+        html! {
+            @for rock in 0..self.field.rocks().len() {
+                @let (at, radius) = self.rock(rock);
+                @if let (Some(label), Some(colours)) = (label(rock), colours) {
+                    @let colour = colours[label.class as usize];
+                    @let percent = libm::round(100.0 * f64::from(label.confidence));
+                    @let is_read = label.image || label.spectrum;
+                    @let fill = if is_read { "rock" } else { "rock unread" };
+                    g class={ "n" (colour % COLOURS) } {
+                        path class=(fill) d=(shape(colour, at, radius))
+                            fill-opacity=(Px(f64::from(label.confidence))) {
+                            title { "rock " (rock) ": class " (label.class) ", " (percent) " %" }
+                        }
+                    }
+                } @else {
+                    path class="rock unread" d=(shape(0, at, radius)) {}
+                }
+            }
+        }
+    }
+
+    /// A dot where a spectrum is known, a ring where an image is.
+    fn readings(&self, learned: Option<&Learned>) -> Markup {
+        let rocks = learned.map_or(&[][..], |learned| &learned.rocks);
+        html! {
+            @for (rock, label) in rocks.iter().enumerate() {
+                @let ((x, y), radius) = self.rock(rock);
+                @if label.image {
+                    circle class="image" cx=(Px(x)) cy=(Px(y)) r=(Px(radius + 2.5)) {}
+                }
+                @if label.spectrum { circle class="spectrum" cx=(Px(x)) cy=(Px(y)) r="2" {} }
+            }
+        }
+    }
+
+    /// Where rovers were, in truth and as they believed, and where they are.
+    fn tracks(&self, at_ns: u64) -> Markup {
+        let line = |points: Vec<[f64; 2]>| path(points.into_iter().map(|at_m| self.px(at_m)));
+        html! {
+            @for (rover, name) in self.history.names.iter().enumerate() {
+                @let moments = self.history.until(rover, at_ns);
+                path class="track" d=(line(moments.iter().map(|m| m.true_m).collect())) {
+                    title { (name) ", in truth" }
+                }
+                path class="track believed" d=(line(moments.iter().map(|m| m.believed_m).collect())) {
+                    title { (name) ", as it believes" }
+                }
+                @if let Some(last) = moments.last() {
+                    @let (x, y) = self.px(last.true_m);
+                    path class="rover" d=(arrow((x, y), last.yaw_rad)) { title { (name) } }
+                    (over_lines("who", (x, y - 12.0), "middle", &shortened(name, 12)))
+                }
+            }
+        }
+    }
+}
+
+/// A rover, pointed where it heads.
+fn arrow((x, y): (f64, f64), yaw_rad: f64) -> String {
+    let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
+    let corner = |(ahead, left): (f64, f64)| {
+        // Pixels count downwards.
+        (x + ahead * cos - left * sin, y - ahead * sin - left * cos)
+    };
+    let corners = [(9.0, 0.0), (-6.0, 5.5), (-3.0, 0.0), (-6.0, -5.5)];
+    format!("{}Z", path(corners.map(corner)))
+}
+
+fn legend(field: &RockField, (x, y): (f64, f64)) -> Markup {
+    let mut rows: Vec<(Markup, String)> = Vec::new();
+    for (class, one) in field.classes().iter().enumerate() {
+        let rock = html! {
+            g class={ "n" (class % COLOURS) } {
+                path class="rock" d=(shape(class, (x + 12.0, 0.0), 7.0)) {}
+            }
+        };
+        rows.push((rock, shortened(&one.name, 26)));
+    }
+    let hollow = html! { path class="rock unread" d=(shape(0, (x + 12.0, 0.0), 7.0)) {} };
+    let faint = html! {
+        g class="n0" { path class="rock" d=(shape(0, (x + 12.0, 0.0), 7.0)) fill-opacity="0.4" {} }
+    };
+    let line = |class: &str| {
+        let data = path([(x, 0.0), (x + 26.0, 0.0)]);
+        html! { path class=(class) d=(data) {} }
+    };
+    rows.extend([
+        (faint, "less sure".to_owned()),
+        (hollow, "not read: by its place alone".to_owned()),
+        (
+            html! { circle class="spectrum" cx=(Px(x + 12.0)) cy="0" r="2" {} },
+            "spectrum known".to_owned(),
+        ),
+        (
+            html! { circle class="image" cx=(Px(x + 12.0)) cy="0" r="7" {} },
+            "image known".to_owned(),
+        ),
+        (
+            html! { path class="rover" d=(arrow((x + 12.0, 0.0), 0.0)) {} },
+            "rover".to_owned(),
+        ),
+        (line("track"), "where it was".to_owned()),
+        (line("track believed"), "where it believed to be".to_owned()),
+        (
+            line("relief key"),
+            format!("contours every {} m", relief::contour_step_m(field.terrain())),
+        ),
+    ]);
+    html! {
+        @for (row, (sample, says)) in rows.iter().enumerate() {
+            g transform={ "translate(0 " (Px(y + ROW * row as f64)) ")" } {
+                (sample)
+                text x=(Px(x + 36.0)) y="4.5" { (says) }
+            }
+        }
+    }
+}

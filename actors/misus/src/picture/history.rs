@@ -1,0 +1,183 @@
+//! What a recorded run says of its rovers: where they were and believed to be, what they had, which
+//! faults came, and what they learnt.
+
+use farside::encoding::{DecodeError, Schema};
+use farside::record::RecordClass;
+use farside_actors::rover::{FaultBegins, RoverPose, RoverResources, hardware_name};
+use farside_actors::system::{PictureError, Recorded, Recording};
+
+use crate::messages::Learned;
+
+/// A rover at an instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Moment {
+    pub(super) time_ns: u64,
+    /// Where it is.
+    pub(super) true_m: [f64; 2],
+    /// Where it believes to be.
+    pub(super) believed_m: [f64; 2],
+    pub(super) yaw_rad: f64,
+    pub(super) battery_j: f64,
+    pub(super) solar_w: f64,
+    pub(super) load_w: f64,
+    pub(super) memory_bytes: f64,
+}
+
+/// A fault that began.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Fault {
+    pub(super) time_ns: u64,
+    pub(super) rover: usize,
+    pub(super) name: String,
+}
+
+/// What is known of all rovers, each in order of time.
+pub(super) struct History {
+    pub(super) scenario: String,
+    pub(super) seed: u64,
+    pub(super) names: Vec<String>,
+    moments: Vec<Vec<Moment>>,
+    lessons: Vec<Vec<(u64, Learned)>>,
+    faults: Vec<Fault>,
+    pub(super) end_ns: u64,
+}
+
+/// The schemas of what is read.
+struct Schemas {
+    pose: Schema,
+    resources: Schema,
+    learned: Schema,
+    fault: Schema,
+}
+
+impl Schemas {
+    fn new() -> Result<Schemas, PictureError> {
+        let unusable = |error: farside::encoding::SchemaError| {
+            PictureError::NotDrawn(format!("its samples cannot be read: {error}"))
+        };
+        Ok(Schemas {
+            pose: Schema::of::<RoverPose>().map_err(unusable)?,
+            resources: Schema::of::<RoverResources>().map_err(unusable)?,
+            learned: Schema::of::<Learned>().map_err(unusable)?,
+            fault: Schema::of::<FaultBegins>().map_err(unusable)?,
+        })
+    }
+}
+
+impl History {
+    /// Reads it from a recorded run of these rovers.
+    pub(super) fn read(run: &dyn Recording, names: Vec<String>) -> Result<History, PictureError> {
+        let schemas = Schemas::new()?;
+        let count = names.len();
+        let hardware: Vec<String> = names.iter().map(|name| hardware_name(name)).collect();
+        let mut history = History {
+            scenario: run.scenario().to_owned(),
+            seed: run.seeds().run,
+            names,
+            moments: vec![Vec::new(); count],
+            lessons: vec![Vec::new(); count],
+            faults: Vec::new(),
+            end_ns: 0,
+        };
+        let ending = run.for_each(&mut |record| {
+            history.end_ns = history.end_ns.max(record.time_ns);
+            let unreadable = |error: DecodeError| {
+                let (actor, kind) = (record.actor, record.kind);
+                PictureError::Unreadable(format!("a {kind} of {actor} cannot be read: {error}"))
+            };
+            let of_hardware = hardware.iter().position(|name| name == record.actor);
+            if let Some(rover) = of_hardware {
+                return history.hardware(rover, record, &schemas).map_err(unreadable);
+            }
+            let scientist = history.names.iter().position(|name| name == record.actor);
+            if let (Some(rover), RecordClass::Sample, "Learned") =
+                (scientist, record.class, record.kind)
+            {
+                let learned = schemas.learned.decode(record.body).map_err(unreadable)?;
+                history.lessons[rover].push((record.time_ns, learned));
+            }
+            Ok(())
+        })?;
+        if history.moments.iter().all(Vec::is_empty) {
+            let excluded = match run.excluded() {
+                [] => String::new(),
+                left_out => format!("; left out of it were {}", left_out.join(", ")),
+            };
+            return Err(PictureError::NotDrawn(format!(
+                "it holds no states of rovers: expected samples of RoverPose{excluded}"
+            )));
+        }
+        history.end_ns = ending.time_ns.unwrap_or(history.end_ns);
+        Ok(history)
+    }
+
+    fn hardware(
+        &mut self,
+        rover: usize,
+        record: &Recorded<'_>,
+        schemas: &Schemas,
+    ) -> Result<(), DecodeError> {
+        let time_ns = record.time_ns;
+        let before = self.moments[rover].last().copied().unwrap_or_default();
+        match (record.class, record.kind) {
+            (RecordClass::Sample, "RoverPose") => {
+                let pose: RoverPose = schemas.pose.decode(record.body)?;
+                self.moments[rover].push(Moment {
+                    time_ns,
+                    true_m: [pose.east_m, pose.north_m],
+                    believed_m: [pose.estimated_east_m, pose.estimated_north_m],
+                    yaw_rad: pose.yaw_rad,
+                    ..before
+                });
+            }
+            (RecordClass::Sample, "RoverResources") => {
+                let resources: RoverResources = schemas.resources.decode(record.body)?;
+                self.moments[rover].push(Moment {
+                    time_ns,
+                    battery_j: resources.energy.stored_j,
+                    solar_w: resources.solar_w,
+                    load_w: resources.load_w,
+                    memory_bytes: resources.memory_used_bytes as f64,
+                    ..before
+                });
+            }
+            (RecordClass::Told, "FaultBegins") => {
+                let fault: FaultBegins = schemas.fault.decode(record.body)?;
+                let name = fault.kind.name().to_owned();
+                self.faults.push(Fault {
+                    time_ns,
+                    rover,
+                    name,
+                });
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A rover's moments up to a time.
+    pub(super) fn until(&self, rover: usize, at_ns: u64) -> &[Moment] {
+        let all = &self.moments[rover];
+        &all[..all.partition_point(|moment| moment.time_ns <= at_ns)]
+    }
+
+    /// What a rover had learnt by a time.
+    pub(super) fn learned(&self, rover: usize, at_ns: u64) -> Option<&Learned> {
+        let all = &self.lessons[rover];
+        let before = all.partition_point(|(time_ns, _)| *time_ns <= at_ns);
+        before.checked_sub(1).map(|last| &all[last].1)
+    }
+
+    /// How many faults had begun by a time.
+    pub(super) fn faults_until(&self, at_ns: u64) -> usize {
+        self.faults.iter().filter(|fault| fault.time_ns <= at_ns).count()
+    }
+
+    /// The faults of a rover in a time span.
+    pub(super) fn faults_of(&self, rover: usize, from_ns: u64, to_ns: u64) -> Vec<&Fault> {
+        let within = |fault: &&Fault| {
+            fault.rover == rover && (from_ns..=to_ns).contains(&fault.time_ns)
+        };
+        self.faults.iter().filter(within).collect()
+    }
+}

@@ -1,0 +1,234 @@
+//! A rover's resources over time: its battery, what the solar array yields and what its parts take,
+//! its memory; with nights, and the faults that it had.
+
+use farside::SimDuration;
+use farside_actors::figure::Figure;
+use farside_actors::figure::scale::Scale;
+use farside_actors::figure::svg::{Area, Frame, Px, over_lines, path};
+use farside_worlds::sky::SOL_S;
+use maud::{Markup, html};
+
+use super::history::{Fault, History, Moment};
+use crate::place::Place;
+
+/// The width of a strip, in pixels.
+const WIDTH: f64 = 880.0;
+/// The height of a strip.
+const HEIGHT: f64 = 130.0;
+/// From strip to strip.
+const APART: f64 = 190.0;
+/// Left of the strips: the marks of their axes.
+const LEFT: f64 = 64.0;
+/// Above the first strip.
+const TOP: f64 = 112.0;
+
+/// A curve of a strip.
+struct Curve {
+    name: &'static str,
+    /// Its colour and dashes.
+    series: usize,
+    value: fn(&Moment) -> f64,
+}
+
+/// One resource.
+struct Strip {
+    label: &'static str,
+    curves: Vec<Curve>,
+    /// What the resource holds at most, if that is known.
+    full: Option<f64>,
+}
+
+/// The profiles of the rover of this number, from a time to another.
+pub(super) fn figure(
+    history: &History,
+    place: &Place,
+    capacity: [f64; 2],
+    rover: usize,
+    (from_ns, to_ns): (u64, u64),
+) -> Figure {
+    let name = &history.names[rover];
+    let moments: Vec<Moment> = history
+        .until(rover, to_ns)
+        .iter()
+        .filter(|moment| moment.time_ns >= from_ns)
+        .copied()
+        .collect();
+    let faults = history.faults_of(rover, from_ns, to_ns);
+    let strips = strips(capacity);
+    let [from, to] = [from_ns, to_ns].map(SimDuration::from_nanos);
+    let title = format!(
+        "{name} of {}, seed {}, from {from} to {to}",
+        history.scenario, history.seed
+    );
+    let says = says(&moments, faults.len());
+    let bottom = TOP + APART * strips.len() as f64;
+    let x = Axis {
+        from_s: from.as_secs_f64(),
+        to_s: to.as_secs_f64(),
+    };
+    let body = html! {
+        text class="title" x="16" y="28" { (title) }
+        text class="tick" x="16" y="50" { (says) }
+        @for (row, strip) in strips.iter().enumerate() {
+            @let area = Area {
+                left: LEFT,
+                top: TOP + APART * row as f64,
+                width: WIDTH,
+                height: HEIGHT,
+            };
+            (nights(place, &x, &area))
+            (drawn(strip, &moments, &x, &area))
+            (faulty(&faults, &x, &area, row == 0))
+        }
+    };
+    Figure {
+        file: format!("profiles-{name}.svg"),
+        title: format!("Resources of {title}"),
+        description: says,
+        width: LEFT + WIDTH + 24.0,
+        height: bottom,
+        body,
+        facet: String::new(),
+        style: super::STYLE,
+    }
+}
+
+fn strips([battery_j, memory_bytes]: [f64; 2]) -> Vec<Strip> {
+    const J_PER_WH: f64 = 3600.0;
+    let curve = |name, series, value| Curve {
+        name,
+        series,
+        value,
+    };
+    vec![
+        Strip {
+            label: "battery [Wh]",
+            curves: vec![curve("charge", 0, |m| m.battery_j / J_PER_WH)],
+            full: Some(battery_j / J_PER_WH),
+        },
+        Strip {
+            label: "power [W]",
+            curves: vec![
+                curve("from the solar array", 4, |m| m.solar_w),
+                curve("taken by all parts", 1, |m| m.load_w),
+            ],
+            full: None,
+        },
+        Strip {
+            label: "memory [MB]",
+            curves: vec![curve("used", 2, |m| m.memory_bytes / 1e6)],
+            full: Some(memory_bytes / 1e6),
+        },
+    ]
+}
+
+fn says(moments: &[Moment], faults: usize) -> String {
+    let faults = match faults {
+        0 => "No fault.".to_owned(),
+        1 => "One fault.".to_owned(),
+        more => format!("{more} faults."),
+    };
+    let least = moments.iter().map(|m| m.battery_j).min_by(f64::total_cmp);
+    match least {
+        None => format!("Nothing is recorded of it then. {faults}"),
+        Some(least_j) => format!("Its battery held {:.0} Wh at least. {faults}", least_j / 3600.0),
+    }
+}
+
+/// The time along all strips.
+struct Axis {
+    from_s: f64,
+    to_s: f64,
+}
+
+impl Axis {
+    /// Where a time \[s\] lies, from 0 to 1.
+    fn place(&self, time_s: f64) -> f64 {
+        ((time_s - self.from_s) / (self.to_s - self.from_s)).clamp(0.0, 1.0)
+    }
+}
+
+fn drawn(strip: &Strip, moments: &[Moment], x: &Axis, area: &Area) -> Markup {
+    let values = strip.curves.iter().flat_map(|curve| moments.iter().map(curve.value));
+    let scale = Scale::measured(values.chain(strip.full).chain([0.0]));
+    let sols = Scale::between(x.from_s / SOL_S, x.to_s / SOL_S);
+    let mut x_ticks = sols.ticks(10.0);
+    for tick in &mut x_ticks {
+        tick.at = x.place(tick.value * SOL_S);
+    }
+    let frame = Frame {
+        area: *area,
+        x_label: "sols since the start",
+        x_ticks,
+        y_label: strip.label.to_owned(),
+        y_ticks: scale.ticks(4.0),
+    };
+    let line = |curve: &Curve| {
+        let points = moments.iter().map(|moment| {
+            let time_s = moment.time_ns as f64 / 1e9;
+            (area.x(x.place(time_s)), area.y(scale.place((curve.value)(moment))))
+        });
+        path(points)
+    };
+    html! {
+        (frame.draw())
+        @if let Some(full) = strip.full {
+            @let y = area.y(scale.place(full));
+            path class="full" d=(path([(area.left, y), (area.x(1.0), y)])) { title { "full" } }
+        }
+        @for (at, curve) in strip.curves.iter().enumerate() {
+            g class={ "s" (curve.series) } {
+                path class="line" stroke-dasharray=(if at == 0 { "none" } else { "5 2" })
+                    d=(line(curve)) { title { (curve.name) } }
+                @if strip.curves.len() > 1 {
+                    @let left = area.x(1.0) - 330.0 + 165.0 * at as f64;
+                    @let y = area.top - 16.0;
+                    path class="line" stroke-dasharray=(if at == 0 { "none" } else { "5 2" })
+                        d=(path([(left, y - 4.5), (left + 24.0, y - 4.5)])) {}
+                    text x=(Px(left + 30.0)) y=(Px(y)) { (curve.name) }
+                }
+            }
+        }
+    }
+}
+
+/// When the Sun is below the horizon.
+fn nights(place: &Place, x: &Axis, area: &Area) -> Markup {
+    let first = libm::floor((place.starts_s + x.from_s) / SOL_S).max(0.0) as u32;
+    let last = libm::floor((place.starts_s + x.to_s) / SOL_S).max(0.0) as u32;
+    // From each sunset to the next sunrise, in the run's time.
+    let mut dark_from_s = x.from_s;
+    let mut nights = Vec::new();
+    for sol in first..=last {
+        if let Some([rises_s, sets_s]) = place.sky.daylight_s(sol) {
+            nights.push([dark_from_s, rises_s - place.starts_s]);
+            dark_from_s = sets_s - place.starts_s;
+        }
+    }
+    nights.push([dark_from_s, x.to_s]);
+    html! {
+        @for [from_s, to_s] in nights {
+            @let (left, right) = (area.x(x.place(from_s)), area.x(x.place(to_s)));
+            @if right > left {
+                rect class="night" x=(Px(left)) y=(Px(area.top)) width=(Px(right - left))
+                    height=(Px(area.height)) { title { "night" } }
+            }
+        }
+    }
+}
+
+/// When faults began.
+fn faulty(faults: &[&Fault], x: &Axis, area: &Area, named: bool) -> Markup {
+    html! {
+        @for (row, fault) in faults.iter().enumerate() {
+            @let at = area.x(x.place(fault.time_ns as f64 / 1e9));
+            path class="fault" d=(path([(at, area.top), (at, area.y(0.0))])) {
+                title { (fault.name) }
+            }
+            @if named {
+                @let y = area.top + 12.0 + 14.0 * (row % 8) as f64;
+                (over_lines("fault-name", (at + 4.0, y), "start", &fault.name))
+            }
+        }
+    }
+}
