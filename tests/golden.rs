@@ -114,6 +114,8 @@ fn cuts_of(scenario: &'static str) -> Vec<Cut> {
         let until = match scenario {
             // Its first pass is hours away.
             "traffic/contact-plan" => "until=6h",
+            // Rovers take a quarter of an hour from rock to rock.
+            _ if scenario.starts_with("misus/") => "until=8h",
             _ => "until=60s",
         };
         return vec![cut("as it is", &[&[until]])];

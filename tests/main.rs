@@ -9,6 +9,7 @@ mod end_of_time;
 mod golden;
 mod house;
 mod layering;
+mod misus;
 mod network_complete;
 mod network_deadlock;
 mod network_maps;

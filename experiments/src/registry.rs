@@ -13,6 +13,7 @@
 
 use farside::suggest::nearest;
 use farside_actors::system::{Builtin, Metric, System};
+use farside_misus::MisusSystem;
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;
 use thiserror::Error;
@@ -99,7 +100,10 @@ impl Registry {
 
     /// Knows the systems that are built in.
     pub fn builtin() -> Self {
-        Registry::empty().with(NetworkSystem).with(TrafficSystem)
+        Registry::empty()
+            .with(NetworkSystem)
+            .with(MisusSystem)
+            .with(TrafficSystem)
     }
 
     /// Knows `system` too; of two with one name, the later one.

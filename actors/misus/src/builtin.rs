@@ -3,10 +3,16 @@
 use farside_actors::system::Builtin;
 
 /// Sorted by name.
-pub(crate) const SCENARIOS: [Builtin; 1] = [Builtin {
-    name: "misus/learn",
-    text: include_str!("../scenarios/learn.toml"),
-}];
+pub(crate) const SCENARIOS: [Builtin; 2] = [
+    Builtin {
+        name: "misus/faults",
+        text: include_str!("../scenarios/faults.toml"),
+    },
+    Builtin {
+        name: "misus/learn",
+        text: include_str!("../scenarios/learn.toml"),
+    },
+];
 
 /// Sorted by name.
 pub(crate) const STUDIES: [Builtin; 2] = [

@@ -2,7 +2,7 @@
 //! hardware is `[rover]`, as [`farside_actors::rover`] declares it.
 
 use farside::SimDuration;
-use farside_actors::system::settings::{if_set, in_unit, one_of, over};
+use farside_actors::system::settings::{Within, if_set, in_unit, one_of, over, such_that};
 use farside_actors::{settings, units};
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +12,13 @@ settings! {
         /// The story that laid the rocks: which class to expect where.
         pub story: String = "strata".to_owned(),
             one_of(&["strata", "ejecta", "lava", "outwash", "uniform"]);
-        /// How many classes of rock there are, of those built in or of the library's.
+        /// How many classes of rock there are, of those built in or of the library's; unless they are
+        /// named or described.
         pub classes: u32 = 4, 1..=8;
+        /// The classes by name, of those built in or of the library's.
+        pub class_names: Vec<String> [skip_serializing_if = "Vec::is_empty"];
+        /// Classes of one's own, in place of those built in; not with a library.
+        pub own_classes as "class": Vec<ClassConfig> [skip_serializing_if = "Vec::is_empty"], Within;
         /// How many rocks there are: the largest to be expected at the abundance.
         pub rocks: u32 = 90, 1..=5_000;
         /// The side of the square field.
@@ -38,6 +43,40 @@ settings! {
         pub dust: f64 = 0.5, 0.0..=10.0;
         /// The time of day at which the run starts, from local midnight.
         pub starts: SimDuration [with = "units::duration"] = SimDuration::from_secs(7 * 3600);
+    }
+}
+
+settings! {
+    /// A `[[world.class]]` entry: a class of rock of one's own. Fractions are by volume and sum to 1.
+    pub struct ClassConfig {
+        /// Its name.
+        pub name: String, such_that("a name", |_| "missing".to_owned(), |name: &String| !name.is_empty());
+        /// The mean fraction of olivine.
+        pub olivine: f64 [with = "units::fraction"];
+        /// The mean fraction of orthopyroxene.
+        pub orthopyroxene: f64 [with = "units::fraction"];
+        /// The mean fraction of clinopyroxene.
+        pub clinopyroxene: f64 [with = "units::fraction"];
+        /// The mean fraction of plagioclase.
+        pub plagioclase: f64 [with = "units::fraction"];
+        /// The mean fraction of hematite.
+        pub hematite: f64 [with = "units::fraction"];
+        /// The standard deviation of the logarithm of each fraction.
+        pub scatter: f64 = 0.1, 0.0..=1.0;
+        /// The median size of its grains.
+        pub grain_m as "grain": f64 [with = "units::length_m"] = 2e-4, in_unit("m", 5e-6..=5e-3);
+        /// The mean share of a rock's surface that dust covers.
+        pub dust: f64 [with = "units::fraction"] = 0.1;
+        /// The mean contrast of its texture: squared difference of neighbouring pixels, 0 to 1.
+        pub contrast: f64 = 0.2, 0.0..=1.0;
+        /// The mean energy of its texture: how even it is, 0 to 1.
+        pub energy: f64 = 0.15, 0.0..=1.0;
+        /// The mean correlation of neighbouring pixels, -1 to 1.
+        pub correlation: f64 = 0.5, -1.0..=1.0;
+        /// The mean anisotropy of its texture, 0 to 1.
+        pub anisotropy: f64 = 0.1, 0.0..=1.0;
+        /// The standard deviation of each statistic of texture.
+        pub texture_scatter: f64 = 0.05, 0.0..=1.0;
     }
 }
 
@@ -89,7 +128,7 @@ settings! {
             in_unit("m", 0.3..=50.0);
         /// How many rocks each rover reads from near before its tour is over; all of its sector unless
         /// given.
-        pub stops: Option<u32> [skip_serializing_if = "Option::is_none"], if_set(1..=5_000);
+        pub stops: Option<u32> [skip_serializing_if = "Option::is_none"], if_set(0..=5_000);
         /// How many rocks lie between two panoramic images, which correct where a rover believes to
         /// be; with 0 there are none.
         pub panorama_every: u32 = 4, 0..=1_000;

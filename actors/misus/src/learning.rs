@@ -21,10 +21,10 @@ pub(crate) fn basis(place: &Place) -> Result<SpectralBasis, SetupError> {
         Some(library) => library.as_ref(),
         None => {
             builtin = SpectralLibrary::builtin();
-            builtin
+            &builtin
         }
     };
-    let spectra: Vec<&[f64]> = (0..library.len()).map(|at| library.reflectance(at)).collect();
+    let spectra: Vec<&[f64]> = library.samples().map(|sample| sample.reflectance).collect();
     let basis = SpectralBasis::new(library.wavelengths_nm(), &spectra);
     basis.map_err(|error| SetupError::value("world.spectra", error))
 }

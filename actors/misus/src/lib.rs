@@ -19,6 +19,7 @@ mod metrics;
 mod monitor;
 mod picture;
 mod place;
+mod scene;
 mod scientist;
 mod site;
 mod system;

@@ -2,9 +2,11 @@
 
 mod catalogue;
 
+use std::collections::BTreeMap;
 use std::sync::{OnceLock, PoisonError};
 
 use farside::SimTime;
+use farside_actors::rover::{RoverEnergy, RoverPose};
 use farside_actors::system::{Metric, Results, Series, with_about};
 use farside_worlds::RockField;
 use farside_worlds::sky::SOL_S;
@@ -56,14 +58,52 @@ farside_actors::documented! {
         pub exchange_messages: u64,
         /// Their bytes \[byte\].
         pub exchange_bytes: u64,
+        /// How far rovers went, all together \[m\].
+        pub distance_m: f64,
+        /// How far rovers are at the end from where they believe to be, mean over rovers \[m\].
+        pub position_error_m: Option<f64>,
+        /// What the solar arrays yielded, all together \[Wh\].
+        pub solar_wh: f64,
+        /// What all parts of all rovers took \[Wh\].
+        pub used_wh: f64,
+        /// What was lost in charging, or yielded while the battery was full \[Wh\].
+        pub unused_wh: f64,
+        /// What the batteries hold at the end \[Wh\].
+        pub stored_wh: f64,
+        /// The greatest share of a rover's energy that was ever not accounted for: rounding, or a
+        /// mistake of the simulator.
+        pub energy_imbalance: f64,
+        /// Faults that rovers had.
+        pub faults: u32,
+        /// How often a battery was down to the level at which all loads are cut off.
+        pub brown_outs: u32,
     }
 }
 
+/// All figures of a run.
+pub(crate) struct Figures {
+    metrics: MisusMetrics,
+    over_sols: Series,
+    /// How often each kind of fault came.
+    faults: Vec<String>,
+}
+
 /// What came of a run that ended at `end`.
-pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> (MisusMetrics, Series) {
+pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> Figures {
     let tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
-    let metrics = figures(&tally, field);
-    (metrics, over_sols(&tally, field, end))
+    let mut counts = BTreeMap::<&str, u32>::new();
+    for name in tally.rovers.iter().flat_map(|rover| &rover.faults) {
+        *counts.entry(name).or_default() += 1;
+    }
+    let faults = counts.iter().map(|(name, count)| match count {
+        1 => (*name).to_owned(),
+        _ => format!("{name} ({count})"),
+    });
+    Figures {
+        metrics: figures(&tally, field),
+        over_sols: over_sols(&tally, field, end),
+        faults: faults.collect(),
+    }
 }
 
 fn figures(tally: &Tally, field: &RockField) -> MisusMetrics {
@@ -86,6 +126,35 @@ fn figures(tally: &Tally, field: &RockField) -> MisusMetrics {
         stops: tally.rovers.iter().map(|rover| rover.stops).sum(),
         exchange_messages: tally.exchanged,
         exchange_bytes: tally.exchanged_bytes,
+        ..hardware(tally)
+    }
+}
+
+/// What concerns rovers' hardware.
+fn hardware(tally: &Tally) -> MisusMetrics {
+    const J_PER_WH: f64 = 3600.0;
+    let rovers = || tally.rovers.iter();
+    let energy_wh = |part: &dyn Fn(&RoverEnergy) -> f64| {
+        rovers().map(|rover| part(&rover.resources.energy)).sum::<f64>() / J_PER_WH
+    };
+    let error_m = |pose: &RoverPose| {
+        let (east_m, north_m) = (
+            pose.east_m - pose.estimated_east_m,
+            pose.north_m - pose.estimated_north_m,
+        );
+        libm::hypot(east_m, north_m)
+    };
+    MisusMetrics {
+        distance_m: rovers().map(|rover| rover.distance_m).sum(),
+        position_error_m: mean(rovers().filter_map(|rover| rover.pose.as_ref()).map(error_m)),
+        solar_wh: energy_wh(&|energy| energy.solar_j),
+        used_wh: energy_wh(&RoverEnergy::used_j),
+        unused_wh: energy_wh(&|energy| energy.charge_loss_j + energy.not_taken_j),
+        stored_wh: energy_wh(&|energy| energy.stored_j),
+        energy_imbalance: rovers().map(|rover| rover.imbalance).fold(0.0, f64::max),
+        faults: rovers().map(|rover| rover.faults.len() as u32).sum(),
+        brown_outs: rovers().map(|rover| rover.brown_outs).sum(),
+        ..MisusMetrics::default()
     }
 }
 
@@ -140,7 +209,12 @@ fn over_sols(tally: &Tally, field: &RockField, end: SimTime) -> Series {
 }
 
 /// The results of a run.
-pub(crate) fn results((metrics, over_sols): (MisusMetrics, Series)) -> Results {
+pub(crate) fn results(figures: Figures) -> Results {
+    let Figures {
+        metrics,
+        over_sols,
+        faults,
+    } = figures;
     let mut results = Results::of(&metrics).metric("class_ari_by_sol", over_sols);
     let figure = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
     results.line("rocks with a spectrum", metrics.rocks_read.to_string());
@@ -148,6 +222,15 @@ pub(crate) fn results((metrics, over_sols): (MisusMetrics, Series)) -> Results {
     results.line("adjusted Rand index", figure(metrics.class_ari));
     results.line("error of the distribution", figure(metrics.distribution_error));
     results.line("entropy of a rock's class", figure(metrics.posterior_entropy));
+    results.line("driven", format!("{:.0} m", metrics.distance_m));
+    let [solar_wh, used_wh] = [metrics.solar_wh, metrics.used_wh];
+    results.line("energy", format!("{solar_wh:.0} Wh of sunlight, {used_wh:.0} Wh used"));
+    if metrics.brown_outs > 0 {
+        results.line("brown-outs", metrics.brown_outs.to_string());
+    }
+    if !faults.is_empty() {
+        results.line("faults", faults.join(", "));
+    }
     results
 }
 

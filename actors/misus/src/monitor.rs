@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{RunInfo, SimTime};
-use farside_actors::rover::hardware_name;
+use farside_actors::rover::{
+    FaultBegins, RoverIncident, RoverPose, RoverResources, hardware_name,
+};
 
 use crate::messages::Learned;
 use crate::site::SharedSite;
@@ -27,6 +29,34 @@ pub(crate) struct RoverTally {
     pub(crate) lessons: Vec<(SimTime, Learned)>,
     /// Rocks that it set out for.
     pub(crate) stops: u32,
+    /// Its hardware's last word of what it has.
+    pub(crate) resources: RoverResources,
+    /// The greatest share of all energy that was ever not accounted for.
+    pub(crate) imbalance: f64,
+    /// Its hardware's last word of where it is.
+    pub(crate) pose: Option<RoverPose>,
+    /// How far it went, as samples have it \[m\].
+    pub(crate) distance_m: f64,
+    /// The names of its faults, in order.
+    pub(crate) faults: Vec<&'static str>,
+    pub(crate) brown_outs: u32,
+}
+
+impl RoverTally {
+    fn place(&mut self, pose: RoverPose) {
+        if let Some(before) = &self.pose {
+            let (east_m, north_m) = (pose.east_m - before.east_m, pose.north_m - before.north_m);
+            self.distance_m += libm::hypot(east_m, north_m);
+        }
+        self.pose = Some(pose);
+    }
+
+    fn supply(&mut self, resources: RoverResources) {
+        let energy = &resources.energy;
+        let share = energy.imbalance_j().abs() / energy.total_j();
+        self.imbalance = self.imbalance.max(share);
+        self.resources = resources;
+    }
 }
 
 /// Which rover an actor belongs to, and what it is.
@@ -104,7 +134,24 @@ impl Observer for Monitor {
             (RecordClass::Sample, Role::Scientist(rover), "Stop") => {
                 tally.rovers[rover].stops += 1;
             }
-            (RecordClass::Sample, Role::Hardware(_), _) => {}
+            (RecordClass::Sample, Role::Hardware(rover), "RoverPose") => {
+                let pose = kind.schema().decode(record.body).map_err(failed)?;
+                tally.rovers[rover].place(pose);
+            }
+            (RecordClass::Sample, Role::Hardware(rover), "RoverResources") => {
+                let resources = kind.schema().decode(record.body).map_err(failed)?;
+                tally.rovers[rover].supply(resources);
+            }
+            (RecordClass::Sample, Role::Hardware(rover), "RoverIncident") => {
+                let incident: RoverIncident = kind.schema().decode(record.body).map_err(failed)?;
+                if matches!(incident, RoverIncident::BrownOut { .. }) {
+                    tally.rovers[rover].brown_outs += 1;
+                }
+            }
+            (RecordClass::Told, Role::Hardware(rover), "FaultBegins") => {
+                let fault: FaultBegins = kind.schema().decode(record.body).map_err(failed)?;
+                tally.rovers[rover].faults.push(fault.kind.name());
+            }
             _ => {}
         }
         Ok(Flow::Continue)

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::assemble::{Parts, assemble};
 use crate::config::{FieldConfig, LearnConfig, TeamConfig};
 use crate::place::{Place, story};
+use crate::scene::MisusScene;
 use crate::{builtin, metrics, picture};
 
 /// The multi-rover integrated science understanding system.
@@ -100,10 +101,13 @@ impl Settings for MisusScenario {
         };
         let team = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
         let field = place.field.clone();
+        let team_names = team.site.rovers.clone();
         let assembly = Assembly::new(move |report: &Report| {
             let metrics = metrics::of(&team, &field, report.end_time);
             metrics::results(metrics)
         });
+        let scene = MisusScene::new(place.field.clone(), team_names);
+        let assembly = assembly.with_scene(scene);
         let faults = self.rover.faults.iter().enumerate();
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::Network;
 use crate::safety::messages::RoverState;
 use farside::record::{Record, RecordClass};
-use farside::scene::{Drawing, Form, Level, Pose, Scene, Shape};
+use farside::scene::{Drawing, Form, Level, Pose, Scene};
 use farside::{RunInfo, SimDuration};
 use farside_worlds::{NodeId, Roadmap, SensorNetwork, VertexId};
 
@@ -396,7 +396,7 @@ mod tests {
         let knots = points("/crater");
         assert_eq!(
             (knots.len(), knots[0].len()),
-            (1, GROUND_POINTS * GROUND_POINTS)
+            (1, drawing::GROUND_POINTS * drawing::GROUND_POINTS)
         );
         for knot in &knots[0] {
             let [x, y, z] = knot.position_m;

@@ -6,7 +6,8 @@ use farside_actors::system::MetricKind::{Number, Rate, Series};
 use farside_actors::system::SeriesIndex;
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 14] = [
+pub(crate) const ALL: [Metric; 23] = [
+    Metric::new("brown_outs", "brown-outs", "", Number, Lower),
     Metric::new("class_ari", "adjusted Rand index of classes", "", Number, Higher),
     Metric::new(
         "class_ari_by_sol",
@@ -20,6 +21,7 @@ pub(crate) const ALL: [Metric; 14] = [
          spectrum at the end of the run.",
     ),
     Metric::new("class_ari_least", "the same of the worst rover", "", Number, Higher),
+    Metric::new("distance_m", "distance driven", "m", Number, Neither),
     Metric::new(
         "distribution_error",
         "error of the distribution of classes",
@@ -27,6 +29,7 @@ pub(crate) const ALL: [Metric; 14] = [
         Number,
         Lower,
     ),
+    Metric::new("energy_imbalance", "energy not accounted for", "", Number, Lower),
     Metric::new("exchange_bytes", "bytes of the exchange", "B", Number, Lower),
     Metric::new(
         "exchange_messages",
@@ -35,10 +38,12 @@ pub(crate) const ALL: [Metric; 14] = [
         Number,
         Lower,
     ),
+    Metric::new("faults", "faults of rovers", "", Number, Neither),
     Metric::new("k", "classes told apart", "classes", Number, Neither),
     Metric::new("k_agrees", "all rovers tell equally many apart", "", Rate, Higher),
     Metric::new("log_likelihood", "log-likelihood of readings", "", Number, Neither),
     Metric::new("objective", "objective function", "", Number, Neither),
+    Metric::new("position_error_m", "error of the estimated position", "m", Number, Lower),
     Metric::new(
         "posterior_entropy",
         "entropy of a rock's class",
@@ -48,5 +53,9 @@ pub(crate) const ALL: [Metric; 14] = [
     ),
     Metric::new("readings", "readings that a rover knows", "readings", Number, Higher),
     Metric::new("rocks_read", "rocks with a spectrum", "rocks", Number, Higher),
+    Metric::new("solar_wh", "energy of the solar arrays", "Wh", Number, Higher),
     Metric::new("stops", "rocks that rovers set out for", "rocks", Number, Higher),
+    Metric::new("stored_wh", "energy stored at the end", "Wh", Number, Higher),
+    Metric::new("unused_wh", "energy lost or not taken", "Wh", Number, Lower),
+    Metric::new("used_wh", "energy used", "Wh", Number, Neither),
 ];
