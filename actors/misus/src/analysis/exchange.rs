@@ -39,6 +39,9 @@ pub struct Statistics {
     pub from: Origin,
     /// The incarnation of the recipient that the sender has last heard from.
     pub heard: Option<u32>,
+    /// Whether the sender wants to be told that this came: it holds rows, or the sender does not know
+    /// yet that its incarnation was heard.
+    pub answer: bool,
     /// Through which write of each origin the sender has all rows. Origins ascend.
     pub have: Vec<Has>,
     /// Rows, by origin. Origins ascend.
@@ -95,6 +98,8 @@ pub struct Received {
     pub revised: usize,
     /// Rows that were known already.
     pub known: usize,
+    /// Rows that were not taken, since earlier ones are missing; they will be sent again.
+    pub early: usize,
 }
 
 /// Why a reading or a message is refused. Nothing of it is taken.
@@ -158,7 +163,7 @@ struct Peer {
     have: Vector,
     /// Whether it has said that it heard this rover's incarnation.
     has_heard: bool,
-    /// Whether it sent rows since it was last told what this rover has.
+    /// Whether it waits to be told what this rover has.
     is_owed: bool,
     /// The origin whose rows came last in the latest message that was cut.
     cut_at: Option<Origin>,
@@ -316,7 +321,8 @@ impl Exchange {
     pub fn offer(&mut self, peer: u32) -> Option<Statistics> {
         let mut state = self.peers.remove(&peer).unwrap_or_default();
         let spans = self.spans_for(&mut state);
-        let needed = !spans.is_empty() || state.is_owed || !state.has_heard;
+        let answer = !spans.is_empty() || !state.has_heard;
+        let needed = answer || state.is_owed;
         state.is_owed = false;
         let heard = state.incarnation;
         self.peers.insert(peer, state);
@@ -324,6 +330,7 @@ impl Exchange {
         needed.then(|| Statistics {
             from: self.me,
             heard,
+            answer,
             have: have
                 .map(|(&origin, &through)| Has { origin, through })
                 .collect(),
@@ -392,6 +399,13 @@ impl Exchange {
         self.check(message)?;
         let mut received = Received::default();
         for span in &message.spans {
+            let through = self.have.get(&span.origin).copied().unwrap_or(0);
+            if span.after > through {
+                // The sender thinks of what this rover had before it restarted. Rows behind a gap
+                // could not be passed on; they come again once the sender knows.
+                received.early += span.rows.len();
+                continue;
+            }
             for row in &span.rows {
                 let id = ReadingId {
                     origin: span.origin,
@@ -408,11 +422,7 @@ impl Exchange {
                     Joined::Known => received.known += 1,
                 }
             }
-            // After a gap the rows count, but they are not all rows through that write.
-            let through = self.have.get(&span.origin).copied().unwrap_or(0);
-            if span.after <= through && span.through > through {
-                self.have.insert(span.origin, span.through);
-            }
+            self.have.insert(span.origin, through.max(span.through));
         }
         self.learn_of(message);
         Ok(received)
@@ -431,8 +441,7 @@ impl Exchange {
             return;
         }
         peer.has_heard |= message.heard == Some(self.me.incarnation);
-        // Who sends rows, or has not heard this rover, wants an answer.
-        peer.is_owed |= !message.spans.is_empty() || message.heard != Some(self.me.incarnation);
+        peer.is_owed |= message.answer;
         for has in &message.have {
             let through = peer.have.entry(has.origin).or_default();
             *through = has.through.max(*through);
@@ -476,3 +485,6 @@ enum Joined {
     Revised,
     Known,
 }
+
+#[cfg(test)]
+mod tests;
