@@ -24,21 +24,30 @@ pub mod crater;
 pub mod decimal;
 pub mod error;
 pub mod generate;
+pub mod geology;
 pub mod ids;
 pub mod movingai;
 pub mod roadmap;
+pub mod rock_field;
 pub mod rocks;
 pub mod sensors;
 pub mod sky;
+pub mod spectra;
 pub mod terrain;
 
 pub use contacts::{CapacityTrace, ContactError, ContactFormat, ContactPlan, ContactWindow};
 pub use crater::{Crater, CraterSettings, Hazard};
 pub use error::{RoadmapError, SensorError, SkyError, TerrainError, WorldError};
+pub use geology::{GeologyError, RockClass, Story, StoryKind, TEXTURE, TEXTURE_NAMES};
 pub use ids::{NodeId, VertexId};
 pub use movingai::{GridError, GridMap, GridTask, GridWorld, TaskList};
 pub use roadmap::{Blocked, DistancesTo, Endpoints, Roadmap, RoadmapTable, well_formed};
+pub use rock_field::{
+    FieldClasses, FieldRock, FieldRocks, FieldSpectra, FieldTruth, Footprint, RockField,
+    RockFieldSettings, RockTruth,
+};
 pub use rocks::{Rock, RockAbundance};
 pub use sensors::{Ownership, SensorNetwork};
 pub use sky::{Sky, SolWindow};
+pub use spectra::{LibraryError, SpectralLibrary};
 pub use terrain::HeightField;
