@@ -29,17 +29,17 @@ struct Team {
     under_way: Vec<(usize, Statistics)>,
     stream: Stream,
     loss: f64,
-    most_rows: usize,
+    most_writes: usize,
 }
 
 impl Team {
-    fn new(rovers: usize, seed: u64, loss: f64, most_rows: usize) -> Team {
+    fn new(rovers: usize, seed: u64, loss: f64, most_writes: usize) -> Team {
         let new = |rover| {
             let origin = Origin {
                 rover: rover as u32,
                 incarnation: 0,
             };
-            Exchange::new(origin).with_rows_per_message(most_rows)
+            Exchange::new(origin).with_writes_per_message(most_writes)
         };
         Team {
             rovers: (0..rovers).map(new).collect(),
@@ -47,7 +47,7 @@ impl Team {
             under_way: Vec::new(),
             stream: RandomKey::new(seed).stream(),
             loss,
-            most_rows,
+            most_writes,
         }
     }
 
@@ -55,7 +55,7 @@ impl Team {
         let Some(message) = self.rovers[from].offer(to as u32) else {
             return false;
         };
-        assert!(message.rows() <= self.most_rows);
+        assert!(message.writes() <= self.most_writes);
         if self.is_present[from] && !self.stream.chance(self.loss) {
             self.under_way.push((to, message.clone()));
             if self.stream.chance(0.2) {
@@ -125,7 +125,7 @@ impl Team {
                     rover,
                     incarnation: incarnation + 1,
                 };
-                self.rovers[a] = Exchange::new(next).with_rows_per_message(self.most_rows);
+                self.rovers[a] = Exchange::new(next).with_writes_per_message(self.most_writes);
             }
             _ => self.is_present[a] = !self.is_present[a],
         }
@@ -145,17 +145,17 @@ impl Team {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig::with_cases(500))]
 
     #[test]
     fn all_agree_in_the_end(
         rovers in 2usize..5,
         seed: u64,
         loss in 0.0f64..0.9,
-        most_rows in 1usize..8,
+        most_writes in 1usize..8,
         events in 0usize..300,
     ) {
-        let mut team = Team::new(rovers, seed, loss, most_rows);
+        let mut team = Team::new(rovers, seed, loss, most_writes);
         for _ in 0..events {
             team.something_happens();
         }
@@ -225,7 +225,7 @@ proptest! {
 
 #[test]
 fn one_round_without_loss_is_enough() {
-    let mut team = Team::new(4, 1, 0.6, ROWS_PER_MESSAGE);
+    let mut team = Team::new(4, 1, 0.6, WRITES_PER_MESSAGE);
     for _ in 0..15 {
         for rover in 0..4 {
             let reading = reading(&mut team.stream);
@@ -243,7 +243,7 @@ fn one_round_without_loss_is_enough() {
 
 #[test]
 fn a_restarted_rover_is_told_everything_again() {
-    let mut team = Team::new(2, 1, 0.0, ROWS_PER_MESSAGE);
+    let mut team = Team::new(2, 1, 0.0, WRITES_PER_MESSAGE);
     let first = reading(&mut team.stream);
     team.rovers[0].record(first).unwrap();
     while team.round() {}
@@ -268,18 +268,18 @@ fn what_contradicts_itself_is_refused_whole() {
         incarnation: 0,
     };
     let mut rover = Exchange::new(me);
-    let row = |ordinal, version| SpanRow {
-        ordinal,
-        version,
-        reading: Reading::default(),
-    };
-    let message = |origin, through, rows: &[SpanRow]| Statistics {
+    let message = |origin, after, reading| Statistics {
         from: other,
         spans: vec![Span {
             origin,
-            after: 0,
-            through,
-            rows: rows.to_vec(),
+            after,
+            writes: vec![
+                Write::default(),
+                Write {
+                    ordinal: 1,
+                    reading,
+                },
+            ],
         }],
         ..Statistics::default()
     };
@@ -288,19 +288,23 @@ fn what_contradicts_itself_is_refused_whole() {
         assert_eq!(rover.rows().len(), 0);
         error
     };
+    let plain = Reading::default();
     assert_eq!(
-        refused(&mut rover, &message(other, 2, &[row(0, 1), row(1, 3)])),
-        "a row of Origin { rover: 1, incarnation: 0 } has version 3, must be over 1 and at most 2"
+        refused(&mut rover, &message(other, u32::MAX - 1, plain)),
+        "writes of Origin { rover: 1, incarnation: 0 } end at 4294967296, must end at 4294967295 \
+         at most"
     );
     assert_eq!(
-        refused(&mut rover, &message(me, 1, &[row(0, 1)])),
-        "Origin { rover: 1, incarnation: 0 } has write 1 of Origin { rover: 0, incarnation: 0 }, \
+        refused(&mut rover, &message(me, 0, plain)),
+        "Origin { rover: 1, incarnation: 0 } has write 2 of Origin { rover: 0, incarnation: 0 }, \
          which has made 0"
     );
-    let mut broken = row(1, 2);
-    broken.reading.position_sd_m = f32::NAN;
+    let broken = Reading {
+        position_sd_m: f32::NAN,
+        ..plain
+    };
     assert_eq!(
-        refused(&mut rover, &message(other, 2, &[row(0, 1), broken])),
+        refused(&mut rover, &message(other, 0, broken)),
         "the reading of rock 0 has the position_sd_m NaN, must be finite and at least 0"
     );
     let foreign = ReadingId {
@@ -326,7 +330,7 @@ fn messages_are_encoded_and_come_back() {
     let schema = farside::encoding::Schema::of::<Statistics>().unwrap();
     let mut rover = Exchange::new(Origin::default());
     let mut stream = RandomKey::new(3).stream();
-    for _ in 0..ROWS_PER_MESSAGE {
+    for _ in 0..WRITES_PER_MESSAGE {
         rover.record(reading(&mut stream)).unwrap();
     }
     let message = rover.offer(1).unwrap();
