@@ -14,7 +14,10 @@
 pub mod exchange;
 pub mod features;
 pub mod goals;
+pub mod learned;
 pub mod mixture;
+pub mod objective;
+pub mod prioritise;
 pub mod reading;
 pub mod rocks;
 pub mod scores;

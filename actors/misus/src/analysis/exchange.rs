@@ -7,12 +7,18 @@
 //! # Which rows a message holds
 //!
 //! Each origin numbers its writes, new readings and corrections alike, from 1; a row's version is the
-//! number of its last write. A rover keeps for each origin through which write it has them all, and
-//! for each peer what that peer has said it has. A message to a peer holds, for each origin, the
-//! rows between the two, and what the sender has, which acknowledges. So a row is repeated until
-//! its receipt is known and no longer; rows of others are passed on, which makes partitions, joining
-//! and leaving nothing special. A rover that restarts without its rows calls itself by a new
-//! incarnation; what its earlier one was known to have is forgotten by those who hear the new one.
+//! number of its last write. A rover keeps the writes of each origin from the first on without gaps,
+//! and for each peer through which write of each origin that peer has said it has them. A message to
+//! a peer holds the writes between the two, as many as fit, and what the sender has, which
+//! acknowledges. So a write is repeated until its receipt is known and no longer; those of others are
+//! passed on, which makes partitions, joining and leaving nothing special. A rover that restarts
+//! without its rows calls itself by a new incarnation; what its earlier one was known to have is
+//! forgotten by those who hear the new one.
+//!
+//! What a rover has is thus told by one number for each origin, and rovers with equal numbers have
+//! equal rows. This is why writes that a later one replaces are passed on too: left out, a rover
+//! that received half of a long message would lack a row that it is thought to have, and if the
+//! sender is never heard again, no one would give it.
 //!
 //! # Why rows, and not sums over a model
 //!
@@ -29,8 +35,8 @@ use serde::{Deserialize, Serialize};
 
 use super::reading::{Origin, Reading, ReadingError, ReadingId, Row};
 
-/// How many rows a message holds at most, unless said otherwise: some 4 kB.
-pub const ROWS_PER_MESSAGE: usize = 64;
+/// How many writes a message holds at most, unless said otherwise: some 5 kB.
+pub const WRITES_PER_MESSAGE: usize = 64;
 
 /// A message from one rover to another: rows that the other may lack, and what the sender has.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -39,20 +45,23 @@ pub struct Statistics {
     pub from: Origin,
     /// The incarnation of the recipient that the sender has last heard from.
     pub heard: Option<u32>,
-    /// Through which write of each origin the sender has all rows. Origins ascend.
+    /// Whether the sender wants to be told that this came: it holds rows, or the sender does not know
+    /// yet that its incarnation was heard.
+    pub answer: bool,
+    /// How many writes of each origin the sender has, from the first on. Origins ascend.
     pub have: Vec<Has>,
-    /// Rows, by origin. Origins ascend.
+    /// Writes, by origin. Origins ascend.
     pub spans: Vec<Span>,
 }
 
 impl Statistics {
-    /// How many rows it holds.
-    pub fn rows(&self) -> usize {
-        self.spans.iter().map(|span| span.rows.len()).sum()
+    /// How many writes it holds.
+    pub fn writes(&self) -> usize {
+        self.spans.iter().map(|span| span.writes.len()).sum()
     }
 }
 
-/// Through which write of an origin somebody has all rows.
+/// How many writes of an origin somebody has, from the first on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Has {
     /// Whose rows.
@@ -61,27 +70,29 @@ pub struct Has {
     pub through: u32,
 }
 
-/// All rows of an origin that were last written within a range. Rows written in the range and
-/// again after it are not among them.
+/// Consecutive writes of an origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Span {
-    /// Whose rows.
+    /// Whose writes.
     pub origin: Origin,
-    /// The range begins after this write; 0 is before the first.
+    /// How many writes came before these.
     pub after: u32,
-    /// The last write of the range.
-    pub through: u32,
-    /// The rows. Versions ascend.
-    pub rows: Vec<SpanRow>,
+    /// The writes, in order.
+    pub writes: Vec<Write>,
 }
 
-/// A row without its origin, which the span says.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SpanRow {
+impl Span {
+    /// The number of the last write.
+    fn through(&self) -> u64 {
+        u64::from(self.after) + self.writes.len() as u64
+    }
+}
+
+/// A reading of an origin, new or corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Write {
     /// See [`ReadingId::ordinal`].
     pub ordinal: u32,
-    /// See [`Row::version`].
-    pub version: u32,
     /// What was read.
     pub reading: Reading,
 }
@@ -89,12 +100,14 @@ pub struct SpanRow {
 /// What a message changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Received {
-    /// Rows of readings that were not known.
+    /// Readings that were not known.
     pub added: usize,
-    /// Rows that replaced an earlier version.
+    /// Corrections of readings that were.
     pub revised: usize,
-    /// Rows that were known already.
+    /// Writes that were known already.
     pub known: usize,
+    /// Writes that were not taken, since earlier ones are missing; they will be sent again.
+    pub early: usize,
 }
 
 /// Why a reading or a message is refused. Nothing of it is taken.
@@ -119,17 +132,15 @@ pub enum ExchangeError {
         /// How many readings there are of this origin.
         written: u32,
     },
-    /// A row lies outside the range of writes that its span says.
-    #[error("a row of {origin:?} has version {actual}, must be over {after} and at most {through}")]
-    Version {
-        /// Whose row.
+    /// A number of writes that nobody can have made.
+    #[error("writes of {origin:?} end at {actual}, must end at {limit} at most")]
+    TooMany {
+        /// Whose writes.
         origin: Origin,
-        /// Its version.
-        actual: u32,
-        /// Where the range begins.
-        after: u32,
-        /// Where it ends.
-        through: u32,
+        /// The most.
+        limit: u32,
+        /// The last one's number.
+        actual: u64,
     },
     /// Somebody has writes of this rover that it did not make: two rovers have one name, or a
     /// restarted one took an incarnation again.
@@ -142,11 +153,11 @@ pub enum ExchangeError {
         /// How many writes it has made.
         expected: u32,
         /// Which one the other has.
-        actual: u32,
+        actual: u64,
     },
 }
 
-/// Through which write of each origin all rows are there.
+/// How many writes of each origin somebody has: all from the first on.
 type Vector = BTreeMap<Origin, u32>;
 
 /// What is known of a peer.
@@ -158,7 +169,7 @@ struct Peer {
     have: Vector,
     /// Whether it has said that it heard this rover's incarnation.
     has_heard: bool,
-    /// Whether it sent rows since it was last told what this rover has.
+    /// Whether it waits to be told what this rover has.
     is_owed: bool,
     /// The origin whose rows came last in the latest message that was cut.
     cut_at: Option<Origin>,
@@ -190,11 +201,11 @@ struct Peer {
 #[derive(Clone, Debug)]
 pub struct Exchange {
     me: Origin,
-    rows_per_message: usize,
+    writes_per_message: usize,
+    /// The writes of each origin, from the first on.
+    writes: BTreeMap<Origin, Vec<Write>>,
+    /// The last write of each reading.
     rows: BTreeMap<ReadingId, Row>,
-    /// The ordinals of `rows` by origin and version.
-    written: BTreeMap<(Origin, u32), u32>,
-    have: Vector,
     /// How many readings this rover has made.
     readings: u32,
     peers: BTreeMap<u32, Peer>,
@@ -206,19 +217,18 @@ impl Exchange {
     pub fn new(me: Origin) -> Exchange {
         Exchange {
             me,
-            rows_per_message: ROWS_PER_MESSAGE,
+            writes_per_message: WRITES_PER_MESSAGE,
+            writes: BTreeMap::new(),
             rows: BTreeMap::new(),
-            written: BTreeMap::new(),
-            have: Vector::new(),
             readings: 0,
             peers: BTreeMap::new(),
         }
     }
 
-    /// With messages of at most this many rows, at least 1.
+    /// With messages of at most this many writes, at least 1.
     #[must_use]
-    pub fn with_rows_per_message(mut self, rows: usize) -> Exchange {
-        self.rows_per_message = rows.max(1);
+    pub fn with_writes_per_message(mut self, writes: usize) -> Exchange {
+        self.writes_per_message = writes.max(1);
         self
     }
 
@@ -248,7 +258,7 @@ impl Exchange {
             ordinal: self.readings,
         };
         self.readings += 1;
-        self.write(id, reading);
+        self.append(id, reading);
         Ok(id)
     }
 
@@ -271,41 +281,32 @@ impl Exchange {
             }),
             Some(row) if row.reading == reading => Ok(()),
             Some(_) => {
-                self.write(id, reading);
+                self.append(id, reading);
                 Ok(())
             }
         }
     }
 
-    fn write(&mut self, id: ReadingId, reading: Reading) {
-        let version = self.have.get(&self.me).map_or(1, |through| through + 1);
-        self.have.insert(self.me, version);
-        self.join(Row {
+    /// How many writes of an origin there are.
+    fn has(&self, origin: Origin) -> u32 {
+        // No origin makes more writes than a number has; messages that say so are refused.
+        self.writes
+            .get(&origin)
+            .map_or(0, |writes| writes.len() as u32)
+    }
+
+    /// Adds the next write of an origin. Whether the reading was not known before.
+    fn append(&mut self, id: ReadingId, reading: Reading) -> bool {
+        let ordinal = id.ordinal;
+        let writes = self.writes.entry(id.origin).or_default();
+        writes.push(Write { ordinal, reading });
+        let version = writes.len() as u32;
+        let row = Row {
             id,
             version,
             reading,
-        });
-    }
-
-    /// Takes a row, unless a later version is known. Which of two rows counts depends on nothing
-    /// but the two.
-    fn join(&mut self, row: Row) -> Joined {
-        let joined = match self.rows.get(&row.id) {
-            None => Joined::Added,
-            Some(known) => {
-                let order = (known.version.cmp(&row.version))
-                    .then_with(|| known.reading.cmp_bits(&row.reading));
-                if order.is_ge() {
-                    return Joined::Known;
-                }
-                self.written.remove(&(row.id.origin, known.version));
-                Joined::Revised
-            }
         };
-        self.written
-            .insert((row.id.origin, row.version), row.id.ordinal);
-        self.rows.insert(row.id, row);
-        joined
+        self.rows.insert(id, row).is_none()
     }
 
     /// What to send to a peer: rows that it is not known to have, and what this rover has. `None` if
@@ -316,66 +317,54 @@ impl Exchange {
     pub fn offer(&mut self, peer: u32) -> Option<Statistics> {
         let mut state = self.peers.remove(&peer).unwrap_or_default();
         let spans = self.spans_for(&mut state);
-        let needed = !spans.is_empty() || state.is_owed || !state.has_heard;
+        let answer = !spans.is_empty() || !state.has_heard;
+        let needed = answer || state.is_owed;
         state.is_owed = false;
         let heard = state.incarnation;
         self.peers.insert(peer, state);
-        let have = self.have.iter();
+        let have = self.writes.iter();
         needed.then(|| Statistics {
             from: self.me,
             heard,
+            answer,
             have: have
-                .map(|(&origin, &through)| Has { origin, through })
+                .map(|(&origin, writes)| Has {
+                    origin,
+                    through: writes.len() as u32,
+                })
                 .collect(),
             spans,
         })
     }
 
-    /// The rows that a peer is not known to have, as many as a message holds. If that is not all,
-    /// the next message begins where this one was cut, so that no origin waits for ever.
+    /// The writes that a peer is not known to have, as many as a message holds. If that is not all, the
+    /// next message begins where this one was cut, so that no origin waits for ever.
     fn spans_for(&self, peer: &mut Peer) -> Vec<Span> {
         let first = peer.cut_at.take();
         let later = self
-            .have
+            .writes
             .iter()
             .filter(|(origin, _)| first <= Some(**origin));
         let earlier = self
-            .have
+            .writes
             .iter()
             .filter(|(origin, _)| first > Some(**origin));
-        let mut room = self.rows_per_message;
+        let mut room = self.writes_per_message;
         let mut spans = Vec::new();
-        for (&origin, &through) in later.chain(earlier) {
+        for (&origin, writes) in later.chain(earlier) {
             let after = peer.have.get(&origin).copied().unwrap_or(0);
-            if after >= through {
-                continue;
-            }
-            let mut span = Span {
-                origin,
-                after,
-                through,
-                rows: Vec::new(),
-            };
-            let written = self.written.range((origin, after + 1)..=(origin, through));
-            for (&(_, version), &ordinal) in written {
-                if room == 0 {
-                    // What was taken so far is complete up to the row before this one.
-                    span.through = span.rows.last().map_or(after, |row| row.version);
-                    peer.cut_at = Some(origin);
-                    break;
-                }
-                room -= 1;
-                let reading = self.rows[&ReadingId { origin, ordinal }].reading;
-                span.rows.push(SpanRow {
-                    ordinal,
-                    version,
-                    reading,
+            let lacking = writes.get(after as usize..).unwrap_or_default();
+            let sent = &lacking[..lacking.len().min(room)];
+            if !sent.is_empty() {
+                room -= sent.len();
+                spans.push(Span {
+                    origin,
+                    after,
+                    writes: sent.to_vec(),
                 });
             }
-            if span.through > after {
-                spans.push(span);
-            }
-            if peer.cut_at.is_some() {
+            if sent.len() < lacking.len() {
+                peer.cut_at = Some(origin);
                 break;
             }
         }
@@ -392,26 +381,23 @@ impl Exchange {
         self.check(message)?;
         let mut received = Received::default();
         for span in &message.spans {
-            for row in &span.rows {
+            let known = self.has(span.origin).saturating_sub(span.after) as usize;
+            if span.after > self.has(span.origin) {
+                // The sender thinks of what this rover had before it restarted. What is behind the
+                // gap comes again once the sender knows.
+                received.early += span.writes.len();
+                continue;
+            }
+            received.known += known.min(span.writes.len());
+            for write in span.writes.iter().skip(known) {
                 let id = ReadingId {
                     origin: span.origin,
-                    ordinal: row.ordinal,
+                    ordinal: write.ordinal,
                 };
-                let (version, reading) = (row.version, row.reading);
-                match self.join(Row {
-                    id,
-                    version,
-                    reading,
-                }) {
-                    Joined::Added => received.added += 1,
-                    Joined::Revised => received.revised += 1,
-                    Joined::Known => received.known += 1,
+                match self.append(id, write.reading) {
+                    true => received.added += 1,
+                    false => received.revised += 1,
                 }
-            }
-            // After a gap the rows count, but they are not all rows through that write.
-            let through = self.have.get(&span.origin).copied().unwrap_or(0);
-            if span.after <= through && span.through > through {
-                self.have.insert(span.origin, span.through);
             }
         }
         self.learn_of(message);
@@ -431,8 +417,7 @@ impl Exchange {
             return;
         }
         peer.has_heard |= message.heard == Some(self.me.incarnation);
-        // Who sends rows, or has not heard this rover, wants an answer.
-        peer.is_owed |= !message.spans.is_empty() || message.heard != Some(self.me.incarnation);
+        peer.is_owed |= message.answer;
         for has in &message.have {
             let through = peer.have.entry(has.origin).or_default();
             *through = has.through.max(*through);
@@ -440,39 +425,37 @@ impl Exchange {
     }
 
     fn check(&self, message: &Statistics) -> Result<(), ExchangeError> {
-        let own = self.have.get(&self.me).copied().unwrap_or(0);
-        let said = message.have.iter().map(|has| (has.origin, has.through));
-        let sent = message.spans.iter().map(|span| (span.origin, span.through));
-        if let Some((origin, actual)) = said.chain(sent).find(|&(o, w)| o == self.me && w > own) {
-            return Err(ExchangeError::Impostor {
-                from: message.from,
-                origin,
-                expected: own,
-                actual,
-            });
-        }
-        for span in &message.spans {
-            let mut before = span.after;
-            for row in &span.rows {
-                if row.version <= before || row.version > span.through {
-                    return Err(ExchangeError::Version {
-                        origin: span.origin,
-                        actual: row.version,
-                        after: before,
-                        through: span.through,
-                    });
-                }
-                before = row.version;
-                row.reading.check()?;
+        let own = self.has(self.me);
+        let said = message
+            .have
+            .iter()
+            .map(|has| (has.origin, u64::from(has.through)));
+        let sent = message
+            .spans
+            .iter()
+            .map(|span| (span.origin, span.through()));
+        for (origin, actual) in said.chain(sent) {
+            if origin == self.me && actual > u64::from(own) {
+                return Err(ExchangeError::Impostor {
+                    from: message.from,
+                    origin,
+                    expected: own,
+                    actual,
+                });
+            }
+            if actual > u64::from(u32::MAX) {
+                let limit = u32::MAX;
+                return Err(ExchangeError::TooMany {
+                    origin,
+                    limit,
+                    actual,
+                });
             }
         }
-        Ok(())
+        let mut writes = message.spans.iter().flat_map(|span| &span.writes);
+        Ok(writes.try_for_each(|write| write.reading.check())?)
     }
 }
 
-/// What became of a row.
-enum Joined {
-    Added,
-    Revised,
-    Known,
-}
+#[cfg(test)]
+mod tests;

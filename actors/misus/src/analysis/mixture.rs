@@ -41,6 +41,8 @@
 mod em;
 mod select;
 mod starts;
+#[cfg(test)]
+mod tests;
 
 pub use select::{Candidate, Fit, fit};
 

@@ -3,8 +3,6 @@
 //! A row holds features, not the spectrum: a spectrum of a hundred bands becomes four numbers (see
 //! [`super::features`]).
 
-use std::cmp::Ordering;
-
 use serde::{Deserialize, Serialize};
 
 /// How many features a spectrum becomes.
@@ -139,35 +137,6 @@ impl Reading {
             noise("noise_sd", textural.noise_sd)?;
         }
         Ok(())
-    }
-
-    /// An order of readings by the bits of their numbers, so that of two different ones all rovers
-    /// choose the same.
-    pub(crate) fn cmp_bits(&self, other: &Reading) -> Ordering {
-        fn bits(reading: &Reading) -> impl Iterator<Item = u32> {
-            let part = |present: bool, features: Option<(&[f32], f32)>| {
-                let (features, noise_sd) = features.unwrap_or_default();
-                let numbers = features.iter().copied().chain([noise_sd]);
-                [u32::from(present)]
-                    .into_iter()
-                    .chain(numbers.map(f32::to_bits).collect::<Vec<_>>())
-            };
-            let spectral = reading
-                .spectral
-                .as_ref()
-                .map(|s| (&s.features[..], s.noise_sd));
-            let textural = reading
-                .textural
-                .as_ref()
-                .map(|t| (&t.features[..], t.noise_sd));
-            let [east, north] = reading.position_m.map(f32::to_bits);
-            let [sd, diameter] = [reading.position_sd_m, reading.diameter_m].map(f32::to_bits);
-            [reading.rock, east, north, sd, diameter]
-                .into_iter()
-                .chain(part(spectral.is_some(), spectral))
-                .chain(part(textural.is_some(), textural))
-        }
-        bits(self).cmp(bits(other))
     }
 }
 

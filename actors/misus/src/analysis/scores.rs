@@ -92,3 +92,156 @@ pub fn posterior_entropy(responsibilities: &[f64], classes: usize) -> f64 {
     let surprise = |&p: &f64| if p > 0.0 { -p * libm::log(p) } else { 0.0 };
     responsibilities.iter().map(surprise).sum::<f64>() / rows.max(1) as f64
 }
+
+/// The total variation distance between the learnt shares of classes and the true ones, learnt classes
+/// matched to true ones so that as many rocks as possible agree: half the sum of absolute
+/// differences, 0 to 1. A class that nothing is matched to counts with its whole share.
+///
+/// ```
+/// use farside_misus::analysis::scores::distribution_error;
+/// // Three rocks of one class and one of the other; all four taken for one class.
+/// assert_eq!(distribution_error(&[1.0], &[0, 0, 0, 0], &[0, 0, 0, 1]), 0.25);
+/// assert_eq!(distribution_error(&[0.25, 0.75], &[1, 1, 1, 0], &[0, 0, 0, 1]), 0.0);
+/// ```
+///
+/// # Panics
+/// When there are not as many learnt classes as true ones, item by item, or a class without a share.
+pub fn distribution_error(shares: &[f64], learnt: &[usize], truth: &[usize]) -> f64 {
+    let counts = contingency(learnt, truth);
+    let size = shares.len().max(counts.columns);
+    let mut gain = vec![0.0; size * size];
+    for (a, row) in counts.cells.chunks(counts.columns).enumerate() {
+        gain[a * size..a * size + row.len()].copy_from_slice(row);
+    }
+    let total = (truth.len() as f64).max(1.0);
+    let mut of_truth: Vec<f64> = counts.of_b().map(|count| count / total).collect();
+    of_truth.resize(size, 0.0);
+    let matched = best_assignment(&gain, size);
+    let difference = |(a, &b): (usize, &usize)| {
+        let share = shares.get(a).copied().unwrap_or(0.0);
+        (share - of_truth[b]).abs()
+    };
+    0.5 * matched.iter().enumerate().map(difference).sum::<f64>()
+}
+
+/// The column of each row of a square matrix such that the sum of entries is the greatest (the
+/// Hungarian method, by shortest augmenting paths; of equal ones always the same).
+fn best_assignment(gain: &[f64], size: usize) -> Vec<usize> {
+    let most = gain.iter().copied().fold(0.0, f64::max);
+    let cost = |row: usize, column: usize| most - gain[row * size + column];
+    // Rows and columns from 1, as the method has them; 0 is where a new row begins.
+    let (mut of_row, mut of_column) = (vec![0.0; size + 1], vec![0.0; size + 1]);
+    let mut row_of = vec![0usize; size + 1];
+    for row in 1..=size {
+        row_of[0] = row;
+        let mut least = vec![f64::INFINITY; size + 1];
+        let mut before = vec![0usize; size + 1];
+        let mut is_done = vec![false; size + 1];
+        let mut column = 0;
+        while row_of[column] != 0 {
+            is_done[column] = true;
+            let from = row_of[column];
+            let (mut step, mut next) = (f64::INFINITY, 0);
+            for to in 1..=size {
+                if is_done[to] {
+                    continue;
+                }
+                let reduced = cost(from - 1, to - 1) - of_row[from] - of_column[to];
+                if reduced < least[to] {
+                    (least[to], before[to]) = (reduced, column);
+                }
+                if least[to] < step {
+                    (step, next) = (least[to], to);
+                }
+            }
+            for to in 0..=size {
+                if is_done[to] {
+                    of_row[row_of[to]] += step;
+                    of_column[to] -= step;
+                } else {
+                    least[to] -= step;
+                }
+            }
+            column = next;
+        }
+        while column != 0 {
+            row_of[column] = row_of[before[column]];
+            column = before[column];
+        }
+    }
+    let mut column_of = vec![0; size];
+    for column in 1..=size {
+        column_of[row_of[column] - 1] = column - 1;
+    }
+    column_of
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// By its definition: pairs of items that both partitions treat alike.
+    fn rand_by_pairs(a: &[usize], b: &[usize]) -> f64 {
+        let (mut both, mut in_a, mut in_b, mut all) = (0.0, 0.0, 0.0, 0.0);
+        for i in 0..a.len() {
+            for j in 0..i {
+                let (same_a, same_b) = (a[i] == a[j], b[i] == b[j]);
+                all += 1.0;
+                in_a += f64::from(u8::from(same_a));
+                in_b += f64::from(u8::from(same_b));
+                both += f64::from(u8::from(same_a && same_b));
+            }
+        }
+        let expected = in_a * in_b / all;
+        (both - expected) / (0.5 * (in_a + in_b) - expected)
+    }
+
+    fn permutations(size: usize) -> Vec<Vec<usize>> {
+        if size == 0 {
+            return vec![vec![]];
+        }
+        let shorter = permutations(size - 1);
+        let insert = |at: usize, p: &[usize]| {
+            let mut p = p.to_vec();
+            p.insert(at, size - 1);
+            p
+        };
+        (0..size)
+            .flat_map(|at| shorter.iter().map(move |p| insert(at, p)))
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn rand_index_is_that_of_pairs(
+            labels in prop::collection::vec((0usize..4, 0usize..3), 2..40),
+        ) {
+            let (a, b): (Vec<_>, Vec<_>) = labels.into_iter().unzip();
+            let expected = rand_by_pairs(&a, &b);
+            prop_assume!(expected.is_finite());
+            prop_assert!((adjusted_rand_index(&a, &b) - expected).abs() < 1e-12);
+            prop_assert_eq!(adjusted_rand_index(&a, &a), 1.0);
+        }
+
+        #[test]
+        fn assignments_are_the_best(size in 1usize..6, seed: u64) {
+            let mut stream = farside::random::RandomKey::new(seed).stream();
+            let gain: Vec<f64> = (0..size * size).map(|_| stream.below(20) as f64).collect();
+            let sum = |p: &[usize]| (0..size).map(|row| gain[row * size + p[row]]).sum::<f64>();
+            let best = permutations(size).iter().map(|p| sum(p)).fold(0.0, f64::max);
+            prop_assert_eq!(sum(&best_assignment(&gain, size)), best);
+        }
+
+        #[test]
+        fn errors_of_shares_are_distances(
+            labels in prop::collection::vec((0usize..4, 0usize..3), 1..40),
+        ) {
+            let (learnt, truth): (Vec<_>, Vec<_>) = labels.into_iter().unzip();
+            let shares = [0.4, 0.3, 0.2, 0.1];
+            let error = distribution_error(&shares, &learnt, &truth);
+            prop_assert!((0.0..=1.0 + 1e-12).contains(&error));
+        }
+    }
+}
