@@ -1,209 +1,105 @@
 //! Rock fields: ground with hills, boulders and rocks of several classes, laid out by a story.
 //!
-//! A rock field belongs to the world: instruments of a rover read it, noise and all, and metrics
-//! compare with its [`RockField::truth`]. What decides on board (data analysis, planners) never
-//! gets a `RockField`, and nothing outside metrics and pictures calls `truth`.
+//! How many rocks of which size there are says [`RockAbundance`](crate::RockAbundance); where they
+//! lie and what they are, a [`Story`]; what they are made of and look like, their [`RockClass`].
+//!
+//! A rock field belongs to the world. Instruments of a rover read it and add their noise; metrics and
+//! pictures compare with its [`RockField::truth`]. What decides on board, such as data analysis and
+//! planners, is never handed a `RockField`, so that it cannot look.
 
-use std::sync::Arc;
+mod composition;
+mod footprint;
+mod grid;
+mod ground;
+mod palette;
+mod placement;
+mod settings;
 
-use nalgebra::{Point2, Point3};
+use farside::random::RandomKey;
+use nalgebra::Point2;
+
+use composition::{Composition, GROUND_TEXTURE};
+pub use footprint::Footprint;
+use grid::Grid;
+use palette::Palette;
+pub use settings::{FieldClasses, FieldRocks, FieldSpectra, MAX_FIELD_ROCKS, RockFieldSettings};
 
 use crate::crater::Hazard;
-use crate::geology::{GeologyError, RockClass, StoryKind, TEXTURE};
-use crate::spectra::SpectralLibrary;
+use crate::geology::{GeologyError, RockClass, Story, StoryKind, TEXTURE};
+use crate::rocks::Rock;
 use crate::terrain::HeightField;
 
-/// Which classes of rock a field has.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FieldClasses {
-    /// This many, drawn from those built in (or from the groups of the library).
-    Count(usize),
-    /// Built-in classes (or groups of the library) by name.
-    Named(Vec<String>),
-    /// Classes of one's own, over the built-in minerals; not with a library.
-    Custom(Vec<RockClass>),
-}
-
-/// How many rocks a field has.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FieldRocks {
-    /// As many of this diameter \[m\] or more as the abundance says, as a Poisson field.
-    FromDiameter(f64),
-    /// Exactly so many: the largest ones that are to be expected at this abundance.
-    Exactly(usize),
-}
-
-/// Where the spectra of the rocks come from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum FieldSpectra {
-    /// Mixed from the absorption bands of the built-in minerals.
-    Mixed,
-    /// Each rock has the spectrum and the fractions of a sample of this library; its class is the
-    /// sample's dominant mineral.
-    Library(Arc<SpectralLibrary>),
-}
-
-/// What a rock field is made from.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RockFieldSettings {
-    /// The seed of all draws.
-    pub seed: u64,
-    /// The side of the square field \[m\], which has the origin of coordinates in its middle.
-    pub side_m: f64,
-    /// How the field came to be.
-    pub story: StoryKind,
-    /// Which classes of rock there are.
-    pub classes: FieldClasses,
-    /// The share of the ground covered by rocks (Golombek and Rapp's k); over 0, at most 1.
-    pub abundance: f64,
-    /// How many rocks there are.
-    pub rocks: FieldRocks,
-    /// The distance between height samples \[m\].
-    pub resolution_m: f64,
-    /// How many hills there are.
-    pub hills: usize,
-    /// The height of the highest hill \[m\].
-    pub hill_height_m: f64,
-    /// The diameter from which a rock is a boulder, which a rover must go round and which hides
-    /// what is behind it \[m\].
-    pub boulder_least_m: f64,
-    /// The slope from which ground is too steep \[rad\].
-    pub slope_limit_rad: f64,
-    /// Where spectra come from.
-    pub spectra: FieldSpectra,
-}
-
-impl Default for RockFieldSettings {
-    fn default() -> Self {
-        RockFieldSettings {
-            seed: 1,
-            side_m: 100.0,
-            story: StoryKind::Strata,
-            classes: FieldClasses::Count(4),
-            abundance: 0.05,
-            rocks: FieldRocks::Exactly(90),
-            resolution_m: 0.5,
-            hills: 3,
-            hill_height_m: 4.0,
-            boulder_least_m: 1.0,
-            slope_limit_rad: 20.0 * std::f64::consts::PI / 180.0,
-            spectra: FieldSpectra::Mixed,
-        }
-    }
-}
-
-/// A rock of a field, as anyone may know it who sees it: place and size.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldRock {
-    /// Where its centre lies \[m\].
-    pub position_m: Point2<f64>,
-    /// Its diameter \[m\].
-    pub diameter_m: f64,
-}
-
-/// What is true of a rock and hidden from rovers. Only metrics and pictures look at it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RockTruth<'a> {
-    /// Its class, an index into [`RockField::classes`].
-    pub class: u16,
-    /// The fraction of each of [`RockField::minerals`] by volume; they sum to 1.
-    pub fractions: &'a [f64],
-    /// The size of its grains \[um\]; none, if its spectrum is measured.
-    pub grain_um: Option<f64>,
-    /// The share of its surface that dust covers, 0 to 1.
-    pub dust: f64,
-}
-
-/// The truth about all rocks of a field: for metrics and pictures, never for what decides on board.
-#[derive(Clone, Copy, Debug)]
-pub struct FieldTruth<'a> {
-    field: &'a RockField,
-}
-
-impl<'a> FieldTruth<'a> {
-    /// The truth about one rock.
-    ///
-    /// # Panics
-    /// When there is no such rock.
-    pub fn rock(&self, rock: usize) -> RockTruth<'a> {
-        let minerals = self.field.minerals.len();
-        RockTruth {
-            class: self.field.class[rock],
-            fractions: &self.field.fractions[rock * minerals..(rock + 1) * minerals],
-            grain_um: None,
-            dust: 0.0,
-        }
-    }
-
-    /// The class of each rock.
-    pub fn classes(&self) -> &'a [u16] {
-        &self.field.class
-    }
-}
+/// A rock of a field, as anyone may know it who sees it: its place and its size.
+pub type FieldRock = Rock;
 
 /// Ground with rocks.
+///
+/// ```
+/// use farside_worlds::{RockField, RockFieldSettings, StoryKind};
+/// use nalgebra::{Point2, Point3};
+/// let settings = RockFieldSettings { story: StoryKind::Lava, seed: 7, ..RockFieldSettings::default() };
+/// let field = RockField::generate(&settings)?;
+/// assert_eq!((field.rocks().len(), field.classes().len()), (90, 4));
+///
+/// // A point spectrometer of one milliradian on a mast of 1.5 m, pointed at a rock 10 m away.
+/// let rock = field.near(Point2::origin(), 20.0).next().expect("rocks are everywhere");
+/// let aim_m = field.rocks()[rock].position_m;
+/// let from_m = field.terrain().antenna_m(aim_m.x - 10.0, aim_m.y, 1.5);
+/// let footprint = field.footprint(from_m, aim_m, 0.5e-3);
+/// let mut spectrum = vec![0.0; field.wavelengths_nm().len()];
+/// field.mixed_reflectance(&footprint, &mut spectrum);
+/// assert_eq!(spectrum, field.reflectance(rock));
+/// # Ok::<(), farside_worlds::GeologyError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RockField {
     settings: RockFieldSettings,
+    story: Story,
+    ground: HeightField,
     terrain: HeightField,
-    rocks: Vec<FieldRock>,
+    rocks: Vec<Rock>,
+    grid: Grid,
+    /// The diameter of the largest rock; 0 without rocks.
+    largest_m: f64,
     classes: Vec<RockClass>,
-    class: Vec<u16>,
     minerals: Vec<String>,
-    fractions: Vec<f64>,
-    wavelengths_nm: Vec<f64>,
-    reflectance: Vec<f64>,
-    ground_reflectance: Vec<f64>,
-    texture: Vec<[f64; TEXTURE]>,
-    ground_texture: [f64; TEXTURE],
+    composition: Composition,
 }
 
 impl RockField {
     /// The field of these settings: the same for the same settings, on every machine.
     ///
     /// # Errors
-    /// When a setting is out of its range.
+    /// When a setting is out of its range, there is no such class, a class cannot be drawn from (see
+    /// [`RockClass::check`]), or there would be more than [`MAX_FIELD_ROCKS`] rocks or 2^24 height
+    /// samples.
     pub fn generate(settings: &RockFieldSettings) -> Result<RockField, GeologyError> {
-        use farside::random::RandomKey;
-        let half_m = 0.5 * settings.side_m;
-        let mut stream = RandomKey::new(settings.seed).text("rock_field").stream();
-        let FieldRocks::Exactly(count) = settings.rocks else {
-            return Err(GeologyError::Setting {
-                setting: "rocks",
-                least: 0.0,
-                most: 0.0,
-                actual: 0.0,
-            });
-        };
-        let rocks = (0..count)
-            .map(|_| FieldRock {
-                position_m: Point2::new(
-                    stream.uniform_in(-half_m, half_m),
-                    stream.uniform_in(-half_m, half_m),
-                ),
-                diameter_m: stream.uniform_in(0.3, 1.5),
-            })
-            .collect();
-        let terrain = HeightField::new(
-            Point2::new(-half_m, -half_m),
-            settings.side_m / 2.0,
-            3,
-            vec![0.0; 9],
-        )?;
-        let wavelengths_nm: Vec<f64> = (0..101).map(|i| 450.0 + 20.0 * f64::from(i)).collect();
+        settings.check()?;
+        let key = RandomKey::new(settings.seed).text("rock_field");
+        let palette = Palette::of(settings, key)?;
+        let mut stream = key.text("story").stream();
+        let story = Story::draw(
+            settings.story,
+            palette.classes.len(),
+            settings.side_m,
+            &mut stream,
+        );
+        let mut rocks = placement::rocks(settings, &story, key)?;
+        let grid = Grid::sort(settings.side_m, &mut rocks);
+        let ground = ground::bare(settings, key)?;
+        let terrain = ground::with_boulders(&ground, &rocks, settings.boulder_least_m)?;
+        let composition = Composition::draw(&settings.spectra, &palette, &story, &rocks, key);
         Ok(RockField {
             settings: settings.clone(),
+            story,
+            ground,
             terrain,
+            largest_m: rocks.iter().map(|rock| rock.diameter_m).fold(0.0, f64::max),
             rocks,
-            classes: Vec::new(),
-            class: vec![0; count],
-            minerals: vec!["olivine".to_owned()],
-            fractions: vec![1.0; count],
-            reflectance: vec![0.3; count * wavelengths_nm.len()],
-            ground_reflectance: vec![0.2; wavelengths_nm.len()],
-            wavelengths_nm,
-            texture: vec![[0.1; TEXTURE]; count],
-            ground_texture: [0.1; TEXTURE],
+            grid,
+            classes: palette.classes,
+            minerals: palette.minerals,
+            composition,
         })
     }
 
@@ -217,17 +113,17 @@ impl RockField {
         &self.terrain
     }
 
-    /// The rocks, by place: from south to north in rows of cells, within a row from west to east.
+    /// The rocks, by place: cells of a grid from south to north, in each row from west to east.
     pub fn rocks(&self) -> &[FieldRock] {
         &self.rocks
     }
 
-    /// The classes of rock that there are.
+    /// The classes of rock that there are. Which rock is of which, [`RockField::truth`] knows.
     pub fn classes(&self) -> &[RockClass] {
         &self.classes
     }
 
-    /// How the field came to be.
+    /// How the field came to be, which is a truth, too.
     pub fn story(&self) -> StoryKind {
         self.settings.story
     }
@@ -239,52 +135,75 @@ impl RockField {
 
     /// The wavelengths of the bands \[nm\], ascending.
     pub fn wavelengths_nm(&self) -> &[f64] {
-        &self.wavelengths_nm
+        &self.composition.wavelengths_nm
     }
 
-    /// What is hidden from rovers.
+    /// What is hidden from rovers: for metrics and pictures alone.
     pub fn truth(&self) -> FieldTruth<'_> {
         FieldTruth { field: self }
     }
 
-    /// The reflectance of a rock in each band, without noise.
+    /// The reflectance of a rock in each band, without noise: 0 to 1, or what a library says.
     ///
     /// # Panics
     /// When there is no such rock.
     pub fn reflectance(&self, rock: usize) -> &[f64] {
-        let bands = self.wavelengths_nm.len();
-        &self.reflectance[rock * bands..(rock + 1) * bands]
+        match &self.settings.spectra {
+            FieldSpectra::Mixed => {
+                let bands = self.wavelengths_nm().len();
+                &self.composition.reflectance[rock * bands..(rock + 1) * bands]
+            }
+            FieldSpectra::Library(library) => {
+                library
+                    .sample(self.composition.sample[rock] as usize)
+                    .reflectance
+            }
+        }
     }
 
-    /// The reflectance of the ground between the rocks in each band.
+    /// The reflectance of the ground between the rocks in each band: sand of all classes alike, half
+    /// under dust; with a library the mean of the samples, all classes alike.
     pub fn ground_reflectance(&self) -> &[f64] {
-        &self.ground_reflectance
+        &self.composition.ground_reflectance
     }
 
-    /// The texture statistics of a rock, without noise.
+    /// The statistics of a rock's texture, without noise, in the order of
+    /// [`TEXTURE_NAMES`](crate::TEXTURE_NAMES).
     ///
     /// # Panics
     /// When there is no such rock.
     pub fn texture(&self, rock: usize) -> [f64; TEXTURE] {
-        self.texture[rock]
+        self.composition.looks[rock].texture
     }
 
-    /// The texture statistics of the ground between the rocks.
+    /// The statistics of the texture of the ground between the rocks.
     pub fn ground_texture(&self) -> [f64; TEXTURE] {
-        self.ground_texture
+        GROUND_TEXTURE
     }
 
     /// The rocks whose centres lie within a radius \[m\] of a place, ascending.
     pub fn near(&self, center_m: Point2<f64>, radius_m: f64) -> impl Iterator<Item = usize> {
-        let near = move |rock: &FieldRock| (rock.position_m - center_m).norm() <= radius_m;
-        let rocks = self.rocks.iter().enumerate();
-        rocks.filter(move |(_, rock)| near(rock)).map(|(i, _)| i)
+        let ranges = self.grid.ranges(center_m, radius_m);
+        let within =
+            move |&rock: &usize| (self.rocks[rock].position_m - center_m).norm() <= radius_m;
+        ranges.flatten().filter(within)
     }
 
-    /// What is wrong with a place \[m\]: too steep, or under a boulder.
+    /// What is wrong with a place \[m\]: under a boulder, or too steep.
     pub fn hazard(&self, x_m: f64, y_m: f64) -> Hazard {
-        let _ = (x_m, y_m);
-        Hazard::None
+        let place_m = Point2::new(x_m, y_m);
+        let mut boulders = self.near(place_m, 0.5 * self.largest_m).filter(|&rock| {
+            let rock = &self.rocks[rock];
+            rock.diameter_m >= self.settings.boulder_least_m
+                && (rock.position_m - place_m).norm() <= 0.5 * rock.diameter_m
+        });
+        if boulders.next().is_some() {
+            Hazard::Boulder
+        } else if self.slope_rad(x_m, y_m) > self.settings.slope_limit_rad {
+            Hazard::Steep
+        } else {
+            Hazard::None
+        }
     }
 
     /// Whether a rover must not be at a place \[m\].
@@ -292,77 +211,96 @@ impl RockField {
         self.hazard(x_m, y_m) != Hazard::None
     }
 
+    /// The ground without its boulders, on which a rover's wheels stand.
+    pub fn ground(&self) -> &HeightField {
+        &self.ground
+    }
+
     /// The slope of the ground without its boulders \[rad\].
     pub fn slope_rad(&self, x_m: f64, y_m: f64) -> f64 {
-        self.terrain.slope_rad(x_m, y_m)
+        self.ground.slope_rad(x_m, y_m)
     }
 
-    /// The height of the ground without its boulders \[m\]: what a rover's wheels stand on.
+    /// The height of the ground without its boulders \[m\].
     pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
-        self.terrain.height_m(x_m, y_m)
+        self.ground.height_m(x_m, y_m)
     }
+}
 
-    /// The share of the ground within a radius \[m\] of a place that is under the field's rocks, 0 to 1.
-    pub fn rock_cover(&self, center_m: Point2<f64>, radius_m: f64) -> f64 {
-        let _ = (center_m, radius_m);
-        0.0
-    }
+/// What is true of a rock and hidden from rovers. Only metrics and pictures look at it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RockTruth<'a> {
+    /// Its class, an index into [`RockField::classes`].
+    pub class: u16,
+    /// The fraction of each of [`RockField::minerals`] by volume; they sum to 1.
+    pub fractions: &'a [f64],
+    /// The size of its grains \[um\]; none, if its spectrum is measured.
+    pub grain_um: Option<f64>,
+    /// The share of its surface that dust covers, 0 to 1; 0, if its spectrum is measured.
+    pub dust: f64,
+    /// The sample of the library whose spectrum it has, if there is a library.
+    pub sample: Option<usize>,
+}
 
-    /// What a beam sees: how much of it falls on which rock and on the ground.
-    ///
-    /// The beam is a cone from `from_m` around the direction to the surface at `aim_m`, with this
-    /// half angle \[rad\].
-    pub fn footprint(
-        &self,
-        from_m: Point3<f64>,
-        aim_m: Point2<f64>,
-        half_angle_rad: f64,
-    ) -> Footprint {
-        let _ = (from_m, aim_m, half_angle_rad);
-        Footprint {
-            rocks: Vec::new(),
-            ground: 1.0,
-        }
-    }
+/// The truth about all rocks of a field: for metrics and pictures, never for what decides on board.
+///
+/// ```
+/// use farside_worlds::{RockField, RockFieldSettings};
+/// let field = RockField::generate(&RockFieldSettings::default())?;
+/// let truth = field.truth();
+/// let rock = truth.rock(3);
+/// assert_eq!(rock.class, truth.classes()[3]);
+/// assert!((rock.fractions.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+/// # Ok::<(), farside_worlds::GeologyError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct FieldTruth<'a> {
+    field: &'a RockField,
+}
 
-    /// The reflectance that a beam sees, rocks and ground mixed by area, without noise. `out` has
-    /// one entry for each band.
+impl<'a> FieldTruth<'a> {
+    /// The truth about one rock.
     ///
     /// # Panics
-    /// When `out` has another length.
-    pub fn mixed_reflectance(&self, footprint: &Footprint, out: &mut [f64]) {
-        assert_eq!(
-            out.len(),
-            self.wavelengths_nm.len(),
-            "one entry for each band"
-        );
-        for (mixed, ground) in out.iter_mut().zip(&self.ground_reflectance) {
-            *mixed = footprint.ground * ground;
-        }
-        for &(rock, share) in &footprint.rocks {
-            for (mixed, value) in out.iter_mut().zip(self.reflectance(rock)) {
-                *mixed += share * value;
+    /// When there is no such rock.
+    pub fn rock(&self, rock: usize) -> RockTruth<'a> {
+        let composition = &self.field.composition;
+        let class = composition.class[rock];
+        match &self.field.settings.spectra {
+            FieldSpectra::Mixed => {
+                let minerals = self.field.minerals.len();
+                let look = &composition.looks[rock];
+                RockTruth {
+                    class,
+                    fractions: &composition.fractions[rock * minerals..(rock + 1) * minerals],
+                    grain_um: Some(look.grain_um),
+                    dust: look.dust,
+                    sample: None,
+                }
+            }
+            FieldSpectra::Library(library) => {
+                let sample = composition.sample[rock] as usize;
+                RockTruth {
+                    class,
+                    fractions: library.sample(sample).fractions,
+                    grain_um: None,
+                    dust: 0.0,
+                    sample: Some(sample),
+                }
             }
         }
     }
 
-    /// The texture statistics that a beam sees, mixed by area, without noise.
-    pub fn mixed_texture(&self, footprint: &Footprint) -> [f64; TEXTURE] {
-        let mut mixed = self.ground_texture.map(|value| footprint.ground * value);
-        for &(rock, share) in &footprint.rocks {
-            for (mixed, value) in mixed.iter_mut().zip(self.texture[rock]) {
-                *mixed += share * value;
-            }
-        }
-        mixed
+    /// The class of each rock.
+    pub fn classes(&self) -> &'a [u16] {
+        &self.field.composition.class
+    }
+
+    /// The story with its parameters, which laid the rocks out.
+    pub fn story(&self) -> &'a Story {
+        &self.field.story
     }
 }
 
-/// What a beam sees.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Footprint {
-    /// The rocks in it, from the nearest to the farthest, each with its share of the beam.
-    pub rocks: Vec<(usize, f64)>,
-    /// The share of the ground: what the rocks leave of 1.
-    pub ground: f64,
-}
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,11 @@
 //! [`crate::rocks`]. Whether a radio signal gets through is for a link to decide; here is only
 //! whether the ground is in the way, and by how much.
 
+mod noise;
+
 use nalgebra::{Point2, Point3, Vector2};
+
+pub(crate) use noise::Noise;
 
 use crate::error::TerrainError;
 

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 
 use super::CraterSettings;
 use crate::error::TerrainError;
-use crate::terrain::{HeightField, MAX_SAMPLES};
+use crate::terrain::{HeightField, MAX_SAMPLES, Noise};
 
 /// Waves of the outline round the rim, as (times round, share of the radius).
 const OUTLINE: [(f64, f64); 4] = [(2.0, 0.025), (3.0, 0.02), (5.0, 0.012), (9.0, 0.006)];
@@ -43,7 +43,10 @@ pub(super) fn height_field(
     let pits = pits(settings, key);
     let octaves: Vec<Noise> = ROUGHNESS
         .iter()
-        .map(|&(length_m, amplitude_m)| Noise::new(key, half, length_m, amplitude_m))
+        .map(|&(length_m, amplitude_m)| {
+            let key = key.text("roughness").number(length_m as u64);
+            Noise::new(half, length_m, amplitude_m, &mut key.stream())
+        })
         .collect();
     let mut heights_m = Vec::with_capacity(columns * columns);
     for row in 0..columns {
@@ -110,49 +113,5 @@ impl Pit {
             let fade = (2.0 - distance).max(0.0);
             rim_m * fade * fade
         }
-    }
-}
-
-/// Smooth noise between random values on a lattice.
-struct Noise {
-    half_m: f64,
-    length_m: f64,
-    points: usize,
-    values_m: Vec<f64>,
-}
-
-impl Noise {
-    fn new(key: RandomKey, half_m: f64, length_m: f64, amplitude_m: f64) -> Noise {
-        let points = libm::ceil(2.0 * half_m / length_m) as usize + 2;
-        let mut stream = key.text("roughness").number(length_m as u64).stream();
-        let values_m = (0..points * points)
-            .map(|_| stream.uniform_in(-amplitude_m, amplitude_m))
-            .collect();
-        Noise {
-            half_m,
-            length_m,
-            points,
-            values_m,
-        }
-    }
-
-    fn at(&self, x_m: f64, y_m: f64) -> f64 {
-        let (column, east) = self.cell(x_m);
-        let (row, north) = self.cell(y_m);
-        let value = |c: usize, r: usize| self.values_m[r * self.points + c];
-        let south_m = value(column, row) * (1.0 - east) + value(column + 1, row) * east;
-        let north_m = value(column, row + 1) * (1.0 - east) + value(column + 1, row + 1) * east;
-        south_m * (1.0 - north) + north_m * north
-    }
-
-    /// The lattice cell of a coordinate and the smoothed share of it.
-    fn cell(&self, coordinate_m: f64) -> (usize, f64) {
-        let at = ((coordinate_m + self.half_m) / self.length_m).max(0.0);
-        let cell = (at as usize).min(self.points - 2);
-        let share = (at - cell as f64).clamp(0.0, 1.0);
-        (
-            cell,
-            share * share * share * (share * (share * 6.0 - 15.0) + 10.0),
-        )
     }
 }
