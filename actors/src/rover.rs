@@ -6,9 +6,16 @@
 //! [`CommandReport`] and [`RoverState`], sends it [`RoverCommand`]s.
 
 mod actor;
+mod body;
 mod command;
 mod faults;
+mod hardware;
+mod instruments;
+mod landmarks;
+mod memory;
 mod model;
+mod power;
+mod record;
 
 use std::sync::Arc;
 
@@ -22,6 +29,8 @@ pub use command::{
 };
 pub use faults::{FaultBegins, FaultConfig, FaultEnds, FaultKind, FaultRates, PlannedFault};
 pub use model::{InstrumentKind, InstrumentModel, RoverConfig, RoverModel, ViewModel};
+pub use power::RoverEnergy;
+pub use record::{RoverFigures, RoverIncident, RoverPose, RoverResources, RoverTally};
 
 /// Where rovers are: shared by all of a run.
 #[derive(Clone, Debug)]
@@ -62,6 +71,8 @@ pub struct RoverSpec {
     pub seed: u64,
     /// The end of the run: until then there are faults by chance.
     pub until: SimDuration,
+    /// Where its figures go, for the run's results.
+    pub tally: RoverTally,
 }
 
 /// Adds a rover's hardware to its host, as an actor `{name}/hardware`, with its faults. It reports to
@@ -92,3 +103,6 @@ where
 pub fn hardware_name(rover: &str) -> String {
     format!("{rover}/hardware")
 }
+
+#[cfg(test)]
+mod tests;

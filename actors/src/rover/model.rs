@@ -18,6 +18,9 @@ const TEXT: &str = include_str!("models.toml");
 /// The names, in the file's order. A test holds them to the file.
 const NAMES: [&str; 3] = ["mer", "fido", "k9"];
 
+/// The most instruments of a rover.
+const MAX_INSTRUMENTS: usize = 32;
+
 /// The names of parts that every rover has, as faults give them.
 const PARTS: [&str; 5] = ["wheels", "mast", "radio", "heater", "body"];
 
@@ -33,6 +36,9 @@ settings! {
         pub model: String = "mer".to_owned(), one_of(&NAMES);
         /// Its mass \[kg\].
         pub mass_kg: f64 = 174.0, in_unit("kg", 0.1..=10_000.0);
+        /// How far apart its wheels are, in front and behind, left and right: what roll and pitch are
+        /// measured over.
+        pub wheelbase_m as "wheelbase": f64 [with = "units::length_m"] = 1.4, in_unit("m", 0.05..=10.0);
         /// How fast it drives on level ground without rocks.
         pub speed_m_per_s as "speed": f64 [with = "units::speed_m_per_s"] = 0.05,
             in_unit("m/s", 1e-4..=10.0);
@@ -302,6 +308,11 @@ impl RoverModel {
                 self.recovery, self.cutoff
             );
             return Err(SetupError::value(&format!("{name}.recovery"), message));
+        }
+        if self.instruments.len() > MAX_INSTRUMENTS {
+            let found = self.instruments.len();
+            let message = format!("{found} of them: expected at most {MAX_INSTRUMENTS}");
+            return Err(SetupError::value(&format!("{name}.{INSTRUMENTS}"), message));
         }
         for (index, instrument) in self.instruments.iter().enumerate() {
             let key = |key: &str| format!("{name}.instrument.{index}.{key}");

@@ -1,0 +1,154 @@
+//! What a rover's hardware leaves to logs, pictures and metrics: samples of its state, and figures.
+//! Nothing here reaches the controller.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+use super::power::RoverEnergy;
+
+/// A sample: where a rover is, and where it believes to be. Recorded at the start, at the end of
+/// each step of driving, when an image corrects the estimate, and every `record_every`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RoverPose {
+    /// In truth, to the east \[m\].
+    pub east_m: f64,
+    /// In truth, to the north \[m\].
+    pub north_m: f64,
+    /// In truth, how high the ground is \[m\].
+    pub height_m: f64,
+    /// In truth \[rad, counted from east to north\].
+    pub yaw_rad: f64,
+    /// In truth \[rad, right side down\].
+    pub roll_rad: f64,
+    /// In truth \[rad, nose up\].
+    pub pitch_rad: f64,
+    /// As estimated, to the east \[m\].
+    pub estimated_east_m: f64,
+    /// As estimated, to the north \[m\].
+    pub estimated_north_m: f64,
+    /// As estimated \[rad\].
+    pub estimated_yaw_rad: f64,
+    /// The standard deviation that the rover reckons with \[m\].
+    pub position_sigma_m: f64,
+}
+
+/// A sample: what a rover has left, and what it lives on. Recorded when commands begin and end and
+/// every `record_every`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RoverResources {
+    /// What the array yields \[W\].
+    pub solar_w: f64,
+    /// What all consumers take \[W\].
+    pub load_w: f64,
+    /// What the battery holds at most \[J\].
+    pub battery_capacity_j: f64,
+    /// What is in memory \[byte\].
+    pub memory_used_bytes: u64,
+    /// What memory can hold \[byte\].
+    pub memory_size_bytes: u64,
+    /// Whether it sleeps.
+    pub asleep: bool,
+    /// Whether it lies in a brown-out.
+    pub brown_out: bool,
+    /// Where energy came from and went to; the battery's charge is among it.
+    pub energy: RoverEnergy,
+}
+
+/// A sample: something happened to a rover that nobody had told it to do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum RoverIncident {
+    /// The battery is down: all loads are cut off.
+    BrownOut {
+        /// The commands that it ended.
+        ended: Vec<u32>,
+    },
+    /// The battery has charge again.
+    Recovered,
+    /// Links took more than the battery had.
+    Unsupplied {
+        /// How much was not there \[J\].
+        energy_j: f64,
+    },
+    /// The controller was not heard of for too long.
+    LeaseEnded {
+        /// The commands that it ended.
+        ended: Vec<u32>,
+    },
+    /// Memory that is out of order, or full, lost data.
+    DataLost {
+        /// How much \[byte\].
+        bytes: u64,
+    },
+    /// An image placed the rover among rocks that it knows.
+    Placed {
+        /// How far the estimate moved \[m\].
+        moved_m: f64,
+    },
+}
+
+/// What a rover did until the end of a run, for metrics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RoverFigures {
+    /// Where energy came from and went to.
+    pub energy: RoverEnergy,
+    /// The greatest share of all energy that came in that was ever not accounted for.
+    pub imbalance: f64,
+    /// The least charge that the battery had \[J\].
+    pub least_stored_j: f64,
+    /// How far the wheels went \[m\].
+    pub driven_m: f64,
+    /// How far the rover is from where it believes to be \[m\].
+    pub position_error_m: f64,
+    /// The furthest that it ever was \[m\].
+    pub max_position_error_m: f64,
+    /// Commands that came, other than to stop.
+    pub commands: u32,
+    /// Commands that were done.
+    pub done: u32,
+    /// Commands that were stopped.
+    pub stopped: u32,
+    /// Commands that failed.
+    pub failed: u32,
+    /// Commands that were refused.
+    pub refused: u32,
+    /// Readings taken.
+    pub readings: u32,
+    /// Faults that began.
+    pub faults: u32,
+    /// Brown-outs.
+    pub brown_outs: u32,
+    /// Times that the controller's lease ended while something ran.
+    pub lease_ends: u32,
+    /// Times that an image placed the rover.
+    pub placed: u32,
+    /// What is in memory \[byte\].
+    pub memory_used_bytes: u64,
+    /// All that was ever read \[byte\].
+    pub stored_bytes: u64,
+    /// All that was transmitted of it \[byte\].
+    pub sent_bytes: u64,
+    /// All that was lost of it \[byte\].
+    pub lost_bytes: u64,
+}
+
+/// Where a rover's hardware puts its figures after each event; clones are the same.
+///
+/// ```
+/// use farside_actors::rover::RoverTally;
+/// let tally = RoverTally::default();
+/// assert_eq!(tally.clone().figures().commands, 0);
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct RoverTally(Arc<Mutex<RoverFigures>>);
+
+impl RoverTally {
+    /// The figures so far.
+    pub fn figures(&self) -> RoverFigures {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn put(&self, figures: &RoverFigures) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = *figures;
+    }
+}

@@ -1,0 +1,355 @@
+//! The hardware in a simulation: a controller beside it, crashes, links that take energy, and what
+//! idle rovers cost.
+
+use std::sync::{Arc, Mutex};
+
+use farside::carrier::{Carriage, NoChange};
+use farside::prelude::*;
+use farside::record::{Record, RecordClass};
+use farside::{Carrier, Parcel, Report, Verdicts};
+use serde::{Deserialize, Serialize};
+
+use super::*;
+
+/// A controller that gives each command of a list at its time, and keeps what it is told.
+struct Script {
+    rover: String,
+    plan: Vec<(u64, Command)>,
+    log: Arc<Mutex<Vec<(SimTime, CommandReport)>>>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Turn {
+    number: u32,
+}
+
+impl Actor for Script {
+    type Accepts = (Turn, CommandReport, RoverState);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for (number, (at_s, _)) in (0..).zip(&self.plan) {
+            ctx.timer(SimDuration::from_secs(*at_s), Turn { number });
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Turn> for Script {
+    fn handle(&mut self, turn: Turn, ctx: &mut Context<'_, Self>) -> Outcome {
+        let hardware = ctx.lookup::<RoverHardware>(&hardware_name(&self.rover))?;
+        let command = self.plan[turn.number as usize].1.clone();
+        ctx.send(
+            hardware,
+            RoverCommand {
+                id: turn.number,
+                command,
+            },
+        );
+        Ok(())
+    }
+}
+
+impl Handler<CommandReport> for Script {
+    fn handle(&mut self, report: CommandReport, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.log.lock().unwrap().push((ctx.now(), report));
+        Ok(())
+    }
+}
+
+impl Handler<RoverState> for Script {
+    fn handle(&mut self, _state: RoverState, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+type Told = Arc<Mutex<Vec<(SimTime, CommandReport)>>>;
+
+/// A rover and its controller on one host.
+fn add(sim: &mut Simulation, spec: RoverSpec, plan: &[(u64, Command)]) -> (HostId, Told) {
+    let host = sim.host(&spec.name);
+    let log = Told::default();
+    let (rover, plan, told) = (spec.name.clone(), plan.to_vec(), log.clone());
+    let name = format!("{rover}/controller");
+    let controller = sim.actor(host, &name, move |_| Script {
+        rover: rover.clone(),
+        plan: plan.clone(),
+        log: told.clone(),
+    });
+    add_hardware(sim, host, spec, controller);
+    (host, log)
+}
+
+fn config() -> RoverConfig {
+    let mut config = RoverConfig::named("mer").expect("a model");
+    config.lease = SimDuration::ZERO;
+    config
+}
+
+fn fault(at_s: u64, kind: FaultKind, part: Option<&str>) -> FaultConfig {
+    FaultConfig {
+        at: SimDuration::from_secs(at_s),
+        kind,
+        part: part.map(str::to_owned),
+        duration: Some(SimDuration::from_secs(500)),
+        ..FaultConfig::default()
+    }
+}
+
+#[test]
+fn a_stop_is_obeyed_in_one_event() {
+    let mut sim = Simulation::new(1);
+    let plan = [(0, drive(5.0, 0.0)), (30, STOP)];
+    let (_, told) = add(&mut sim, spec(level_field(1), config()), &plan);
+    let after: Arc<Mutex<Vec<RecordClass>>> = Arc::default();
+    let seen = after.clone();
+    sim.observe(move |record: &Record<'_>| {
+        if record.time() == SimTime::from_secs(30) {
+            seen.lock().unwrap().push(record.class);
+        }
+    });
+    sim.stop_at(SimTime::from_secs(3600), "enough");
+    sim.run(Executor::Inline).unwrap();
+    let told = told.lock().unwrap();
+    let at = SimTime::from_secs(30);
+    let ends: Vec<_> = told
+        .iter()
+        .map(|(time, report)| (*time, &report.end))
+        .collect();
+    assert_eq!(ends, [(at, &stopped()), (at, &CommandEnd::Done)]);
+    // The controller's timer, the command, two reports: the rover stands in the second of four.
+    let (timer, delivered) = (RecordClass::Timer, RecordClass::Delivered);
+    assert_eq!(
+        *after.lock().unwrap(),
+        [timer, delivered, delivered, delivered]
+    );
+}
+
+/// Every kind of fault in one run of three sols, on a rover that is kept busy.
+fn troubled(executor: Executor) -> (Report, RoverFigures, Vec<String>) {
+    let mut sim = Simulation::new(4);
+    let mut config = config();
+    for (number, kind) in (0..).zip(FaultKind::ALL) {
+        config.faults.push(fault(1000 + 2000 * number, kind, None));
+    }
+    config.fault_rates.dust = 1.0;
+    let mut plan = Vec::new();
+    for round in 0..40 {
+        let at_s = 700 * round;
+        let metre = (round % 7) as f64;
+        plan.push((at_s, drive(metre, -metre)));
+        plan.push((at_s + 300, down()));
+        plan.push((at_s + 400, image(View::Point)));
+        plan.push((at_s + 500, spectrum(View::Point)));
+    }
+    let spec = RoverSpec {
+        seed: 4,
+        ..spec(level_field(60), config)
+    };
+    let tally = spec.tally.clone();
+    add(&mut sim, spec, &plan);
+    let told: Arc<Mutex<Vec<String>>> = Arc::default();
+    let seen = told.clone();
+    sim.observe(move |record: &Record<'_>| {
+        if record.class == RecordClass::Told {
+            let kind = record
+                .kind
+                .map(|kind| kind.name().to_owned())
+                .unwrap_or_default();
+            seen.lock().unwrap().push(kind);
+        }
+    });
+    sim.stop_at(SimTime::from_secs(3 * 88_775), "three sols");
+    let report = sim.run(executor).unwrap();
+    let told = told.lock().unwrap().clone();
+    (report, tally.figures(), told)
+}
+
+#[test]
+fn faults_are_told_end_no_run_and_change_no_executor() {
+    let (report, figures, told) = troubled(Executor::Inline);
+    assert_eq!(report.end.name(), "stopped");
+    let begun = told
+        .iter()
+        .filter(|kind| kind.ends_with("FaultBegins"))
+        .count();
+    assert_eq!(begun, figures.faults as usize);
+    assert!(begun >= 11);
+    assert!(figures.failed > 0 && figures.done > 20, "{figures:?}");
+    assert!(figures.imbalance <= 1e-9, "{}", figures.imbalance);
+    let (again, ..) = troubled(Executor::Kameo { threads: 2 });
+    assert_eq!(again.digest, report.digest);
+    assert_eq!(again.counts, report.counts);
+}
+
+#[test]
+fn ten_sols_of_three_idle_rovers_are_cheap() {
+    let mut sim = Simulation::new(1);
+    let field = level_field(90);
+    let mut tallies = Vec::new();
+    for number in 0..3 {
+        let spec = RoverSpec {
+            number,
+            name: format!("rover_{number:02}"),
+            ..spec(field.clone(), config())
+        };
+        tallies.push(spec.tally.clone());
+        add(&mut sim, spec, &[]);
+    }
+    #[derive(Default)]
+    struct Seen {
+        records: u64,
+        bytes: u64,
+    }
+    let seen: Arc<Mutex<Seen>> = Arc::default();
+    sim.observe(Bytes(seen.clone()));
+    sim.stop_at(SimTime::from_secs(10 * 88_775), "ten sols");
+    let report = sim.run(Executor::Inline).unwrap();
+    let seen = seen.lock().unwrap();
+    // 49.3 records of the state a sol, of two samples each, and looks at the battery.
+    let events = report.counts.events as f64 / 30.0;
+    assert!(
+        (49.0..54.0).contains(&events),
+        "{events} events for each rover and sol"
+    );
+    let bytes = seen.bytes as f64 / 10.0;
+    assert!(
+        bytes < 100_000.0,
+        "{bytes} bytes a sol, in {} records",
+        seen.records
+    );
+    for tally in tallies {
+        let figures = tally.figures();
+        assert!(figures.imbalance <= 1e-9 && figures.brown_outs == 0);
+        assert!(figures.energy.not_taken_j > 0.0 && figures.energy.heater_j > 0.0);
+    }
+
+    struct Bytes(Arc<Mutex<Seen>>);
+    impl farside::record::Observer for Bytes {
+        fn wants(&self) -> farside::record::Wants {
+            farside::record::Wants {
+                bodies: true,
+                samples: true,
+                checkpoints: false,
+            }
+        }
+        fn record(
+            &mut self,
+            record: &Record<'_>,
+        ) -> Result<farside::record::Flow, farside::record::ObserverError> {
+            let mut seen = self.0.lock().unwrap();
+            seen.records += 1;
+            seen.bytes += record.body.len() as u64;
+            Ok(farside::record::Flow::Continue)
+        }
+    }
+}
+
+/// Takes energy from the sender and from the receiver.
+#[derive(Clone)]
+struct Costly;
+
+impl Carrier for Costly {
+    type Change = NoChange;
+
+    fn min_delay(&self) -> SimDuration {
+        SimDuration::from_millis(10)
+    }
+
+    fn carry(&mut self, _parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        let carriage = Carriage {
+            propagation: self.min_delay(),
+            attempts: 1,
+            energy_j: 50.0,
+            receive_j: 7.0,
+            ..Carriage::default()
+        };
+        verdicts.deliver_as(self.min_delay(), carriage);
+        verdicts.charge(50.0);
+    }
+
+    fn change(&mut self, _change: NoChange, _now: SimTime) {}
+}
+
+/// Sends to whoever accepts it, ten times.
+struct Chatter(&'static str);
+
+#[derive(Serialize, Deserialize)]
+struct Word {
+    number: u32,
+}
+
+impl Actor for Chatter {
+    type Accepts = (Word,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        let other = ctx.lookup::<Chatter>(self.0)?;
+        for number in 0..10 {
+            ctx.send(other, Word { number });
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Word> for Chatter {
+    fn handle(&mut self, _word: Word, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+#[test]
+fn what_links_charge_the_host_comes_from_the_battery() {
+    let mut sim = Simulation::new(1);
+    let rover = spec(level_field(1), config());
+    let tally = rover.tally.clone();
+    let (host, _) = add(&mut sim, rover, &[]);
+    let base = sim.host("base");
+    sim.actor(host, "rover_03/chatter", |_| Chatter("base/chatter"));
+    sim.actor(base, "base/chatter", |_| Chatter("rover_03/chatter"));
+    sim.link(host, base, "rover_03-base", Costly);
+    sim.link(base, host, "base-rover_03", Costly);
+    sim.stop_at(SimTime::from_secs(7200), "two hours");
+    sim.run(Executor::Inline).unwrap();
+    let energy = tally.figures().energy;
+    assert_eq!(energy.links_j, 570.0);
+    assert!(energy.imbalance_j().abs() <= 1e-9 * energy.total_j());
+}
+
+#[test]
+fn a_crash_of_the_computer_stops_the_rover_and_forgets_no_metal() {
+    let mut sim = Simulation::new(1);
+    let mut config = config();
+    config.faults.push(fault(250, FaultKind::ExtraPower, None));
+    let plan = [
+        (0, down()),
+        (100, image(View::Point)),
+        (180, drive(10.0, 0.0)),
+    ];
+    let rover = spec(level_field(1), config);
+    let tally = rover.tally.clone();
+    let (host, told) = add(&mut sim, rover, &plan);
+    sim.crash_host_at(SimTime::from_secs(230), host);
+    sim.restart_host_at(SimTime::from_secs(400), host);
+    sim.stop_at(SimTime::from_secs(405), "seen enough");
+    sim.run(Executor::Inline).unwrap();
+    let figures = tally.figures();
+    // The leg that was under way at 230 s ended at 3 m, within the slip's draws.
+    assert!(
+        (2.9..3.1).contains(&figures.driven_m),
+        "{}",
+        figures.driven_m
+    );
+    assert_eq!(
+        (figures.readings, figures.memory_used_bytes),
+        (1, 1_000_000)
+    );
+    // Told in vain at 250 s, found at the restart.
+    assert_eq!((figures.faults, figures.energy.fault_j), (1, 150.0 * 20.0));
+    // Nobody was told of the drive; the controller began again, and points the mast once more.
+    let ids: Vec<u32> = told
+        .lock()
+        .unwrap()
+        .iter()
+        .map(|(_, report)| report.id)
+        .collect();
+    assert_eq!(ids, [0, 1, 0]);
+}
