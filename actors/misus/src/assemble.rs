@@ -4,13 +4,13 @@
 use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
-use farside_actors::rover::{RoverConfig, RoverSite, RoverSpec, RoverStart, add_hardware};
+use farside_actors::rover::{RoverConfig, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware};
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
 use nalgebra::Point3;
 
 use crate::config::{LearnConfig, TeamConfig};
-use crate::learning::basis;
+use crate::learning::Tools;
 use crate::monitor::{Monitor, Tally};
 use crate::place::Place;
 use crate::scientist::Scientist;
@@ -72,7 +72,8 @@ pub(crate) fn assemble(
         sectors: Site::sectors(&catalogue, rovers.len()),
         catalogue,
         rovers,
-        basis: basis(parts.place)?,
+        side_m: field.settings().side_m,
+        tools: Tools::new(parts.place, parts.learn)?,
         sky: parts.place.sky,
         starts_s: parts.place.starts_s,
         instruments: Instruments::of(parts.rover),
@@ -98,6 +99,7 @@ pub(crate) fn assemble(
             start,
             seed: parts.seed,
             until: parts.until,
+            tally: RoverTally::default(),
         };
         add_hardware(sim, *host, spec, scientist);
         let height_m = field.ground_m(start.east_m, start.north_m);

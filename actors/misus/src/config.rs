@@ -137,6 +137,10 @@ settings! {
             over(SimDuration::ZERO);
         /// The share of each sol, around noon, in which rovers exchange.
         pub contact: f64 [with = "units::fraction"] = 1.0;
+        /// The time from one lesson to the next: what was read and heard since is learnt from then. On
+        /// prioritised tours it is before every choice, too.
+        pub learn_every: SimDuration [with = "units::duration"] = SimDuration::from_secs(4 * 3600),
+            over(SimDuration::ZERO);
         /// The most classes that are told apart.
         pub max_classes: u32 = 8, 1..=20;
         /// Below this share of its battery a rover rests.

@@ -3,105 +3,203 @@
 //! same.
 
 use farside_actors::system::SetupError;
+use farside_worlds::geology::StoryKind;
 use farside_worlds::spectra::SpectralLibrary;
 
 use crate::analysis::features::SpectralBasis;
-use crate::analysis::mixture::{Fit, FitSettings, Table, fit};
-use crate::analysis::reading::Row;
-use crate::analysis::rocks::{COLUMNS, POSITION_AT, Rocks};
-use crate::analysis::scores::{hard, posterior_entropy};
-use crate::messages::{Learned, RockLabel};
+use crate::analysis::learned::Learned;
+use crate::analysis::mixture::{Fit, FitSettings};
+use crate::analysis::objective::{
+    MineralGauge, Objective as Analysed, Stories, StoryBelief, StorySettings,
+};
+use crate::analysis::prioritise::{PrioritiserSettings, rank};
+use crate::analysis::reading::{Origin, Reading, ReadingId, Row};
+use crate::analysis::rocks::Rocks;
+use crate::config::{LearnConfig, Objective};
+use crate::messages::{FieldModel, RockLabel, StoryProbability};
 use crate::place::Place;
 use crate::site::Site;
 
-/// The basis of spectra that all rovers carry: of the scenario's library, or of the built-in one.
-pub(crate) fn basis(place: &Place) -> Result<SpectralBasis, SetupError> {
-    let builtin;
-    let library = match &place.library {
-        Some(library) => library.as_ref(),
-        None => {
-            builtin = SpectralLibrary::builtin();
-            &builtin
+/// How sure the catalogue is of where a rock lies \[m\].
+const CATALOGUE_SD_M: f32 = 0.1;
+
+/// What all rovers carry to learn with: a basis of spectra, and a gauge for the mineral if one is
+/// looked for.
+pub(crate) struct Tools {
+    pub(crate) basis: SpectralBasis,
+    gauge: Option<MineralGauge>,
+}
+
+impl Tools {
+    /// From the scenario's library of spectra, or from the built-in one.
+    pub(crate) fn new(place: &Place, learn: &LearnConfig) -> Result<Tools, SetupError> {
+        let builtin;
+        let library = match &place.library {
+            Some(library) => library.as_ref(),
+            None => {
+                builtin = SpectralLibrary::builtin();
+                &builtin
+            }
+        };
+        let spectra: Vec<&[f64]> = library.samples().map(|one| one.reflectance).collect();
+        let wrong = |error: &dyn std::fmt::Display| SetupError::value("world.spectra", error);
+        let basis = SpectralBasis::new(library.wavelengths_nm(), &spectra);
+        let basis = basis.map_err(|error| wrong(&error))?;
+        if learn.objective != Objective::Mineral {
+            return Ok(Tools { basis, gauge: None });
         }
-    };
-    let spectra: Vec<&[f64]> = library.samples().map(|sample| sample.reflectance).collect();
-    let basis = SpectralBasis::new(library.wavelengths_nm(), &spectra);
-    basis.map_err(|error| SetupError::value("world.spectra", error))
+        let minerals = library.minerals();
+        let at = minerals.iter().position(|name| *name == learn.mineral);
+        let Some(at) = at else {
+            let (known, wanted) = (minerals.join(", "), &learn.mineral);
+            let hint = farside::suggest::nearest(wanted, minerals.iter().map(String::as_str));
+            let hint = farside::suggest::did_you_mean(hint.as_deref());
+            let message = format!("{wanted:?}: expected one of {known}{hint}");
+            return Err(SetupError::value("learn.mineral", message));
+        };
+        let fractions: Vec<f64> = library.samples().map(|one| one.fractions[at]).collect();
+        let gauge = MineralGauge::new(&basis, &spectra, &fractions);
+        let gauge = Some(gauge.map_err(|error| wrong(&error))?);
+        Ok(Tools { basis, gauge })
+    }
+}
+
+/// Stories to weigh, for a field of this side \[m\].
+pub(crate) fn stories(side_m: f64) -> Stories {
+    Stories::new(StorySettings {
+        side_m,
+        ..StorySettings::default()
+    })
 }
 
 /// What was learnt of some readings.
 pub(crate) struct Lesson {
-    /// The rocks that were read.
-    pub(crate) rocks: Rocks,
-    /// Their classes.
-    pub(crate) fit: Fit,
-    /// The probability of each class for each rock of the catalogue, rock by rock.
-    pub(crate) all: Vec<f64>,
+    /// Of the rocks that were read.
+    read: Learned,
+    /// Of all rocks of the catalogue, in the order of their numbers: of those that nobody has read,
+    /// from their place alone.
+    whole: Learned,
+    story: Option<StoryBelief>,
 }
 
 impl Lesson {
     /// Learns from readings in the order of their ids; none if there are none.
-    pub(crate) fn of<'a>(site: &Site, rows: impl Iterator<Item = &'a Row>) -> Option<Lesson> {
-        let rocks = Rocks::pool(rows);
+    pub(crate) fn of<'a>(
+        site: &Site,
+        stories: &mut Stories,
+        rows: impl Iterator<Item = &'a Row> + Clone,
+    ) -> Option<Lesson> {
         let settings = FitSettings {
             max_classes: site.config.max_classes as usize,
             ..FitSettings::default()
         };
         // Settings are in their ranges: the one error left is that there are no rocks.
-        let fit = fit(rocks.table(), &settings).ok()?;
-        let all = fit.mixture.responsibilities(&whole_field(site, &rocks)).ok()?;
-        Some(Lesson { rocks, fit, all })
+        let read = Learned::from_rows(rows.clone(), &settings).ok()?;
+        let unread = unread(site, &read);
+        let rocks = Rocks::pool(rows.chain(&unread));
+        let responsibilities = read.fit.mixture.responsibilities(rocks.table()).ok()?;
+        let fit = Fit {
+            responsibilities,
+            ..read.fit.clone()
+        };
+        let whole = Learned { rocks, fit };
+        let asks = site.config.objective == Objective::Process;
+        let story = asks.then(|| stories.weigh(&whole));
+        Some(Lesson { read, whole, story })
+    }
+
+    fn objective<'a>(&'a self, site: &'a Site) -> Analysed<'a> {
+        match (&site.tools.gauge, &self.story) {
+            (Some(gauge), _) => Analysed::Mineral(gauge),
+            (None, Some(story)) => Analysed::Process(story),
+            (None, None) => Analysed::Distribution,
+        }
+    }
+
+    /// Of some rocks the one whose spectrum is worth most; none if all have a good one.
+    pub(crate) fn most_wanted(&self, site: &Site, of: &[u32]) -> Option<u32> {
+        let settings = PrioritiserSettings::default();
+        let all = self.whole.rocks.len();
+        let picks = rank(&self.whole, self.objective(site), &settings, all);
+        let rocks = picks.iter().map(|pick| self.whole.rocks.numbers()[pick.index]);
+        rocks.into_iter().find(|rock| of.contains(rock))
     }
 
     /// What a rover records of it.
-    pub(crate) fn learned(&self, readings: usize) -> Learned {
-        let classes = self.fit.mixture.classes();
-        let read = &self.fit.responsibilities;
-        let labels = hard(&self.all, classes);
-        let field = self.all.chunks_exact(classes).zip(labels).enumerate();
-        let label = |(rock, (row, class)): (usize, (&[f64], usize))| {
-            let at = self.rocks.index_of(rock as u32);
-            RockLabel {
-                class: class as u32,
-                confidence: row[class] as f32,
-                image: at.is_some_and(|at| self.rocks.has_image(at)),
-                spectrum: at.is_some_and(|at| self.rocks.has_spectrum(at)),
-            }
-        };
-        let rocks: Vec<RockLabel> = field.map(label).collect();
+    pub(crate) fn model(&self, site: &Site, readings: usize) -> FieldModel {
+        let classes = self.whole.classes();
+        let rocks: Vec<RockLabel> = (0..self.whole.rocks.len())
+            .map(|rock| self.label(rock))
+            .collect();
         let share = |class| {
-            let of_class = self.all.iter().skip(class).step_by(classes);
-            of_class.sum::<f64>() / rocks.len().max(1) as f64
+            let of_class = self.whole.fit.responsibilities.iter().skip(class);
+            of_class.step_by(classes).sum::<f64>() / rocks.len().max(1) as f64
         };
-        let spectra = (0..self.rocks.len()).filter(|at| self.rocks.has_spectrum(*at));
-        Learned {
+        let spectra = (0..self.read.rocks.len()).filter(|at| self.read.rocks.has_spectrum(*at));
+        let richest = site.tools.gauge.as_ref();
+        let richest = richest.and_then(|gauge| gauge.richest(&self.whole.rocks));
+        FieldModel {
             readings: readings as u32,
-            rocks_read: self.rocks.len() as u32,
+            rocks_read: self.read.rocks.len() as u32,
             rocks_with_spectrum: spectra.count() as u32,
             classes: classes as u32,
-            log_likelihood: self.fit.chosen.log_likelihood,
-            objective: self.fit.chosen.objective,
-            posterior_entropy: posterior_entropy(read, classes),
+            log_likelihood: self.read.fit.chosen.log_likelihood,
+            objective: self.read.fit.chosen.objective,
+            posterior_entropy: self.read.posterior_entropy(),
             proportions: (0..classes).map(share).collect(),
             rocks,
+            richest: richest.map(|at| self.whole.rocks.numbers()[at]),
+            stories: self.story.as_ref().map_or_else(Vec::new, probabilities),
+        }
+    }
+
+    /// What is thought of a rock of the catalogue.
+    fn label(&self, rock: usize) -> RockLabel {
+        let probabilities = self.whole.probabilities(rock);
+        let best = |best: usize, class: usize| match probabilities[class] > probabilities[best] {
+            true => class,
+            false => best,
+        };
+        let class = (1..probabilities.len()).fold(0, best);
+        RockLabel {
+            class: class as u32,
+            confidence: probabilities[class] as f32,
+            image: self.whole.rocks.has_image(rock),
+            spectrum: self.whole.rocks.has_spectrum(rock),
         }
     }
 }
 
-/// The features of every rock of the catalogue: of those that nobody has read, their place alone.
-fn whole_field(site: &Site, rocks: &Rocks) -> Table {
-    let mut table = Table::new(COLUMNS, 2);
-    for (number, rock) in (0..).zip(&site.catalogue) {
-        match rocks.index_of(number) {
-            Some(at) => table.push(rocks.table().row(at), rocks.table().noise(at)),
-            None => {
-                let (mut values, mut noise) = ([0.0; COLUMNS], [f64::INFINITY; COLUMNS]);
-                let place_m = [rock.position_m.x, rock.position_m.y];
-                values[POSITION_AT..].copy_from_slice(&place_m);
-                noise[POSITION_AT..].fill(0.0);
-                table.push(&values, &noise);
-            }
-        }
-    }
-    table
+fn probabilities(story: &StoryBelief) -> Vec<StoryProbability> {
+    let all = story.kinds().iter().zip(story.probabilities());
+    let one = |(kind, &probability): (&StoryKind, &f64)| StoryProbability {
+        story: kind.name().to_owned(),
+        probability,
+    };
+    all.map(one).collect()
+}
+
+/// What the catalogue alone says of rocks that nobody has read.
+fn unread(site: &Site, read: &Learned) -> Vec<Row> {
+    let rocks = (0..).zip(&site.catalogue);
+    let unread = rocks.filter(|(number, _)| read.rocks.index_of(*number).is_none());
+    let row = |(number, rock): (u32, &farside_worlds::rock_field::FieldRock)| Row {
+        id: ReadingId {
+            // Nobody's: these rows are never exchanged.
+            origin: Origin {
+                rover: u32::MAX,
+                incarnation: 0,
+            },
+            ordinal: number,
+        },
+        version: 1,
+        reading: Reading {
+            rock: number,
+            position_m: [rock.position_m.x as f32, rock.position_m.y as f32],
+            position_sd_m: CATALOGUE_SD_M,
+            diameter_m: rock.diameter_m as f32,
+            ..Reading::default()
+        },
+    };
+    unread.map(row).collect()
 }

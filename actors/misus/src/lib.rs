@@ -26,6 +26,6 @@ mod system;
 pub mod tour;
 
 pub use config::{FieldConfig, LearnConfig, Objective, TeamConfig, Tour};
-pub use messages::{Learned, RockLabel, Stop};
+pub use messages::{FieldModel, RockLabel, Stop};
 pub use metrics::MisusMetrics;
 pub use system::MisusSystem;

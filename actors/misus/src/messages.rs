@@ -12,6 +12,10 @@ pub struct LeaseDue;
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ExchangeDue;
 
+/// A timer: the rover learns from what it knows.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct LessonDue;
+
 /// A timer: the hardware is asked how it is, and then something is begun.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct GoOn;
@@ -23,16 +27,16 @@ pub struct Overdue {
     pub command: u32,
 }
 
-/// A state sample: what a rover has learnt.
+/// A state sample: what a rover thinks of the field.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Learned {
+pub struct FieldModel {
     /// How many readings it knows of, its own and those of others.
     pub readings: u32,
     /// How many rocks they are of.
     pub rocks_read: u32,
     /// How many of these it knows a spectrum of.
     pub rocks_with_spectrum: u32,
-    /// How many classes it tells apart; 0 while it knows no reading.
+    /// How many classes it tells apart.
     pub classes: u32,
     /// The log-likelihood of the readings.
     pub log_likelihood: f64,
@@ -44,6 +48,20 @@ pub struct Learned {
     pub proportions: Vec<f64>,
     /// What it thinks of each rock of the catalogue, in the order of their numbers.
     pub rocks: Vec<RockLabel>,
+    /// The rock that it thinks is the richest in the mineral that is looked for; with
+    /// `objective = "mineral"`.
+    pub richest: Option<u32>,
+    /// How likely each story is; with `objective = "process"`.
+    pub stories: Vec<StoryProbability>,
+}
+
+/// How likely a story is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoryProbability {
+    /// Its name, as scenarios give it.
+    pub story: String,
+    /// 0 to 1; those of all stories sum to 1.
+    pub probability: f64,
 }
 
 /// What a rover thinks of a rock.

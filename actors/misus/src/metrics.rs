@@ -12,9 +12,11 @@ use farside_worlds::RockField;
 use farside_worlds::sky::SOL_S;
 use serde::Serialize;
 
-use crate::analysis::scores::adjusted_rand_index;
+use crate::analysis::objective::regret;
+use crate::analysis::scores::{adjusted_rand_index, distribution_error};
 use crate::assemble::Team;
-use crate::messages::Learned;
+use crate::config::{LearnConfig, Objective};
+use crate::messages::FieldModel;
 use crate::monitor::{RoverTally, Tally};
 
 /// What runs can be measured by, each with what its field says.
@@ -50,6 +52,13 @@ farside_actors::documented! {
         pub objective: Option<f64>,
         /// Readings that a rover knows at the end, its own and those of others, mean over rovers.
         pub readings: f64,
+        /// By how much the rock that rovers name falls short of the richest in the mineral that is
+        /// looked for: the best true fraction less that of the rock named, mean over rovers. Only
+        /// with `objective = "mineral"`.
+        pub regret: Option<f64>,
+        /// The logarithm of how likely rovers think the true story is, at least that of 1e-6, mean over
+        /// rovers; 0 is best. Only with `objective = "process"`.
+        pub log_score: Option<f64>,
         /// Rocks of which some rover took a spectrum.
         pub rocks_read: u32,
         /// Rocks that rovers set out for.
@@ -80,6 +89,9 @@ farside_actors::documented! {
     }
 }
 
+/// The least probability that counts in a score.
+const LEAST_PROBABILITY: f64 = 1e-6;
+
 /// All figures of a run.
 pub(crate) struct Figures {
     metrics: MisusMetrics,
@@ -100,18 +112,20 @@ pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> Figures {
         _ => format!("{name} ({count})"),
     });
     Figures {
-        metrics: figures(&tally, field),
+        metrics: figures(&tally, field, &team.site.config),
         over_sols: over_sols(&tally, field, end),
         faults: faults.collect(),
     }
 }
 
-fn figures(tally: &Tally, field: &RockField) -> MisusMetrics {
-    let last: Vec<&Learned> = tally.rovers.iter().filter_map(latest).collect();
+fn figures(tally: &Tally, field: &RockField, learn: &LearnConfig) -> MisusMetrics {
+    let looks_for = (learn.objective == Objective::Mineral).then_some(learn.mineral.as_str());
+    let regret_of = |one: &FieldModel| mineral_regret(one, field, looks_for?);
+    let last: Vec<&FieldModel> = tally.rovers.iter().filter_map(latest).collect();
     let read = read_by_some(&last);
     let aris: Vec<f64> = last.iter().map(|one| ari(one, field, &read)).collect();
-    let mean_of = |value: &dyn Fn(&Learned) -> f64| mean(last.iter().map(|one| value(one)));
-    let errors = last.iter().map(|one| distribution_error(one, field));
+    let mean_of = |value: &dyn Fn(&FieldModel) -> f64| mean(last.iter().map(|one| value(one)));
+    let errors = last.iter().map(|one| share_error(one, field));
     MisusMetrics {
         class_ari: mean(aris.iter().copied()),
         class_ari_least: aris.iter().copied().min_by(f64::total_cmp),
@@ -122,6 +136,8 @@ fn figures(tally: &Tally, field: &RockField) -> MisusMetrics {
         log_likelihood: mean_of(&|one| one.log_likelihood),
         objective: mean_of(&|one| one.objective),
         readings: mean_of(&|one| f64::from(one.readings)).unwrap_or(0.0),
+        regret: mean(last.iter().filter_map(|one| regret_of(one))),
+        log_score: mean(last.iter().filter_map(|one| story_score(one, field))),
         rocks_read: read.iter().filter(|read| **read).count() as u32,
         stops: tally.rovers.iter().map(|rover| rover.stops).sum(),
         exchange_messages: tally.exchanged,
@@ -158,8 +174,8 @@ fn hardware(tally: &Tally) -> MisusMetrics {
     }
 }
 
-fn latest(rover: &RoverTally) -> Option<&Learned> {
-    rover.lessons.last().map(|(_, learned)| learned)
+fn latest(rover: &RoverTally) -> Option<&FieldModel> {
+    rover.models.last().map(|(_, model)| model)
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -172,18 +188,18 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Which rocks some rover knows a spectrum of.
-fn read_by_some(last: &[&Learned]) -> Vec<bool> {
+fn read_by_some(last: &[&FieldModel]) -> Vec<bool> {
     let rocks = last.first().map_or(0, |one| one.rocks.len());
     let read = |rock: usize| last.iter().any(|one| one.rocks[rock].spectrum);
     (0..rocks).map(read).collect()
 }
 
 /// The adjusted Rand index of a rover's classes over some rocks.
-fn ari(learned: &Learned, field: &RockField, over: &[bool]) -> f64 {
+fn ari(model: &FieldModel, field: &RockField, over: &[bool]) -> f64 {
     let truth = field.truth();
     let chosen = |rock: &usize| over[*rock];
     let rocks: Vec<usize> = (0..over.len()).filter(chosen).collect();
-    let own: Vec<usize> = rocks.iter().map(|&rock| learned.rocks[rock].class as usize).collect();
+    let own: Vec<usize> = rocks.iter().map(|&rock| model.rocks[rock].class as usize).collect();
     let true_of = |&rock: &usize| usize::from(truth.classes()[rock]);
     let true_classes: Vec<usize> = rocks.iter().map(true_of).collect();
     adjusted_rand_index(&own, &true_classes)
@@ -192,17 +208,17 @@ fn ari(learned: &Learned, field: &RockField, over: &[bool]) -> f64 {
 /// How a team's knowledge grew: at the end of each sol, the mean over rovers of the adjusted Rand index
 /// of all rocks that some rover has a spectrum of at the end of the run.
 fn over_sols(tally: &Tally, field: &RockField, end: SimTime) -> Series {
-    let last: Vec<&Learned> = tally.rovers.iter().filter_map(latest).collect();
+    let last: Vec<&FieldModel> = tally.rovers.iter().filter_map(latest).collect();
     let read = read_by_some(&last);
     let sols = libm::floor(end.as_secs_f64() / SOL_S) as u32;
     let at = |sol: u32| {
         let until_s = f64::from(sol) * SOL_S;
         let by_then = tally.rovers.iter().filter_map(|rover| {
-            let lessons = rover.lessons.iter();
-            let before = lessons.take_while(|(at, _)| at.as_secs_f64() <= until_s);
-            before.last().map(|(_, learned)| learned)
+            let models = rover.models.iter();
+            let before = models.take_while(|(at, _)| at.as_secs_f64() <= until_s);
+            before.last().map(|(_, model)| model)
         });
-        mean(by_then.map(|learned| ari(learned, field, &read)))
+        mean(by_then.map(|model| ari(model, field, &read)))
     };
     let index = (1..=sols).map(f64::from).collect();
     Series::new(index, (1..=sols).map(at).collect()).unwrap_or_default()
@@ -234,6 +250,24 @@ pub(crate) fn results(figures: Figures) -> Results {
     results
 }
 
-fn distribution_error(_learned: &Learned, _field: &RockField) -> f64 {
-    f64::NAN
+/// How far the learnt shares of the classes are from the true ones.
+fn share_error(model: &FieldModel, field: &RockField) -> f64 {
+    let learnt: Vec<usize> = model.rocks.iter().map(|label| label.class as usize).collect();
+    let truth: Vec<usize> = field.truth().classes().iter().map(|class| usize::from(*class)).collect();
+    distribution_error(&model.proportions, &learnt, &truth)
+}
+
+/// By how much the rock that a rover names falls short of the richest in a mineral.
+fn mineral_regret(model: &FieldModel, field: &RockField, mineral: &str) -> Option<f64> {
+    let at = field.minerals().iter().position(|name| name == mineral)?;
+    let rocks = 0..field.rocks().len();
+    let fractions: Vec<f64> = rocks.map(|rock| field.truth().rock(rock).fractions[at]).collect();
+    Some(regret(&fractions, model.richest.map(|rock| rock as usize)))
+}
+
+/// The logarithm of how likely a rover thinks the true story is.
+fn story_score(model: &FieldModel, field: &RockField) -> Option<f64> {
+    let truth = field.story().name();
+    let story = model.stories.iter().find(|one| one.story == truth)?;
+    Some(libm::log(story.probability.max(LEAST_PROBABILITY)))
 }

@@ -9,7 +9,7 @@ use farside_actors::rover::{
     FaultBegins, RoverIncident, RoverPose, RoverResources, hardware_name,
 };
 
-use crate::messages::Learned;
+use crate::messages::FieldModel;
 use crate::site::SharedSite;
 
 /// What is known of a team.
@@ -26,7 +26,7 @@ pub(crate) struct Tally {
 #[derive(Default)]
 pub(crate) struct RoverTally {
     /// What it learnt, and when, in order.
-    pub(crate) lessons: Vec<(SimTime, Learned)>,
+    pub(crate) models: Vec<(SimTime, FieldModel)>,
     /// Rocks that it set out for.
     pub(crate) stops: u32,
     /// Its hardware's last word of what it has.
@@ -127,9 +127,9 @@ impl Observer for Monitor {
                 tally.exchanged += 1;
                 tally.exchanged_bytes += record.body.len() as u64;
             }
-            (RecordClass::Sample, Role::Scientist(rover), "Learned") => {
-                let learned = kind.schema().decode(record.body).map_err(failed)?;
-                tally.rovers[rover].lessons.push((record.time(), learned));
+            (RecordClass::Sample, Role::Scientist(rover), "FieldModel") => {
+                let model = kind.schema().decode(record.body).map_err(failed)?;
+                tally.rovers[rover].models.push((record.time(), model));
             }
             (RecordClass::Sample, Role::Scientist(rover), "Stop") => {
                 tally.rovers[rover].stops += 1;

@@ -12,7 +12,7 @@ use farside_actors::drawing::{self, MAP, base_link, layered, poses, shape, text}
 use farside_actors::rover::{FaultBegins, RoverPose, hardware_name};
 use farside_worlds::RockField;
 
-use crate::messages::Learned;
+use crate::messages::FieldModel;
 
 /// How large rovers are drawn \[m\].
 const SCALE_M: f64 = 3.0;
@@ -80,8 +80,8 @@ impl MisusScene {
     }
 
     /// Rocks whose class or confidence is another than when they were last drawn.
-    fn learn(&mut self, learned: &Learned, out: &mut Vec<Drawing>) {
-        for (rock, label) in learned.rocks.iter().enumerate() {
+    fn learn(&mut self, model: &FieldModel, out: &mut Vec<Drawing>) {
+        for (rock, label) in model.rocks.iter().enumerate() {
             let tenths = (10.0 * label.confidence) as u8;
             if self.drawn[rock] == Some((label.class, tenths)) {
                 continue;
@@ -164,11 +164,11 @@ impl Scene for MisusScene {
                     out.push(text(Level::Warning, name, &message));
                 }
             }
-            (RecordClass::Sample, None, "Learned")
+            (RecordClass::Sample, None, "FieldModel")
                 if self.scientist == Some(record.receiver.index()) =>
             {
-                if let Ok(learned) = kind.schema().decode(record.body) {
-                    self.learn(&learned, out);
+                if let Ok(model) = kind.schema().decode(record.body) {
+                    self.learn(&model, out);
                 }
             }
             _ => {}

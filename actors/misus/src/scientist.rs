@@ -17,8 +17,10 @@ use farside_actors::rover::{
 };
 
 use crate::analysis::exchange::{Exchange, Statistics};
+use crate::analysis::objective::Stories;
 use crate::analysis::reading::{Origin, ReadingId};
-use crate::messages::{ExchangeDue, GoOn, LeaseDue, Overdue};
+use crate::learning::{Lesson, stories};
+use crate::messages::{ExchangeDue, GoOn, LeaseDue, LessonDue, Overdue};
 use crate::site::SharedSite;
 use touring::{Doing, Logbook};
 
@@ -40,6 +42,8 @@ pub(crate) struct Scientist {
     since_panorama: Option<u32>,
     /// Whether something was read or heard since the last lesson.
     is_to_learn: bool,
+    lesson: Option<Lesson>,
+    stories: Stories,
 }
 
 /// Which kind of instrument a reading is from.
@@ -52,6 +56,7 @@ enum Instrument {
 impl Scientist {
     /// The scientist of the rover of this number.
     pub(crate) fn new(site: SharedSite, number: u32) -> Scientist {
+        let stories = stories(site.side_m);
         Scientist {
             site,
             number,
@@ -64,6 +69,8 @@ impl Scientist {
             waits_for: None,
             since_panorama: None,
             is_to_learn: false,
+            lesson: None,
+            stories,
         }
     }
 
@@ -105,6 +112,7 @@ impl Actor for Scientist {
     type Accepts = (
         LeaseDue,
         ExchangeDue,
+        LessonDue,
         GoOn,
         Overdue,
         CommandReport,
@@ -121,6 +129,7 @@ impl Actor for Scientist {
             ctx.timer(every, LeaseDue);
         }
         self.schedule_exchange(ctx);
+        ctx.timer(self.site.config.learn_every, LessonDue);
         let logbook = ctx.durable::<Logbook>();
         logbook.visited.resize(self.site.catalogue.len(), false);
         if ctx.incarnation() > 0 {

@@ -11,8 +11,8 @@ use farside_worlds::rock_field::FieldRock;
 use farside_worlds::sky::SOL_S;
 use nalgebra::Point2;
 
-use crate::analysis::features::SpectralBasis;
 use crate::config::LearnConfig;
+use crate::learning::Tools;
 use crate::tour::sector;
 
 /// What scientists share.
@@ -24,7 +24,9 @@ pub(crate) struct Site {
     pub(crate) sectors: Vec<u32>,
     /// The rovers' names, by their numbers.
     pub(crate) rovers: Vec<String>,
-    pub(crate) basis: SpectralBasis,
+    /// The side of the field \[m\].
+    pub(crate) side_m: f64,
+    pub(crate) tools: Tools,
     pub(crate) sky: Sky,
     /// The sky's time at the start of the run \[s since a local solar midnight\].
     pub(crate) starts_s: f64,

@@ -6,7 +6,7 @@ use farside_actors::system::MetricKind::{Number, Rate, Series};
 use farside_actors::system::SeriesIndex;
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 23] = [
+pub(crate) const ALL: [Metric; 25] = [
     Metric::new("brown_outs", "brown-outs", "", Number, Lower),
     Metric::new("class_ari", "adjusted Rand index of classes", "", Number, Higher),
     Metric::new(
@@ -42,6 +42,7 @@ pub(crate) const ALL: [Metric; 23] = [
     Metric::new("k", "classes told apart", "classes", Number, Neither),
     Metric::new("k_agrees", "all rovers tell equally many apart", "", Rate, Higher),
     Metric::new("log_likelihood", "log-likelihood of readings", "", Number, Neither),
+    Metric::new("log_score", "log score of the true story", "", Number, Higher),
     Metric::new("objective", "objective function", "", Number, Neither),
     Metric::new("position_error_m", "error of the estimated position", "m", Number, Lower),
     Metric::new(
@@ -52,6 +53,7 @@ pub(crate) const ALL: [Metric; 23] = [
         Lower,
     ),
     Metric::new("readings", "readings that a rover knows", "readings", Number, Higher),
+    Metric::new("regret", "regret of the rock named richest", "", Number, Lower),
     Metric::new("rocks_read", "rocks with a spectrum", "rocks", Number, Higher),
     Metric::new("solar_wh", "energy of the solar arrays", "Wh", Number, Higher),
     Metric::new("stops", "rocks that rovers set out for", "rocks", Number, Higher),

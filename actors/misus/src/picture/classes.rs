@@ -4,7 +4,7 @@
 use farside_actors::figure::svg::path;
 use farside_worlds::RockField;
 
-use crate::messages::Learned;
+use crate::messages::FieldModel;
 
 /// How many colours there are.
 pub(super) const COLOURS: usize = 8;
@@ -36,11 +36,11 @@ pub(super) fn shape(class: usize, (x, y): (f64, f64), radius: f64) -> String {
 /// For each learnt class the true class that it is drawn as: the one that most of its rocks are of. Of
 /// several learnt classes that are mostly of one, the one with most of its rocks has it; the others
 /// get those that are left.
-pub(super) fn matched(learned: &Learned, field: &RockField) -> Vec<usize> {
+pub(super) fn matched(model: &FieldModel, field: &RockField) -> Vec<usize> {
     let truth = field.truth();
-    let (own, all) = (learned.classes as usize, field.classes().len());
+    let (own, all) = (model.classes as usize, field.classes().len());
     let mut shared = vec![0_u32; own * all];
-    for (label, class) in learned.rocks.iter().zip(truth.classes()) {
+    for (label, class) in model.rocks.iter().zip(truth.classes()) {
         shared[label.class as usize * all + usize::from(*class)] += 1;
     }
     let mut drawn: Vec<Option<usize>> = vec![None; own];

@@ -10,7 +10,7 @@ use maud::{Markup, html};
 
 use super::classes::{COLOURS, matched, shape};
 use super::history::History;
-use crate::messages::Learned;
+use crate::messages::FieldModel;
 
 /// The side of a panel, in pixels.
 const PANEL: f64 = 560.0;
@@ -36,7 +36,7 @@ struct Panel<'a> {
 
 /// The picture of a field at a time, as the rover of this number thinks it is.
 pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: u64) -> Figure {
-    let learned = history.learned(rover, at_ns);
+    let model = history.model(rover, at_ns);
     let name = &history.names[rover];
     let px_per_m = PANEL / field.settings().side_m;
     let panel = |left| Panel {
@@ -48,8 +48,8 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
     let (truth, thought) = (panel(SIDE), panel(SIDE + PANEL + GAP));
     let at = SimDuration::from_nanos(at_ns);
     let title = format!("{}, seed {}, at {at}", history.scenario, history.seed);
-    let says = says(history, field, learned, name, at_ns);
-    let colours = learned.map(|learned| matched(learned, field));
+    let says = says(history, field, model, name, at_ns);
+    let colours = model.map(|model| matched(model, field));
     let right = SIDE + 2.0 * PANEL + GAP + 20.0;
     let body = html! {
         text class="title" x=(Px(SIDE)) y="28" { (title) }
@@ -60,8 +60,8 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
         (truth.true_rocks())
         (truth.tracks(at_ns))
         (thought.ground())
-        (thought.learned_rocks(learned, colours.as_deref()))
-        (thought.readings(learned))
+        (thought.learned_rocks(model, colours.as_deref()))
+        (thought.readings(model))
         (thought.tracks(at_ns))
         (legend(field, (right, TOP + 10.0)))
     };
@@ -81,7 +81,7 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
 fn says(
     history: &History,
     field: &RockField,
-    learned: Option<&Learned>,
+    model: Option<&FieldModel>,
     name: &str,
     at_ns: u64,
 ) -> String {
@@ -93,15 +93,15 @@ fn says(
         1 => " One fault so far.".to_owned(),
         more => format!(" {more} faults so far."),
     };
-    match learned {
+    match model {
         None => format!("{rocks} rocks ({story}). {name} has learnt nothing yet.{faults}"),
-        Some(learned) => format!(
+        Some(model) => format!(
             "{rocks} rocks of {} classes ({story}). {name} knows {} readings of {} rocks and tells {} \
              classes apart.{faults}",
             field.classes().len(),
-            learned.readings,
-            learned.rocks_read,
-            learned.classes
+            model.readings,
+            model.rocks_read,
+            model.classes
         ),
     }
 }
@@ -152,8 +152,8 @@ impl Panel<'_> {
     }
 
     /// Rocks by learnt class: the surer, the fuller; those that nobody has read are hollow.
-    fn learned_rocks(&self, learned: Option<&Learned>, colours: Option<&[usize]>) -> Markup {
-        let label = |rock: usize| learned.map(|learned| learned.rocks[rock]);
+    fn learned_rocks(&self, model: Option<&FieldModel>, colours: Option<&[usize]>) -> Markup {
+        let label = |rock: usize| model.map(|model| model.rocks[rock]);
         html! {
             @for rock in 0..self.field.rocks().len() {
                 @let (at, radius) = self.rock(rock);
@@ -176,8 +176,8 @@ impl Panel<'_> {
     }
 
     /// A dot where a spectrum is known, a ring where an image is.
-    fn readings(&self, learned: Option<&Learned>) -> Markup {
-        let rocks = learned.map_or(&[][..], |learned| &learned.rocks);
+    fn readings(&self, model: Option<&FieldModel>) -> Markup {
+        let rocks = model.map_or(&[][..], |model| &model.rocks);
         html! {
             @for (rock, label) in rocks.iter().enumerate() {
                 @let ((x, y), radius) = self.rock(rock);

@@ -6,7 +6,7 @@ use farside::record::RecordClass;
 use farside_actors::rover::{FaultBegins, RoverPose, RoverResources, hardware_name};
 use farside_actors::system::{PictureError, Recorded, Recording};
 
-use crate::messages::Learned;
+use crate::messages::FieldModel;
 
 /// A rover at an instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +37,7 @@ pub(super) struct History {
     pub(super) seed: u64,
     pub(super) names: Vec<String>,
     moments: Vec<Vec<Moment>>,
-    lessons: Vec<Vec<(u64, Learned)>>,
+    models: Vec<Vec<(u64, FieldModel)>>,
     faults: Vec<Fault>,
     pub(super) end_ns: u64,
 }
@@ -46,7 +46,7 @@ pub(super) struct History {
 struct Schemas {
     pose: Schema,
     resources: Schema,
-    learned: Schema,
+    model: Schema,
     fault: Schema,
 }
 
@@ -58,7 +58,7 @@ impl Schemas {
         Ok(Schemas {
             pose: Schema::of::<RoverPose>().map_err(unusable)?,
             resources: Schema::of::<RoverResources>().map_err(unusable)?,
-            learned: Schema::of::<Learned>().map_err(unusable)?,
+            model: Schema::of::<FieldModel>().map_err(unusable)?,
             fault: Schema::of::<FaultBegins>().map_err(unusable)?,
         })
     }
@@ -75,7 +75,7 @@ impl History {
             seed: run.seeds().run,
             names,
             moments: vec![Vec::new(); count],
-            lessons: vec![Vec::new(); count],
+            models: vec![Vec::new(); count],
             faults: Vec::new(),
             end_ns: 0,
         };
@@ -90,11 +90,11 @@ impl History {
                 return history.hardware(rover, record, &schemas).map_err(unreadable);
             }
             let scientist = history.names.iter().position(|name| name == record.actor);
-            if let (Some(rover), RecordClass::Sample, "Learned") =
+            if let (Some(rover), RecordClass::Sample, "FieldModel") =
                 (scientist, record.class, record.kind)
             {
-                let learned = schemas.learned.decode(record.body).map_err(unreadable)?;
-                history.lessons[rover].push((record.time_ns, learned));
+                let model = schemas.model.decode(record.body).map_err(unreadable)?;
+                history.models[rover].push((record.time_ns, model));
             }
             Ok(())
         })?;
@@ -162,8 +162,8 @@ impl History {
     }
 
     /// What a rover had learnt by a time.
-    pub(super) fn learned(&self, rover: usize, at_ns: u64) -> Option<&Learned> {
-        let all = &self.lessons[rover];
+    pub(super) fn model(&self, rover: usize, at_ns: u64) -> Option<&FieldModel> {
+        let all = &self.models[rover];
         let before = all.partition_point(|(time_ns, _)| *time_ns <= at_ns);
         before.checked_sub(1).map(|last| &all[last].1)
     }

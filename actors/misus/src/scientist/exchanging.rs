@@ -7,7 +7,7 @@ use super::{Instrument, Scientist};
 use crate::analysis::exchange::{ExchangeError, Statistics};
 use crate::analysis::reading::{Reading, TEXTURAL, Textural};
 use crate::learning::Lesson;
-use crate::messages::ExchangeDue;
+use crate::messages::{ExchangeDue, LessonDue};
 
 impl Handler<ExchangeDue> for Scientist {
     fn handle(&mut self, _: ExchangeDue, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -21,8 +21,15 @@ impl Handler<ExchangeDue> for Scientist {
                 }
             }
         }
-        self.learn(ctx);
         self.schedule_exchange(ctx);
+        Ok(())
+    }
+}
+
+impl Handler<LessonDue> for Scientist {
+    fn handle(&mut self, _: LessonDue, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.learn(ctx);
+        ctx.timer(self.site.config.learn_every, LessonDue);
         Ok(())
     }
 }
@@ -102,7 +109,7 @@ impl Scientist {
             Instrument::Camera
         } else {
             // A spectrum in which nothing was reflected says nothing of what reflects.
-            let features = self.site.basis.features(&measured.spectrum, measured.noise);
+            let features = self.site.tools.basis.features(&measured.spectrum, measured.noise);
             reading.spectral = Some(features.ok()?);
             Instrument::Spectrometer
         };
@@ -117,13 +124,18 @@ impl Scientist {
         if !std::mem::take(&mut self.is_to_learn) {
             return;
         }
-        let lesson = Lesson::of(&self.site, self.exchange.rows());
-        if let Some(lesson) = &lesson {
-            ctx.sample(&lesson.learned(self.exchange.rows().len()));
+        let rows = self.exchange.rows();
+        self.lesson = Lesson::of(&self.site, &mut self.stories, rows);
+        if let Some(lesson) = &self.lesson {
+            ctx.sample(&lesson.model(&self.site, self.exchange.rows().len()));
         }
     }
 
-    pub(super) fn most_wanted(&self, left: &[u32]) -> Option<u32> {
-        left.first().copied()
+    /// Of some rocks the one that the prioritiser values most, by all that is known now. Before
+    /// anything is known there is nothing to choose by.
+    pub(super) fn most_wanted(&mut self, ctx: &mut Context<'_, Self>, left: &[u32]) -> Option<u32> {
+        self.learn(ctx);
+        let wanted = |lesson: &Lesson| lesson.most_wanted(&self.site, left);
+        self.lesson.as_ref().and_then(wanted)
     }
 }

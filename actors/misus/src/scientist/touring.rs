@@ -225,7 +225,11 @@ impl Scientist {
                 let mut draws = ctx.random_at("tour", u64::from(stops)).stream();
                 tour::any(&left, &mut draws)
             }
-            Tour::Prioritised => self.most_wanted(&left),
+            Tour::Prioritised => {
+                let places = left.iter().map(|rock| (*rock, site.place_m(*rock)));
+                let nearest = tour::nearest(here_m, places);
+                self.most_wanted(ctx, &left).or(nearest)
+            }
         }
     }
 
