@@ -79,7 +79,10 @@ fn who_restarts_learns_again_what_the_others_know() {
     assert_ne!(without.digest, report.digest);
     assert_eq!(results.metrics["k_agrees"], true);
     let least = metric(&results, "class_ari_least");
-    assert!((metric(&results, "class_ari") - least).abs() < 1e-9, "{least}");
+    assert!(
+        (metric(&results, "class_ari") - least).abs() < 1e-9,
+        "{least}"
+    );
 }
 
 #[test]
@@ -118,7 +121,11 @@ fn both_executors_have_one_result() {
 /// Rovers that have nothing to do cost little.
 #[test]
 fn idle_rovers_are_cheap() {
-    let (results, _, told) = run_watched("misus/learn", &["until=10sol", "learn.stops=0"], Executor::Inline);
+    let (results, _, told) = run_watched(
+        "misus/learn",
+        &["until=10sol", "learn.stops=0"],
+        Executor::Inline,
+    );
     let records = told.0.lock().unwrap().1;
     assert!(metric(&results, "solar_wh") > 0.0);
     assert!(records < 200_000, "{records} records in 10 sols");

@@ -4,7 +4,9 @@
 use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
-use farside_actors::rover::{RoverConfig, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware};
+use farside_actors::rover::{
+    RoverConfig, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware,
+};
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
 use nalgebra::Point3;
@@ -83,9 +85,8 @@ pub(crate) fn assemble(
     let mut wiring = Wiring::default();
     for (number, (host, name)) in (0..).zip(hosts.iter().zip(&site.rovers)) {
         let shared = site.clone();
-        let scientist: Address<Scientist> = sim.actor(*host, name, move |_| {
-            Scientist::new(shared.clone(), number)
-        });
+        let scientist: Address<Scientist> =
+            sim.actor(*host, name, move |_| Scientist::new(shared.clone(), number));
         let start = start(number, parts.team.rovers);
         let spec = RoverSpec {
             number,

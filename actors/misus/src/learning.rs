@@ -96,7 +96,8 @@ impl Lesson {
         // Settings are in their ranges: the one error left is that there are no rocks.
         let read = Learned::from_rows(rows.clone(), &settings).ok()?;
         let unread = unread(site, &read);
-        let rocks = Rocks::pool(rows.chain(&unread));
+        let known: Vec<&Row> = rows.collect();
+        let rocks = Rocks::pool(known.into_iter().chain(&unread));
         let responsibilities = read.fit.mixture.responsibilities(rocks.table()).ok()?;
         let fit = Fit {
             responsibilities,
@@ -121,7 +122,9 @@ impl Lesson {
         let settings = PrioritiserSettings::default();
         let all = self.whole.rocks.len();
         let picks = rank(&self.whole, self.objective(site), &settings, all);
-        let rocks = picks.iter().map(|pick| self.whole.rocks.numbers()[pick.index]);
+        let rocks = picks
+            .iter()
+            .map(|pick| self.whole.rocks.numbers()[pick.index]);
         rocks.into_iter().find(|rock| of.contains(rock))
     }
 

@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 
 /// A timer: the lease of the hardware is to be renewed.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct LeaseDue;
+pub(crate) struct LeaseDue;
 
 /// A timer: readings are exchanged with the other rovers.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct ExchangeDue;
+pub(crate) struct ExchangeDue;
 
 /// A timer: the rover learns from what it knows.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct LessonDue;
+pub(crate) struct LessonDue;
 
 /// A timer: the hardware is asked how it is, and then something is begun.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct GoOn;
+pub(crate) struct GoOn;
 
 /// A timer: a command should have ended long ago.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Overdue {
+pub(crate) struct Overdue {
     /// The command's number.
-    pub command: u32,
+    pub(crate) command: u32,
 }
 
 /// A state sample: what a rover thinks of the field.

@@ -151,7 +151,10 @@ fn hardware(tally: &Tally) -> MisusMetrics {
     const J_PER_WH: f64 = 3600.0;
     let rovers = || tally.rovers.iter();
     let energy_wh = |part: &dyn Fn(&RoverEnergy) -> f64| {
-        rovers().map(|rover| part(&rover.resources.energy)).sum::<f64>() / J_PER_WH
+        rovers()
+            .map(|rover| part(&rover.resources.energy))
+            .sum::<f64>()
+            / J_PER_WH
     };
     let error_m = |pose: &RoverPose| {
         let (east_m, north_m) = (
@@ -162,7 +165,11 @@ fn hardware(tally: &Tally) -> MisusMetrics {
     };
     MisusMetrics {
         distance_m: rovers().map(|rover| rover.distance_m).sum(),
-        position_error_m: mean(rovers().filter_map(|rover| rover.pose.as_ref()).map(error_m)),
+        position_error_m: mean(
+            rovers()
+                .filter_map(|rover| rover.pose.as_ref())
+                .map(error_m),
+        ),
         solar_wh: energy_wh(&|energy| energy.solar_j),
         used_wh: energy_wh(&RoverEnergy::used_j),
         unused_wh: energy_wh(&|energy| energy.charge_loss_j + energy.not_taken_j),
@@ -199,7 +206,10 @@ fn ari(model: &FieldModel, field: &RockField, over: &[bool]) -> f64 {
     let truth = field.truth();
     let chosen = |rock: &usize| over[*rock];
     let rocks: Vec<usize> = (0..over.len()).filter(chosen).collect();
-    let own: Vec<usize> = rocks.iter().map(|&rock| model.rocks[rock].class as usize).collect();
+    let own: Vec<usize> = rocks
+        .iter()
+        .map(|&rock| model.rocks[rock].class as usize)
+        .collect();
     let true_of = |&rock: &usize| usize::from(truth.classes()[rock]);
     let true_classes: Vec<usize> = rocks.iter().map(true_of).collect();
     adjusted_rand_index(&own, &true_classes)
@@ -236,11 +246,20 @@ pub(crate) fn results(figures: Figures) -> Results {
     results.line("rocks with a spectrum", metrics.rocks_read.to_string());
     results.line("classes told apart", figure(metrics.k));
     results.line("adjusted Rand index", figure(metrics.class_ari));
-    results.line("error of the distribution", figure(metrics.distribution_error));
-    results.line("entropy of a rock's class", figure(metrics.posterior_entropy));
+    results.line(
+        "error of the distribution",
+        figure(metrics.distribution_error),
+    );
+    results.line(
+        "entropy of a rock's class",
+        figure(metrics.posterior_entropy),
+    );
     results.line("driven", format!("{:.0} m", metrics.distance_m));
     let [solar_wh, used_wh] = [metrics.solar_wh, metrics.used_wh];
-    results.line("energy", format!("{solar_wh:.0} Wh of sunlight, {used_wh:.0} Wh used"));
+    results.line(
+        "energy",
+        format!("{solar_wh:.0} Wh of sunlight, {used_wh:.0} Wh used"),
+    );
     if metrics.brown_outs > 0 {
         results.line("brown-outs", metrics.brown_outs.to_string());
     }
@@ -252,8 +271,17 @@ pub(crate) fn results(figures: Figures) -> Results {
 
 /// How far the learnt shares of the classes are from the true ones.
 fn share_error(model: &FieldModel, field: &RockField) -> f64 {
-    let learnt: Vec<usize> = model.rocks.iter().map(|label| label.class as usize).collect();
-    let truth: Vec<usize> = field.truth().classes().iter().map(|class| usize::from(*class)).collect();
+    let learnt: Vec<usize> = model
+        .rocks
+        .iter()
+        .map(|label| label.class as usize)
+        .collect();
+    let truth: Vec<usize> = field
+        .truth()
+        .classes()
+        .iter()
+        .map(|class| usize::from(*class))
+        .collect();
     distribution_error(&model.proportions, &learnt, &truth)
 }
 
@@ -261,7 +289,9 @@ fn share_error(model: &FieldModel, field: &RockField) -> f64 {
 fn mineral_regret(model: &FieldModel, field: &RockField, mineral: &str) -> Option<f64> {
     let at = field.minerals().iter().position(|name| name == mineral)?;
     let rocks = 0..field.rocks().len();
-    let fractions: Vec<f64> = rocks.map(|rock| field.truth().rock(rock).fractions[at]).collect();
+    let fractions: Vec<f64> = rocks
+        .map(|rock| field.truth().rock(rock).fractions[at])
+        .collect();
     Some(regret(&fractions, model.richest.map(|rock| rock as usize)))
 }
 

@@ -5,9 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{RunInfo, SimTime};
-use farside_actors::rover::{
-    FaultBegins, RoverIncident, RoverPose, RoverResources, hardware_name,
-};
+use farside_actors::rover::{FaultBegins, RoverIncident, RoverPose, RoverResources, hardware_name};
 
 use crate::messages::FieldModel;
 use crate::site::SharedSite;
@@ -111,7 +109,11 @@ impl Observer for Monitor {
     }
 
     fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
-        self.roles = run.entities.iter().map(|one| self.role(&one.name)).collect();
+        self.roles = run
+            .entities
+            .iter()
+            .map(|one| self.role(&one.name))
+            .collect();
         Ok(())
     }
 

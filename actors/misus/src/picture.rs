@@ -9,9 +9,12 @@ mod profiles;
 use farside::SimDuration;
 use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
+use farside_actors::figure::numbers::plain;
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
 };
+
+use farside_worlds::sky::SOL_S;
 
 use crate::assemble::names;
 use crate::place::Place;
@@ -97,4 +100,12 @@ fn time_ns(history: &History, at: Option<SimDuration>) -> Result<u64, PictureErr
         ))),
         Some(at) => Ok(at.as_nanos()),
     }
+}
+
+/// A time of a run in sols, to a thousandth.
+fn in_sols(time: SimDuration) -> String {
+    format!(
+        "{} sol",
+        plain(libm::round(time.as_secs_f64() / SOL_S * 1e3) / 1e3)
+    )
 }

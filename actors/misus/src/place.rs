@@ -112,7 +112,10 @@ fn library(
         return Ok(None);
     };
     let wrong = |message: String| SetupError::value("world.spectra", message);
-    let bytes = setup.files.read(name, MAX_FILE_BYTES as u64).map_err(wrong)?;
+    let bytes = setup
+        .files
+        .read(name, MAX_FILE_BYTES as u64)
+        .map_err(wrong)?;
     let library = SpectralLibrary::from_csv(&bytes);
     let library = library.map_err(|error| wrong(format!("{name}: {error}")))?;
     Ok(Some(Arc::new(library)))

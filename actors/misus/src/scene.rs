@@ -104,11 +104,7 @@ impl MisusScene {
             pose: here,
         });
         out.push(poses(name, vec![here]));
-        let believed_m = [
-            pose.estimated_east_m,
-            pose.estimated_north_m,
-            pose.height_m,
-        ];
+        let believed_m = [pose.estimated_east_m, pose.estimated_north_m, pose.height_m];
         let form = Form::Cube {
             size_m: [0.5, 0.35, 0.25].map(|part| part * SCALE_M),
         };

@@ -51,7 +51,9 @@ impl Instruments {
     pub(crate) fn of(rover: &RoverConfig) -> Instruments {
         let all = || rover.instruments.iter().filter(|one| one.on_mast);
         let name = |one: &farside_actors::rover::InstrumentModel| one.name.clone();
-        let is = |kind: InstrumentKind| move |one: &&farside_actors::rover::InstrumentModel| one.kind == kind;
+        let is = |kind: InstrumentKind| {
+            move |one: &&farside_actors::rover::InstrumentModel| one.kind == kind
+        };
         Instruments {
             camera: all()
                 .filter(is(InstrumentKind::Camera))

@@ -210,7 +210,10 @@ impl NetworkScene {
         Drawing::Entity {
             id: layered("nodes", name),
             frame: MAP.to_owned(),
-            shapes: vec![ball, drawing::label(name, [x, y, z + diameter_m], 0.5 * self.scale_m)],
+            shapes: vec![
+                ball,
+                drawing::label(name, [x, y, z + diameter_m], 0.5 * self.scale_m),
+            ],
         }
     }
 
@@ -276,7 +279,11 @@ impl Scene for NetworkScene {
         };
         self.rovers = run.entities.iter().map(drawn).collect();
         if let Some(crater) = self.in_crater.then(crater).and_then(Result::ok) {
-            out.extend(drawing::net(crater.terrain(), "crater", 0.02 * self.scale_m));
+            out.extend(drawing::net(
+                crater.terrain(),
+                "crater",
+                0.02 * self.scale_m,
+            ));
         }
         out.push(self.roads());
         let posts = self.posts();

@@ -110,9 +110,8 @@ pub(crate) fn with_pictures(command: clap::Command, registry: &Registry) -> clap
 impl Args {
     /// Takes over a picture that was named as an option, with what it is drawn along.
     pub(crate) fn name_picture(&mut self, given: &clap::ArgMatches, registry: &Registry) {
-        let typed = |name: &str| {
-            given.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
-        };
+        let typed =
+            |name: &str| given.value_source(name) == Some(clap::parser::ValueSource::CommandLine);
         let named = all_pictures(registry);
         let Some(picture) = named.iter().find(|picture| typed(picture.name)) else {
             return;

@@ -2,14 +2,15 @@
 //! read of them, where rovers are and where they believe to be.
 
 use farside::SimDuration;
+use farside_actors::figure::Figure;
 use farside_actors::figure::relief;
 use farside_actors::figure::svg::{Px, over_lines, path, shortened};
-use farside_actors::figure::Figure;
 use farside_worlds::RockField;
 use maud::{Markup, html};
 
 use super::classes::{COLOURS, matched, shape};
 use super::history::History;
+use super::in_sols;
 use crate::messages::FieldModel;
 
 /// The side of a panel, in pixels.
@@ -46,7 +47,7 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
         px_per_m,
     };
     let (truth, thought) = (panel(SIDE), panel(SIDE + PANEL + GAP));
-    let at = SimDuration::from_nanos(at_ns);
+    let at = in_sols(SimDuration::from_nanos(at_ns));
     let title = format!("{}, seed {}, at {at}", history.scenario, history.seed);
     let says = says(history, field, model, name, at_ns);
     let colours = model.map(|model| matched(model, field));
@@ -259,7 +260,10 @@ fn legend(field: &RockField, (x, y): (f64, f64)) -> Markup {
         (line("track believed"), "where it believed to be".to_owned()),
         (
             line("relief key"),
-            format!("contours every {} m", relief::contour_step_m(field.terrain())),
+            format!(
+                "contours every {} m",
+                relief::contour_step_m(field.terrain())
+            ),
         ),
     ]);
     html! {

@@ -9,7 +9,7 @@ use farside_actors::system::{PictureError, Recorded, Recording};
 use crate::messages::FieldModel;
 
 /// A rover at an instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     pub(super) time_ns: u64,
     /// Where it is.
@@ -17,6 +17,12 @@ pub(super) struct Moment {
     /// Where it believes to be.
     pub(super) believed_m: [f64; 2],
     pub(super) yaw_rad: f64,
+}
+
+/// What a rover has at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Level {
+    pub(super) time_ns: u64,
     pub(super) battery_j: f64,
     pub(super) solar_w: f64,
     pub(super) load_w: f64,
@@ -37,6 +43,8 @@ pub(super) struct History {
     pub(super) seed: u64,
     pub(super) names: Vec<String>,
     moments: Vec<Vec<Moment>>,
+    /// What rovers had, apart from where they were.
+    levels: Vec<Vec<Level>>,
     models: Vec<Vec<(u64, FieldModel)>>,
     faults: Vec<Fault>,
     pub(super) end_ns: u64,
@@ -75,6 +83,7 @@ impl History {
             seed: run.seeds().run,
             names,
             moments: vec![Vec::new(); count],
+            levels: vec![Vec::new(); count],
             models: vec![Vec::new(); count],
             faults: Vec::new(),
             end_ns: 0,
@@ -87,7 +96,9 @@ impl History {
             };
             let of_hardware = hardware.iter().position(|name| name == record.actor);
             if let Some(rover) = of_hardware {
-                return history.hardware(rover, record, &schemas).map_err(unreadable);
+                return history
+                    .hardware(rover, record, &schemas)
+                    .map_err(unreadable);
             }
             let scientist = history.names.iter().position(|name| name == record.actor);
             if let (Some(rover), RecordClass::Sample, "FieldModel") =
@@ -118,7 +129,6 @@ impl History {
         schemas: &Schemas,
     ) -> Result<(), DecodeError> {
         let time_ns = record.time_ns;
-        let before = self.moments[rover].last().copied().unwrap_or_default();
         match (record.class, record.kind) {
             (RecordClass::Sample, "RoverPose") => {
                 let pose: RoverPose = schemas.pose.decode(record.body)?;
@@ -127,18 +137,16 @@ impl History {
                     true_m: [pose.east_m, pose.north_m],
                     believed_m: [pose.estimated_east_m, pose.estimated_north_m],
                     yaw_rad: pose.yaw_rad,
-                    ..before
                 });
             }
             (RecordClass::Sample, "RoverResources") => {
                 let resources: RoverResources = schemas.resources.decode(record.body)?;
-                self.moments[rover].push(Moment {
+                self.levels[rover].push(Level {
                     time_ns,
                     battery_j: resources.energy.stored_j,
                     solar_w: resources.solar_w,
                     load_w: resources.load_w,
                     memory_bytes: resources.memory_used_bytes as f64,
-                    ..before
                 });
             }
             (RecordClass::Told, "FaultBegins") => {
@@ -161,6 +169,13 @@ impl History {
         &all[..all.partition_point(|moment| moment.time_ns <= at_ns)]
     }
 
+    /// What a rover had in a time span.
+    pub(super) fn levels(&self, rover: usize, from_ns: u64, to_ns: u64) -> &[Level] {
+        let all = &self.levels[rover];
+        let from = all.partition_point(|level| level.time_ns < from_ns);
+        &all[from..all.partition_point(|level| level.time_ns <= to_ns)]
+    }
+
     /// What a rover had learnt by a time.
     pub(super) fn model(&self, rover: usize, at_ns: u64) -> Option<&FieldModel> {
         let all = &self.models[rover];
@@ -170,14 +185,16 @@ impl History {
 
     /// How many faults had begun by a time.
     pub(super) fn faults_until(&self, at_ns: u64) -> usize {
-        self.faults.iter().filter(|fault| fault.time_ns <= at_ns).count()
+        self.faults
+            .iter()
+            .filter(|fault| fault.time_ns <= at_ns)
+            .count()
     }
 
     /// The faults of a rover in a time span.
     pub(super) fn faults_of(&self, rover: usize, from_ns: u64, to_ns: u64) -> Vec<&Fault> {
-        let within = |fault: &&Fault| {
-            fault.rover == rover && (from_ns..=to_ns).contains(&fault.time_ns)
-        };
+        let within =
+            |fault: &&Fault| fault.rover == rover && (from_ns..=to_ns).contains(&fault.time_ns);
         self.faults.iter().filter(within).collect()
     }
 }

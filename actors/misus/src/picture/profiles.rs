@@ -8,7 +8,8 @@ use farside_actors::figure::svg::{Area, Frame, Px, over_lines, path};
 use farside_worlds::sky::SOL_S;
 use maud::{Markup, html};
 
-use super::history::{Fault, History, Moment};
+use super::history::{Fault, History, Level};
+use super::in_sols;
 use crate::place::Place;
 
 /// The width of a strip, in pixels.
@@ -16,7 +17,7 @@ const WIDTH: f64 = 880.0;
 /// The height of a strip.
 const HEIGHT: f64 = 130.0;
 /// From strip to strip.
-const APART: f64 = 190.0;
+const APART: f64 = 200.0;
 /// Left of the strips: the marks of their axes.
 const LEFT: f64 = 64.0;
 /// Above the first strip.
@@ -27,7 +28,7 @@ struct Curve {
     name: &'static str,
     /// Its colour and dashes.
     series: usize,
-    value: fn(&Moment) -> f64,
+    value: fn(&Level) -> f64,
 }
 
 /// One resource.
@@ -47,20 +48,16 @@ pub(super) fn figure(
     (from_ns, to_ns): (u64, u64),
 ) -> Figure {
     let name = &history.names[rover];
-    let moments: Vec<Moment> = history
-        .until(rover, to_ns)
-        .iter()
-        .filter(|moment| moment.time_ns >= from_ns)
-        .copied()
-        .collect();
+    let levels = history.levels(rover, from_ns, to_ns);
     let faults = history.faults_of(rover, from_ns, to_ns);
     let strips = strips(capacity);
     let [from, to] = [from_ns, to_ns].map(SimDuration::from_nanos);
+    let [begins, ends] = [from, to].map(in_sols);
     let title = format!(
-        "{name} of {}, seed {}, from {from} to {to}",
+        "{name} of {}, seed {}, from {begins} to {ends}",
         history.scenario, history.seed
     );
-    let says = says(&moments, faults.len());
+    let says = says(levels, faults.len());
     let bottom = TOP + APART * strips.len() as f64;
     let x = Axis {
         from_s: from.as_secs_f64(),
@@ -77,7 +74,7 @@ pub(super) fn figure(
                 height: HEIGHT,
             };
             (nights(place, &x, &area))
-            (drawn(strip, &moments, &x, &area))
+            (drawn(strip, levels, &x, &area, row + 1 == strips.len()))
             (faulty(&faults, &x, &area, row == 0))
         }
     };
@@ -122,16 +119,19 @@ fn strips([battery_j, memory_bytes]: [f64; 2]) -> Vec<Strip> {
     ]
 }
 
-fn says(moments: &[Moment], faults: usize) -> String {
+fn says(levels: &[Level], faults: usize) -> String {
     let faults = match faults {
         0 => "No fault.".to_owned(),
         1 => "One fault.".to_owned(),
         more => format!("{more} faults."),
     };
-    let least = moments.iter().map(|m| m.battery_j).min_by(f64::total_cmp);
+    let least = levels.iter().map(|m| m.battery_j).min_by(f64::total_cmp);
     match least {
         None => format!("Nothing is recorded of it then. {faults}"),
-        Some(least_j) => format!("Its battery held {:.0} Wh at least. {faults}", least_j / 3600.0),
+        Some(least_j) => format!(
+            "Its battery held {:.0} Wh at least. {faults}",
+            least_j / 3600.0
+        ),
     }
 }
 
@@ -148,25 +148,27 @@ impl Axis {
     }
 }
 
-fn drawn(strip: &Strip, moments: &[Moment], x: &Axis, area: &Area) -> Markup {
-    let values = strip.curves.iter().flat_map(|curve| moments.iter().map(curve.value));
+fn drawn(strip: &Strip, levels: &[Level], x: &Axis, area: &Area, is_last: bool) -> Markup {
+    let values = strip
+        .curves
+        .iter()
+        .flat_map(|curve| levels.iter().map(curve.value));
     let scale = Scale::measured(values.chain(strip.full).chain([0.0]));
     let sols = Scale::between(x.from_s / SOL_S, x.to_s / SOL_S);
-    let mut x_ticks = sols.ticks(10.0);
-    for tick in &mut x_ticks {
-        tick.at = x.place(tick.value * SOL_S);
-    }
     let frame = Frame {
         area: *area,
-        x_label: "sols since the start",
-        x_ticks,
+        x_label: if is_last { "sols since the start" } else { "" },
+        x_ticks: sols.ticks(10.0),
         y_label: strip.label.to_owned(),
         y_ticks: scale.ticks(4.0),
     };
     let line = |curve: &Curve| {
-        let points = moments.iter().map(|moment| {
-            let time_s = moment.time_ns as f64 / 1e9;
-            (area.x(x.place(time_s)), area.y(scale.place((curve.value)(moment))))
+        let points = levels.iter().map(|level| {
+            let time_s = level.time_ns as f64 / 1e9;
+            (
+                area.x(x.place(time_s)),
+                area.y(scale.place((curve.value)(level))),
+            )
         });
         path(points)
     };

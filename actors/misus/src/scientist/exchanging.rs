@@ -109,7 +109,11 @@ impl Scientist {
             Instrument::Camera
         } else {
             // A spectrum in which nothing was reflected says nothing of what reflects.
-            let features = self.site.tools.basis.features(&measured.spectrum, measured.noise);
+            let features = self
+                .site
+                .tools
+                .basis
+                .features(&measured.spectrum, measured.noise);
             reading.spectral = Some(features.ok()?);
             Instrument::Spectrometer
         };

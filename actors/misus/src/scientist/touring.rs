@@ -59,10 +59,12 @@ pub(super) enum Doing {
     },
     /// To be a little away from what is in the way.
     BackingUp { rock: u32, detours: u32 },
+    /// An image of all around, to see where a rock is that was missed.
+    Searching { rock: u32 },
     /// The mast to point at a rock.
-    Pointing { rock: u32 },
+    Pointing { rock: u32, again: bool },
     /// An image of a rock.
-    Imaging { rock: u32 },
+    Imaging { rock: u32, again: bool },
     /// A spectrum of a rock.
     Reading { rock: u32 },
 }
@@ -137,18 +139,28 @@ impl Handler<CommandReport> for Scientist {
                 CommandEnd::Done
                 | CommandEnd::Failed {
                     reason: Failure::Blocked { .. },
-                } => self.point(ctx, rock),
+                } => self.point(ctx, rock, self.site.place_m(rock), false),
                 end => self.later(ctx, &end),
             },
             Doing::BackingUp { rock, detours } => {
                 self.go_round(ctx, &report.pose, rock, detours + 1)
             }
-            Doing::Pointing { rock } => match report.end {
-                CommandEnd::Done => self.image(ctx, rock),
+            Doing::Searching { rock } => match place_of(&report, rock) {
+                Some(place_m) => self.point(ctx, rock, place_m, true),
+                None => self.give_up(ctx, rock, &report.end),
+            },
+            Doing::Pointing { rock, again } => match report.end {
+                CommandEnd::Done => self.image(ctx, rock, again),
                 end => self.give_up(ctx, rock, &end),
             },
+            // Whoever believes to be elsewhere points beside the rock: it looks round for it, once.
+            Doing::Imaging { rock, again: false }
+                if report.end == CommandEnd::Done && place_of(&report, rock).is_none() =>
+            {
+                self.search(ctx, rock)
+            }
             // Without an image there is still the spectrum.
-            Doing::Imaging { rock } => self.spectrum(ctx, rock),
+            Doing::Imaging { rock, .. } => self.spectrum(ctx, rock),
             Doing::Reading { rock } => match report.end {
                 CommandEnd::Done => self.visited(ctx, rock),
                 end => self.give_up(ctx, rock, &end),
@@ -246,7 +258,7 @@ impl Scientist {
         let radius_m = 0.5 * self.site.catalogue[rock as usize].diameter_m;
         let stands_m = radius_m + self.site.config.stand_off_m;
         if way_m.norm() <= stands_m {
-            return self.point(ctx, rock);
+            return self.point(ctx, rock, self.site.place_m(rock), false);
         }
         let goal_m = self.site.place_m(rock) + way_m.normalize() * stands_m;
         let doing = Doing::Driving {
@@ -281,20 +293,49 @@ impl Scientist {
         self.command(ctx, doing, to(here_m + turn * direction * aside_m))
     }
 
-    fn point(&mut self, ctx: &mut Context<'_, Self>, rock: u32) -> Outcome {
-        let place_m = self.site.place_m(rock);
+    /// Looks round for a rock that was missed.
+    fn search(&mut self, ctx: &mut Context<'_, Self>, rock: u32) -> Outcome {
+        self.since_panorama = Some(0);
+        match self.site.instruments.panorama.clone() {
+            Some(camera) => {
+                let view = View::Panorama;
+                self.command(
+                    ctx,
+                    Doing::Searching { rock },
+                    Command::Image { camera, view },
+                )
+            }
+            None => self.spectrum(ctx, rock),
+        }
+    }
+
+    fn point(
+        &mut self,
+        ctx: &mut Context<'_, Self>,
+        rock: u32,
+        place_m: Point2<f64>,
+        again: bool,
+    ) -> Outcome {
         let aim = Aim::Place {
             east_m: place_m.x,
             north_m: place_m.y,
         };
-        self.command(ctx, Doing::Pointing { rock }, Command::PanTilt { aim })
+        self.command(
+            ctx,
+            Doing::Pointing { rock, again },
+            Command::PanTilt { aim },
+        )
     }
 
-    fn image(&mut self, ctx: &mut Context<'_, Self>, rock: u32) -> Outcome {
+    fn image(&mut self, ctx: &mut Context<'_, Self>, rock: u32, again: bool) -> Outcome {
         match self.site.instruments.camera.clone() {
             Some(camera) => {
                 let view = View::Point;
-                self.command(ctx, Doing::Imaging { rock }, Command::Image { camera, view })
+                self.command(
+                    ctx,
+                    Doing::Imaging { rock, again },
+                    Command::Image { camera, view },
+                )
             }
             None => self.spectrum(ctx, rock),
         }
@@ -310,6 +351,15 @@ impl Scientist {
             None => self.visited(ctx, rock),
         }
     }
+}
+
+/// Where a rock lies, as readings of it have it; none if there is no reading of it.
+fn place_of(report: &CommandReport, rock: u32) -> Option<Point2<f64>> {
+    let reading = report
+        .readings
+        .iter()
+        .find(|reading| reading.rock == Some(rock))?;
+    Some(Point2::new(reading.east_m, reading.north_m))
 }
 
 fn to(goal_m: Point2<f64>) -> Command {

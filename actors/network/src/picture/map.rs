@@ -16,8 +16,8 @@ use super::colouring;
 use super::{Drawn, Surroundings, counted};
 use crate::tracks::Sighting;
 use crate::waits::{Waits, nearer};
-use farside_actors::figure::{Figure, relief};
 use farside_actors::figure::svg::{Px, over_lines, path};
+use farside_actors::figure::{Figure, relief};
 
 /// The middle length of an edge, in pixels; a map too large for that is drawn smaller.
 const EDGE: f64 = 34.0;

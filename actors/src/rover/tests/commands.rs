@@ -315,7 +315,10 @@ fn slopes_tilt_it_slow_it_and_cost_power() {
     let (lasts_s, report) = bench.done(drive(12.0, 9.0));
     assert_eq!(report.end, CommandEnd::Done);
     let level_s = 15.0 / 0.05 + libm::atan2(9.0, 12.0) / (2.0 * PI) * 180.0;
-    assert!(lasts_s > level_s + 1.0, "{lasts_s} s, and {level_s} s on level ground");
+    assert!(
+        lasts_s > level_s + 1.0,
+        "{lasts_s} s, and {level_s} s on level ground"
+    );
     let energy_j = bench.hardware.figures().energy.wheels_j;
     assert!(energy_j > 100.0 * lasts_s - 200.0);
     let tilted = bench.out.iter().filter_map(|output| match output {

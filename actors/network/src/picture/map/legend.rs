@@ -4,8 +4,8 @@ use farside_actors::figure::svg::{Px, path};
 use maud::{Markup, html};
 
 use super::{Sheet, arrow, ends_of, entry_mark, exit_mark, nose};
-use farside_actors::figure::relief::{contour_step_m, step};
 use crate::picture::Surroundings;
+use farside_actors::figure::relief::{contour_step_m, step};
 
 /// The most that it is high.
 pub(super) const HEIGHT: f64 = 24.0 * 15.0;
