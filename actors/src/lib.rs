@@ -1,5 +1,5 @@
-//! What systems of actors share, for Farside: links, radios, processors, units, teams, invariants,
-//! figures, and what a system is.
+//! What systems of actors share, for Farside: links, radios, processors, units, teams, the hardware of
+//! rovers, invariants, figures, and what a system is.
 
 pub mod figure;
 pub mod invariants;
