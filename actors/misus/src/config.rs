@@ -119,7 +119,7 @@ settings! {
     pub struct LearnConfig {
         /// What the team wants to find out.
         pub objective: Objective, one_of(&["distribution", "mineral", "process"]);
-        /// The mineral that is looked for; only with `objective = "mineral"`.
+        /// The mineral whose richest rock rovers name, and look for with `objective = "mineral"`.
         pub mineral: String = "olivine".to_owned();
         /// Which rock a rover goes to next, of those in its own sector of the field.
         pub tour: Tour, one_of(&["fixed", "random", "prioritised"]);

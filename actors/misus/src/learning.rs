@@ -23,8 +23,8 @@ use crate::site::Site;
 /// How sure the catalogue is of where a rock lies \[m\].
 const CATALOGUE_SD_M: f32 = 0.1;
 
-/// What all rovers carry to learn with: a basis of spectra, and a gauge for the mineral if one is
-/// looked for.
+/// What all rovers carry to learn with: a basis of spectra, and a gauge for the mineral of
+/// `learn.mineral`, if the library knows it.
 pub(crate) struct Tools {
     pub(crate) basis: SpectralBasis,
     gauge: Option<MineralGauge>,
@@ -45,12 +45,12 @@ impl Tools {
         let wrong = |error: &dyn std::fmt::Display| SetupError::value("world.spectra", error);
         let basis = SpectralBasis::new(library.wavelengths_nm(), &spectra);
         let basis = basis.map_err(|error| wrong(&error))?;
-        if learn.objective != Objective::Mineral {
-            return Ok(Tools { basis, gauge: None });
-        }
         let minerals = library.minerals();
         let at = minerals.iter().position(|name| *name == learn.mineral);
         let Some(at) = at else {
+            if learn.objective != Objective::Mineral {
+                return Ok(Tools { basis, gauge: None });
+            }
             let (known, wanted) = (minerals.join(", "), &learn.mineral);
             let hint = farside::suggest::nearest(wanted, minerals.iter().map(String::as_str));
             let hint = farside::suggest::did_you_mean(hint.as_deref());
@@ -79,7 +79,7 @@ pub(crate) struct Lesson {
     /// Of all rocks of the catalogue, in the order of their numbers: of those that nobody has read,
     /// from their place alone.
     whole: Learned,
-    story: Option<StoryBelief>,
+    story: StoryBelief,
 }
 
 impl Lesson {
@@ -104,16 +104,16 @@ impl Lesson {
             ..read.fit.clone()
         };
         let whole = Learned { rocks, fit };
-        let asks = site.config.objective == Objective::Process;
-        let story = asks.then(|| stories.weigh(&whole));
+        let story = stories.weigh(&whole);
         Some(Lesson { read, whole, story })
     }
 
     fn objective<'a>(&'a self, site: &'a Site) -> Analysed<'a> {
-        match (&site.tools.gauge, &self.story) {
-            (Some(gauge), _) => Analysed::Mineral(gauge),
-            (None, Some(story)) => Analysed::Process(story),
-            (None, None) => Analysed::Distribution,
+        match (site.config.objective, &site.tools.gauge) {
+            (Objective::Mineral, Some(gauge)) => Analysed::Mineral(gauge),
+            (Objective::Process, _) => Analysed::Process(&self.story),
+            // A mineral that the library does not know is refused before the run.
+            (Objective::Distribution | Objective::Mineral, _) => Analysed::Distribution,
         }
     }
 
@@ -152,7 +152,7 @@ impl Lesson {
             proportions: (0..classes).map(share).collect(),
             rocks,
             richest: richest.map(|at| self.whole.rocks.numbers()[at]),
-            stories: self.story.as_ref().map_or_else(Vec::new, probabilities),
+            stories: probabilities(&self.story),
         }
     }
 

@@ -48,10 +48,9 @@ pub struct FieldModel {
     pub proportions: Vec<f64>,
     /// What it thinks of each rock of the catalogue, in the order of their numbers.
     pub rocks: Vec<RockLabel>,
-    /// The rock that it thinks is the richest in the mineral that is looked for; with
-    /// `objective = "mineral"`.
+    /// The rock that it thinks is the richest in the mineral of `learn.mineral`.
     pub richest: Option<u32>,
-    /// How likely each story is; with `objective = "process"`.
+    /// How likely each story is.
     pub stories: Vec<StoryProbability>,
 }
 

@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::analysis::objective::regret;
 use crate::analysis::scores::{adjusted_rand_index, distribution_error};
 use crate::assemble::Team;
-use crate::config::{LearnConfig, Objective};
+use crate::config::LearnConfig;
 use crate::messages::FieldModel;
 use crate::monitor::{RoverTally, Tally};
 
@@ -52,12 +52,11 @@ farside_actors::documented! {
         pub objective: Option<f64>,
         /// Readings that a rover knows at the end, its own and those of others, mean over rovers.
         pub readings: f64,
-        /// By how much the rock that rovers name falls short of the richest in the mineral that is
-        /// looked for: the best true fraction less that of the rock named, mean over rovers. Only
-        /// with `objective = "mineral"`.
+        /// By how much the rock that rovers name falls short of the richest in the mineral of
+        /// `learn.mineral`: the best true fraction less that of the rock named, mean over rovers.
         pub regret: Option<f64>,
         /// The logarithm of how likely rovers think the true story is, at least that of 1e-6, mean over
-        /// rovers; 0 is best. Only with `objective = "process"`.
+        /// rovers; 0 is best. None where no story laid the field (`uniform`).
         pub log_score: Option<f64>,
         /// Rocks of which some rover took a spectrum.
         pub rocks_read: u32,
@@ -119,8 +118,7 @@ pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> Figures {
 }
 
 fn figures(tally: &Tally, field: &RockField, learn: &LearnConfig) -> MisusMetrics {
-    let looks_for = (learn.objective == Objective::Mineral).then_some(learn.mineral.as_str());
-    let regret_of = |one: &FieldModel| mineral_regret(one, field, looks_for?);
+    let regret_of = |one: &FieldModel| mineral_regret(one, field, &learn.mineral);
     let last: Vec<&FieldModel> = tally.rovers.iter().filter_map(latest).collect();
     let read = read_by_some(&last);
     let aris: Vec<f64> = last.iter().map(|one| ari(one, field, &read)).collect();

@@ -73,7 +73,7 @@ impl Pose {
     }
 
     /// A place given ahead and to the left of this pose \[m\].
-    pub(super) fn from_body(&self, ahead_m: f64, left_m: f64) -> Point2<f64> {
+    pub(super) fn place_at(&self, ahead_m: f64, left_m: f64) -> Point2<f64> {
         let (sine, cosine) = libm::sincos(self.yaw_rad);
         let east_m = self.east_m + ahead_m * cosine - left_m * sine;
         Point2::new(east_m, self.north_m + ahead_m * sine + left_m * cosine)
@@ -110,7 +110,7 @@ impl Attitude {
     /// On the ground below its wheels, whose ends lie half a base from its middle.
     pub(super) fn on(ground: &RockField, pose: &Pose, wheelbase_m: f64) -> Attitude {
         let height_m = |ahead_m, left_m| {
-            let place_m = pose.from_body(ahead_m, left_m);
+            let place_m = pose.place_at(ahead_m, left_m);
             ground.ground_m(place_m.x, place_m.y)
         };
         let half_m = 0.5 * wheelbase_m;

@@ -92,7 +92,7 @@ impl Landmarks {
             yaw_rad,
             ..Pose::default()
         };
-        let middle_m = turned.from_body(seen_m[0], seen_m[1]);
+        let middle_m = turned.place_at(seen_m[0], seen_m[1]);
         let pose = Pose {
             east_m: known_m[0] - middle_m.x,
             north_m: known_m[1] - middle_m.y,
@@ -106,7 +106,7 @@ impl Landmarks {
     pub(super) fn remember(&mut self, sightings: &[Sighting], from: &Pose, sigma_m: f64) {
         for seen in sightings {
             self.0.entry(seen.rock).or_insert_with(|| Landmark {
-                place_m: from.from_body(seen.ahead_m, seen.left_m),
+                place_m: from.place_at(seen.ahead_m, seen.left_m),
                 sigma_m: libm::hypot(sigma_m, seen.sigma_m).max(LEAST_SIGMA_M),
             });
         }

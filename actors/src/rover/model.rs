@@ -135,7 +135,10 @@ settings! {
         /// How long the rover goes on without a word from its controller; with 0 s, for ever.
         pub lease: SimDuration [with = "units::duration"] = SimDuration::from_secs(600);
         /// How often it records its state when nothing happens; with 0 s, never.
-        pub record_every: SimDuration [with = "units::duration"] = SimDuration::from_secs(1800);
+        pub record_every: SimDuration [with = "units::duration"] = SimDuration::from_secs(1800),
+            such_that("0s, or 1s and more", SimDuration::to_string, |every: &SimDuration| {
+                every.is_zero() || *every >= SimDuration::from_secs(1)
+            });
         /// Its cameras and spectrometers. One of a name that the model has changes that one.
         pub instruments as "instrument": Vec<InstrumentModel>, Within;
         /// Faults at times of one's own choice.
@@ -416,6 +419,11 @@ mod tests {
         assert!(refused("recovery = 0.1").contains("rover.recovery: 0.1: expected more than"));
         assert!(refused("[[instrument]]\nname = 'x'").contains("rover.instrument.2.point"));
         assert!(refused("[[instrument]]\nnoise = 1").contains("noise"));
+        let error = refused("record_every = '1ms'");
+        assert_eq!(
+            error,
+            "rover.record_every: 1ms: expected 0s, or 1s and more"
+        );
         let twice = "[[instrument]]\nname = ''\n[instrument.point]";
         assert!(refused(twice).contains("rover.instrument.2.name: missing"));
     }

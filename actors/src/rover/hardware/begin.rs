@@ -206,7 +206,7 @@ impl Hardware {
         let [ahead_m, left_m] = estimate.to_body(place_m);
         let attitude = self.attitude(&truth);
         let eye = Eye::on(&truth, &attitude, self.spec.config.mast_m);
-        eye.angles_rad(&self.spec.site.ground, truth.from_body(ahead_m, left_m))
+        eye.angles_rad(&self.spec.site.ground, truth.place_at(ahead_m, left_m))
     }
 
     /// The place of an instrument and what a view of it takes.

@@ -216,7 +216,7 @@ impl Hardware {
         let estimate = self.body.estimate;
         let first = u64::from(self.spec.number) << 32 | number;
         let reading = |(id, one): (u64, Measured)| {
-            let at_m = estimate.from_body(one.ahead_m, one.left_m);
+            let at_m = estimate.place_at(one.ahead_m, one.left_m);
             Reading {
                 id,
                 instrument: name.clone(),

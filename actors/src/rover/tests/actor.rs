@@ -75,7 +75,7 @@ fn add(sim: &mut Simulation, spec: RoverSpec, plan: &[(u64, Command)]) -> (HostI
         plan: plan.clone(),
         log: told.clone(),
     });
-    add_hardware(sim, host, spec, controller);
+    add_hardware(sim, host, spec, controller).expect("a rover on its terrain");
     (host, log)
 }
 
@@ -93,6 +93,32 @@ fn fault(at_s: u64, kind: FaultKind, part: Option<&str>) -> FaultConfig {
         duration: Some(SimDuration::from_secs(500)),
         ..FaultConfig::default()
     }
+}
+
+#[test]
+fn a_rover_that_cannot_be_is_refused() {
+    let refused = |edit: fn(&mut RoverSpec)| {
+        let mut sim = Simulation::new(1);
+        let host = sim.host("rover_03");
+        let controller = sim.actor(host, "rover_03/controller", |_| Script {
+            rover: String::new(),
+            plan: Vec::new(),
+            log: Told::default(),
+        });
+        let mut spec = spec(level_field(1), config());
+        edit(&mut spec);
+        add_hardware(&mut sim, host, spec, controller)
+            .unwrap_err()
+            .to_string()
+    };
+    let error = refused(|spec| spec.start.east_m = 51.0);
+    assert!(
+        error.starts_with("rover_03: starts at (51, 0) m: expected"),
+        "{error}"
+    );
+    assert!(refused(|spec| spec.start.north_m = f64::NAN).contains("(0, NaN) m"));
+    assert!(refused(|spec| spec.site.starts_s = f64::INFINITY).contains("starts_s: inf"));
+    assert!(refused(|spec| spec.config.recovery = 0.0).starts_with("rover.recovery"));
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn a_drive_takes_its_time_and_ends_at_its_place() {
     let figures = *bench.hardware.figures();
     assert_near(figures.driven_m, 5.0, 1e-9);
     assert_near(figures.position_error_m, 0.0, 1e-9);
-    assert_near(figures.energy.wheels_j, 145.0 * 100.0, 1e-6);
+    assert_near(figures.energy.wheels_j, 145.0 * 100.0, 0.5);
 }
 
 #[test]
@@ -216,6 +216,29 @@ fn a_point_reading_is_of_what_the_mast_points_at() {
         .zip(&reading.spectrum)
         .map(|(a, b)| (a - b) * (a - b));
     assert!(libm::sqrt(squares.sum::<f64>() / ground.len() as f64) < 2.0 * reading.noise);
+}
+
+#[test]
+fn from_afar_the_beam_takes_in_what_is_beside_it() {
+    let field = level_field(40);
+    let (rock, [east_m, north_m]) = lonely_rock(&field);
+    let clean = field.reflectance(rock as usize).to_vec();
+    let mut config = exact();
+    let point = config.instruments[1].point.as_mut();
+    let point = point.expect("it reads points");
+    // 12 cm wide at the rock, and 1.4 m from afar.
+    (point.noise, point.beam_rad) = (0.0, 0.06);
+    let off_at = |behind_m: f64| {
+        let mut spec = spec(field.clone(), config.clone());
+        (spec.start.east_m, spec.start.north_m) = (east_m - behind_m, north_m);
+        let mut bench = Bench::new(spec);
+        bench.done(at(east_m + 2.0, north_m));
+        let (_, report) = bench.done(spectrum(View::Point));
+        let differences = clean.iter().zip(&report.readings[0].spectrum);
+        differences.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let [near, far] = [off_at(0.0), off_at(22.0)];
+    assert!(near < 1e-9 && far > 0.01, "{near} {far}");
 }
 
 #[test]
