@@ -35,6 +35,9 @@ farside_actors::documented! {
         pub class_ari: Option<f64>,
         /// The same of the rover for which it is least.
         pub class_ari_least: Option<f64>,
+        /// The same as `class_ari` over all rocks of the field, read or not, mean over rovers: how well
+        /// a team knows the whole field.
+        pub field_ari: Option<f64>,
         /// How many classes rovers tell apart, mean over rovers.
         pub k: Option<f64>,
         /// Whether all rovers tell equally many classes apart.
@@ -127,6 +130,10 @@ fn figures(tally: &Tally, field: &RockField, learn: &LearnConfig) -> MisusMetric
     MisusMetrics {
         class_ari: mean(aris.iter().copied()),
         class_ari_least: aris.iter().copied().min_by(f64::total_cmp),
+        field_ari: mean(
+            last.iter()
+                .map(|one| ari(one, field, &vec![true; read.len()])),
+        ),
         k: mean_of(&|one| f64::from(one.classes)),
         k_agrees: last.windows(2).all(|two| two[0].classes == two[1].classes),
         distribution_error: mean(errors),
@@ -214,10 +221,9 @@ fn ari(model: &FieldModel, field: &RockField, over: &[bool]) -> f64 {
 }
 
 /// How a team's knowledge grew: at the end of each sol, the mean over rovers of the adjusted Rand index
-/// of all rocks that some rover has a spectrum of at the end of the run.
+/// of all rocks of the field.
 fn over_sols(tally: &Tally, field: &RockField, end: SimTime) -> Series {
-    let last: Vec<&FieldModel> = tally.rovers.iter().filter_map(latest).collect();
-    let read = read_by_some(&last);
+    let all = vec![true; field.rocks().len()];
     let sols = libm::floor(end.as_secs_f64() / SOL_S) as u32;
     let at = |sol: u32| {
         let until_s = f64::from(sol) * SOL_S;
@@ -226,7 +232,7 @@ fn over_sols(tally: &Tally, field: &RockField, end: SimTime) -> Series {
             let before = models.take_while(|(at, _)| at.as_secs_f64() <= until_s);
             before.last().map(|(_, model)| model)
         });
-        mean(by_then.map(|model| ari(model, field, &read)))
+        mean(by_then.map(|model| ari(model, field, &all)))
     };
     let index = (1..=sols).map(f64::from).collect();
     Series::new(index, (1..=sols).map(at).collect()).unwrap_or_default()
@@ -239,7 +245,7 @@ pub(crate) fn results(figures: Figures) -> Results {
         over_sols,
         faults,
     } = figures;
-    let mut results = Results::of(&metrics).metric("class_ari_by_sol", over_sols);
+    let mut results = Results::of(&metrics).metric("field_ari_by_sol", over_sols);
     let figure = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
     results.line("rocks with a spectrum", metrics.rocks_read.to_string());
     results.line("classes told apart", figure(metrics.k));

@@ -6,7 +6,7 @@ use farside_actors::system::MetricKind::{Number, Rate, Series};
 use farside_actors::system::SeriesIndex;
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 25] = [
+pub(crate) const ALL: [Metric; 26] = [
     Metric::new("brown_outs", "brown-outs", "", Number, Lower),
     Metric::new(
         "class_ari",
@@ -14,17 +14,6 @@ pub(crate) const ALL: [Metric; 25] = [
         "",
         Number,
         Higher,
-    ),
-    Metric::new(
-        "class_ari_by_sol",
-        "adjusted Rand index of classes",
-        "",
-        Series(SeriesIndex::new("sol", "")),
-        Higher,
-    )
-    .about(
-        "class_ari as it was at the end of each sol, over the rocks of which some rover has a \
-         spectrum at the end of the run.",
     ),
     Metric::new(
         "class_ari_least",
@@ -63,6 +52,21 @@ pub(crate) const ALL: [Metric; 25] = [
         Lower,
     ),
     Metric::new("faults", "faults of rovers", "", Number, Neither),
+    Metric::new(
+        "field_ari",
+        "adjusted Rand index of the whole field",
+        "",
+        Number,
+        Higher,
+    ),
+    Metric::new(
+        "field_ari_by_sol",
+        "adjusted Rand index of the whole field",
+        "",
+        Series(SeriesIndex::new("sol", "")),
+        Higher,
+    )
+    .about("field_ari as it was at the end of each sol."),
     Metric::new("k", "classes told apart", "classes", Number, Neither),
     Metric::new(
         "k_agrees",
