@@ -1,11 +1,13 @@
-//! Terrain, roadmaps, sensor networks and contact plans for Farside.
+//! Terrain, rock fields, roadmaps, sensor networks and contact plans for Farside.
 //!
 //! A world is what rovers drive on and what radio nodes stand in: it holds no time, sends no
 //! message and writes no log. The network-guided system needs two things of it, a [`Roadmap`] and
 //! a [`SensorNetwork`] over it. Both lie in a generated [`Crater`], whose [`HeightField`] tells a
-//! radio link what the ground hides. [`sky`] says where the Sun stands over Mars. [`contacts`] reads
-//! when which node hears which, as ION, HDTN and mahimahi write it down; [`movingai`] reads grid maps
-//! and tasks of path-finding benchmarks.
+//! radio link what the ground hides. Rovers that drive freely and look at rocks do so in a
+//! [`RockField`]: rocks of classes that [`geology`] knows, laid out by a [`Story`], with [`spectra`]
+//! that are mixed from minerals or measured ([`SpectralLibrary`]). [`sky`] says where the Sun stands
+//! over Mars. [`contacts`] reads when which node hears which, as ION, HDTN and mahimahi write it down;
+//! [`movingai`] reads grid maps and tasks of path-finding benchmarks.
 //!
 //! ```
 //! use farside_worlds::{Roadmap, SensorNetwork};

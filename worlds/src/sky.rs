@@ -237,6 +237,7 @@ fn transmitted(optical_depth: f64, sine: f64) -> f64 {
 /// let pass = SolWindow::new(80_000.0, 1_000.0)?;
 /// assert!(pass.contains(SOL_S) && !pass.contains(40_000.0));
 /// assert_eq!(pass.next_opening_s(100.0), 80_000.0);
+/// assert_eq!(pass.next_closing_s(80_000.0), SOL_S + 1_000.0);
 /// # Ok::<(), farside_worlds::SkyError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -280,6 +281,16 @@ impl SolWindow {
     pub fn next_opening_s(&self, time_s: f64) -> f64 {
         let waits_s = self.opens_s - second_of_sol(time_s);
         if waits_s >= 0.0 {
+            time_s + waits_s
+        } else {
+            time_s + waits_s + SOL_S
+        }
+    }
+
+    /// When it closes next, after a time \[s\]: if it is open then, when this opening ends.
+    pub fn next_closing_s(&self, time_s: f64) -> f64 {
+        let waits_s = self.closes_s - second_of_sol(time_s);
+        if waits_s > 0.0 {
             time_s + waits_s
         } else {
             time_s + waits_s + SOL_S
@@ -403,7 +414,7 @@ mod tests {
             prop_assert!((parts - whole).abs() <= 2e-4 * whole.max(1e5), "{parts} {whole}");
         }
 
-        /// A window is open at its next opening, and not before.
+        /// A window is open at its next opening, and not before; and until its next closing, and not after.
         #[test]
         fn windows_repeat_by_the_sol(
             opens_s in 0.0..SOL_S,
@@ -419,6 +430,13 @@ mod tests {
             let between_s = time_s + share * (next_s - time_s) - 1e-3;
             if !window.contains(time_s) && between_s > time_s {
                 prop_assert!(!window.contains(between_s));
+            }
+            let ends_s = window.next_closing_s(time_s);
+            prop_assert!((0.0..=SOL_S).contains(&(ends_s - time_s)));
+            prop_assert!(window.contains(ends_s - 1e-3) && !window.contains(ends_s + 1e-3));
+            let inside_s = time_s + share * (ends_s - time_s) - 1e-3;
+            if window.contains(time_s) && inside_s > time_s {
+                prop_assert!(window.contains(inside_s));
             }
         }
     }

@@ -26,10 +26,10 @@ pub const FRACTION_SUM_TOLERANCE: f64 = 1e-6;
 pub const MAX_CLASSES: usize = 64;
 
 /// The scatter of the logarithm of grain sizes within a class: half or twice the median is rare.
-const GRAIN_SCATTER: f64 = 0.3;
+const GRAIN_SCATTER: f64 = 0.25;
 
 /// The standard deviation of the share of a surface under dust.
-const DUST_SCATTER: f64 = 0.06;
+const DUST_SCATTER: f64 = 0.05;
 
 /// A kind of rock: what its rocks are made of and look like, in distribution.
 ///
@@ -51,9 +51,9 @@ pub struct RockClass {
     /// The standard deviation of the logarithm of each fraction before they are divided by their
     /// sum; 0 to 1. A mineral that the class has none of, no rock of it has.
     pub scatter: f64,
-    /// The median size of its grains \[um, 5 to 5000\]; their logarithm scatters by 0.3.
+    /// The median size of its grains \[um, 5 to 5000\]; their logarithm scatters by 0.25.
     pub grain_um: f64,
-    /// The mean share of a rock's surface that dust covers, 0 to 1; it scatters by 0.06.
+    /// The mean share of a rock's surface that dust covers, 0 to 1; it scatters by 0.05.
     pub dust: f64,
     /// The mean of each statistic of texture, within its range.
     pub texture: [f64; TEXTURE],
@@ -151,7 +151,7 @@ const BUILTIN: [Row; 8] = [
 ];
 
 /// The scatter of fractions in the built-in classes.
-const FRACTION_SCATTER: f64 = 0.15;
+const FRACTION_SCATTER: f64 = 0.12;
 
 /// The scatter of textures in the built-in classes.
 const TEXTURE_SCATTER: [f64; TEXTURE] = [0.03, 0.025, 0.06, 0.03];

@@ -35,8 +35,8 @@ pub enum StoryKind {
     /// What lay deepest comes to lie nearest the rim (E. Shoemaker, *Impact mechanics at Meteor
     /// Crater*, 1963); the blanket thins with the cube of the distance (T. McGetchin and others, EPSL
     /// 20, 1973) and ends in older ground; blocks become smaller outwards (G. Bart and H. Melosh,
-    /// Icarus 209, 2010). Prior: the crater lies within 0.45 sides of the middle; its radius is 0.08
-    /// to 0.18 sides; the blanket has thinned to half at 2 to 3.5 radii; sizes correlate with nearness
+    /// Icarus 209, 2010). Prior: the crater lies within 0.45 sides of the middle; its radius is 0.1
+    /// to 0.2 sides; the blanket has thinned to half at 2.5 to 4 radii; sizes correlate with nearness
     /// by 0.4 to 0.8.
     Ejecta,
     /// A lava flow over older ground.

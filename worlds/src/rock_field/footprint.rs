@@ -42,8 +42,12 @@ impl Footprint {
             true => way / range_m,
             false => -Vector3::z(),
         };
-        // A NaN is taken as the narrowest.
-        let spread = libm::tan(half_angle_rad.max(HALF_ANGLE_RAD[0]).min(HALF_ANGLE_RAD[1]));
+        let [narrowest, widest] = HALF_ANGLE_RAD;
+        let half_angle_rad = match half_angle_rad.is_nan() {
+            true => narrowest,
+            false => half_angle_rad.clamp(narrowest, widest),
+        };
+        let spread = libm::tan(half_angle_rad);
         let flat_m = way.xy().norm();
         // From the viewer to as far beyond the aim: there the beam's axis is deep in the ground.
         let reach_m = flat_m + 2.0 * range_m * spread + field.largest_m;
@@ -80,19 +84,21 @@ impl RockField {
     /// What a beam sees, that is a cone from `from_m` with this half angle \[rad\] around the
     /// direction to `aim_m`: to the rock that lies there, or else to the ground.
     ///
-    /// Hills and boulders are not looked for on the way: see [`RockField::sees`].
+    /// A half angle of nothing, or none that is a number, is taken as a microradian; one of a right
+    /// angle as a little less. Hills and boulders are not looked for on the way: see
+    /// [`RockField::sees`].
     pub fn footprint(
         &self,
         from_m: Point3<f64>,
         aim_m: Point2<f64>,
         half_angle_rad: f64,
     ) -> Footprint {
-        Footprint::of(self, from_m, self.aim_m(aim_m), half_angle_rad)
+        Footprint::of(self, from_m, self.target_m(aim_m), half_angle_rad)
     }
 
     /// The point that an instrument looks at which is pointed at a place: the middle of the largest
     /// rock there, or else the ground.
-    pub fn aim_m(&self, aim_m: Point2<f64>) -> Point3<f64> {
+    pub fn target_m(&self, aim_m: Point2<f64>) -> Point3<f64> {
         let there = self.near(aim_m, 0.5 * self.largest_m).filter(|&rock| {
             let rock = &self.rocks()[rock];
             (rock.position_m - aim_m).norm() <= 0.5 * rock.diameter_m

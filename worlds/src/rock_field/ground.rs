@@ -71,7 +71,7 @@ pub(super) fn bare(
 fn hills(settings: &RockFieldSettings, key: RandomKey) -> Vec<Hill> {
     let half_m = 0.5 * settings.side_m;
     let mut stream = key.text("hills").stream();
-    let mut hill = |number: usize| {
+    let hill = |number: usize| {
         let height_m = match number {
             0 => settings.hill_height_m,
             _ => settings.hill_height_m * stream.uniform_in(0.5, 1.0),
@@ -86,7 +86,7 @@ fn hills(settings: &RockFieldSettings, key: RandomKey) -> Vec<Hill> {
             height_m,
         }
     };
-    (0..settings.hills).map(|number| hill(number)).collect()
+    (0..settings.hills).map(hill).collect()
 }
 
 impl Hill {

@@ -108,8 +108,8 @@ impl Layout {
                 let direction = azimuth(stream);
                 Layout::Ejecta {
                     center: Point2::from(direction * stream.uniform_in(0.0, 0.45)),
-                    radius: stream.uniform_in(0.08, 0.18),
-                    reach: stream.uniform_in(2.0, 3.5),
+                    radius: stream.uniform_in(0.10, 0.20),
+                    reach: stream.uniform_in(2.5, 4.0),
                 }
             }
             StoryKind::Lava => Layout::Lava {
