@@ -64,6 +64,15 @@ impl FaultKind {
         NAMES[self as usize]
     }
 
+    /// Which parts it can be of: all, instruments only, or none in particular.
+    fn parts(self) -> PartsOf {
+        match self {
+            FaultKind::EndsEarly | FaultKind::EndsLate | FaultKind::NeverEnds => PartsOf::All,
+            FaultKind::InstrumentFails | FaultKind::InstrumentDrifts => PartsOf::Instruments,
+            _ => PartsOf::None,
+        }
+    }
+
     /// What its amount is unless it is given, and between what it may be; none for those that have
     /// no amount.
     fn amount(self) -> Option<[f64; 3]> {
@@ -79,6 +88,14 @@ impl FaultKind {
             FaultKind::NeverEnds | FaultKind::InstrumentFails | FaultKind::StuckMast => None,
         }
     }
+}
+
+/// Which parts a kind of fault can be of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum PartsOf {
+    All,
+    Instruments,
+    None,
 }
 
 /// The names, in the order of [`FaultKind::ALL`].
@@ -130,8 +147,8 @@ settings! {
         pub duration: Option<SimDuration>
             [with = "units::duration::option", skip_serializing_if = "Option::is_none"],
             if_set(over(SimDuration::ZERO));
-        /// Which instrument it is, or which part's commands are too long or too short: `wheels`,
-        /// `mast`, `radio`, `heater`, `body` or an instrument's name; without, all of them.
+        /// Which instrument fails or drifts; or which part's commands end early, late or never:
+        /// `wheels`, `mast`, `radio`, `heater`, `body` or an instrument's name. Without, all of them.
         pub part: Option<String> [skip_serializing_if = "Option::is_none"];
         /// How bad it is; see the table.
         pub amount: Option<f64> [skip_serializing_if = "Option::is_none"];
@@ -222,8 +239,13 @@ pub struct PlannedFault {
 
 impl FaultConfig {
     /// Checks values beside each other; `key` is the entry's place in the scenario, `parts` the
-    /// names of parts that there are.
-    pub(super) fn check_together(&self, key: &str, parts: &[&str]) -> Result<(), SetupError> {
+    /// names of parts that every rover has, and `instruments` of those that this one has.
+    pub(super) fn check_together(
+        &self,
+        key: &str,
+        parts: &[&str],
+        instruments: &[&str],
+    ) -> Result<(), SetupError> {
         let wrong =
             |name: &str, message: String| Err(SetupError::value(&format!("{key}.{name}"), message));
         if let Err(error) = Pattern::over_names(&self.rover) {
@@ -240,18 +262,38 @@ impl FaultConfig {
             }
             _ => {}
         }
-        match &self.part {
-            Some(part) if !parts.contains(&part.as_str()) => {
-                let nearest = farside::suggest::nearest(part, parts.iter().copied());
-                let question = farside::suggest::did_you_mean(nearest.as_deref());
-                let parts = parts.join(", ");
-                wrong(
-                    "part",
-                    format!("{part:?}: expected one of {parts}{question}"),
-                )
+        let Some(part) = &self.part else {
+            return Ok(());
+        };
+        let allowed: Vec<&str> = match self.kind.parts() {
+            PartsOf::All => [parts, instruments].concat(),
+            PartsOf::Instruments => instruments.to_vec(),
+            PartsOf::None => {
+                return wrong("part", format!("{part:?}: kind = {kind:?} is of no part"));
             }
-            _ => Ok(()),
+        };
+        if allowed.contains(&part.as_str()) {
+            return Ok(());
         }
+        let nearest = farside::suggest::nearest(part, allowed.iter().copied());
+        let question = farside::suggest::did_you_mean(nearest.as_deref());
+        let allowed = allowed.join(", ");
+        wrong(
+            "part",
+            format!("{part:?}: expected one of {allowed}{question}"),
+        )
+    }
+
+    /// Checks that it is a fault of some rover of these names.
+    pub(super) fn check_rover(&self, key: &str, rovers: &[&str]) -> Result<(), SetupError> {
+        let pattern = Pattern::over_names(&self.rover);
+        if pattern.is_ok_and(|pattern| rovers.iter().any(|rover| pattern.matches(rover))) {
+            return Ok(());
+        }
+        let nearest = farside::suggest::nearest(&self.rover, rovers.iter().copied());
+        let question = farside::suggest::did_you_mean(nearest.as_deref());
+        let message = format!("{:?} matches no rover{question}", self.rover);
+        Err(SetupError::value(&format!("{key}.rover"), message))
     }
 
     fn planned(&self) -> PlannedFault {

@@ -264,3 +264,78 @@ impl Gaze<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use farside_worlds::RockFieldSettings;
+    use farside_worlds::rock_field::FieldRocks;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn hills() -> RockField {
+        let settings = RockFieldSettings {
+            hills: 5,
+            hill_height_m: 8.0,
+            rocks: FieldRocks::Exactly(1),
+            ..RockFieldSettings::default()
+        };
+        RockField::generate(&settings).expect("within its ranges")
+    }
+
+    #[test]
+    fn roll_is_right_side_down_and_pitch_nose_up() {
+        let field = hills();
+        let mut steepest = 0.0f64;
+        for place in 0..200 {
+            let (east_m, north_m) = (
+                f64::from(place % 20) * 4.0 - 38.0,
+                f64::from(place / 20) * 7.0 - 32.0,
+            );
+            let rise = field.ground().gradient(east_m, north_m);
+            let pose = Pose {
+                east_m,
+                north_m,
+                yaw_rad: 0.0,
+            };
+            let attitude = Attitude::on(&field, &pose, 1.0);
+            // Facing east, north is to the left.
+            assert!((attitude.pitch_rad - libm::atan(rise.x)).abs() < 0.05);
+            assert!((attitude.roll_rad - libm::atan(rise.y)).abs() < 0.05);
+            steepest = steepest.max(attitude.tilt_rad());
+            let back = Pose {
+                yaw_rad: std::f64::consts::PI,
+                ..pose
+            };
+            let turned = Attitude::on(&field, &back, 1.0);
+            assert!((turned.roll_rad + attitude.roll_rad).abs() < 1e-9);
+            assert!((turned.pitch_rad + attitude.pitch_rad).abs() < 1e-9);
+        }
+        assert!(steepest > 0.15, "{steepest}");
+    }
+
+    proptest! {
+        /// The line of sight meets the ground where the mast was pointed, if nothing is between.
+        #[test]
+        fn the_mast_points_where_it_is_pointed(
+            east_m in -35.0..35.0f64,
+            north_m in -35.0..35.0f64,
+            yaw_rad in -3.1..3.1f64,
+            bearing_rad in -3.1..3.1f64,
+            range_m in 1.0..14.0f64,
+        ) {
+            let field = hills();
+            let pose = Pose { east_m, north_m, yaw_rad };
+            let eye = Eye::on(&pose, &Attitude::on(&field, &pose, 1.4), 1.5);
+            let place_m = Pose { yaw_rad: bearing_rad, ..pose }.ahead(range_m).place_m();
+            let aims_m = field.terrain().antenna_m(place_m.x, place_m.y, 0.0);
+            let above_m = aims_m + (eye.from_m - aims_m) * 0.02;
+            prop_assume!(field.terrain().line_of_sight(eye.from_m, above_m));
+            let angles_rad = eye.angles_rad(&field, place_m);
+            let met_m = eye.meets(&field, angles_rad, 40.0).expect("it is on the ground");
+            let way_m = (eye.from_m - aims_m).norm();
+            let off_m = (met_m - aims_m).norm();
+            prop_assert!(off_m < 0.02 * way_m + 0.25, "{off_m} at {way_m}");
+        }
+    }
+}

@@ -93,7 +93,7 @@ settings! {
         /// The area of the solar array \[m²\]. It lies level.
         pub array_m2: f64 = 1.3, in_unit("m²", 0.0..=1000.0);
         /// The share of the sunlight that a clean array turns into power.
-        pub array_efficiency: f64 [with = "units::fraction"] = 0.27;
+        pub array_efficiency: f64 [with = "units::fraction"] = 0.2;
         /// The share of its power that dust takes from the array each sol.
         pub dust_per_sol: f64 [with = "units::fraction"] = 0.0028, in_unit("of 1", 0.0..=0.5);
         /// What the body takes while it is awake.
@@ -234,14 +234,9 @@ impl RoverConfig {
         Ok(RoverConfig(model))
     }
 
-    /// The names of all models.
+    /// The names of all models: `mer`, `fido`, `k9`.
     pub fn names() -> impl Iterator<Item = &'static str> {
         NAMES.into_iter()
-    }
-
-    /// With these keys and no others.
-    pub fn of(model: RoverModel) -> RoverConfig {
-        RoverConfig(model)
     }
 }
 
@@ -330,10 +325,32 @@ impl RoverModel {
             }
         }
         let instruments = self.instruments.iter().map(|one| one.name.as_str());
-        let parts: Vec<&str> = PARTS.into_iter().chain(instruments).collect();
+        let instruments: Vec<&str> = instruments.collect();
         let mut faults = self.faults.iter().enumerate();
         faults.try_for_each(|(index, fault)| {
-            fault.check_together(&format!("{name}.fault.{index}"), &parts)
+            fault.check_together(&format!("{name}.fault.{index}"), &PARTS, &instruments)
+        })
+    }
+
+    /// Checks that each fault is one of some rover: what a system does that knows all their hosts.
+    /// `name` is that of the table.
+    ///
+    /// ```
+    /// use farside_actors::rover::RoverConfig;
+    /// let text = "fault = [{ kind = 'dust', rover = 'rove_01' }]";
+    /// let config: RoverConfig = toml::from_str(text)?;
+    /// let error = config.check_rovers("rover", &["rover_01", "rover_02"]).unwrap_err();
+    /// let expected = "rover.fault.0.rover: \"rove_01\" matches no rover; did you mean \"rover_01\"?";
+    /// assert_eq!(error.to_string(), expected);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When one matches no rover; the error has the nearest name.
+    pub fn check_rovers(&self, name: &str, rovers: &[&str]) -> Result<(), SetupError> {
+        let mut faults = self.faults.iter().enumerate();
+        faults.try_for_each(|(index, fault)| {
+            fault.check_rover(&format!("{name}.fault.{index}"), rovers)
         })
     }
 }

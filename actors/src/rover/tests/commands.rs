@@ -219,6 +219,23 @@ fn a_point_reading_is_of_what_the_mast_points_at() {
 }
 
 #[test]
+fn a_rover_that_does_not_know_where_it_is_points_past_a_rock() {
+    let field = level_field(40);
+    let (rock, [east_m, north_m]) = lonely_rock(&field);
+    for (slip, is_hit) in [(0.0, true), (0.9, false)] {
+        let mut spec = spec(field.clone(), exact());
+        (spec.start.east_m, spec.start.north_m) = (east_m, north_m);
+        let mut bench = Bench::new(spec);
+        bench.done(Command::Turn { yaw_rad: FRAC_PI_2 });
+        bench.fails(FaultKind::Slip, "", slip);
+        bench.done(drive(east_m, north_m + 1.5));
+        bench.done(at(east_m + 2.0, north_m));
+        let (_, report) = bench.done(image(View::Point));
+        assert_eq!(report.readings[0].rock == Some(rock), is_hit, "slip {slip}");
+    }
+}
+
+#[test]
 fn from_afar_the_beam_takes_in_what_is_beside_it() {
     let field = level_field(40);
     let (rock, [east_m, north_m]) = lonely_rock(&field);

@@ -169,7 +169,7 @@ proptest! {
                 let at_s = second as f64 + 0.5;
                 let dust = libm::pow(1.0 - 0.0028, at_s / SOL_S);
                 let sun_w_m2 = site.sky.power_w_m2(site.starts_s + at_s);
-                let array_w = 1.3 * 0.27 * dust * sun_w_m2;
+                let array_w = 1.3 * 0.2 * dust * sun_w_m2;
                 let night_w = (6.0 - array_w).max(0.0);
                 let net_j = clean * array_w - night_w - load_w;
                 stored_j += if net_j > 0.0 { 0.95 * net_j } else { net_j };

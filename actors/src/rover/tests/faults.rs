@@ -40,7 +40,10 @@ fn slip_leads_astray_from_now_on() {
     bench.pass(30.0);
     bench.fails(FaultKind::Slip, "", 0.5);
     bench.pass(60.0);
-    assert_eq!(bench.reports()[0].end, CommandEnd::Done);
+    let report = bench.reports().remove(0);
+    assert_eq!(report.end, CommandEnd::Done);
+    // It believes to be there.
+    assert!((report.pose.east_m - 4.0).abs() < 1e-9);
     // Of the 2.5 m that were left it went half.
     let error_m = bench.hardware.figures().position_error_m;
     assert!((error_m - 1.25).abs() < 1e-9, "{error_m}");
@@ -90,7 +93,7 @@ fn dust_takes_its_share_of_the_sunlight() {
     let clean_w = bench.state().solar_w;
     let first = bench.fails(FaultKind::Dust, "", 0.5);
     bench.fails(FaultKind::Dust, "", 0.5);
-    assert!(clean_w > 100.0 && (bench.state().solar_w - 0.25 * clean_w).abs() < 1e-9);
+    assert!(clean_w > 80.0 && (bench.state().solar_w - 0.25 * clean_w).abs() < 1e-9);
     bench.mended(first);
     assert!((bench.state().solar_w - 0.5 * clean_w).abs() < 1e-9);
 }
@@ -365,7 +368,17 @@ fn mistakes_in_faults_are_named() {
         error.starts_with("rover.fault.0.amount: 2: expected 0 to 1"),
         "{error}"
     );
-    let error = refused("part = 'panacm'");
+    let error = refused("kind = 'dust'\npart = 'mast'");
+    assert_eq!(
+        error,
+        "rover.fault.0.part: \"mast\": kind = \"dust\" is of no part"
+    );
+    let error = refused("kind = 'instrument-fails'\npart = 'wheels'");
+    assert!(
+        error.contains("expected one of pancam, mini_tes"),
+        "{error}"
+    );
+    let error = refused("kind = 'never-ends'\npart = 'panacm'");
     assert!(error.ends_with("did you mean \"pancam\"?"), "{error}");
     assert!(refused("duration = '0s'").contains("duration"));
     assert!(toml::from_str::<RoverConfig>("[[fault]]\nkind = 'dusty'").is_err());
