@@ -15,6 +15,7 @@ pub mod exchange;
 pub mod features;
 pub mod goals;
 pub mod learned;
+pub mod library;
 pub mod mixture;
 pub mod objective;
 pub mod prioritise;

@@ -168,9 +168,9 @@ impl Default for FitSettings {
     fn default() -> FitSettings {
         FitSettings {
             position_weight: 0.5,
-            shrinkage: 5.0,
+            shrinkage: 10.0,
             weight_prior: 0.5,
-            least_spread: 0.02,
+            least_spread: 0.2,
             min_classes: 1,
             max_classes: 10,
             starts: 10,

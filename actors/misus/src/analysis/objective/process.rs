@@ -11,7 +11,7 @@
 
 use farside::random::RandomKey;
 use farside_worlds::Rock;
-use farside_worlds::geology::{Story, StoryKind};
+use farside_worlds::geology::{Evidence, Story, StoryKind};
 use nalgebra::Point2;
 
 use crate::analysis::learned::Learned;
@@ -114,6 +114,7 @@ impl Stories {
             }
         }
         let field = Field {
+            sizes: Evidence::new(&places, classes, &vec![1.0; shares.len()]),
             places,
             shares,
             classes,
@@ -137,6 +138,8 @@ struct Field {
     places: Vec<Rock>,
     shares: Vec<f64>,
     classes: usize,
+    /// Evidence that tells nothing but sizes: of any class with certainty.
+    sizes: Evidence,
 }
 
 fn belief(settings: &StorySettings, drawn: &[Story], field: &Field) -> StoryBelief {
@@ -150,7 +153,7 @@ fn belief(settings: &StorySettings, drawn: &[Story], field: &Field) -> StoryBeli
         for draw in draws {
             fill_probabilities(draw, field, &mut probabilities);
             let matched = Matching::of(field, &probabilities);
-            let log = matched.log_mean;
+            let log = matched.log_mean + draw.log_likelihood(&field.sizes);
             weighed.push((log, matched.classes));
         }
         let largest = weighed
