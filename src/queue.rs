@@ -192,11 +192,10 @@ impl Queue {
             return;
         }
         // Mostly among the earliest, where walking is faster than halving.
-        let mut at = self.near.len();
-        let walked = at.saturating_sub(NEAR);
-        while at > walked && self.near[at - 1].before(&entry) {
-            at -= 1;
-        }
+        let walked = self.near.len().saturating_sub(NEAR);
+        let nearest = self.near[walked..].iter().rev();
+        let before = nearest.take_while(|other| other.before(&entry)).count();
+        let mut at = self.near.len() - before;
         if at == walked {
             at = self.near[..walked].partition_point(|other| entry.before(other));
         }

@@ -52,6 +52,7 @@ pub(crate) struct Side {
 }
 
 /// Something that happened, as it is committed.
+#[derive(Clone, Copy)]
 pub(crate) struct Happened<'a> {
     pub(crate) class: RecordClass,
     pub(crate) key: EventKey,

@@ -131,6 +131,12 @@ impl Parts {
         Pending { head, letter, side }
     }
 
+    /// The key of the event in hand.
+    #[inline(always)]
+    pub(crate) fn key(&self) -> EventKey {
+        self.key
+    }
+
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
     #[inline(always)]
     pub(crate) fn begin(
@@ -225,17 +231,22 @@ impl Parts {
             delay,
         } = outbound;
         let (ordinal, repeat) = state.next_in_flow(receiver, kind, match_key);
-        let mut head = Head::of_entity(Class::Message, me).caused(self.key, kind, ordinal);
-        head.receiver = receiver;
-        if let Some(match_key) = match_key {
-            head = head.keyed(match_key, repeat);
-        }
+        // Called on each way by itself: what one way puts in memory the other keeps in registers.
+        let head = |parts: &Parts| {
+            let mut head = Head::of_entity(Class::Message, me).caused(parts.key, kind, ordinal);
+            head.receiver = receiver;
+            match match_key {
+                Some(match_key) => head.keyed(match_key, repeat),
+                None => head,
+            }
+        };
         self.sends += 1;
         let (from, to) = (self.topology.place(me), self.topology.place(receiver));
         if from.host == to.host {
             let key = self.later_key(me, &mut state.count, delay);
-            self.insert(key, head, Some(letter));
+            self.insert(key, head(self), Some(letter));
         } else if delay.is_zero() {
+            let head = head(self);
             self.send_away(state, (from.host, to.host), head, letter);
         } else {
             let receiver = self.topology.name(receiver).to_owned();
