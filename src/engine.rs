@@ -115,7 +115,7 @@ impl Engine {
             let Some(entry) = self.parts.queue.pop_before(bound) else {
                 break;
             };
-            if self.parts.queue.has_new_batch() && self.parts.store.is_large() {
+            if self.parts.queue.has_unread() && self.parts.store.is_large() {
                 self.read_ahead();
             }
             self.handle(entry, sink)?;
@@ -127,16 +127,23 @@ impl Engine {
     /// other, when each is handled, every miss of the cache would be waited for. Read here, where no
     /// read depends on the one before, a processor waits for many of them at once.
     #[inline(never)]
-    fn read_ahead(&self) {
+    fn read_ahead(&mut self) {
+        let Parts {
+            queue,
+            store,
+            topology,
+            ..
+        } = &mut self.parts;
+        let entries = queue.unread();
         let mut read = 0;
-        for entry in self.parts.queue.batch() {
-            read ^= self.parts.store.receiver(entry.slot).0;
-            read ^= u32::from(self.parts.store.has_letter(entry.slot));
+        for entry in entries {
+            read ^= store.receiver(entry.slot).0;
+            read ^= u32::from(store.has_letter(entry.slot));
         }
         let mut counts = u64::from(read);
-        for entry in self.parts.queue.batch() {
-            let receiver = self.parts.store.receiver(entry.slot);
-            let local = self.parts.topology.place(receiver).local as usize;
+        for entry in entries {
+            let receiver = store.receiver(entry.slot);
+            let local = topology.place(receiver).local as usize;
             // Not every event is an actor's.
             if let Some(cell) = self.actors.get(local) {
                 counts ^= cell.read_ahead();
@@ -337,7 +344,7 @@ impl Engine {
         };
         let held = self.parts.side.filter(|_| head.class == Class::Held);
         let parts = &mut self.parts;
-        let carried = guarded(|| parts.carry(link, head, letter, held));
+        let carried = guarded(|| parts.carry_on(link, head, letter, held));
         let result = carried.and_then(|charge_j| match self.parts.fault.take() {
             Some(cause) => Err(cause),
             None => Ok(charge_j),

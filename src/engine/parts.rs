@@ -246,21 +246,21 @@ impl Parts {
             let key = self.later_key(me, &mut state.count, delay);
             self.insert(key, head(self), Some(letter));
         } else if delay.is_zero() {
-            let head = head(self);
-            self.send_away(state, (from.host, to.host), head, letter);
+            let (mut head, mut letter) = (head(self), Some(letter));
+            self.send_away(state, (from.host, to.host), &mut head, &mut letter);
         } else {
             let receiver = self.topology.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
         }
     }
 
-    /// Sends a message to another host.
+    /// Sends a message to another host. The letter is taken, unless there is no way.
     fn send_away(
         &mut self,
         state: &mut CellState,
         (from, to): (HostIndex, HostIndex),
-        head: Head,
-        letter: Sealed,
+        head: &mut Head,
+        letter: &mut Option<Sealed>,
     ) {
         let me = head.sender;
         let Some(link) = self.topology.link(from, to) else {
@@ -274,12 +274,12 @@ impl Parts {
                 kind: kind.unwrap_or_default(),
             });
         };
-        let mut head = head.through(link);
+        head.link = link;
         if self.topology.links.is_shared(link) {
             let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
             let engine = self.topology.place(link).engine;
             head.class = Class::HandOver;
-            self.schedule(engine, key, head, Some(letter));
+            self.schedule(engine, key, *head, letter.take());
             return;
         }
         let charge_j = self.carry(link, head, letter, None);
