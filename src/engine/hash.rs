@@ -76,7 +76,11 @@ impl Head {
 
 /// Out of the way of the many events that have no reason.
 #[cold]
-#[inline(never)]
 fn reason_hash(reason: &str) -> u64 {
-    xxh3_64(reason.as_bytes())
+    // A link may give an empty one, which is as good as none.
+    if reason.is_empty() {
+        0
+    } else {
+        xxh3_64(reason.as_bytes())
+    }
 }
