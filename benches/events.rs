@@ -6,106 +6,21 @@
 //! counted by valgrind, which runs this program again; where it is not installed, the table has
 //! allocations only, and a line says so.
 //!
-//! The model is PHOLD, the hold model: each event sends a message of 24 bytes to a random actor,
-//! which arrives after a look-ahead plus an exponential delay. Each figure is the difference of two
+//! The model is PHOLD, as `tests/peers` runs it too. Each figure is the difference of two
 //! runs, one longer than the other, so that the start is in none.
 
+#[path = "phold/model.rs"]
+mod phold;
+
 use std::process::{Command, ExitCode};
-use std::sync::{Arc, OnceLock};
 
-use farside::carrier::NoChange;
-use farside::prelude::*;
-use farside::random::Stream;
-use farside::{Carrier, Parcel, Verdicts};
-use serde::{Deserialize, Serialize};
+use farside::Executor;
 
-/// The look-ahead: no event is scheduled sooner \[ns\].
-const LOOK_AHEAD_NS: u64 = 100_000_000;
-/// The mean of the exponential part \[ns\].
-const MEAN_NS: f64 = 900_000_000.0;
+use phold::Phold;
 
 /// The caches that valgrind imagines: size in bytes, ways, bytes of a line. Fixed, so that figures
 /// of two machines can be compared.
 const CACHES: [&str; 3] = ["--I1=32768,8,64", "--D1=32768,8,64", "--LL=33554432,16,64"];
-
-/// A job that passes from actor to actor: 24 bytes.
-#[derive(Serialize, Deserialize)]
-struct Job {
-    id: u64,
-    hops: u64,
-    payload: u64,
-}
-
-/// What all actors know.
-type Others = Arc<OnceLock<Vec<Address<Holder>>>>;
-
-struct Holder {
-    at: u32,
-    others: Others,
-    size: Size,
-    by_link: bool,
-}
-
-impl Actor for Holder {
-    type Accepts = (Job,);
-
-    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        for id in 0..u64::from(self.size.population) {
-            self.pass(
-                Job {
-                    id,
-                    hops: 0,
-                    payload: 0,
-                },
-                ctx,
-            );
-        }
-        Ok(())
-    }
-}
-
-impl Holder {
-    fn pass(&mut self, job: Job, ctx: &mut Context<'_, Self>) {
-        let stream = ctx.random("hold");
-        let others = self.others.get().expect("set before the run");
-        let at = stream.below(others.len() as u64) as usize;
-        if self.by_link && at != self.at as usize {
-            ctx.send(others[at], job);
-        } else {
-            let delay = delay(stream);
-            ctx.send_after(others[at], delay, job);
-        }
-    }
-}
-
-impl Handler<Job> for Holder {
-    fn handle(&mut self, job: Job, ctx: &mut Context<'_, Self>) -> Outcome {
-        let hops = job.hops + 1;
-        self.pass(Job { hops, ..job }, ctx);
-        Ok(())
-    }
-}
-
-fn delay(stream: &mut Stream) -> SimDuration {
-    SimDuration::from_nanos(LOOK_AHEAD_NS + stream.exponential(MEAN_NS) as u64)
-}
-
-/// A link that delays by the look-ahead plus an exponential time.
-struct Hold;
-
-impl Carrier for Hold {
-    type Change = NoChange;
-
-    fn min_delay(&self) -> SimDuration {
-        SimDuration::from_nanos(LOOK_AHEAD_NS)
-    }
-
-    fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
-        verdicts.deliver(delay(&mut parcel.random(0, 0, 0).stream()));
-    }
-
-    fn change(&mut self, _change: NoChange, _now: SimTime) {}
-}
 
 /// What is done with events.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -153,40 +68,13 @@ const SIZES: [Size; 5] = [
 
 /// Runs until about so many events were handled; returns how many were.
 fn hold(size: Size, events: u64, mode: Mode) -> u64 {
-    let by_link = mode == Mode::Links;
-    let mut sim = Simulation::new(1);
-    let one_host = sim.host("all");
-    let others = Others::default();
-    let mut addresses = Vec::new();
-    for at in 0..size.actors {
-        let name = format!("holder_{at}");
-        let host = if by_link { sim.host(&name) } else { one_host };
-        let others = others.clone();
-        addresses.push(sim.actor(host, &name, move |_| {
-            let others = others.clone();
-            Holder {
-                at,
-                others,
-                size,
-                by_link,
-            }
-        }));
-        if by_link {
-            sim.uplink(host, &format!("{name}-all"), Hold);
-        }
-    }
-    assert!(others.set(addresses).is_ok(), "set once");
-    if mode != Mode::Digest {
-        sim.without_digest();
-    }
-    // In the mean one event in (look-ahead + mean) for each of the population.
-    let in_flight = f64::from(size.actors) * f64::from(size.population);
-    let until_ns = events as f64 / in_flight * (LOOK_AHEAD_NS as f64 + MEAN_NS);
-    sim.stop_at(SimTime::from_nanos(until_ns as u64), "enough events");
-    sim.run(Executor::Inline)
-        .expect("the model can start")
-        .counts
-        .events
+    let phold = Phold {
+        actors: size.actors,
+        population: size.population,
+        by_link: mode == Mode::Links,
+        digest: mode == Mode::Digest,
+    };
+    phold.run(events, Executor::Inline)
 }
 
 /// How often memory was asked for, in a run of so many events; and how many events it had.

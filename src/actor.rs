@@ -1,8 +1,5 @@
 //! What an actor is: a state, the messages it accepts, and a handler for each.
 
-use std::any::Any;
-
-use crate::engine::{AnyActor, Core};
 use crate::fault::Outcome;
 use crate::payload::Message;
 use crate::topology::Accepted;
@@ -77,13 +74,3 @@ accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W);
 accepts_tuples!(A B C D E F G H I J K L M N O P Q R S T U V W X);
-
-impl<A: Actor> AnyActor for A {
-    fn started(&mut self, core: &mut Core<'_>) -> Outcome {
-        Actor::started(self, &mut Context::new(core))
-    }
-
-    fn as_any(&mut self) -> &mut dyn Any {
-        self
-    }
-}

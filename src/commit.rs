@@ -31,6 +31,9 @@ pub(crate) struct Committer {
     topology: Arc<Topology>,
     observers: Vec<(Wants, Box<dyn Observer>)>,
     digest: Digest,
+    /// Some observer wants checkpoints.
+    checkpoints: bool,
+    /// Of the records since the last checkpoint, if any are wanted.
     hashes: Vec<u32>,
     hashed: u64,
     counts: Counts,
@@ -54,10 +57,11 @@ impl Committer {
         }
         Ok(Committer {
             last: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
+            checkpoints: observers.iter().any(|(wants, _)| wants.checkpoints),
             topology,
             observers,
             digest: Digest::EMPTY,
-            hashes: Vec::with_capacity(CHECKPOINT_RECORDS),
+            hashes: Vec::new(),
             hashed: 0,
             counts: Counts::default(),
             reasons: Vec::new(),
@@ -158,6 +162,16 @@ impl Committer {
         }
     }
 
+    /// Keeps a record's hash until the next checkpoint.
+    #[inline(never)]
+    fn keep_hash(&mut self, hash: u128) {
+        self.hashed += 1;
+        self.hashes.push(hash as u32);
+        if self.hashes.len() == CHECKPOINT_RECORDS {
+            self.checkpoint();
+        }
+    }
+
     fn checkpoint(&mut self) {
         if self.hashes.is_empty() {
             return;
@@ -212,14 +226,14 @@ impl Sink for Committer {
         self.count(class, head, happened.sends);
         self.last = happened.key;
         if !self.observers.is_empty() {
-            self.show(happened);
+            // A copy, so that it need not lie in memory where nobody observes.
+            let shown = *happened;
+            self.show(&shown);
         }
         if self.topology.digest && class != RecordClass::Sample {
             self.digest.extend(happened.hash);
-            self.hashed += 1;
-            self.hashes.push(happened.hash as u32);
-            if self.hashes.len() == CHECKPOINT_RECORDS {
-                self.checkpoint();
+            if self.checkpoints {
+                self.keep_hash(happened.hash);
             }
         }
     }

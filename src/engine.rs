@@ -26,7 +26,7 @@ use crate::time::SimTime;
 use crate::topology::Topology;
 
 pub(crate) use cell::{ActorCell, CellState};
-pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
+pub(crate) use erased::{AnyActor, Boxed, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
@@ -115,7 +115,7 @@ impl Engine {
             let Some(entry) = self.parts.queue.pop_before(bound) else {
                 break;
             };
-            if self.parts.queue.has_new_batch() && self.parts.store.is_large() {
+            if self.parts.queue.has_unread() && self.parts.store.is_large() {
                 self.read_ahead();
             }
             self.handle(entry, sink)?;
@@ -127,15 +127,23 @@ impl Engine {
     /// other, when each is handled, every miss of the cache would be waited for. Read here, where no
     /// read depends on the one before, a processor waits for many of them at once.
     #[inline(never)]
-    fn read_ahead(&self) {
+    fn read_ahead(&mut self) {
+        let Parts {
+            queue,
+            store,
+            topology,
+            ..
+        } = &mut self.parts;
+        let entries = queue.unread();
         let mut read = 0;
-        for entry in self.parts.queue.batch() {
-            read ^= self.parts.store.receiver(entry.slot).0;
+        for entry in entries {
+            read ^= store.receiver(entry.slot).0;
+            read ^= u32::from(store.has_letter(entry.slot));
         }
         let mut counts = u64::from(read);
-        for entry in self.parts.queue.batch() {
-            let receiver = self.parts.store.receiver(entry.slot);
-            let local = self.parts.topology.place(receiver).local as usize;
+        for entry in entries {
+            let receiver = store.receiver(entry.slot);
+            let local = topology.place(receiver).local as usize;
             // Not every event is an actor's.
             if let Some(cell) = self.actors.get(local) {
                 counts ^= cell.read_ahead();
@@ -148,23 +156,25 @@ impl Engine {
     /// nothing more is to be known.
     #[inline(always)]
     fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
-        let (head, letter) = self.parts.store.take(entry.slot);
+        let head = self.parts.store.take_head(entry.slot);
+        let mut letter = self.parts.store.take_letter(entry.slot);
         let key = entry.key();
+        let local = self.parts.topology.place(head.receiver).local as usize;
         let record = match head.class {
             Class::Message if !head.has_side => RecordClass::Delivered,
-            Class::Timer if head.life() == self.cell(head.receiver).state.incarnation => {
+            Class::Timer if head.life() == self.actors[local].state.incarnation => {
                 RecordClass::Timer
             }
             _ => return self.handle_other(key, head, letter, entry.slot, sink),
         };
-        if self.is_crashed(head.receiver) || key.step > self.parts.topology.step_limit {
+        if self.actors[local].actor.is_none() || key.step > self.parts.topology.step_limit {
             return self.handle_other(key, head, letter, entry.slot, sink);
         }
         if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
             self.parts.note_unfinished(key, head);
             return Err(fault);
         }
-        self.run_handler(record, key, &head, letter, sink)
+        self.run_handler_of(local, record, key, &head, &mut letter, sink)
     }
 
     /// The way of every event, whatever it is.
@@ -273,17 +283,31 @@ impl Engine {
     }
 
     /// Runs one handler, and commits the event if it did not fail.
-    #[inline(always)]
     fn run_handler(
         &mut self,
         record: RecordClass,
         key: EventKey,
         head: &Head,
-        letter: Option<Sealed>,
+        mut letter: Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
-        let cell = &mut self.actors[self.parts.topology.place(head.receiver).local as usize];
-        let result = invoke(cell, &mut self.parts, key, letter);
+        let local = self.parts.topology.place(head.receiver).local as usize;
+        self.run_handler_of(local, record, key, head, &mut letter, sink)
+    }
+
+    /// [`Engine::run_handler`] of the actor whose place is known. The letter is handed on where it
+    /// is: it is as large as a line of cache.
+    #[inline(always)]
+    fn run_handler_of(
+        &mut self,
+        local: usize,
+        record: RecordClass,
+        key: EventKey,
+        head: &Head,
+        letter: &mut Option<Sealed>,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let result = invoke(&mut self.actors[local], &mut self.parts, letter);
         if result.is_err() || self.parts.fault.is_some() {
             return Err(self.handler_fault(key, head, result));
         }
@@ -320,7 +344,7 @@ impl Engine {
         };
         let held = self.parts.side.filter(|_| head.class == Class::Held);
         let parts = &mut self.parts;
-        let carried = guarded(|| parts.carry(link, head, letter, held));
+        let carried = guarded(|| parts.carry_on(link, head, letter, held));
         let result = carried.and_then(|charge_j| match self.parts.fault.take() {
             Some(cause) => Err(cause),
             None => Ok(charge_j),
@@ -492,21 +516,22 @@ impl Engine {
 fn invoke(
     cell: &mut ActorCell,
     parts: &mut Parts,
-    key: EventKey,
-    letter: Option<Sealed>,
+    letter: &mut Option<Sealed>,
 ) -> Result<(), Box<FaultCause>> {
     let Some(actor) = cell.actor.as_deref_mut() else {
         unreachable!("handlers run on living actors only");
     };
     let mut core = Core {
         parts,
-        me: cell.state.entity,
         state: &mut cell.state,
-        key,
     };
-    let outcome: Result<Outcome, _> = guarded(|| match letter {
-        Some(mut letter) => letter.0.deliver(actor.as_any(), &mut core),
-        None => actor.started(&mut core),
+    let outcome: Result<Outcome, _> = guarded(|| {
+        let Some(sealed) = letter else {
+            return actor.started(&mut core);
+        };
+        let outcome = sealed.0.deliver(actor, &mut core);
+        *letter = None;
+        outcome
     });
     outcome?.map_err(|error| Box::new(FaultCause::Error(error.to_string())))
 }

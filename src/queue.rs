@@ -113,6 +113,10 @@ const NEAR: usize = 48;
 /// So many are sorted at most: a bucket of later events is taken whole.
 const SORTED: usize = 512;
 
+/// For so many events at a time is read ahead: what they need fits into the first cache, and a
+/// processor does not wait for more at once.
+const AHEAD: usize = 16;
+
 /// A heap of more than this is spread over buckets. A smaller one lies in the first cache.
 const HEAP: usize = 96;
 
@@ -126,8 +130,8 @@ pub(crate) struct Queue {
     far: Far,
     /// The size at which the heap is spread.
     spread_at: usize,
-    /// A bucket was taken, and nobody has asked.
-    new_batch: bool,
+    /// So many of the later events in `near` came from a bucket, and nobody has read ahead for them.
+    unread: usize,
     /// The rest of the present step, in key order.
     present: VecDeque<Entry>,
     /// The next step of the present instant, in order of arrival.
@@ -143,7 +147,7 @@ impl Default for Queue {
             heap: QuaternaryHeap::default(),
             far: Far::default(),
             spread_at: HEAP,
-            new_batch: false,
+            unread: 0,
             present: VecDeque::new(),
             next: Vec::new(),
             now: None,
@@ -161,7 +165,7 @@ impl Queue {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn belongs_to_next_step(&self, entry: &Entry) -> bool {
         let Some(now) = self.now else { return false };
         let next_step = Bound {
@@ -192,20 +196,36 @@ impl Queue {
             return;
         }
         // Mostly among the earliest, where walking is faster than halving.
-        let mut at = self.near.len();
-        let walked = at.saturating_sub(NEAR);
-        while at > walked && self.near[at - 1].before(&entry) {
-            at -= 1;
+        let walked = self.near.len().saturating_sub(NEAR);
+        if walked > 0 && self.near[walked].before(&entry) {
+            let at = self.near[..walked].partition_point(|other| entry.before(other));
+            self.near.insert(at, entry);
+        } else {
+            self.insert_near(entry);
         }
-        if at == walked {
-            at = self.near[..walked].partition_point(|other| entry.before(other));
-        }
-        self.near.insert(at, entry);
         if self.near.len() > NEAR && self.far.is_empty() {
             self.heap.push(self.near.remove(0));
         } else if self.near.len() > SORTED {
             self.heap.extend(self.near.drain(..SORTED / 2));
         }
+    }
+
+    /// Puts an entry among the last of `near`. They are moved as they are passed: where the walk ends
+    /// no processor can guess, and moving them afterwards would be one guess more.
+    #[inline(always)]
+    fn insert_near(&mut self, entry: Entry) {
+        self.near.push(entry);
+        let last = self.near.len() - 1;
+        let near = &mut self.near[..=last];
+        let mut at = last;
+        while let Some(next) = at.checked_sub(1) {
+            if !near[next].before(&entry) {
+                break;
+            }
+            near[at] = near[next];
+            at = next;
+        }
+        near[at] = entry;
     }
 
     /// Moves what comes later than `near` from the heap to buckets.
@@ -246,21 +266,23 @@ impl Queue {
             self.near.reverse();
         } else if !self.far.is_empty() {
             self.far.take_next(&mut self.near);
-            self.new_batch = true;
+            self.unread = self.near.len();
             // Greatest entry first is least key first, which belongs at the end.
             self.near.sort_unstable();
         }
     }
 
-    /// True once each time events that lay far ahead have become the next ones.
+    /// True if the next events lay far ahead a while ago, and were not yet asked for.
     #[inline(always)]
-    pub(crate) fn has_new_batch(&mut self) -> bool {
-        std::mem::take(&mut self.new_batch)
+    pub(crate) fn has_unread(&self) -> bool {
+        self.near.len() <= self.unread && self.unread > 0
     }
 
-    /// The next events, as far as they stand sorted.
-    pub(crate) fn batch(&self) -> &[Entry] {
-        &self.near
+    /// The next few of those, the last first.
+    pub(crate) fn unread(&mut self) -> &[Entry] {
+        let known = self.near.len();
+        self.unread = known.saturating_sub(AHEAD);
+        &self.near[self.unread..]
     }
 
     /// Time and step of the next event.

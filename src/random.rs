@@ -69,11 +69,13 @@ impl RandomKey {
     }
 
     /// The 128 bits that the key hashes to.
+    #[inline]
     pub fn hash(&self) -> u128 {
         xxh3_128(&self.bytes[..self.len])
     }
 
     /// The stream at this address, at its beginning.
+    #[inline]
     pub fn stream(&self) -> Stream {
         let hash = self.hash();
         let mut seed = [0u8; 32];
@@ -85,6 +87,7 @@ impl RandomKey {
 
     /// One uniform draw from [0, 1) at this address, without building a stream: what a link that
     /// asks a single question of a message wants.
+    #[inline]
     pub fn uniform(&self) -> f64 {
         unit_interval(self.hash() as u64)
     }

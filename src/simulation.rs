@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::actor::{self, Accepts, Actor, Address, Recipient};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
-use crate::engine::{AnyActor, Factory, Sealed};
+use crate::engine::{Boxed, Factory, Sealed};
 use crate::executor::{self, Executor};
 use crate::fault::{BuildError, LookupError};
 use crate::ids::{HostId, LinkId};
@@ -140,7 +140,7 @@ impl Simulation {
             name: name.to_owned(),
             host,
             actor_type,
-            factory: Box::new(move |name| Box::new(build(name)) as Box<dyn AnyActor>),
+            factory: Box::new(move |name| Boxed::new(build(name))),
         });
         Address::new(self.actors.len() as u32 - 1)
     }

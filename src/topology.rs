@@ -371,18 +371,11 @@ impl Topology {
     }
 
     /// Completes a key with the tie hash that this run's tie seed gives it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn key(&self, time: SimTime, step: u32, source: EntityId, count: u64) -> EventKey {
         let tie = match self.info.tie_seed {
             // `@control` comes first whatever the tie seed.
-            Some(seed) if source != EntityId::CONTROL => {
-                let key = crate::random::RandomKey::new(seed)
-                    .number(time.as_nanos())
-                    .number(u64::from(step))
-                    .number(self.name_hash(source));
-                // The top bit keeps the hash above zero, which is `@control`'s.
-                key.hash() as u32 | 1
-            }
+            Some(seed) if source != EntityId::CONTROL => self.tie(seed, time, step, source),
             _ => 0,
         };
         EventKey {
@@ -392,6 +385,16 @@ impl Topology {
             source,
             count,
         }
+    }
+
+    #[inline(never)]
+    fn tie(&self, seed: u64, time: SimTime, step: u32, source: EntityId) -> u32 {
+        let key = crate::random::RandomKey::new(seed)
+            .number(time.as_nanos())
+            .number(u64::from(step))
+            .number(self.name_hash(source));
+        // The lowest bit keeps the hash above zero, which is `@control`'s.
+        key.hash() as u32 | 1
     }
 
     /// The number of a loss reason.

@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use super::context::Context;
 use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
-use crate::engine::{Core, Letter, Sealed};
+use crate::engine::{AnyActor, Boxed, Core, Letter, Sealed};
 use crate::fault::{LookupError, Outcome};
 use crate::payload::{Encode, Message};
 use crate::topology::{ActorType, KindEntry};
@@ -149,7 +149,7 @@ impl<M: Message> Encode for Change<M> {
 }
 
 impl<M: Message> Letter for Change<M> {
-    fn deliver(&mut self, _actor: &mut dyn Any, _core: &mut Core<'_>) -> Outcome {
+    fn deliver(&mut self, _actor: &mut dyn AnyActor, _core: &mut Core<'_>) -> Outcome {
         unreachable!("changes go to links");
     }
 
@@ -187,12 +187,12 @@ impl<A: Handler<M>, M: Message> Encode for Addressed<A, M> {
 }
 
 impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
-    fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome {
-        let actor = actor
-            .downcast_mut::<A>()
+    fn deliver(&mut self, actor: &mut dyn AnyActor, core: &mut Core<'_>) -> Outcome {
+        let boxed = (actor as &mut dyn Any)
+            .downcast_mut::<Boxed<A>>()
             .expect("addresses are typed by their actor");
         let message = self.message.take().expect("a letter is delivered once");
-        actor.handle(message, &mut Context::new(core))
+        boxed.actor.handle(message, &mut Context::new(core))
     }
 
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {

@@ -9,7 +9,6 @@ use super::{Actor, Handler};
 use crate::engine::{CellState, Core, Outbound, Parts};
 use crate::fault::{FaultCause, LookupError};
 use crate::ids::{EntityId, LinkId, MatchKey, TimerId};
-use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::{RandomKey, Stream};
 use crate::time::{SimDuration, SimTime};
@@ -19,8 +18,6 @@ use crate::topology::Topology;
 pub struct Context<'a, A> {
     parts: &'a mut Parts,
     state: &'a mut CellState,
-    me: EntityId,
-    key: EventKey,
     actor: PhantomData<fn() -> A>,
 }
 
@@ -29,20 +26,22 @@ impl<'a, A: Actor> Context<'a, A> {
         Context {
             parts: &mut *core.parts,
             state: &mut *core.state,
-            me: core.me,
-            key: core.key,
             actor: PhantomData,
         }
     }
 
+    fn me(&self) -> EntityId {
+        self.state.entity
+    }
+
     /// The present instant.
     pub fn now(&self) -> SimTime {
-        self.key.time
+        self.parts.key().time
     }
 
     /// This actor's name.
     pub fn name(&self) -> &str {
-        self.parts.topology.name(self.me)
+        self.parts.topology.name(self.me())
     }
 
     /// This actor's own address.
@@ -147,7 +146,7 @@ impl<'a, A: Actor> Context<'a, A> {
         A: Handler<M>,
     {
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
-            self.not_listed::<M>(self.me);
+            self.not_listed::<M>(self.me());
             return TimerId {
                 slot: u32::MAX,
                 kind: 0,
@@ -156,19 +155,19 @@ impl<'a, A: Actor> Context<'a, A> {
         };
         let letter = self.address().seal(message);
         self.parts
-            .set_timer(self.state, self.me, kind, letter, delay)
+            .set_timer(self.state, self.me(), kind, letter, delay)
     }
 
     /// Cancels a timer. False if it has fired or was cancelled before.
     pub fn cancel(&mut self, timer: TimerId) -> bool {
-        self.parts.cancel_timer(self.me, timer)
+        self.parts.cancel_timer(self.me(), timer)
     }
 
     /// The links that carry what this host sends and take changes of type `C`, in name order: those
     /// that [`Context::tell_link`] may be called with.
     pub fn links<C: Message>(&self) -> Vec<LinkId<C>> {
         let topology = &self.parts.topology;
-        let host = topology.place(self.me).host;
+        let host = topology.place(self.me()).host;
         let Some(kind) = topology.kind_of_type.get(&TypeId::of::<C>()) else {
             return Vec::new();
         };
@@ -196,7 +195,7 @@ impl<'a, A: Actor> Context<'a, A> {
     pub fn tell_link<C: Message>(&mut self, link: LinkId<C>, change: C) {
         let link = self.parts.topology.declared_links[link.declared as usize];
         let letter = seal_change(change);
-        self.parts.ask_change(self.state, self.me, link, letter);
+        self.parts.ask_change(self.state, self.me(), link, letter);
     }
 
     /// What links have charged this actor so far for transmitting what it sent, in joules. It
@@ -282,7 +281,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// assert_eq!(sim.run(Executor::Inline).unwrap().end.name(), "completed");
     /// ```
     pub fn host_transmit_energy_j(&self) -> f64 {
-        let host = self.parts.topology.place(self.me).host;
+        let host = self.parts.topology.place(self.me()).host;
         self.parts.energy_so_far(host).transmit_j
     }
 
@@ -291,14 +290,14 @@ impl<'a, A: Actor> Context<'a, A> {
     ///
     /// [`Carriage::receive_j`]: crate::Carriage::receive_j
     pub fn host_receive_energy_j(&self) -> f64 {
-        let host = self.parts.topology.place(self.me).host;
+        let host = self.parts.topology.place(self.me()).host;
         self.parts.energy_so_far(host).receive_j
     }
 
     /// This actor's random stream for `purpose`, derived from (run seed, actor, purpose,
     /// incarnation). It goes on where it was left.
     pub fn random(&mut self, purpose: &'static str) -> &mut Stream {
-        let (topology, me) = (&self.parts.topology, self.me);
+        let (topology, me) = (&self.parts.topology, self.me());
         let incarnation = u64::from(self.state.incarnation);
         self.state.stream(purpose, || {
             draws(topology, me, purpose, incarnation).stream()
@@ -308,7 +307,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// The address of draws by `key` (a cycle, a sample's number), the same whatever was drawn
     /// before.
     pub fn random_at(&self, purpose: &str, key: u64) -> RandomKey {
-        draws(&self.parts.topology, self.me, purpose, key)
+        draws(&self.parts.topology, self.me(), purpose, key)
     }
 
     /// Durable memory: a value of type `D` that outlives a crash, made by `Default` when first
@@ -337,16 +336,16 @@ impl<'a, A: Actor> Context<'a, A> {
     /// Logs know a sample by the serde name of its type. A second type of the same name is a fault,
     /// [`FaultCause::SampleNames`], watched or not.
     pub fn sample<S: Message>(&mut self, sample: &S) {
-        let at = self.parts.sample_type::<S>(self.me);
+        let at = self.parts.sample_type::<S>(self.me());
         if self.samples_wanted() {
-            self.parts.add_sample(self.me, at, sample);
+            self.parts.add_sample(self.me(), at, sample);
         }
     }
 
     /// Asks for the run to stop, for `reason`, one look-ahead from now.
     pub fn stop(&mut self, reason: impl Into<String>) {
         if self.parts.stop.is_none() {
-            self.parts.stop = Some((self.key, self.me, reason.into()));
+            self.parts.stop = Some((self.parts.key(), self.me(), reason.into()));
         }
     }
 
@@ -370,7 +369,7 @@ impl<'a, A: Actor> Context<'a, A> {
             match_key,
             delay,
         };
-        self.parts.send(self.state, self.me, outbound);
+        self.parts.send(self.state, self.me(), outbound);
     }
 
     fn not_listed<M>(&mut self, receiver: EntityId) {

@@ -90,26 +90,19 @@ fn spread(value: u64, len: usize) -> u64 {
     x | (0x8080_8080_8080_8080 & more)
 }
 
-/// Appends `tag` and `value` as a varint.
+/// Appends `tag` and `value` as a varint. Small values under small tags are written in one go,
+/// whatever bytes they take; the buffer's growth is left to the others, which need a call anyway.
 #[inline(always)]
 pub(super) fn put_varint(out: &mut Vec<u8>, tag: Tag, value: u64) {
-    if value < 0x80 && tag.len == 1 {
-        out.extend_from_slice(&[tag.bits as u8, value as u8]);
-    } else if tag.len == 0 && value < 0x4000 {
-        put_short_packed(out, value as u16);
-    } else {
-        put_long_varint(out, tag, value);
+    if value >= 0x4000 || tag.len > 1 || out.capacity() - out.len() < 4 {
+        return put_long_varint(out, tag, value);
     }
-}
-
-/// Appends one of many in a packed field. Indices of vertices are mostly of this size.
-#[inline(always)]
-fn put_short_packed(out: &mut Vec<u8>, value: u16) {
-    if value < 0x80 {
-        out.push(value as u8);
-    } else {
-        out.extend_from_slice(&[value as u8 | 0x80, (value >> 7) as u8]);
-    }
+    let more = u32::from(value >= 0x80);
+    let varint = (value as u32 & 0x7f) | more << 7 | (value as u32 >> 7) << 8;
+    let word = tag.bits as u32 | varint << (8 * tag.len);
+    let end = out.len() + (tag.len + 1 + more) as usize;
+    out.extend_from_slice(&word.to_le_bytes());
+    out.truncate(end);
 }
 
 #[inline(never)]

@@ -121,8 +121,8 @@ impl CellState {
     }
 }
 
-/// An actor, with what outlives it.
-#[repr(align(64))]
+/// An actor, with what outlives it. As with events that wait, its two lines are an aligned pair.
+#[repr(align(128))]
 pub(crate) struct ActorCell {
     /// `None` while crashed.
     pub(crate) actor: Option<Box<dyn AnyActor>>,
@@ -140,7 +140,8 @@ impl ActorCell {
             .first_stream
             .as_ref()
             .map_or(0, |(name, _)| name.len());
-        state.count ^ stream as u64 ^ state.flows.read_ahead()
+        let actor = self.actor.as_ref().map_or(0, |actor| actor.read_ahead());
+        state.count ^ stream as u64 ^ state.flows.read_ahead() ^ actor
     }
 }
 

@@ -6,10 +6,9 @@ use smallbox::SmallBox;
 use smallbox::space::S4;
 
 use super::{CellState, Parts};
+use crate::actor::{Actor, Context};
 use crate::encoding::{DecodeError, Schema};
 use crate::fault::Outcome;
-use crate::ids::EntityId;
-use crate::key::EventKey;
 use crate::payload::Encode;
 
 /// A message on its way, with what it takes to deliver, encode and copy it. Messages of up to 24
@@ -20,7 +19,7 @@ pub struct Sealed(pub(crate) SmallBox<dyn Letter, S4>);
 /// What the engine can do with a message whose type it does not know.
 pub(crate) trait Letter: Encode + Send {
     /// Hands the message to `actor`, which must be of the type it was addressed to.
-    fn deliver(&mut self, actor: &mut dyn Any, core: &mut Core<'_>) -> Outcome;
+    fn deliver(&mut self, actor: &mut dyn AnyActor, core: &mut Core<'_>) -> Outcome;
     /// Another letter with the message that `bytes` encode, for a link's further copies: messages
     /// need not be `Clone`.
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError>;
@@ -31,9 +30,34 @@ pub(crate) trait Letter: Encode + Send {
 }
 
 /// An actor whose type the engine does not know.
-pub(crate) trait AnyActor: Send {
+pub(crate) trait AnyActor: Any + Send {
     fn started(&mut self, core: &mut Core<'_>) -> Outcome;
-    fn as_any(&mut self) -> &mut dyn Any;
+    /// Reads a part of the actor; see [`Engine::read_ahead`].
+    ///
+    /// [`Engine::read_ahead`]: super::Engine::read_ahead
+    fn read_ahead(&self) -> u64;
+}
+
+/// An actor in its box, with something that can be read whatever its type is.
+pub(crate) struct Boxed<A> {
+    pub(crate) actor: A,
+    readable: u64,
+}
+
+impl<A: Actor> Boxed<A> {
+    pub(crate) fn new(actor: A) -> Box<dyn AnyActor> {
+        Box::new(Boxed { actor, readable: 0 })
+    }
+}
+
+impl<A: Actor> AnyActor for Boxed<A> {
+    fn started(&mut self, core: &mut Core<'_>) -> Outcome {
+        self.actor.started(&mut Context::new(core))
+    }
+
+    fn read_ahead(&self) -> u64 {
+        self.readable
+    }
 }
 
 /// The constructor of an actor, called with its name at the start and at each restart.
@@ -43,7 +67,4 @@ pub(crate) type Factory = Box<dyn Fn(&str) -> Box<dyn AnyActor> + Send>;
 pub(crate) struct Core<'a> {
     pub(crate) parts: &'a mut Parts,
     pub(crate) state: &'a mut CellState,
-    pub(crate) me: EntityId,
-    /// The key of the event being handled.
-    pub(crate) key: EventKey,
 }

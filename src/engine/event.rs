@@ -52,6 +52,7 @@ pub(crate) struct Side {
 }
 
 /// Something that happened, as it is committed.
+#[derive(Clone, Copy)]
 pub(crate) struct Happened<'a> {
     pub(crate) class: RecordClass,
     pub(crate) key: EventKey,
@@ -101,7 +102,7 @@ pub(crate) struct Head {
     pub(crate) sender: EntityId,
     pub(crate) receiver: EntityId,
     /// [`NOBODY`] within a host.
-    link: EntityId,
+    pub(super) link: EntityId,
     /// [`NO_KIND`] for events without a message.
     kind: KindIndex,
     /// Of a message, which copy it is; of a start or a timer, the actor's incarnation.
@@ -184,12 +185,6 @@ impl Head {
             kind: kind.unwrap_or(NO_KIND),
             ..self
         }
-    }
-
-    /// This head, for what `link` carries.
-    #[inline(always)]
-    pub(crate) fn through(self, link: EntityId) -> Self {
-        Head { link, ..self }
     }
 
     /// This head, of another copy.

@@ -95,7 +95,7 @@ impl Flows {
     #[inline(never)]
     fn add(&mut self, flow: u32) {
         if (self.taken as usize + 1) * 4 > self.places.len() * 3 {
-            let more = vec![Short::default(); (self.places.len() * 2).max(4)].into();
+            let more = vec![Short::default(); grown(self.places.len())].into();
             let all = std::mem::replace(&mut self.places, more);
             for place in all.into_iter().filter(|place| place.count > 0) {
                 self.put(place);
@@ -121,6 +121,16 @@ impl Flows {
         let count = long.entry((receiver, kind)).or_insert(first.into());
         *count += 1;
         *count - 1
+    }
+}
+
+/// The next size of a table. A small one grows by more, since who starts with many flows would put
+/// each anew at each size.
+fn grown(places: usize) -> usize {
+    if places < 64 {
+        (places * 4).max(4)
+    } else {
+        places * 2
     }
 }
 

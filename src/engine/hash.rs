@@ -7,7 +7,7 @@ use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::record::RecordClass;
 use crate::time::SimTime;
-use crate::topology::Topology;
+use crate::topology::{Reason, Topology};
 
 /// What stands for the cause of an event that has none.
 const NO_CAUSE: EventKey = EventKey {
@@ -44,7 +44,6 @@ impl Head {
         let match_key = self.match_key();
         let shape =
             class as u64 | u64::from(match_key.is_some()) << 8 | u64::from(self.copy()) << 32;
-        let reason = topology.reason(self.reason);
         let words = [
             key.time.as_nanos(),
             u64::from(key.step) << 32 | u64::from(cause.step),
@@ -60,10 +59,10 @@ impl Head {
             self.kind().map_or(0, |kind| topology.kind(kind).hash()),
             self.ordinal,
             match_key.map_or(0, |key| key.bits()),
-            if reason.is_empty() {
+            if self.reason == Reason::default() {
                 0
             } else {
-                xxh3_64(reason.as_bytes())
+                reason_hash(topology.reason(self.reason))
             },
             body.len() as u64,
         ];
@@ -72,5 +71,16 @@ impl Head {
             place.copy_from_slice(&word.to_le_bytes());
         }
         xxh3_128_with_seed(&bytes, xxh3_64(body))
+    }
+}
+
+/// Out of the way of the many events that have no reason.
+#[cold]
+fn reason_hash(reason: &str) -> u64 {
+    // A link may give an empty one, which is as good as none.
+    if reason.is_empty() {
+        0
+    } else {
+        xxh3_64(reason.as_bytes())
     }
 }

@@ -131,6 +131,12 @@ impl Parts {
         Pending { head, letter, side }
     }
 
+    /// The key of the event in hand.
+    #[inline(always)]
+    pub(crate) fn key(&self) -> EventKey {
+        self.key
+    }
+
     /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
     #[inline(always)]
     pub(crate) fn begin(
@@ -225,31 +231,36 @@ impl Parts {
             delay,
         } = outbound;
         let (ordinal, repeat) = state.next_in_flow(receiver, kind, match_key);
-        let mut head = Head::of_entity(Class::Message, me).caused(self.key, kind, ordinal);
-        head.receiver = receiver;
-        if let Some(match_key) = match_key {
-            head = head.keyed(match_key, repeat);
-        }
+        // Called on each way by itself: what one way puts in memory the other keeps in registers.
+        let head = |parts: &Parts| {
+            let mut head = Head::of_entity(Class::Message, me).caused(parts.key, kind, ordinal);
+            head.receiver = receiver;
+            match match_key {
+                Some(match_key) => head.keyed(match_key, repeat),
+                None => head,
+            }
+        };
         self.sends += 1;
         let (from, to) = (self.topology.place(me), self.topology.place(receiver));
         if from.host == to.host {
             let key = self.later_key(me, &mut state.count, delay);
-            self.insert(key, head, Some(letter));
+            self.insert(key, head(self), Some(letter));
         } else if delay.is_zero() {
-            self.send_away(state, (from.host, to.host), head, letter);
+            let (mut head, mut letter) = (head(self), Some(letter));
+            self.send_away(state, (from.host, to.host), &mut head, &mut letter);
         } else {
             let receiver = self.topology.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
         }
     }
 
-    /// Sends a message to another host.
+    /// Sends a message to another host. The letter is taken, unless there is no way.
     fn send_away(
         &mut self,
         state: &mut CellState,
         (from, to): (HostIndex, HostIndex),
-        head: Head,
-        letter: Sealed,
+        head: &mut Head,
+        letter: &mut Option<Sealed>,
     ) {
         let me = head.sender;
         let Some(link) = self.topology.link(from, to) else {
@@ -263,12 +274,12 @@ impl Parts {
                 kind: kind.unwrap_or_default(),
             });
         };
-        let mut head = head.through(link);
+        head.link = link;
         if self.topology.links.is_shared(link) {
             let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
             let engine = self.topology.place(link).engine;
             head.class = Class::HandOver;
-            self.schedule(engine, key, head, Some(letter));
+            self.schedule(engine, key, *head, letter.take());
             return;
         }
         let charge_j = self.carry(link, head, letter, None);

@@ -4,7 +4,8 @@ use super::{Class, Head, Sealed, Side};
 use crate::ids::EntityId;
 
 /// An event that waits: what is known of a message and the message itself, in two lines of cache.
-#[repr(align(64))]
+/// They are neighbours that many a processor reads together: those of one aligned pair.
+#[repr(align(128))]
 struct Waiting {
     head: Head,
     letter: Option<Sealed>,
@@ -25,18 +26,26 @@ impl Store {
     /// Puts an event in a free slot. Inlined, so that it is built where it waits.
     #[inline(always)]
     pub(crate) fn insert(&mut self, head: Head, letter: Option<Sealed>) -> u32 {
-        let waiting = Waiting { head, letter };
-        if let Some(slot) = self.free.pop() {
-            self.waiting[slot as usize] = waiting;
-            return slot;
-        }
-        self.append(waiting)
+        let slot = match self.free.pop() {
+            Some(slot) => slot,
+            None => self.append(),
+        };
+        let waiting = &mut self.waiting[slot as usize];
+        waiting.head = head;
+        // A free slot has no letter. To the compiler it may have one, whose drop may panic, for which
+        // the new one would be copied about.
+        std::mem::forget(std::mem::replace(&mut waiting.letter, letter));
+        slot
     }
 
+    /// A new slot.
     #[cold]
-    fn append(&mut self, waiting: Waiting) -> u32 {
+    fn append(&mut self) -> u32 {
         let slot = u32::try_from(self.waiting.len()).expect("fewer than 2^32 events wait");
-        self.waiting.push(waiting);
+        self.waiting.push(Waiting {
+            head: Head::of_entity(Class::Void, EntityId::CONTROL),
+            letter: None,
+        });
         slot
     }
 
@@ -52,12 +61,25 @@ impl Store {
     /// used again.
     #[inline(always)]
     pub(crate) fn take(&mut self, slot: u32) -> (Head, Option<Sealed>) {
-        let waiting = &mut self.waiting[slot as usize];
+        let head = self.take_head(slot);
+        (head, self.take_letter(slot))
+    }
+
+    /// The first half of [`Store::take`], for who is to have each half in its own place.
+    #[inline(always)]
+    pub(crate) fn take_head(&mut self, slot: u32) -> Head {
+        let head = self.waiting[slot as usize].head;
         self.free.push(slot);
-        if waiting.head.class == Class::Void {
+        if head.class == Class::Void {
             self.voids -= 1;
         }
-        (waiting.head, waiting.letter.take())
+        head
+    }
+
+    /// The second half of [`Store::take`].
+    #[inline(always)]
+    pub(crate) fn take_letter(&mut self, slot: u32) -> Option<Sealed> {
+        self.waiting[slot as usize].letter.take()
     }
 
     /// What an event just taken has besides.
@@ -70,6 +92,12 @@ impl Store {
     #[inline(always)]
     pub(crate) fn receiver(&self, slot: u32) -> EntityId {
         self.waiting[slot as usize].head.receiver
+    }
+
+    /// Whether the event in this slot has a letter, which lies in the other of its two lines.
+    #[inline(always)]
+    pub(crate) fn has_letter(&self, slot: u32) -> bool {
+        self.waiting[slot as usize].letter.is_some()
     }
 
     /// True if what waits does not fit into a processor's nearest caches.

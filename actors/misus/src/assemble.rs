@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
 use farside_actors::rover::{
-    RoverConfig, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware,
+    RoverConfig, RoverError, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware,
 };
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
@@ -59,6 +59,15 @@ pub(crate) fn start(number: u32, rovers: u32) -> RoverStart {
     }
 }
 
+/// Which key of the scenario a rover that cannot be is of.
+fn blame(error: RoverError) -> SetupError {
+    match error {
+        RoverError::Settings(error) => error,
+        RoverError::OutsideTerrain { .. } => SetupError::value("team.rovers", error),
+        RoverError::NotFinite { .. } => SetupError::value("rover", error),
+    }
+}
+
 /// Declares hosts, actors and links.
 pub(crate) fn assemble(
     sim: &mut Simulation,
@@ -102,7 +111,7 @@ pub(crate) fn assemble(
             until: parts.until,
             tally: RoverTally::default(),
         };
-        add_hardware(sim, *host, spec, scientist);
+        add_hardware(sim, *host, spec, scientist).map_err(blame)?;
         let height_m = field.ground_m(start.east_m, start.north_m);
         let antenna_m = height_m + parts.rover.mast_m;
         wiring.place(name, Point3::new(start.east_m, start.north_m, antenna_m));

@@ -53,26 +53,13 @@ impl<'w, 's, const NOTING: bool> Compound<'w, 's, NOTING> {
                 self.rest = rest;
                 field
             }
-            _ => self.find(key)?,
+            _ => {
+                let at = find(self.message, key)?;
+                self.rest = &self.message.fields[at + 1..];
+                &self.message.fields[at]
+            }
         };
         self.put(field, value)
-    }
-
-    /// Finds a field that is not the next one: those between were skipped.
-    #[cold]
-    fn find(&mut self, key: &'static str) -> Result<&'s Field, Fault> {
-        match self
-            .message
-            .fields
-            .iter()
-            .position(|field| field.key.name == key)
-        {
-            Some(position) => {
-                self.rest = &self.message.fields[position + 1..];
-                Ok(&self.message.fields[position])
-            }
-            None => Err(self.unknown(key.to_owned())),
-        }
     }
 
     /// Notes that `Serialize` leaves a field out.
@@ -88,22 +75,34 @@ impl<'w, 's, const NOTING: bool> Compound<'w, 's, NOTING> {
         }
     }
 
-    #[cold]
-    fn unknown(&self, field: String) -> Fault {
-        Box::new(EncodeError::UnknownField {
-            message: self.message.name.clone(),
-            field,
-        })
-    }
-
     #[inline(always)]
     fn positional<T: ?Sized + Serialize>(&mut self, value: &T) -> Result<(), Fault> {
         let Some((field, rest)) = self.rest.split_first() else {
-            return Err(self.unknown(self.message.fields.len().to_string()));
+            return Err(unknown(self.message, self.message.fields.len().to_string()));
         };
         self.rest = rest;
         self.put(field, value)
     }
+}
+
+// What is not inlined takes no reference to a `Compound`, which so stays in registers.
+
+/// Finds a field that is not the next one: those between were skipped.
+#[cold]
+fn find(message: &Message, key: &'static str) -> Result<usize, Fault> {
+    let found = message
+        .fields
+        .iter()
+        .position(|field| field.key.name == key);
+    found.ok_or_else(|| unknown(message, key.to_owned()))
+}
+
+#[cold]
+fn unknown(message: &Message, field: String) -> Fault {
+    Box::new(EncodeError::UnknownField {
+        message: message.name.clone(),
+        field,
+    })
 }
 
 impl<const NOTING: bool> ser::SerializeStruct for Compound<'_, '_, NOTING> {

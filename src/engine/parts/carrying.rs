@@ -7,7 +7,7 @@ use std::num::NonZeroU64;
 
 use super::{Effect, Parts};
 use crate::carrier::{Carriage, Parcel, Verdict};
-use crate::engine::{CellState, Class, Head, Parked, Pending, Sealed, Side};
+use crate::engine::{CellState, Class, Head, Outgoing, Parked, Pending, Sealed, Side};
 use crate::fault::FaultCause;
 use crate::ids::{EntityId, KindIndex};
 use crate::key::EventKey;
@@ -16,19 +16,22 @@ use crate::time::{SimDuration, SimTime};
 
 impl Parts {
     /// Lets `link` decide the fate of a message, now; `held` if it held it before. Returns what the
-    /// sender is charged at once, in joules: what an own link asks for.
-    pub(crate) fn carry(
+    /// sender is charged at once, in joules: what an own link asks for. The letter is taken.
+    ///
+    /// Inlined where a message is sent, which no link has held.
+    #[inline(always)]
+    pub(super) fn carry(
         &mut self,
         link: EntityId,
-        head: Head,
-        letter: Sealed,
+        head: &mut Head,
+        letter: &mut Option<Sealed>,
         held: Option<Side>,
     ) -> f64 {
         self.carrying = Some(link);
         let Parts {
             topology, links, ..
         } = self;
-        let Some(kind) = head.kind() else {
+        let (Some(kind), Some(sealed)) = (head.kind(), letter.as_ref()) else {
             return 0.0;
         };
         let local = topology.place(link).local as usize;
@@ -45,7 +48,7 @@ impl Parts {
             copy: head.copy(),
             token: held.map(|held| held.token),
             match_key: head.match_key(),
-            letter: &*letter.0,
+            letter: &*sealed.0,
             size: Cell::new(None),
         };
         let cell = &mut links[local];
@@ -70,7 +73,18 @@ impl Parts {
         if charge_j == 0.0 && charge_receiver_j == 0.0 {
             return 0.0;
         }
-        self.charge(link, &head, held.is_some(), charge_j, charge_receiver_j)
+        self.charge(link, head, held.is_some(), charge_j, charge_receiver_j)
+    }
+
+    /// [`Parts::carry`] for a shared link, or one that held the message.
+    pub(crate) fn carry_on(
+        &mut self,
+        link: EntityId,
+        mut head: Head,
+        letter: Sealed,
+        held: Option<Side>,
+    ) -> f64 {
+        self.carry(link, &mut head, &mut Some(letter), held)
     }
 
     /// Charges what a link asks for; returns what the sender is charged at once, in joules.
@@ -212,38 +226,74 @@ impl Parts {
 
     /// Turns a link's verdicts into events, the last copy with the letter itself.
     #[inline(always)]
-    fn execute(&mut self, link: EntityId, count: &mut u64, mut head: Head, letter: Sealed) {
+    fn execute(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        head: &mut Head,
+        letter: &mut Option<Sealed>,
+    ) {
+        // Only a hand-over is an event of its own between the cause and this.
+        head.handed_over = match head.class {
+            Class::HandOver => NonZeroU64::new(self.key.count),
+            _ => None,
+        };
         // Of the messages that a link decides about, only those that it held have a side.
         let held = head.has_side;
-        // Only a hand-over is an event of its own between the cause and this, unless it was held.
-        let handed_over = head.cause().filter(|cause| *cause != self.key && !held);
-        head.handed_over = handed_over.and_then(|_| NonZeroU64::new(self.key.count));
-        let scheduled_by = held.then_some(self.key);
-        let [verdict] = self.verdicts.list[..] else {
-            return self.execute_all(link, count, head, letter, scheduled_by);
-        };
-        if let Err(cause) = self.obey(link, count, verdict, (head, letter), scheduled_by) {
-            self.raise(*cause);
+        if let [Verdict::Deliver { after, carriage }] = &self.verdicts.list[..]
+            && carriage.is_none()
+            && !held
+        {
+            let after = *after;
+            return match self.check_delay(link, after) {
+                Ok(()) => self.deliver(link, count, after, head, letter),
+                Err(cause) => self.raise(*cause),
+            };
+        }
+        self.execute_all(link, count, head, letter, held.then_some(self.key));
+    }
+
+    /// The way of nearly all messages through a link: one copy, of which nothing more is to be known.
+    #[inline(always)]
+    fn deliver(
+        &mut self,
+        link: EntityId,
+        count: &mut u64,
+        after: SimDuration,
+        head: &mut Head,
+        letter: &mut Option<Sealed>,
+    ) {
+        let engine = self.topology.place(head.receiver).engine;
+        let key = self.later_key(link, count, after);
+        head.class = Class::Message;
+        if engine == self.index {
+            self.insert(key, *head, letter.take());
+        } else {
+            let (head, letter, side) = (*head, letter.take(), None);
+            self.outgoing.push(Outgoing {
+                engine,
+                key,
+                pending: Pending { head, letter, side },
+            });
         }
     }
 
-    /// As [`Parts::execute`], for any number of verdicts.
+    /// As [`Parts::execute`], for any verdicts.
     #[inline(never)]
     fn execute_all(
         &mut self,
         link: EntityId,
         count: &mut u64,
-        head: Head,
-        letter: Sealed,
+        head: &Head,
+        letter: &mut Option<Sealed>,
         scheduled_by: Option<EventKey>,
     ) {
         let copies = self.verdicts.list.len();
-        let mut letter = Some(letter);
         for copy in 0..copies {
             let Some(own) = (if copy + 1 == copies {
                 letter.take()
             } else {
-                self.copy_of(letter.as_ref(), &head)
+                self.copy_of(letter.as_ref(), head)
             }) else {
                 return;
             };
@@ -264,7 +314,6 @@ impl Parts {
     }
 
     /// Does to one copy what the link decided.
-    #[inline(always)]
     fn obey(
         &mut self,
         link: EntityId,
@@ -273,21 +322,6 @@ impl Parts {
         (mut head, letter): (Head, Sealed),
         scheduled_by: Option<EventKey>,
     ) -> Result<(), Box<FaultCause>> {
-        if let (
-            Verdict::Deliver {
-                after,
-                carriage: None,
-            },
-            None,
-        ) = (verdict, scheduled_by)
-        {
-            self.check_delay(link, after)?;
-            let engine = self.topology.place(head.receiver).engine;
-            let key = self.later_key(link, count, after);
-            (head.class, head.has_side) = (Class::Message, false);
-            self.schedule(engine, key, head, Some(letter));
-            return Ok(());
-        }
         let side = |carriage: Option<Carriage>| {
             (carriage.is_some() || scheduled_by.is_some()).then_some(Side {
                 carriage,

@@ -8,19 +8,19 @@
 //! SimPy where python3 can install it. This is no part of the workspace, so that it costs a user
 //! nothing.
 
-mod farside_hold;
 mod nexosim_hold;
 mod outside;
+#[path = "../../../benches/phold/model.rs"]
+mod phold;
 mod ratios;
 
 use std::time::Instant;
 
-use outside::Program;
+use farside::Executor;
 
-/// The look-ahead: no event is scheduled sooner [ns].
-const LOOK_AHEAD_NS: u64 = 100_000_000;
-/// The mean of the exponential part [ns].
-const MEAN_NS: f64 = 900_000_000.0;
+use outside::Program;
+use phold::{LOOK_AHEAD_NS, MEAN_NS, Phold};
+
 /// Rounds, unless told otherwise.
 const ROUNDS: usize = 5;
 
@@ -93,6 +93,26 @@ fn event_ns(size: Size, hold: impl Fn(Size) -> u64) -> f64 {
     (long_s - short_s) * 1e9 / (long_events - short_events)
 }
 
+/// Farside on one host and one thread.
+fn inline(size: Size, digest: bool) -> u64 {
+    farside(size, false, digest, Executor::Inline)
+}
+
+/// Farside with a host for each actor, joined by links, through kameo; no digest, as in the others.
+fn kameo(size: Size) -> u64 {
+    farside(size, true, false, Executor::Kameo { threads: 1 })
+}
+
+fn farside(size: Size, by_link: bool, digest: bool, executor: Executor) -> u64 {
+    let phold = Phold {
+        actors: size.actors,
+        population: size.population,
+        by_link,
+        digest,
+    };
+    phold.run(size.events, executor)
+}
+
 /// One round: how long an event takes in each of [`NAMES`] [ns], none where that takes no part.
 fn round(size: Size, ns_3: Option<&Program>, simpy: Option<&Program>) -> [Option<f64>; 6] {
     let joined = size.actors <= MOST_JOINED;
@@ -106,9 +126,9 @@ fn round(size: Size, ns_3: Option<&Program>, simpy: Option<&Program>) -> [Option
             })
         }),
         ns_3.and_then(|ns_3| ns_3.event_ns(Size { events, ..size })),
-        Some(event_ns(size, |size| farside_hold::inline(size, false))),
-        Some(event_ns(size, |size| farside_hold::inline(size, true))),
-        joined.then(|| event_ns(size, farside_hold::kameo)),
+        Some(event_ns(size, |size| inline(size, false))),
+        Some(event_ns(size, |size| inline(size, true))),
+        joined.then(|| event_ns(size, kameo)),
     ]
 }
 
@@ -127,12 +147,18 @@ fn row(name: &str, cells: [String; 6]) -> String {
     })
 }
 
-/// `profile SIZE-INDEX EVENTS`: one run of Farside alone, for a profiler.
+/// `profile inline|digest|kameo SIZE-INDEX EVENTS`: one run of Farside alone, for a profiler.
 fn profile(mut arguments: impl Iterator<Item = String>) {
+    let way = arguments.next();
     let mut number = || arguments.next().and_then(|at| at.parse::<u64>().ok());
     let size = SIZES[number().unwrap_or(0) as usize];
     let events = number().unwrap_or(size.events);
-    farside_hold::inline(Size { events, ..size }, false);
+    let size = Size { events, ..size };
+    match way.as_deref() {
+        Some("digest") => inline(size, true),
+        Some("kameo") => kameo(size),
+        _ => inline(size, false),
+    };
 }
 
 fn main() {
