@@ -285,6 +285,16 @@ impl<O: Clone> Store<O> {
         self.nodes.get(variable).is_some()
     }
 
+    /// Whether a variable has no constraints.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn is_apart(&self, variable: Variable) -> bool {
+        let node = self.nodes.get(variable);
+        node.expect("the variable is there").first == NONE
+    }
+
     /// The values that a variable can have.
     ///
     /// # Panics

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::{Database, Guard, InstanceId, Owner, Status, Time, TokenId};
 use crate::Ticks;
 use crate::model::{End, Target};
-use crate::parameters::{Domain, Kind, Operand, Variable};
+use crate::parameters::{Domain, Kind, Operand, Store, Variable};
 use crate::temporal::{Point, Span};
 
 impl Database {
@@ -37,8 +37,12 @@ impl Database {
 
     /// The first token of a timeline, if it and the one after it are past.
     fn next_past(&self, timeline: usize, before: Ticks) -> Option<TokenId> {
-        let first = self.lanes[timeline].first?;
         // The one before the token that lasts now stays, and so does the last one.
+        let lane = self.lanes[timeline];
+        if lane.tokens < 3 {
+            return None;
+        }
+        let first = lane.first?;
         let second = self.at(first).after?;
         self.at(second).after?;
         let past = self.is_past(first, before) && self.is_past(second, before);
@@ -102,7 +106,9 @@ impl Database {
             self.part(other, token);
             self.delete(other);
         }
-        self.store.remove_all(&going);
+        if !going.is_empty() {
+            self.store.remove_all(&going);
+        }
         for instance in std::mem::take(&mut self.change(token).instances) {
             self.forget_instance(instance, before);
         }
@@ -130,7 +136,9 @@ impl Database {
         now.before = None;
         now.after = None;
         for operand in std::mem::take(&mut now.parameters) {
-            self.drop_holder(operand);
+            if let Operand::Variable(variable) = operand {
+                drop_holder(&mut self.holders, &mut self.store, variable);
+            }
         }
         self.delete(token);
     }
@@ -191,6 +199,9 @@ impl Database {
             if let Operand::Variable(variable) = operand {
                 mine.push(variable);
             }
+        }
+        if mine.is_empty() {
+            return SmallVec::new();
         }
         mine.sort_unstable();
         let mut kept: SmallVec<[Variable; 8]> = SmallVec::new();
@@ -260,38 +271,35 @@ impl Database {
                 at.supports -= 1;
             }
         }
-        let Some(at) = self.instances.remove(instance) else {
-            return;
-        };
-        self.steps += 1;
-        for effected in at.effects {
+        let at = self.change_instance(instance);
+        let holds = at.guard == Guard::Holds;
+        let effects = std::mem::take(&mut at.effects);
+        for effected in effects {
             self.forget_effect(effected, before);
         }
-        for variable in at.watched {
+        let at = self.instances.get(instance).expect("the instance is there");
+        for variable in &at.watched {
             self.watchers[variable.index()].retain(|&at| at != instance);
         }
         // What it says of times and values of others stays with them.
-        for operand in at.variables.into_iter().flatten() {
-            self.drop_holder(operand);
-        }
-        if at.guard == Guard::Holds {
-            for place in (0..self.open.len()).rev() {
-                if self.open[place].instance == instance {
-                    self.open.remove(place);
-                }
+        for &operand in at.variables.iter().flatten() {
+            if let Operand::Variable(variable) = operand {
+                drop_holder(&mut self.holders, &mut self.store, variable);
             }
+        }
+        self.instances.discard(instance);
+        if holds {
+            self.open.retain(|open| open.instance != instance);
         }
     }
+}
 
-    /// Counts one less who has a variable. If nobody else has it, it is gone already, but for one
-    /// whose other holders went with this one.
-    fn drop_holder(&mut self, operand: Operand) {
-        if let Operand::Variable(variable) = operand {
-            let holders = &mut self.holders[variable.index()];
-            *holders -= 1;
-            if *holders == 0 && self.store.has(variable) {
-                self.store.remove(variable);
-            }
-        }
+/// Counts one less who has a variable. If nobody else has it, it is gone already, but for one
+/// whose other holders went with this one.
+fn drop_holder(holders: &mut [u32], store: &mut Store<Owner>, variable: Variable) {
+    let holders = &mut holders[variable.index()];
+    *holders -= 1;
+    if *holders == 0 && store.has(variable) {
+        store.remove(variable);
     }
 }

@@ -164,7 +164,7 @@ impl Database {
             changed.clear();
             self.store.take_changed(&mut changed);
             changed.append(&mut self.equalities);
-            if changed.is_empty() {
+            if changed.is_empty() && self.told.is_empty() {
                 break Ok(());
             }
             if let Err(conflict) = self.tell(&changed) {
@@ -230,6 +230,11 @@ impl Database {
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
         // Each once, however many of its variables changed.
         let mut watchers: SmallVec<[InstanceId; 16]> = SmallVec::new();
+        for instance in self.told.drain(..) {
+            if !watchers.contains(&instance) {
+                watchers.push(instance);
+            }
+        }
         for &variable in changed {
             let all = self.watchers.get(variable.index());
             for &instance in all.map_or(&[][..], |all| all) {

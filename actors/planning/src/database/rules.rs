@@ -7,8 +7,8 @@ use super::resources::Effected;
 use super::trail::Change;
 use super::{Conflict, Database, InstanceId, Owner, TokenId};
 use crate::model::{
-    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship, Rule, RuleId,
-    Target, VariableId,
+    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship,
+    RelationshipKind, Rule, RuleId, Target, TimelineId, Value, VariableId,
 };
 use crate::parameters::{self, Operand};
 use crate::temporal::{Constraint, Span};
@@ -220,50 +220,50 @@ impl Database {
         };
         for place in 0..self.model.rules_of(timeline, predicate).len() {
             let rule = self.model.rules_of(timeline, predicate)[place];
-            let labels = self.model.rules[rule].labels.max(1);
-            let mut instance = Instance {
-                rule,
-                master: token,
-                guard: Guard::Waiting,
-                variables: SmallVec::from_elem(None, self.model.rules[rule].variables.len()),
-                labels: SmallVec::from_elem(None, labels),
-                chosen: SmallVec::from_elem(None, self.flats[rule].choices.len()),
-                times: SmallVec::new(),
-                values: SmallVec::new(),
-                effects: SmallVec::new(),
-                watched: SmallVec::new(),
-                kept: self.serial,
-            };
-            instance.labels[0] = Some(token);
+            let instance = self.new_instance(rule, token, timeline);
             let id = self.instances.insert(instance);
             self.note(Change::InstanceAdded(id));
             self.change(token).instances.push(id);
-            self.adopt_master(id);
             self.watch_guard(id)?;
             self.reconsider(id)?;
         }
         Ok(())
     }
 
-    /// The variables among the master's arguments stand for its parameters.
-    fn adopt_master(&mut self, instance: InstanceId) {
-        let rule = self.instance_at(instance).rule;
-        let master = self.instance_at(instance).master;
-        for place in 0..self.model.rules[rule].master.arguments.len() {
-            let argument = self.model.rules[rule].master.arguments[place];
-            if let Argument::Variable(variable) = argument
-                && self.instance_at(instance).variables[variable].is_none()
-            {
-                let operand = self.at(master).parameters[place];
-                self.stand_for(instance, variable, operand);
-            }
+    /// A rule as it waits for its guard: the variables among the master's arguments stand for the
+    /// master's parameters.
+    fn new_instance(&mut self, rule: RuleId, master: TokenId, timeline: TimelineId) -> Instance {
+        let said = &self.model.rules[rule];
+        let mut variables: SmallVec<[Option<Operand>; 4]> =
+            SmallVec::from_elem(None, said.variables.len());
+        let mut labels = SmallVec::from_elem(None, said.labels.max(1));
+        labels[0] = Some(master);
+        let parameters = &self.at(master).parameters;
+        let arguments = said.master.arguments.iter().zip(parameters);
+        let object = self.model.timelines[timeline].object;
+        let named = arguments.filter_map(|(argument, &operand)| match *argument {
+            Argument::Variable(variable) => Some((variable, operand)),
+            Argument::Any | Argument::Value(_) => None,
+        });
+        let object = said.master.object.map(|it| (it, Operand::Value(object)));
+        for (variable, operand) in named.chain(object) {
+            variables[variable].get_or_insert(operand);
         }
-        let object = self.model.rules[rule].master.object;
-        if let (Some(variable), Some(timeline)) = (object, self.at(master).timeline)
-            && self.instance_at(instance).variables[variable].is_none()
-        {
-            let object = Operand::Value(self.model.timelines[timeline].object);
-            self.stand_for(instance, variable, object);
+        for &operand in variables.iter().flatten() {
+            self.hold(operand);
+        }
+        Instance {
+            rule,
+            master,
+            guard: Guard::Waiting,
+            variables,
+            labels,
+            chosen: SmallVec::from_elem(None, self.flats[rule].choices.len()),
+            times: SmallVec::new(),
+            values: SmallVec::new(),
+            effects: SmallVec::new(),
+            watched: SmallVec::new(),
+            kept: self.serial,
         }
     }
 
@@ -298,14 +298,7 @@ impl Database {
             relation: None,
         };
         for place in 0..self.model.rules[rule].relationships.len() {
-            let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
-            for at in 0..self.model.rules[rule].relationships[place].operands.len() {
-                let term = self.model.rules[rule].relationships[place].operands[at];
-                operands.push(self.operand(instance, term)?);
-            }
-            let kind = self.kind(&self.model.rules[rule].relationships[place]);
-            let posted = self.post_value(kind, &operands, owner)?;
-            self.change_instance(instance).values.push((None, posted));
+            self.apply_relationship(instance, place)?;
         }
         if let Some([min, max]) = self.model.rules[rule].duration {
             self.watch_bounds(instance, [min, max]);
@@ -325,6 +318,63 @@ impl Database {
             self.push_open(Open { instance, step });
         }
         Ok(())
+    }
+
+    /// Posts what a rule says of parameters, where that is not certain already.
+    fn apply_relationship(&mut self, instance: InstanceId, place: usize) -> Result<(), Conflict> {
+        let at = self.instance_at(instance);
+        let (rule, owner) = (at.rule, at.owner(None));
+        let count = self.model.rules[rule].relationships[place].operands.len();
+        let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
+        for at in 0..count {
+            let term = self.model.rules[rule].relationships[place].operands[at];
+            if at + 1 == count
+                && let Some(output) = self.known_output(instance, place, term, &operands)
+            {
+                self.stand_for(instance, output.0, output.1);
+                return Ok(());
+            }
+            operands.push(self.operand(instance, term)?);
+        }
+        let kind = self.kind(&self.model.rules[rule].relationships[place]);
+        let known = |operand: &Operand| matches!(operand, Operand::Value(_));
+        self.steps += 1;
+        if operands.iter().all(known) && self.store.entailed(&kind, &operands) == Some(true) {
+            return Ok(());
+        }
+        let posted = self.post_value(kind, &operands, owner)?;
+        self.change_instance(instance).values.push((None, posted));
+        Ok(())
+    }
+
+    /// What a function gives for known values, where nothing stands for its output yet.
+    fn known_output(
+        &self,
+        instance: InstanceId,
+        place: usize,
+        term: Term,
+        inputs: &[Operand],
+    ) -> Option<(VariableId, Operand)> {
+        let rule = self.instance_at(instance).rule;
+        let (Term::Variable(variable), RelationshipKind::Function(function)) =
+            (term, self.model.rules[rule].relationships[place].kind)
+        else {
+            return None;
+        };
+        if self.instance_at(instance).variables[variable].is_some() {
+            return None;
+        }
+        let mut values: SmallVec<[Value; 4]> = SmallVec::new();
+        for input in inputs {
+            let Operand::Value(value) = *input else {
+                return None;
+            };
+            values.push(value);
+        }
+        let output = (self.model.functions[function].call)(&values)?;
+        let of = self.model.rules[rule].variables[variable].of;
+        let may_be = self.domains[of].contains(output);
+        may_be.then_some((variable, Operand::Value(output)))
     }
 
     /// What a term stands for; a variable that nothing stands for yet gets one of the store.

@@ -16,6 +16,9 @@ pub(super) enum Change {
     InstanceChanged(InstanceId),
     InstanceRemoved(InstanceId),
     Lane(TimelineId, Lane),
+    /// Which token stood before or after one.
+    Before(TokenId, Option<TokenId>),
+    After(TokenId, Option<TokenId>),
     Opened,
     /// What was open is not: at which place it stood.
     Closed(usize, Open),
@@ -58,6 +61,7 @@ impl Database {
         self.network.pop();
         self.store.pop();
         self.equalities.clear();
+        self.told.clear();
         self.pop_levels();
     }
 
@@ -159,6 +163,20 @@ impl Database {
         at
     }
 
+    /// Says which token stands before one: a token of which nothing else changes is not kept.
+    pub(super) fn set_before(&mut self, token: TokenId, before: Option<TokenId>) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.before, before);
+        self.note(Change::Before(token, old));
+    }
+
+    /// Says which token stands after one.
+    pub(super) fn set_after(&mut self, token: TokenId, after: Option<TokenId>) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.after, after);
+        self.note(Change::After(token, old));
+    }
+
     pub(super) fn change_lane(&mut self, timeline: TimelineId) -> &mut Lane {
         let lane = self.lanes[timeline];
         self.note(Change::Lane(timeline, lane));
@@ -203,6 +221,16 @@ impl Database {
                 self.instances.undo_remove(instance, before);
             }
             Change::Lane(timeline, lane) => self.lanes[timeline] = lane,
+            Change::Before(token, before) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.before = before;
+                }
+            }
+            Change::After(token, after) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.after = after;
+                }
+            }
             Change::Opened => drop(self.open.pop()),
             Change::Closed(place, open) => self.open.insert(place, open),
             Change::Held(place, count) => self.holders[place] = count,

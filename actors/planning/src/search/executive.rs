@@ -168,9 +168,7 @@ impl Executive {
                 return Ok(());
             };
             let inputs = database.model().predicates[at.predicate].inputs;
-            for (place, &value) in outputs.iter().enumerate() {
-                database.bind(token, inputs + place, value, Owner::Token(token))?;
-            }
+            database.learn(token, inputs, outputs)?;
             if ends {
                 let earliest = database.finish(token).min.max(tick);
                 database.end(token, earliest)?;

@@ -192,14 +192,14 @@ impl<O: Clone> Network<O> {
         }
         self.scratch.begin(self.nodes.places());
         self.find_affected(side, target);
-        // What is not affected offers what it asks for; the horizon asks for something of all.
+        // What is not affected offers what it asks for; the base asks for something of all.
         for index in 0..self.scratch.affected.len() {
             let point = self.scratch.affected[index];
             let node = self.node(point);
             let old = node.value[side];
             let mut next = node.first[1 - side];
             let mut best = Growth {
-                by: self.edge_of_horizon(side) - old,
+                by: node.base[side] - old,
                 point,
                 half: None,
             };
@@ -270,11 +270,6 @@ impl<O: Clone> Network<O> {
         let source = self.node(inequality.source(side)).value[side];
         let target = self.node(inequality.target(side)).value[side];
         source + inequality.gap - target
-    }
-
-    /// What the horizon asks of every point.
-    pub(super) fn edge_of_horizon(&self, side: Side) -> Ticks {
-        [self.horizon.min, -self.horizon.max][side]
     }
 
     fn set(&mut self, side: Side, point: u32, growth: Ticks, by: Option<Half>) {
