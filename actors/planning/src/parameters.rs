@@ -257,6 +257,13 @@ impl<O: Clone> Store<O> {
     ///
     /// If one of them is not there.
     pub fn remove_all(&mut self, variables: &[Variable]) -> bool {
+        if let &[variable] = variables
+            && self.is_apart(variable)
+        {
+            // Nobody is told.
+            self.take_out(variable);
+            return !self.unfinished;
+        }
         let mark = self.begin();
         for &variable in variables {
             let node = self.nodes.get_mut(variable);
@@ -475,6 +482,11 @@ impl<O: Clone> Store<O> {
         into.clear();
         std::mem::swap(into, &mut self.changed);
         self.take_told(into);
+    }
+
+    /// Whether there are variables whose domains changed since this was asked last.
+    pub fn has_changed(&self) -> bool {
+        !self.changed.is_empty()
     }
 
     /// All variables and their domains, place by place, for comparing whole states.

@@ -74,6 +74,9 @@ type Half = u32;
 /// A gap that every pair of points has.
 const NOTHING: Ticks = -(FURTHEST << 2);
 
+/// The place of the origin, which is the first point.
+const ORIGIN: u32 = 0;
+
 /// No inequality.
 const NONE: u32 = u32::MAX;
 
@@ -285,13 +288,13 @@ impl<O: Clone> Network<O> {
     /// If it is not there.
     pub fn is_apart(&self, point: Point) -> bool {
         let node = self.nodes.get(point).expect("the point is there");
-        let (me, origin) = (point.index() as u32, self.origin.index() as u32);
+        let me = point.index() as u32;
         [EARLIEST, LATEST].into_iter().all(|side| {
             let mut half = node.first[side];
             while half != NONE {
                 let inequality = &self.halves[half as usize];
                 let other = inequality.from ^ inequality.to ^ me;
-                if other != origin {
+                if other != ORIGIN {
                     return false;
                 }
                 half = inequality.next[side];
@@ -330,6 +333,13 @@ impl<O: Clone> Network<O> {
         let Some(node) = self.nodes.get(point) else {
             return Vec::new();
         };
+        if point == self.origin {
+            let all = self.edges.iter();
+            let all = all.filter(|(_, edge)| edge.from == point || edge.to == point);
+            let mut found: Vec<_> = all.map(|at| at.0).collect();
+            found.reverse();
+            return found;
+        }
         let mut found = Vec::new();
         for side in [EARLIEST, LATEST] {
             let mut half = node.first[side];

@@ -452,22 +452,18 @@ impl Database {
             Status::Free | Status::Rejected => {}
         }
         self.remove_mirrors(token);
-        let at = self.change(token);
-        let times = std::mem::take(&mut at.times);
-        let values = std::mem::take(&mut at.values);
-        let parameters = std::mem::take(&mut at.parameters);
-        let (start, finish) = (at.start, at.finish);
-        for posted in times {
-            self.retract_time(posted);
+        for place in 0..self.at(token).times.len() {
+            self.retract_time(self.at(token).times[place]);
         }
-        for posted in values {
-            self.retract_value(posted);
+        for place in 0..self.at(token).values.len() {
+            self.retract_value(self.at(token).values[place]);
         }
         self.loosened = true;
-        for operand in parameters {
-            self.release(operand);
+        for place in 0..self.at(token).parameters.len() {
+            self.release(self.at(token).parameters[place]);
         }
-        for time in [start, finish] {
+        self.steps += 1;
+        for time in [self.at(token).start, self.at(token).finish] {
             if let Time::Point(point) = time {
                 self.network.remove_point(point);
             }

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use super::{Database, Guard, InstanceId, Owner, Status, Time, TokenId};
 use crate::Ticks;
-use crate::model::{End, Target};
+use crate::model::Target;
 use crate::parameters::{Domain, Kind, Operand, Store, Variable};
 use crate::temporal::{Point, Span};
 
@@ -95,9 +95,66 @@ impl Database {
     /// Deletes a token of the past: later ones keep what rested on it.
     fn delete_past(&mut self, token: TokenId, before: Ticks) {
         // All that rests on what goes is kept before anything of it does.
-        let merged = self.at(token).merged.clone();
         self.freeze_times(token);
-        let going = self.freeze_values(token);
+        let going = if self.has_variables(token) {
+            self.freeze_values(token)
+        } else {
+            SmallVec::new()
+        };
+        if !self.at(token).merged.is_empty() {
+            self.delete_merged(token);
+        }
+        if !going.is_empty() {
+            self.store.remove_all(&going);
+        }
+        for instance in std::mem::take(&mut self.change(token).instances) {
+            self.forget_instance(instance, before);
+        }
+        let at = self.change(token);
+        // Who asked for it has it: the label is of a token that was.
+        at.supported.clear();
+        let parameters = std::mem::take(&mut at.parameters);
+        let (order, timeline, after) = (at.order.take(), at.timeline, at.after);
+        at.status = Status::Rejected;
+        (at.before, at.after) = (None, None);
+        for operand in parameters {
+            if let Operand::Variable(variable) = operand {
+                drop_holder(&mut self.holders, &mut self.store, variable);
+            }
+        }
+        if let Some(order) = order {
+            self.retract_time(order);
+        }
+        // The next one is the first: what held it after this one is in its own bounds.
+        if let Some(after) = after {
+            let next = self.change(after);
+            next.before = None;
+            if let Some(order) = next.order.take() {
+                self.retract_time(order);
+            }
+        }
+        if let Some(timeline) = timeline {
+            let lane = self.change_lane(timeline);
+            lane.first = after;
+            lane.tokens -= 1;
+        }
+        self.delete(token);
+    }
+
+    /// Whether a token or a rule of it has variables.
+    fn has_variables(&self, token: TokenId) -> bool {
+        let is_variable = |operand: &Operand| matches!(operand, Operand::Variable(_));
+        let at = self.at(token);
+        at.parameters.iter().any(is_variable)
+            || at.instances.iter().any(|&instance| {
+                let mut variables = self.instance_at(instance).variables.iter().flatten();
+                variables.any(is_variable)
+            })
+    }
+
+    /// Deletes what is merged into a token of the past.
+    fn delete_merged(&mut self, token: TokenId) {
+        let merged = self.at(token).merged.clone();
         for &other in &merged {
             self.freeze_times(other);
             self.freeze_values(other);
@@ -106,47 +163,15 @@ impl Database {
             self.part(other, token);
             self.delete(other);
         }
-        if !going.is_empty() {
-            self.store.remove_all(&going);
-        }
-        for instance in std::mem::take(&mut self.change(token).instances) {
-            self.forget_instance(instance, before);
-        }
-        // Who asked for it has it: the label is of a token that was.
-        self.change(token).supported.clear();
-        if let Some(order) = self.change(token).order.take() {
-            self.retract_time(order);
-        }
-        // The next one is the first: what held it after this one is in its own bounds.
-        let (Some(timeline), after) = (self.at(token).timeline, self.at(token).after) else {
-            return;
-        };
-        if let Some(after) = after {
-            let next = self.change(after);
-            next.before = None;
-            if let Some(order) = next.order.take() {
-                self.retract_time(order);
-            }
-        }
-        let lane = self.change_lane(timeline);
-        lane.first = after;
-        lane.tokens -= 1;
-        let now = self.change(token);
-        now.status = Status::Rejected;
-        now.before = None;
-        now.after = None;
-        for operand in std::mem::take(&mut now.parameters) {
-            if let Operand::Variable(variable) = operand {
-                drop_holder(&mut self.holders, &mut self.store, variable);
-            }
-        }
-        self.delete(token);
     }
 
     /// Points that are bound to a token whose times are known are bound to these times instead.
     fn freeze_times(&mut self, token: TokenId) {
-        for end in [End::Start, End::Finish] {
-            if let Time::Point(point) = self.time(token, end) {
+        let at = self.at(token);
+        for time in [at.start, at.finish] {
+            if let Time::Point(point) = time
+                && !self.network.is_apart(point)
+            {
                 self.freeze_neighbours(point);
             }
         }
@@ -199,9 +224,6 @@ impl Database {
             if let Operand::Variable(variable) = operand {
                 mine.push(variable);
             }
-        }
-        if mine.is_empty() {
-            return SmallVec::new();
         }
         mine.sort_unstable();
         let mut kept: SmallVec<[Variable; 8]> = SmallVec::new();

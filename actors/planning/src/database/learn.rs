@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use super::trail::Change;
-use super::{Conflict, Database, InstanceId, Owner, Time, TokenId};
+use super::{Conflict, Database, Owner, Time, TokenId};
 use crate::Ticks;
 use crate::model::{End, Value};
 use crate::parameters::{Operand, Variable};
@@ -25,7 +25,7 @@ impl Database {
             // Nothing but known times says when it ends, and now that is one itself.
             return self.attempt(|database| {
                 database.network.remove_point(point);
-                database.change(token).finish = Time::At(tick);
+                database.set_finish(token, Time::At(tick));
                 database.dirty_if_used(token);
                 database.loosened = true;
                 Ok(())
@@ -63,74 +63,80 @@ impl Database {
     fn own_variables(&self, token: TokenId, from: usize, values: &[Value]) -> SmallVec<[Known; 4]> {
         let at = self.at(token);
         let mut known: SmallVec<[Known; 4]> = SmallVec::new();
-        for (&operand, &value) in at.parameters[from..].iter().zip(values) {
+        let mut shared = false;
+        for ((place, &operand), &value) in at.parameters.iter().enumerate().skip(from).zip(values) {
             if let Operand::Variable(variable) = operand
                 && self.store.is_apart(variable)
                 && self.store.domain(variable).contains(value)
                 && known.iter().all(|other| other.variable != variable)
             {
-                let others = self.holders[variable.index()];
+                let others = self.holders[variable.index()] - 1;
+                shared |= others > 0;
                 known.push(Known {
+                    place,
                     variable,
                     value,
                     others,
                 });
             }
         }
-        let variables = at.instances.iter().flat_map(|&instance| {
-            let variables = self.instance_at(instance).variables.iter();
-            variables.copied().flatten()
-        });
-        for operand in at.parameters.iter().copied().chain(variables) {
-            if let Operand::Variable(variable) = operand
-                && let Some(one) = known.iter_mut().find(|one| one.variable == variable)
-            {
-                one.others -= 1;
+        if shared {
+            let variables = at.instances.iter().flat_map(|&instance| {
+                let variables = self.instance_at(instance).variables.iter();
+                variables.copied().flatten()
+            });
+            let elsewhere = at.parameters.iter().copied().enumerate();
+            let all = elsewhere.map(|(place, operand)| (Some(place), operand));
+            for (place, operand) in all.chain(variables.map(|operand| (None, operand))) {
+                if let Operand::Variable(variable) = operand
+                    && let Some(one) = known.iter_mut().find(|one| one.variable == variable)
+                    && place != Some(one.place)
+                {
+                    one.others -= 1;
+                }
             }
+            known.retain(|one| one.others == 0);
         }
-        known.retain(|one| one.others == 0);
         known
     }
 
     /// Values stand where variables of a token alone did.
     fn make_known(&mut self, token: TokenId, known: &[Known]) {
-        let value_of = |operand: Operand| {
-            let is = |one: &&Known| Operand::Variable(one.variable) == operand;
-            known.iter().find(is).map(|one| Operand::Value(one.value))
-        };
-        let at = self.change(token);
-        for operand in &mut at.parameters {
-            *operand = value_of(*operand).unwrap_or(*operand);
-        }
-        let instances: SmallVec<[InstanceId; 4]> = SmallVec::from_slice(&at.instances);
-        for instance in instances {
-            // What a guard asks of a parameter it watches, be it a variable of the rule or not.
-            let at = self.instance_at(instance);
-            let mut has = at.variables.iter().flatten().copied();
-            let mut watches = at.watched.iter().map(|&variable| variable.into());
-            if !has.any(|at| value_of(at).is_some()) && !watches.any(|at| value_of(at).is_some()) {
-                continue;
-            }
-            let at = self.change_instance(instance);
-            for operand in at.variables.iter_mut().flatten() {
-                *operand = value_of(*operand).unwrap_or(*operand);
-            }
-            let watched = at.watched.len();
-            at.watched
-                .retain(|at| known.iter().all(|one| one.variable != *at));
-            if at.watched.len() < watched {
-                self.told.push(instance);
-            }
-        }
         for one in known {
-            let place = one.variable.index();
+            let (place, value) = (one.variable.index(), Operand::Value(one.value));
+            if self.holders[place] == 1 {
+                self.set_parameter(token, one.place, value);
+            } else {
+                self.replace(token, one.variable.into(), value);
+            }
             while let Some(instance) = self.watchers.get_mut(place).and_then(Vec::pop) {
                 let at = self.watchers[place].len();
                 self.note(Change::Unwatched(place, at, instance));
+                if !self.told.contains(&instance) {
+                    self.told.push(instance);
+                }
             }
             self.note(Change::Held(place, self.holders[place]));
             self.holders[place] = 0;
             self.store.remove(one.variable);
+        }
+    }
+
+    /// Puts an operand where another stands in a token and its rules.
+    fn replace(&mut self, token: TokenId, old: Operand, new: Operand) {
+        for place in 0..self.at(token).parameters.len() {
+            if self.at(token).parameters[place] == old {
+                self.set_parameter(token, place, new);
+            }
+        }
+        for place in 0..self.at(token).instances.len() {
+            let instance = self.at(token).instances[place];
+            if self.instance_at(instance).variables.contains(&Some(old)) {
+                let variables = self.change_instance(instance).variables.iter_mut();
+                variables
+                    .filter(|at| **at == Some(old))
+                    .for_each(|at| *at = Some(new));
+            }
         }
     }
 }
@@ -138,8 +144,10 @@ impl Database {
 /// A variable in whose place a value stands from now on.
 #[derive(Clone, Copy, Debug)]
 struct Known {
+    /// A place that it has among the token's parameters.
+    place: usize,
     variable: Variable,
     value: Value,
-    /// How many hold it but the token and its rules.
+    /// How many hold it but that place, the token's others and its rules.
     others: u32,
 }

@@ -325,6 +325,10 @@ impl Database {
     /// Times and values changed: whoever follows them is told, until nothing changes any more.
     pub(super) fn settle(&mut self) -> Result<(), Conflict> {
         loop {
+            if self.mirrors.is_empty() && !self.has_news() {
+                self.loosened = false;
+                return Ok(());
+            }
             self.settle_values()?;
             let loosened = std::mem::take(&mut self.loosened) && !self.mirrors.is_empty();
             if loosened {

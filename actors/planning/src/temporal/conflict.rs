@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{EARLIEST, Half, NONE, Network, Point, Side};
+use super::{EARLIEST, Half, NONE, Network, ORIGIN, Point, Side};
 use crate::Ticks;
 
 /// An inequality of a cycle: `to - from` is at least `at_least`.
@@ -132,7 +132,7 @@ impl<O: Clone> Network<O> {
                 return;
             }
         }
-        if at != self.origin.index() as u32 {
+        if at != ORIGIN {
             walk.push(self.link_of_horizon(side, at));
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BinaryHeap;
 
 use super::trail::Change;
-use super::{Conflict, EARLIEST, Half, LATEST, NONE, Network, Node, Side};
+use super::{Conflict, EARLIEST, Half, LATEST, NONE, Network, Node, ORIGIN, Side};
 use crate::Ticks;
 
 /// A bound that may grow: by how much more than others is what comes first.
@@ -167,13 +167,12 @@ impl<O: Clone> Network<O> {
 
     /// Whether a point passes its value on to the origin alone, which does not move.
     fn ends_at(&mut self, side: Side, point: u32) -> bool {
-        let origin = self.origin().index() as u32;
         let mut next = self.node(point).first[side];
         let mut looked_at = 0;
         while next != NONE {
             looked_at += 1;
             let inequality = &self.halves[next as usize];
-            if inequality.target(side) != origin {
+            if inequality.target(side) != ORIGIN {
                 // The pass that follows looks at them, and counts them.
                 return false;
             }

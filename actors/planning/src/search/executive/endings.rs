@@ -113,6 +113,15 @@ pub(super) fn close(
     Ok(say_ending(database, endings, token, ending)? || open)
 }
 
+/// Whether a token has ended, and no status is to say how.
+pub(super) fn is_closed(database: &Database, endings: &[Endings], token: TokenId) -> bool {
+    let finish = database.finish(token);
+    let silent = database
+        .token(token)
+        .is_none_or(|at| endings[at.predicate].is_silent());
+    silent && finish.min == finish.max
+}
+
 /// Ends the present token of a timeline, if it is not over: the token after which a new one comes.
 pub(super) fn make_room(
     database: &mut Database,
