@@ -146,6 +146,18 @@ impl<T> Arena<T> {
         Some(value)
     }
 
+    /// Drops a value where it is, if it is there.
+    pub fn discard(&mut self, id: Id<T>) {
+        if let Some(slot) = self.slots.get_mut(id.index())
+            && slot.generation == id.generation
+            && slot.value.is_some()
+        {
+            slot.value = None;
+            slot.generation += 1;
+            self.free.push(id.index);
+        }
+    }
+
     /// Undoes the last [`insert`](Self::insert), which gave this id.
     pub(crate) fn undo_insert(&mut self, id: Id<T>) -> Option<T> {
         let value = self.slots.get_mut(id.index())?.value.take();

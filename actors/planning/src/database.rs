@@ -21,6 +21,7 @@
 mod edit;
 mod forget;
 mod guards;
+mod learn;
 mod resources;
 mod rules;
 mod support;
@@ -166,6 +167,8 @@ pub struct Database {
     changed_points: Vec<Point>,
     /// Variables that are equal to others now, or were: to be told of.
     equalities: Vec<parameters::Variable>,
+    /// Instances that watched a variable in whose place a value stands now: to be told of it.
+    told: Vec<InstanceId>,
     /// Kept for its memory.
     changed: Vec<parameters::Variable>,
     trail: Vec<Change>,
@@ -225,6 +228,7 @@ impl Database {
             dirty: Vec::new(),
             changed_points: Vec::new(),
             equalities: Vec::new(),
+            told: Vec::new(),
             changed: Vec::new(),
             trail: Vec::new(),
             kept_tokens: Vec::new(),

@@ -257,6 +257,13 @@ impl<O: Clone> Store<O> {
     ///
     /// If one of them is not there.
     pub fn remove_all(&mut self, variables: &[Variable]) -> bool {
+        if let &[variable] = variables
+            && self.is_apart(variable)
+        {
+            // Nobody is told.
+            self.take_out(variable);
+            return !self.unfinished;
+        }
         let mark = self.begin();
         for &variable in variables {
             let node = self.nodes.get_mut(variable);
@@ -283,6 +290,16 @@ impl<O: Clone> Store<O> {
     /// Whether a variable is there.
     pub fn has(&self, variable: Variable) -> bool {
         self.nodes.get(variable).is_some()
+    }
+
+    /// Whether a variable has no constraints.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn is_apart(&self, variable: Variable) -> bool {
+        let node = self.nodes.get(variable);
+        node.expect("the variable is there").first == NONE
     }
 
     /// The values that a variable can have.
@@ -465,6 +482,11 @@ impl<O: Clone> Store<O> {
         into.clear();
         std::mem::swap(into, &mut self.changed);
         self.take_told(into);
+    }
+
+    /// Whether there are variables whose domains changed since this was asked last.
+    pub fn has_changed(&self) -> bool {
+        !self.changed.is_empty()
     }
 
     /// All variables and their domains, place by place, for comparing whole states.

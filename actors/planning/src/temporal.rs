@@ -49,9 +49,11 @@ pub type Constraint = Id<Edge>;
 /// What the network keeps of a point.
 #[derive(Clone, Debug)]
 pub struct Node {
+    /// By side: what its value is without any constraint.
+    base: [Ticks; 2],
     /// By [`Side`]: the earliest time, and the latest time's negative.
     value: [Ticks; 2],
-    /// By side: the inequality that the value rests on; none if that is the horizon.
+    /// By side: the inequality that the value rests on; none if that is the base.
     by: [Option<Half>; 2],
     /// By side: the first of the inequalities that pass on a change of this value.
     first: [u32; 2],
@@ -71,6 +73,9 @@ type Half = u32;
 
 /// A gap that every pair of points has.
 const NOTHING: Ticks = -(FURTHEST << 2);
+
+/// The place of the origin, which is the first point.
+const ORIGIN: u32 = 0;
 
 /// No inequality.
 const NONE: u32 = u32::MAX;
@@ -174,6 +179,7 @@ impl<O: Clone> Network<O> {
         );
         let mut nodes = Arena::new();
         let origin = nodes.insert(Node {
+            base: [0, 0],
             value: [0, 0],
             by: [None; 2],
             first: [NONE; 2],
@@ -217,8 +223,30 @@ impl<O: Clone> Network<O> {
 
     /// A new point, anywhere within the horizon.
     pub fn add_point(&mut self) -> Point {
+        self.add_within(self.horizon)
+    }
+
+    /// A new point, which is known for good to lie within a span; none, if nothing of that lies
+    /// within the horizon. That costs less than a constraint, and a conflict tells of it as of the
+    /// horizon.
+    ///
+    /// ```
+    /// use farside_planning::temporal::{Network, Span};
+    /// let mut network = Network::<()>::new(Span::new(0, 100));
+    /// let point = network.add_point_within(Span::at_least(7)).expect("there is room");
+    /// assert_eq!(network.bounds(point), Span::new(7, 100));
+    /// assert_eq!(network.add_point_within(Span::at_least(101)), None);
+    /// ```
+    pub fn add_point_within(&mut self, span: Span) -> Option<Point> {
+        let within = self.horizon.intersect(span);
+        (!within.is_empty()).then(|| self.add_within(within))
+    }
+
+    fn add_within(&mut self, span: Span) -> Point {
+        let base = [span.min, -span.max];
         let point = self.nodes.insert(Node {
-            value: [self.horizon.min, -self.horizon.max],
+            base,
+            value: base,
             by: [None; 2],
             first: [NONE; 2],
         });
@@ -260,13 +288,13 @@ impl<O: Clone> Network<O> {
     /// If it is not there.
     pub fn is_apart(&self, point: Point) -> bool {
         let node = self.nodes.get(point).expect("the point is there");
-        let (me, origin) = (point.index() as u32, self.origin.index() as u32);
+        let me = point.index() as u32;
         [EARLIEST, LATEST].into_iter().all(|side| {
             let mut half = node.first[side];
             while half != NONE {
                 let inequality = &self.halves[half as usize];
                 let other = inequality.from ^ inequality.to ^ me;
-                if other != origin {
+                if other != ORIGIN {
                     return false;
                 }
                 half = inequality.next[side];
@@ -285,6 +313,16 @@ impl<O: Clone> Network<O> {
         Span::new(node.value[EARLIEST], -node.value[LATEST])
     }
 
+    /// Within what a point was added: the horizon or less.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    pub fn added_within(&self, point: Point) -> Span {
+        let node = self.nodes.get(point).expect("the point is there");
+        Span::new(node.base[EARLIEST], -node.base[LATEST])
+    }
+
     /// Whether a point is there.
     pub fn has_point(&self, point: Point) -> bool {
         self.nodes.get(point).is_some()
@@ -295,6 +333,13 @@ impl<O: Clone> Network<O> {
         let Some(node) = self.nodes.get(point) else {
             return Vec::new();
         };
+        if point == self.origin {
+            let all = self.edges.iter();
+            let all = all.filter(|(_, edge)| edge.from == point || edge.to == point);
+            let mut found: Vec<_> = all.map(|at| at.0).collect();
+            found.reverse();
+            return found;
+        }
         let mut found = Vec::new();
         for side in [EARLIEST, LATEST] {
             let mut half = node.first[side];

@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 use super::Slot;
 use super::trail::Change;
 use super::{Cause, Conflict, Database, Owner, Status, Time, Token, TokenId};
+use crate::Ticks;
 use crate::model::{PredicateId, TimelineKind, TypeId};
 use crate::parameters::{self, Domain, Operand};
 use crate::temporal::Span;
@@ -49,11 +50,25 @@ impl Database {
             "as many parameters as {} has",
             predicate.name
         );
-        let mut new_time = |time: Option<Time>| match time {
-            Some(time) => time,
-            None => Time::Point(self.network.add_point()),
+        let least = match wanted
+            .timeline
+            .map(|timeline| self.model.timelines[timeline].kind)
+        {
+            Some(TimelineKind::State | TimelineKind::Unary) => 1,
+            Some(TimelineKind::Free) | None => 0,
         };
-        let (start, finish) = (new_time(wanted.start), new_time(wanted.finish));
+        let (start, finish, lasts) = self.new_times(wanted, least);
+        let mut parameters: SmallVec<[Operand; 4]> = SmallVec::new();
+        for (place, &known) in wanted.parameters.iter().enumerate() {
+            let operand = match known {
+                Some(operand) => operand,
+                None => {
+                    self.new_variable(self.model.predicates[wanted.predicate].parameters[place].of)
+                }
+            };
+            self.hold(operand);
+            parameters.push(operand);
+        }
         let token = self.tokens.insert(Token {
             predicate: wanted.predicate,
             timeline: wanted.timeline,
@@ -61,7 +76,7 @@ impl Database {
             cause: wanted.cause,
             start,
             finish,
-            parameters: SmallVec::new(),
+            parameters,
             supports: 0,
             before: None,
             after: None,
@@ -79,30 +94,32 @@ impl Database {
         self.note(Change::TokenAdded(token));
         self.point_at(token, [start, finish]);
         let owner = Owner::Token(token);
-        let least = match wanted
-            .timeline
-            .map(|timeline| self.model.timelines[timeline].kind)
-        {
-            Some(TimelineKind::State | TimelineKind::Unary) => 1,
-            Some(TimelineKind::Free) | None => 0,
-        };
-        let lasts = Span::at_least(least);
-        if let Some(posted) = self.between(start, finish, lasts, owner)? {
+        if !lasts && let Some(posted) = self.between(start, finish, Span::at_least(least), owner)? {
             self.change(token).times.push(posted);
         }
         for (place, &known) in wanted.parameters.iter().enumerate() {
-            let of = self.model.predicates[wanted.predicate].parameters[place].of;
-            let operand = match known {
-                Some(operand) => {
-                    self.keep_to_type(token, of, operand)?;
-                    operand
-                }
-                None => self.new_variable(of),
-            };
-            self.hold(operand);
-            self.change(token).parameters.push(operand);
+            if let Some(operand) = known {
+                let of = self.model.predicates[wanted.predicate].parameters[place].of;
+                self.keep_to_type(token, of, operand)?;
+            }
         }
         Ok(token)
+    }
+
+    /// When a token that is wanted starts and ends, and whether by that it lasts so many ticks at
+    /// least.
+    fn new_times(&mut self, wanted: &Wanted<'_>, least: Ticks) -> (Time, Time, bool) {
+        if let (Some(start @ Time::At(tick)), None) = (wanted.start, wanted.finish) {
+            let after = Span::at_least(tick.saturating_add(least));
+            if let Some(finish) = self.network.add_point_within(after) {
+                return (start, Time::Point(finish), true);
+            }
+        }
+        let mut new_time = |time: Option<Time>| match time {
+            Some(time) => time,
+            None => Time::Point(self.network.add_point()),
+        };
+        (new_time(wanted.start), new_time(wanted.finish), false)
     }
 
     /// Where there are resources, their profiles follow the points of tokens.
@@ -193,15 +210,20 @@ impl Database {
         at.status = Status::Active;
         at.timeline = Some(slot.timeline);
         (at.before, at.after) = (before, after);
-        match before {
-            Some(before) => self.change(before).after = Some(token),
-            None => self.change_lane(slot.timeline).first = Some(token),
+        let lane = self.change_lane(slot.timeline);
+        lane.tokens += 1;
+        if before.is_none() {
+            lane.first = Some(token);
         }
-        match after {
-            Some(after) => self.change(after).before = Some(token),
-            None => self.change_lane(slot.timeline).last = Some(token),
+        if after.is_none() {
+            lane.last = Some(token);
         }
-        self.change_lane(slot.timeline).tokens += 1;
+        if let Some(before) = before {
+            self.set_after(before, Some(token));
+        }
+        if let Some(after) = after {
+            self.set_before(after, Some(token));
+        }
         if kind != TimelineKind::Free {
             if !lasts_a_tick {
                 let lasts = Span::at_least(1);
@@ -296,15 +318,16 @@ impl Database {
         let Some(timeline) = self.at(token).timeline else {
             return;
         };
+        let lane = self.change_lane(timeline);
+        lane.tokens -= 1;
         match before {
-            Some(before) => self.change(before).after = after,
-            None => self.change_lane(timeline).first = after,
+            Some(before) => self.set_after(before, after),
+            None => lane.first = after,
         }
         match after {
-            Some(after) => self.change(after).before = before,
-            None => self.change_lane(timeline).last = before,
+            Some(after) => self.set_before(after, before),
+            None => self.lanes[timeline].last = before,
         }
-        self.change_lane(timeline).tokens -= 1;
         if let Some(order) = self.at(token).order {
             self.change(token).order = None;
             self.retract_time(order);
@@ -429,29 +452,25 @@ impl Database {
             Status::Free | Status::Rejected => {}
         }
         self.remove_mirrors(token);
-        let at = self.change(token);
-        let times = std::mem::take(&mut at.times);
-        let values = std::mem::take(&mut at.values);
-        let parameters = std::mem::take(&mut at.parameters);
-        let (start, finish) = (at.start, at.finish);
-        for posted in times {
-            self.retract_time(posted);
+        for place in 0..self.at(token).times.len() {
+            self.retract_time(self.at(token).times[place]);
         }
-        for posted in values {
-            self.retract_value(posted);
+        for place in 0..self.at(token).values.len() {
+            self.retract_value(self.at(token).values[place]);
         }
         self.loosened = true;
-        for operand in parameters {
-            self.release(operand);
+        for place in 0..self.at(token).parameters.len() {
+            self.release(self.at(token).parameters[place]);
         }
-        for time in [start, finish] {
+        self.steps += 1;
+        for time in [self.at(token).start, self.at(token).finish] {
             if let Time::Point(point) = time {
                 self.network.remove_point(point);
             }
         }
-        if let Some(removed) = self.tokens.remove(token)
-            && self.depth() > 0
-        {
+        if self.depth() == 0 {
+            self.tokens.discard(token);
+        } else if let Some(removed) = self.tokens.remove(token) {
             self.kept_tokens.push(removed);
             self.note(Change::TokenRemoved(token));
         }

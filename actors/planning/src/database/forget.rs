@@ -4,8 +4,8 @@ use smallvec::SmallVec;
 
 use super::{Database, Guard, InstanceId, Owner, Status, Time, TokenId};
 use crate::Ticks;
-use crate::model::{End, Target};
-use crate::parameters::{Domain, Kind, Operand, Variable};
+use crate::model::Target;
+use crate::parameters::{Domain, Kind, Operand, Store, Variable};
 use crate::temporal::{Point, Span};
 
 impl Database {
@@ -37,8 +37,12 @@ impl Database {
 
     /// The first token of a timeline, if it and the one after it are past.
     fn next_past(&self, timeline: usize, before: Ticks) -> Option<TokenId> {
-        let first = self.lanes[timeline].first?;
         // The one before the token that lasts now stays, and so does the last one.
+        let lane = self.lanes[timeline];
+        if lane.tokens < 3 {
+            return None;
+        }
+        let first = lane.first?;
         let second = self.at(first).after?;
         self.at(second).after?;
         let past = self.is_past(first, before) && self.is_past(second, before);
@@ -91,9 +95,66 @@ impl Database {
     /// Deletes a token of the past: later ones keep what rested on it.
     fn delete_past(&mut self, token: TokenId, before: Ticks) {
         // All that rests on what goes is kept before anything of it does.
-        let merged = self.at(token).merged.clone();
         self.freeze_times(token);
-        let going = self.freeze_values(token);
+        let going = if self.has_variables(token) {
+            self.freeze_values(token)
+        } else {
+            SmallVec::new()
+        };
+        if !self.at(token).merged.is_empty() {
+            self.delete_merged(token);
+        }
+        if !going.is_empty() {
+            self.store.remove_all(&going);
+        }
+        for instance in std::mem::take(&mut self.change(token).instances) {
+            self.forget_instance(instance, before);
+        }
+        let at = self.change(token);
+        // Who asked for it has it: the label is of a token that was.
+        at.supported.clear();
+        let parameters = std::mem::take(&mut at.parameters);
+        let (order, timeline, after) = (at.order.take(), at.timeline, at.after);
+        at.status = Status::Rejected;
+        (at.before, at.after) = (None, None);
+        for operand in parameters {
+            if let Operand::Variable(variable) = operand {
+                drop_holder(&mut self.holders, &mut self.store, variable);
+            }
+        }
+        if let Some(order) = order {
+            self.retract_time(order);
+        }
+        // The next one is the first: what held it after this one is in its own bounds.
+        if let Some(after) = after {
+            let next = self.change(after);
+            next.before = None;
+            if let Some(order) = next.order.take() {
+                self.retract_time(order);
+            }
+        }
+        if let Some(timeline) = timeline {
+            let lane = self.change_lane(timeline);
+            lane.first = after;
+            lane.tokens -= 1;
+        }
+        self.delete(token);
+    }
+
+    /// Whether a token or a rule of it has variables.
+    fn has_variables(&self, token: TokenId) -> bool {
+        let is_variable = |operand: &Operand| matches!(operand, Operand::Variable(_));
+        let at = self.at(token);
+        at.parameters.iter().any(is_variable)
+            || at.instances.iter().any(|&instance| {
+                let mut variables = self.instance_at(instance).variables.iter().flatten();
+                variables.any(is_variable)
+            })
+    }
+
+    /// Deletes what is merged into a token of the past.
+    fn delete_merged(&mut self, token: TokenId) {
+        let merged = self.at(token).merged.clone();
         for &other in &merged {
             self.freeze_times(other);
             self.freeze_values(other);
@@ -102,43 +163,15 @@ impl Database {
             self.part(other, token);
             self.delete(other);
         }
-        self.store.remove_all(&going);
-        for instance in std::mem::take(&mut self.change(token).instances) {
-            self.forget_instance(instance, before);
-        }
-        // Who asked for it has it: the label is of a token that was.
-        self.change(token).supported.clear();
-        if let Some(order) = self.change(token).order.take() {
-            self.retract_time(order);
-        }
-        // The next one is the first: what held it after this one is in its own bounds.
-        let (Some(timeline), after) = (self.at(token).timeline, self.at(token).after) else {
-            return;
-        };
-        if let Some(after) = after {
-            let next = self.change(after);
-            next.before = None;
-            if let Some(order) = next.order.take() {
-                self.retract_time(order);
-            }
-        }
-        let lane = self.change_lane(timeline);
-        lane.first = after;
-        lane.tokens -= 1;
-        let now = self.change(token);
-        now.status = Status::Rejected;
-        now.before = None;
-        now.after = None;
-        for operand in std::mem::take(&mut now.parameters) {
-            self.drop_holder(operand);
-        }
-        self.delete(token);
     }
 
     /// Points that are bound to a token whose times are known are bound to these times instead.
     fn freeze_times(&mut self, token: TokenId) {
-        for end in [End::Start, End::Finish] {
-            if let Time::Point(point) = self.time(token, end) {
+        let at = self.at(token);
+        for time in [at.start, at.finish] {
+            if let Time::Point(point) = time
+                && !self.network.is_apart(point)
+            {
                 self.freeze_neighbours(point);
             }
         }
@@ -260,38 +293,35 @@ impl Database {
                 at.supports -= 1;
             }
         }
-        let Some(at) = self.instances.remove(instance) else {
-            return;
-        };
-        self.steps += 1;
-        for effected in at.effects {
+        let at = self.change_instance(instance);
+        let holds = at.guard == Guard::Holds;
+        let effects = std::mem::take(&mut at.effects);
+        for effected in effects {
             self.forget_effect(effected, before);
         }
-        for variable in at.watched {
+        let at = self.instances.get(instance).expect("the instance is there");
+        for variable in &at.watched {
             self.watchers[variable.index()].retain(|&at| at != instance);
         }
         // What it says of times and values of others stays with them.
-        for operand in at.variables.into_iter().flatten() {
-            self.drop_holder(operand);
-        }
-        if at.guard == Guard::Holds {
-            for place in (0..self.open.len()).rev() {
-                if self.open[place].instance == instance {
-                    self.open.remove(place);
-                }
+        for &operand in at.variables.iter().flatten() {
+            if let Operand::Variable(variable) = operand {
+                drop_holder(&mut self.holders, &mut self.store, variable);
             }
+        }
+        self.instances.discard(instance);
+        if holds {
+            self.open.retain(|open| open.instance != instance);
         }
     }
+}
 
-    /// Counts one less who has a variable. If nobody else has it, it is gone already, but for one
-    /// whose other holders went with this one.
-    fn drop_holder(&mut self, operand: Operand) {
-        if let Operand::Variable(variable) = operand {
-            let holders = &mut self.holders[variable.index()];
-            *holders -= 1;
-            if *holders == 0 && self.store.has(variable) {
-                self.store.remove(variable);
-            }
-        }
+/// Counts one less who has a variable. If nobody else has it, it is gone already, but for one
+/// whose other holders went with this one.
+fn drop_holder(holders: &mut [u32], store: &mut Store<Owner>, variable: Variable) {
+    let holders = &mut holders[variable.index()];
+    *holders -= 1;
+    if *holders == 0 && store.has(variable) {
+        store.remove(variable);
     }
 }

@@ -15,19 +15,21 @@ impl Database {
         if self.flats[rule].unguarded {
             return Ok(());
         }
+        let master = self.instance_at(instance).master;
+        for place in 0..self.flats[rule].guarding.len() {
+            let place = self.flats[rule].guarding[place];
+            let operand = self.at(master).parameters[place];
+            self.watch(instance, operand);
+        }
+        if self.model.rules[rule].when.is_empty() {
+            return Ok(());
+        }
         let model = self.model.clone();
         let rule = &model.rules[rule];
-        let master = self.instance_at(instance).master;
-        for (place, argument) in rule.master.arguments.iter().enumerate() {
-            if *argument != Argument::Any {
-                let operand = self.at(master).parameters[place];
-                self.watch(instance, operand);
-            }
-        }
         for term in rule.when.iter().flat_map(|when| &when.operands) {
             let operand = match *term {
                 Term::Value(_) => continue,
-                Term::Variable(variable) => self.instance_at(instance).variables[variable],
+                Term::Variable(variable) => self.named(self.instance_at(instance), variable),
                 // Only the master is there when the guard is asked.
                 Term::Start(0) => Some(self.mirror(master, Some(End::Start))?),
                 Term::Finish(0) => Some(self.mirror(master, Some(End::Finish))?),
@@ -71,18 +73,18 @@ impl Database {
                 return self.follow_bounds(instance);
             }
             (Guard::Holds, _) => {
-                self.change_instance(instance).guard = now;
+                self.set_guard(instance, now);
                 self.withdraw(instance);
                 return Ok(());
             }
             (_, Guard::Holds) => {
-                self.change_instance(instance).guard = now;
+                self.set_guard(instance, now);
                 return self.apply(instance);
             }
             _ => {}
         }
         if before != now {
-            self.change_instance(instance).guard = now;
+            self.set_guard(instance, now);
         }
         Ok(())
     }
@@ -96,11 +98,12 @@ impl Database {
         let rule = &self.model.rules[at.rule];
         let parameters = &self.at(at.master).parameters;
         let mut all = Guard::Holds;
-        for (argument, &operand) in rule.master.arguments.iter().zip(parameters) {
-            let wanted = match *argument {
+        for &place in &self.flats[at.rule].guarding {
+            let operand = parameters[place];
+            let wanted = match rule.master.arguments[place] {
                 Argument::Any => continue,
                 Argument::Value(value) => Operand::Value(value),
-                Argument::Variable(variable) => match at.variables[variable] {
+                Argument::Variable(variable) => match self.named(at, variable) {
                     Some(wanted) => wanted,
                     None => continue,
                 },
@@ -148,13 +151,18 @@ impl Database {
         for term in &when.operands {
             operands.push(match *term {
                 Term::Value(value) => Operand::Value(value),
-                Term::Variable(variable) => at.variables[variable]?,
+                Term::Variable(variable) => self.named(at, variable)?,
                 Term::Start(label) => self.mirrored_by(at.label(label)?, Some(End::Start))?,
                 Term::Finish(label) => self.mirrored_by(at.label(label)?, Some(End::Finish))?,
                 Term::Duration(label) => self.mirrored_by(at.label(label)?, None)?,
             });
         }
         self.store.entailed(&self.kind(when), &operands)
+    }
+
+    /// Whether variables changed that nobody was told of.
+    pub(super) fn has_news(&self) -> bool {
+        self.store.has_changed() || !self.told.is_empty() || !self.equalities.is_empty()
     }
 
     /// Variables changed: whoever watches them is told, until nothing changes any more.
@@ -164,7 +172,7 @@ impl Database {
             changed.clear();
             self.store.take_changed(&mut changed);
             changed.append(&mut self.equalities);
-            if changed.is_empty() {
+            if changed.is_empty() && self.told.is_empty() {
                 break Ok(());
             }
             if let Err(conflict) = self.tell(&changed) {
@@ -230,6 +238,7 @@ impl Database {
     fn tell(&mut self, changed: &[parameters::Variable]) -> Result<(), Conflict> {
         // Each once, however many of its variables changed.
         let mut watchers: SmallVec<[InstanceId; 16]> = SmallVec::new();
+        watchers.extend(self.told.drain(..));
         for &variable in changed {
             let all = self.watchers.get(variable.index());
             for &instance in all.map_or(&[][..], |all| all) {

@@ -7,8 +7,8 @@ use super::resources::Effected;
 use super::trail::Change;
 use super::{Conflict, Database, InstanceId, Owner, TokenId};
 use crate::model::{
-    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship, Rule, RuleId,
-    Target, VariableId,
+    Argument, Body, Bound, End, Operand as Term, Position, Relation, Relationship,
+    RelationshipKind, Rule, RuleId, Target, Value, VariableId,
 };
 use crate::parameters::{self, Operand};
 use crate::temporal::{Constraint, Span};
@@ -42,23 +42,29 @@ pub(crate) struct Flat {
     pub(crate) top: Vec<Step>,
     /// Whether the rule holds from the first, without a guard.
     pub(crate) unguarded: bool,
+    /// The variables among the master's arguments, each with the first place that it has.
+    pub(super) named: Vec<(VariableId, usize)>,
+    /// The places of the master's arguments that its guard asks of.
+    pub(super) guarding: Vec<usize>,
 }
 
 impl Flat {
     pub(crate) fn of(rule: &Rule) -> Self {
         let mut flat = Flat::default();
         flat.top = flat.parts(&rule.body);
-        let mut seen: Vec<VariableId> = Vec::new();
-        flat.unguarded = rule.when.is_empty()
-            && rule.master.arguments.iter().all(|argument| match argument {
-                Argument::Any => true,
-                Argument::Value(_) => false,
+        for (place, argument) in rule.master.arguments.iter().enumerate() {
+            match *argument {
+                Argument::Any => {}
+                Argument::Value(_) => flat.guarding.push(place),
                 Argument::Variable(variable) => {
-                    let first = !seen.contains(variable);
-                    seen.push(*variable);
-                    first
+                    match flat.named.iter().find(|named| named.0 == variable) {
+                        Some(&(_, first)) => flat.guarding.extend([first, place]),
+                        None => flat.named.push((variable, place)),
+                    }
                 }
-            });
+            }
+        }
+        flat.unguarded = rule.when.is_empty() && flat.guarding.is_empty();
         flat
     }
 
@@ -100,20 +106,21 @@ pub struct Instance {
     pub master: TokenId,
     /// Whether it holds.
     pub guard: Guard,
-    /// By variable of the rule: what it stands for, once something says so.
+    /// By variable of the rule: what it stands for, once something says so. A rule that never held
+    /// has none of these, nor labels and choices.
     pub(super) variables: SmallVec<[Option<Operand>; 4]>,
-    /// By label: the token that has it.
-    pub(super) labels: SmallVec<[Option<TokenId>; 4]>,
+    /// By label: the token that has it, but for label 0, which is the master.
+    pub(super) labels: SmallVec<[Option<TokenId>; 3]>,
     /// By choice: the alternative that was chosen.
     pub(super) chosen: SmallVec<[Option<u32>; 1]>,
     /// Constraints of times, by what they are of.
-    pub(super) times: SmallVec<[Posted; 3]>,
+    pub(super) times: SmallVec<[Posted; 2]>,
     /// Constraints of parameters; of which relation, if of one.
     pub(super) values: SmallVec<[(Option<u32>, parameters::Constraint); 2]>,
     /// What it does to resources.
     pub(super) effects: SmallVec<[Effected; 1]>,
-    /// The variables that it asked to be told of.
-    pub(super) watched: SmallVec<[parameters::Variable; 4]>,
+    /// The variables that it asked to be told of, those among them that are gone.
+    pub(super) watched: SmallVec<[parameters::Variable; 2]>,
     /// Since which edit the trail need not keep it again.
     pub(super) kept: u64,
 }
@@ -147,7 +154,10 @@ pub(super) struct Posted {
 impl Instance {
     /// The token that has a label, if one has it yet; label 0 is the master.
     pub fn label(&self, label: usize) -> Option<TokenId> {
-        self.labels.get(label).copied().flatten()
+        match label {
+            0 => Some(self.master),
+            label => self.labels.get(label).copied().flatten(),
+        }
     }
 
     /// What a variable of the rule stands for, if something says so.
@@ -220,51 +230,59 @@ impl Database {
         };
         for place in 0..self.model.rules_of(timeline, predicate).len() {
             let rule = self.model.rules_of(timeline, predicate)[place];
-            let labels = self.model.rules[rule].labels.max(1);
-            let mut instance = Instance {
+            let id = self.instances.insert(Instance {
                 rule,
                 master: token,
                 guard: Guard::Waiting,
-                variables: SmallVec::from_elem(None, self.model.rules[rule].variables.len()),
-                labels: SmallVec::from_elem(None, labels),
-                chosen: SmallVec::from_elem(None, self.flats[rule].choices.len()),
+                variables: SmallVec::new(),
+                labels: SmallVec::new(),
+                chosen: SmallVec::new(),
                 times: SmallVec::new(),
                 values: SmallVec::new(),
                 effects: SmallVec::new(),
                 watched: SmallVec::new(),
                 kept: self.serial,
-            };
-            instance.labels[0] = Some(token);
-            let id = self.instances.insert(instance);
+            });
             self.note(Change::InstanceAdded(id));
             self.change(token).instances.push(id);
-            self.adopt_master(id);
             self.watch_guard(id)?;
             self.reconsider(id)?;
         }
         Ok(())
     }
 
-    /// The variables among the master's arguments stand for its parameters.
-    fn adopt_master(&mut self, instance: InstanceId) {
-        let rule = self.instance_at(instance).rule;
-        let master = self.instance_at(instance).master;
-        for place in 0..self.model.rules[rule].master.arguments.len() {
-            let argument = self.model.rules[rule].master.arguments[place];
-            if let Argument::Variable(variable) = argument
-                && self.instance_at(instance).variables[variable].is_none()
-            {
-                let operand = self.at(master).parameters[place];
-                self.stand_for(instance, variable, operand);
-            }
+    /// A rule that holds has variables, of which those among the master's arguments stand for the
+    /// master's parameters, labels and choices.
+    fn begin(&mut self, instance: InstanceId) {
+        let at = self.instance_at(instance);
+        let rule = at.rule;
+        let (said, choices) = (&self.model.rules[rule], self.flats[rule].choices.len());
+        let labels = if said.labels > 1 { said.labels } else { 0 };
+        let is = [at.variables.len(), at.labels.len(), at.chosen.len()];
+        if is == [said.variables.len(), labels, choices] {
+            return;
         }
-        let object = self.model.rules[rule].master.object;
-        if let (Some(variable), Some(timeline)) = (object, self.at(master).timeline)
-            && self.instance_at(instance).variables[variable].is_none()
-        {
-            let object = Operand::Value(self.model.timelines[timeline].object);
-            self.stand_for(instance, variable, object);
+        let named = (0..said.variables.len()).map(|variable| self.named(at, variable));
+        let variables: SmallVec<[Option<Operand>; 4]> = named.collect();
+        for &operand in variables.iter().flatten() {
+            self.hold(operand);
         }
+        let at = self.change_instance(instance);
+        at.variables = variables;
+        at.labels = SmallVec::from_elem(None, labels);
+        at.chosen = SmallVec::from_elem(None, choices);
+    }
+
+    /// What a variable stands for by being named among the master's arguments.
+    pub(super) fn named(&self, at: &Instance, variable: VariableId) -> Option<Operand> {
+        let named = self.flats[at.rule].named.iter();
+        let master = self.at(at.master);
+        if let Some(&(_, place)) = { named }.find(|named| named.0 == variable) {
+            return Some(master.parameters[place]);
+        }
+        let object = self.model.rules[at.rule].master.object == Some(variable);
+        let timeline = master.timeline.filter(|_| object)?;
+        Some(Operand::Value(self.model.timelines[timeline].object))
     }
 
     fn stand_for(&mut self, instance: InstanceId, variable: VariableId, operand: Operand) {
@@ -290,6 +308,7 @@ impl Database {
 
     /// The rule holds now: what it says of the master is posted, what it asks for is open.
     pub(super) fn apply(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        self.begin(instance);
         let at = self.instance_at(instance);
         let (rule, master) = (at.rule, at.master);
         let owner = Owner::Rule {
@@ -298,14 +317,7 @@ impl Database {
             relation: None,
         };
         for place in 0..self.model.rules[rule].relationships.len() {
-            let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
-            for at in 0..self.model.rules[rule].relationships[place].operands.len() {
-                let term = self.model.rules[rule].relationships[place].operands[at];
-                operands.push(self.operand(instance, term)?);
-            }
-            let kind = self.kind(&self.model.rules[rule].relationships[place]);
-            let posted = self.post_value(kind, &operands, owner)?;
-            self.change_instance(instance).values.push((None, posted));
+            self.apply_relationship(instance, place)?;
         }
         if let Some([min, max]) = self.model.rules[rule].duration {
             self.watch_bounds(instance, [min, max]);
@@ -325,6 +337,63 @@ impl Database {
             self.push_open(Open { instance, step });
         }
         Ok(())
+    }
+
+    /// Posts what a rule says of parameters, where that is not certain already.
+    fn apply_relationship(&mut self, instance: InstanceId, place: usize) -> Result<(), Conflict> {
+        let at = self.instance_at(instance);
+        let (rule, owner) = (at.rule, at.owner(None));
+        let count = self.model.rules[rule].relationships[place].operands.len();
+        let mut operands: SmallVec<[Operand; 4]> = SmallVec::new();
+        for at in 0..count {
+            let term = self.model.rules[rule].relationships[place].operands[at];
+            if at + 1 == count
+                && let Some(output) = self.known_output(instance, place, term, &operands)
+            {
+                self.stand_for(instance, output.0, output.1);
+                return Ok(());
+            }
+            operands.push(self.operand(instance, term)?);
+        }
+        let kind = self.kind(&self.model.rules[rule].relationships[place]);
+        let known = |operand: &Operand| matches!(operand, Operand::Value(_));
+        self.steps += 1;
+        if operands.iter().all(known) && self.store.entailed(&kind, &operands) == Some(true) {
+            return Ok(());
+        }
+        let posted = self.post_value(kind, &operands, owner)?;
+        self.change_instance(instance).values.push((None, posted));
+        Ok(())
+    }
+
+    /// What a function gives for known values, where nothing stands for its output yet.
+    fn known_output(
+        &self,
+        instance: InstanceId,
+        place: usize,
+        term: Term,
+        inputs: &[Operand],
+    ) -> Option<(VariableId, Operand)> {
+        let rule = self.instance_at(instance).rule;
+        let (Term::Variable(variable), RelationshipKind::Function(function)) =
+            (term, self.model.rules[rule].relationships[place].kind)
+        else {
+            return None;
+        };
+        if self.instance_at(instance).variables[variable].is_some() {
+            return None;
+        }
+        let mut values: SmallVec<[Value; 4]> = SmallVec::new();
+        for input in inputs {
+            let Operand::Value(value) = *input else {
+                return None;
+            };
+            values.push(value);
+        }
+        let output = (self.model.functions[function].call)(&values)?;
+        let of = self.model.rules[rule].variables[variable].of;
+        let may_be = self.domains[of].contains(output);
+        may_be.then_some((variable, Operand::Value(output)))
     }
 
     /// What a term stands for; a variable that nothing stands for yet gets one of the store.

@@ -389,7 +389,7 @@ impl Database {
     /// Takes back what a relation posted.
     fn take_back(&mut self, instance: InstanceId, relation: u32) {
         let at = self.change_instance(instance);
-        let times: SmallVec<[Posted; 3]> = std::mem::take(&mut at.times);
+        let times = std::mem::take(&mut at.times);
         let values = std::mem::take(&mut at.values);
         for posted in times {
             if posted.relation == Some(relation) {

@@ -72,7 +72,13 @@ fn edit(database: &mut Database, dice: &mut Dice) {
                 let parameters = database.at(token).parameters.len();
                 if parameters > 0 {
                     let (place, value) = (dice.below(parameters), dice.below(5) as i64);
-                    drop(database.bind(token, place, value, Owner::Token(token)));
+                    if dice.one_in(2) {
+                        drop(database.bind(token, place, value, Owner::Token(token)));
+                    } else {
+                        let values = [value, dice.below(5) as i64];
+                        let count = dice.below(parameters - place) + 1;
+                        drop(database.learn(token, place, &values[..count]));
+                    }
                 }
             }
         }

@@ -180,30 +180,6 @@ impl Database {
         })
     }
 
-    /// Says that a token ends at a tick, as an executive learns it, and for good.
-    ///
-    /// # Errors
-    ///
-    /// If it cannot end then: nothing changes.
-    pub fn end(&mut self, token: TokenId, tick: Ticks) -> Result<(), Conflict> {
-        let owner = Owner::Token(token);
-        let expected = self.finish(token);
-        if let Time::Point(point) = self.at(token).finish
-            && expected.contains(tick)
-            && self.network.is_apart(point)
-        {
-            // Nothing but known times says when it ends, and now that is one itself.
-            return self.attempt(|database| {
-                database.network.remove_point(point);
-                database.change(token).finish = Time::At(tick);
-                database.dirty_if_used(token);
-                database.loosened = true;
-                Ok(())
-            });
-        }
-        self.restrict_time(token, End::Finish, Span::exactly(tick), owner)
-    }
-
     /// Says how long a token lasts, more closely than before.
     ///
     /// # Errors
@@ -349,6 +325,10 @@ impl Database {
     /// Times and values changed: whoever follows them is told, until nothing changes any more.
     pub(super) fn settle(&mut self) -> Result<(), Conflict> {
         loop {
+            if self.mirrors.is_empty() && !self.has_news() {
+                self.loosened = false;
+                return Ok(());
+            }
             self.settle_values()?;
             let loosened = std::mem::take(&mut self.loosened) && !self.mirrors.is_empty();
             if loosened {

@@ -130,7 +130,7 @@ pub struct Token {
     /// Orders to other tokens, which go when it leaves the plan.
     pub(super) orders: SmallVec<[Constraint; 2]>,
     /// Constraints of times that go with it.
-    pub(super) times: SmallVec<[Constraint; 4]>,
+    pub(super) times: SmallVec<[Constraint; 2]>,
     /// Constraints of parameters that go with it.
     pub(super) values: SmallVec<[parameters::Constraint; 2]>,
     /// The rules that hold for it, or may.

@@ -2,8 +2,9 @@
 
 use super::rules::{Instance, Open};
 use super::times::Mirror;
-use super::{Conflict, Database, InstanceId, Lane, Level, Token, TokenId};
+use super::{Conflict, Database, Guard, InstanceId, Lane, Level, Time, Token, TokenId};
 use crate::model::TimelineId;
+use crate::parameters::Operand;
 
 /// A change of what the database itself keeps, with what was there before.
 #[derive(Clone, Debug)]
@@ -12,10 +13,17 @@ pub(super) enum Change {
     /// What it was is the last of the tokens that were kept; so with the others.
     TokenChanged(TokenId),
     TokenRemoved(TokenId),
+    /// What a parameter of a token was, and when it ended.
+    Parameter(TokenId, usize, Operand),
+    Finish(TokenId, Time),
     InstanceAdded(InstanceId),
     InstanceChanged(InstanceId),
     InstanceRemoved(InstanceId),
+    Guard(InstanceId, Guard),
     Lane(TimelineId, Lane),
+    /// Which token stood before or after one.
+    Before(TokenId, Option<TokenId>),
+    After(TokenId, Option<TokenId>),
     Opened,
     /// What was open is not: at which place it stood.
     Closed(usize, Open),
@@ -58,6 +66,7 @@ impl Database {
         self.network.pop();
         self.store.pop();
         self.equalities.clear();
+        self.told.clear();
         self.pop_levels();
     }
 
@@ -159,6 +168,42 @@ impl Database {
         at
     }
 
+    /// Says which token stands before one: a token of which nothing else changes is not kept.
+    pub(super) fn set_before(&mut self, token: TokenId, before: Option<TokenId>) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.before, before);
+        self.note(Change::Before(token, old));
+    }
+
+    /// Says which token stands after one.
+    pub(super) fn set_after(&mut self, token: TokenId, after: Option<TokenId>) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.after, after);
+        self.note(Change::After(token, old));
+    }
+
+    /// Gives a token another parameter.
+    pub(super) fn set_parameter(&mut self, token: TokenId, place: usize, operand: Operand) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.parameters[place], operand);
+        self.note(Change::Parameter(token, place, old));
+    }
+
+    /// Gives a token another end.
+    pub(super) fn set_finish(&mut self, token: TokenId, finish: Time) {
+        let at = self.tokens.get_mut(token).expect("the token is there");
+        let old = std::mem::replace(&mut at.finish, finish);
+        self.note(Change::Finish(token, old));
+    }
+
+    /// Says whether a rule holds.
+    pub(super) fn set_guard(&mut self, instance: InstanceId, guard: Guard) {
+        let at = self.instances.get_mut(instance);
+        let at = at.expect("the instance is there");
+        let old = std::mem::replace(&mut at.guard, guard);
+        self.note(Change::Guard(instance, old));
+    }
+
     pub(super) fn change_lane(&mut self, timeline: TimelineId) -> &mut Lane {
         let lane = self.lanes[timeline];
         self.note(Change::Lane(timeline, lane));
@@ -191,6 +236,21 @@ impl Database {
                 let before = self.kept_tokens.pop().expect("kept with its change");
                 self.tokens.undo_remove(token, before);
             }
+            Change::Parameter(token, place, operand) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.parameters[place] = operand;
+                }
+            }
+            Change::Finish(token, finish) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.finish = finish;
+                }
+            }
+            Change::Guard(instance, guard) => {
+                if let Some(at) = self.instances.get_mut(instance) {
+                    at.guard = guard;
+                }
+            }
             Change::InstanceAdded(instance) => drop(self.instances.undo_insert(instance)),
             Change::InstanceChanged(instance) => {
                 let before = self.kept_instances.pop().expect("kept with its change");
@@ -203,6 +263,16 @@ impl Database {
                 self.instances.undo_remove(instance, before);
             }
             Change::Lane(timeline, lane) => self.lanes[timeline] = lane,
+            Change::Before(token, before) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.before = before;
+                }
+            }
+            Change::After(token, after) => {
+                if let Some(at) = self.tokens.get_mut(token) {
+                    at.after = after;
+                }
+            }
             Change::Opened => drop(self.open.pop()),
             Change::Closed(place, open) => self.open.insert(place, open),
             Change::Held(place, count) => self.holders[place] = count,

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use smallvec::SmallVec;
+
 use super::arithmetic::times;
 use super::{Domain, Kind, NONE, Operand, Store, Variable};
 use crate::model::Value;
@@ -55,7 +57,8 @@ impl<O: Clone> Store<O> {
             Kind::Table(rows) => self.is_row(rows, operands),
             Kind::Function(call) => {
                 let (last, inputs) = operands.split_last()?;
-                let values: Option<Vec<Value>> = inputs.iter().map(|&x| self.bound(x)).collect();
+                let values: Option<SmallVec<[Value; 4]>> =
+                    inputs.iter().map(|&x| self.bound(x)).collect();
                 let value = call(&values?)?;
                 match self.bound(*last) {
                     Some(bound) => Some(bound == value),

@@ -26,7 +26,7 @@ use crate::database::{Cause, Conflict, Database, Owner, Slot, Time, TokenId, Wan
 use crate::model::{End, Fact, Model, PredicateId, Problem, TimelineId, Value};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
-use endings::{close, make_room};
+use endings::{close, is_closed, make_room};
 use now::Now;
 
 /// A plan that is extended one latency ahead.
@@ -168,9 +168,7 @@ impl Executive {
                 return Ok(());
             };
             let inputs = database.model().predicates[at.predicate].inputs;
-            for (place, &value) in outputs.iter().enumerate() {
-                database.bind(token, inputs + place, value, Owner::Token(token))?;
-            }
+            database.learn(token, inputs, outputs)?;
             if ends {
                 let earliest = database.finish(token).min.max(tick);
                 database.end(token, earliest)?;
@@ -206,7 +204,9 @@ impl Executive {
             let Some(last) = self.database.last(timeline) else {
                 continue;
             };
-            if self.database.finish(last).max <= self.now.tick {
+            if self.database.finish(last).max <= self.now.tick
+                && !is_closed(&self.database, &self.now.endings, last)
+            {
                 let (database, endings) = (&mut self.database, &self.now.endings);
                 // If its status cannot say so, it ends without.
                 let closed = database.attempt(|at| close(at, endings, last, self.now.tick));

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{EARLIEST, Half, NONE, Network, Point, Side};
+use super::{EARLIEST, Half, NONE, Network, ORIGIN, Point, Side};
 use crate::Ticks;
 
 /// An inequality of a cycle: `to - from` is at least `at_least`.
@@ -14,7 +14,7 @@ pub struct Link<O> {
     pub to: Point,
     /// How many ticks are between them at least; below 0, how many `from` is later at most.
     pub at_least: Ticks,
-    /// Whose constraint it is of; none, if it is the horizon.
+    /// Whose constraint it is of; none, if it is the horizon, or within what a point was added.
     pub owner: Option<O>,
 }
 
@@ -132,7 +132,7 @@ impl<O: Clone> Network<O> {
                 return;
             }
         }
-        if at != self.origin.index() as u32 {
+        if at != ORIGIN {
             walk.push(self.link_of_horizon(side, at));
         }
     }
@@ -153,6 +153,7 @@ impl<O: Clone> Network<O> {
     }
 
     fn link_of_horizon(&self, side: Side, point: u32) -> Link<O> {
+        let at_least = self.node(point).base[side];
         let point = self
             .nodes
             .id_at(point as usize)
@@ -165,7 +166,7 @@ impl<O: Clone> Network<O> {
         Link {
             from,
             to,
-            at_least: self.edge_of_horizon(side),
+            at_least,
             owner: None,
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BinaryHeap;
 
 use super::trail::Change;
-use super::{Conflict, EARLIEST, Half, LATEST, NONE, Network, Node, Side};
+use super::{Conflict, EARLIEST, Half, LATEST, NONE, Network, Node, ORIGIN, Side};
 use crate::Ticks;
 
 /// A bound that may grow: by how much more than others is what comes first.
@@ -167,13 +167,12 @@ impl<O: Clone> Network<O> {
 
     /// Whether a point passes its value on to the origin alone, which does not move.
     fn ends_at(&mut self, side: Side, point: u32) -> bool {
-        let origin = self.origin().index() as u32;
         let mut next = self.node(point).first[side];
         let mut looked_at = 0;
         while next != NONE {
             looked_at += 1;
             let inequality = &self.halves[next as usize];
-            if inequality.target(side) != origin {
+            if inequality.target(side) != ORIGIN {
                 // The pass that follows looks at them, and counts them.
                 return false;
             }
@@ -192,14 +191,14 @@ impl<O: Clone> Network<O> {
         }
         self.scratch.begin(self.nodes.places());
         self.find_affected(side, target);
-        // What is not affected offers what it asks for; the horizon asks for something of all.
+        // What is not affected offers what it asks for; the base asks for something of all.
         for index in 0..self.scratch.affected.len() {
             let point = self.scratch.affected[index];
             let node = self.node(point);
             let old = node.value[side];
             let mut next = node.first[1 - side];
             let mut best = Growth {
-                by: self.edge_of_horizon(side) - old,
+                by: node.base[side] - old,
                 point,
                 half: None,
             };
@@ -270,11 +269,6 @@ impl<O: Clone> Network<O> {
         let source = self.node(inequality.source(side)).value[side];
         let target = self.node(inequality.target(side)).value[side];
         source + inequality.gap - target
-    }
-
-    /// What the horizon asks of every point.
-    pub(super) fn edge_of_horizon(&self, side: Side) -> Ticks {
-        [self.horizon.min, -self.horizon.max][side]
     }
 
     fn set(&mut self, side: Side, point: u32, growth: Ticks, by: Option<Half>) {

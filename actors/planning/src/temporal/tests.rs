@@ -13,6 +13,7 @@ const HORIZON: Span = Span::new(-200, 1_000);
 #[derive(Clone, Debug)]
 enum Edit {
     Point,
+    PointWithin(Span),
     RemovePoint(usize),
     Constrain(usize, usize, Span),
     Tighten(usize, Span),
@@ -36,7 +37,8 @@ fn span() -> impl Strategy<Value = Span> {
 fn edit() -> impl Strategy<Value = Edit> {
     let pick = || 0..1_000usize;
     prop_oneof![
-        4 => Just(Edit::Point),
+        3 => Just(Edit::Point),
+        1 => span().prop_map(Edit::PointWithin),
         1 => pick().prop_map(Edit::RemovePoint),
         12 => (pick(), pick(), span()).prop_map(|(a, b, span)| Edit::Constrain(a, b, span)),
         4 => (pick(), span()).prop_map(|(a, span)| Edit::Tighten(a, span)),
@@ -50,6 +52,7 @@ fn edit() -> impl Strategy<Value = Edit> {
 /// The bounds of all points by Bellman and Ford from scratch; none if no times fit.
 fn from_scratch(
     points: &[Point],
+    within: &BTreeMap<Point, Span>,
     constraints: &[(Point, Point, Span)],
     origin: Point,
 ) -> Option<Vec<(Point, Span)>> {
@@ -57,8 +60,9 @@ fn from_scratch(
     // Distances from the origin, and to it: an edge (a, b, w) says b - a <= w.
     let mut edges = Vec::new();
     for point in points.iter().filter(|point| **point != origin) {
-        edges.push((origin.index(), point.index(), HORIZON.max));
-        edges.push((point.index(), origin.index(), -HORIZON.min));
+        let span = within[point];
+        edges.push((origin.index(), point.index(), span.max));
+        edges.push((point.index(), origin.index(), -span.min));
     }
     for (from, to, span) in constraints {
         if span.max != Ticks::MAX {
@@ -97,6 +101,7 @@ fn from_scratch(
 fn check(
     conflict: &Conflict<u32>,
     constraints: &BTreeMap<u32, (Point, Point, Span)>,
+    within: &BTreeMap<Point, Span>,
     network: &Network<u32>,
 ) -> Result<(), TestCaseError> {
     prop_assert!(conflict.excess() > 0, "{conflict}");
@@ -105,9 +110,9 @@ fn check(
         prop_assert_eq!(link.to, next.from, "{}", conflict);
         let holds = match link.owner {
             None => {
-                let from_start = link.from == network.origin() && link.at_least == HORIZON.min;
-                let to_end = link.to == network.origin() && link.at_least == -HORIZON.max;
-                from_start || to_end
+                let origin = network.origin();
+                let from_start = link.from == origin && link.at_least == within[&link.to].min;
+                from_start || link.to == origin && link.at_least == -within[&link.from].max
             }
             Some(owner) => {
                 let (from, to, span) = constraints[&owner];
@@ -142,6 +147,8 @@ fn whole(network: &Network<u32>) -> Whole {
 fn agrees_with_scratch(first: Vec<Edit>, edits: Vec<Edit>) -> Result<(), TestCaseError> {
     let mut network = Network::new(HORIZON);
     let mut marks: Vec<Whole> = Vec::new();
+    // Of each point, also of those that are gone and may come back, within what it was added.
+    let mut within = BTreeMap::from([(network.origin(), Span::exactly(0))]);
     for (number, edit) in (0u32..).zip(first.into_iter().chain(edits)) {
         let points: Vec<Point> = network.all_bounds().map(|(point, _)| point).collect();
         let all: Vec<_> = network.all_constraints().collect();
@@ -153,7 +160,14 @@ fn agrees_with_scratch(first: Vec<Edit>, edits: Vec<Edit>) -> Result<(), TestCas
             .collect();
         let tried: Option<Result<(), Conflict<u32>>> = match edit {
             Edit::Point => {
-                network.add_point();
+                within.insert(network.add_point(), HORIZON);
+                None
+            }
+            Edit::PointWithin(span) => {
+                let span = HORIZON.intersect(span);
+                let point = network.add_point_within(span);
+                prop_assert_eq!(point.is_none(), span.is_empty());
+                within.extend(point.map(|point| (point, span)));
                 None
             }
             Edit::RemovePoint(pick) => {
@@ -199,10 +213,10 @@ fn agrees_with_scratch(first: Vec<Edit>, edits: Vec<Edit>) -> Result<(), TestCas
         };
         if let Some(outcome) = tried {
             let wanted: Vec<_> = owned.values().copied().collect();
-            let fits = from_scratch(&points, &wanted, network.origin()).is_some();
+            let fits = from_scratch(&points, &within, &wanted, network.origin()).is_some();
             prop_assert_eq!(outcome.is_ok(), fits);
             if let Err(conflict) = outcome {
-                check(&conflict, &owned, &network)?;
+                check(&conflict, &owned, &within, &network)?;
                 prop_assert_eq!(whole(&network), before, "refused, it changes nothing");
             }
         }
@@ -211,7 +225,7 @@ fn agrees_with_scratch(first: Vec<Edit>, edits: Vec<Edit>) -> Result<(), TestCas
             .all_constraints()
             .map(|(_, from, to, span)| (from, to, span));
         let all: Vec<_> = all.collect();
-        let expected = from_scratch(&points, &all, network.origin());
+        let expected = from_scratch(&points, &within, &all, network.origin());
         let bounds: Vec<(Point, Span)> = network.all_bounds().collect();
         prop_assert_eq!(Some(bounds), expected);
     }

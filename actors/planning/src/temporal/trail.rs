@@ -1,7 +1,7 @@
 //! What edits changed, so that they can be undone: all since a push, or one that was refused.
 
 use super::{
-    Constraint, EARLIEST, Edge, Half, Inequality, LATEST, NONE, Network, Point, Side, Span,
+    Constraint, EARLIEST, Edge, Half, Inequality, LATEST, NONE, Network, ORIGIN, Point, Side, Span,
 };
 use crate::Ticks;
 
@@ -145,10 +145,14 @@ impl<O: Clone> Network<O> {
         }
     }
 
-    /// Puts an inequality first in its points' lists.
+    /// Puts an inequality first in its points' lists. The origin has none: it does not move, and
+    /// passes nothing on.
     pub(super) fn link(&mut self, half: Half) {
         for side in [EARLIEST, LATEST] {
             let source = self.halves[half as usize].source(side);
+            if source == ORIGIN {
+                continue;
+            }
             let first = std::mem::replace(&mut self.node_mut(source).first[side], half);
             let inequality = &mut self.halves[half as usize];
             (inequality.next[side], inequality.before[side]) = (first, NONE);
@@ -163,6 +167,9 @@ impl<O: Clone> Network<O> {
         for side in [EARLIEST, LATEST] {
             let Inequality { next, before, .. } = self.halves[half as usize];
             let source = self.halves[half as usize].source(side);
+            if source == ORIGIN {
+                continue;
+            }
             self.join(side, source, before[side], next[side]);
         }
     }
@@ -172,6 +179,9 @@ impl<O: Clone> Network<O> {
         for side in [EARLIEST, LATEST] {
             let Inequality { next, before, .. } = self.halves[half as usize];
             let source = self.halves[half as usize].source(side);
+            if source == ORIGIN {
+                continue;
+            }
             match before[side] {
                 NONE => self.node_mut(source).first[side] = half,
                 before => self.halves[before as usize].next[side] = half,

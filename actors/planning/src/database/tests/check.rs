@@ -57,6 +57,15 @@ fn timelines(database: &Database) {
             at.status == Status::Active,
             "{token:?}"
         );
+        let lasts = at.timeline.map_or(0, |timeline| {
+            let kind = database.model.timelines[timeline].kind;
+            i64::from(kind != TimelineKind::Free)
+        });
+        let (starts, ends) = (database.start(token), database.finish(token));
+        assert!(
+            ends.min >= starts.min + lasts && ends.max >= starts.max + lasts,
+            "{token:?}: {starts:?} {ends:?}"
+        );
         if at.status != Status::Active {
             assert!(at.instances.is_empty() && at.before.is_none() && at.after.is_none());
         }
@@ -215,7 +224,10 @@ fn bounds(database: &Database) {
     let mut rebuilt = Network::new(database.horizon());
     let mut points = BTreeMap::from([(database.network.origin(), rebuilt.origin())]);
     for (point, _) in database.network.all_bounds() {
-        points.entry(point).or_insert_with(|| rebuilt.add_point());
+        let within = database.network.added_within(point);
+        points
+            .entry(point)
+            .or_insert_with(|| rebuilt.add_point_within(within).expect("there is room"));
     }
     for (_, from, to, span) in database.network.all_constraints() {
         let posted = rebuilt.constrain(points[&from], points[&to], span, Owner::Given);
@@ -251,7 +263,10 @@ fn variables(database: &Database) {
     let mut watchers: BTreeMap<usize, BTreeSet<InstanceId>> = BTreeMap::new();
     for (id, at) in database.instances.iter() {
         for variable in &at.watched {
-            assert!(database.store.has(*variable));
+            // One in whose place a value stands watches no more.
+            if !database.store.has(*variable) {
+                continue;
+            }
             watchers.entry(variable.index()).or_default().insert(id);
         }
     }

@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use crate::Ticks;
-use crate::database::{Conflict, Database, Owner, TokenId};
+use crate::database::{Conflict, Database, TokenId};
 use crate::model::{Model, PredicateId, TimelineId, TimelineKind, Value, Values};
 
 /// How a token ends of which no status says how.
@@ -43,6 +43,11 @@ impl Endings {
             preempted: named("PREEMPTED"),
         }
     }
+
+    /// Whether no output says how a token ended.
+    fn is_silent(&self) -> bool {
+        self.timed_out.is_empty() && self.preempted.is_empty()
+    }
 }
 
 /// Binds the outputs of a token that say how it ended, if no status did.
@@ -63,7 +68,7 @@ fn say_ending(
     for &(place, value) in outputs {
         let is = database.token(token).map(|at| at.parameters[place]);
         if is.is_some_and(|is| database.value(is).is_none()) {
-            database.bind(token, place, value, Owner::Token(token))?;
+            database.learn(token, place, &[value])?;
             said = true;
         }
     }
@@ -84,10 +89,19 @@ pub(super) fn close(
 ) -> Result<bool, Conflict> {
     let finish = database.finish(token);
     let at = finish.max.min(now);
+    let open = finish.min != finish.max;
+    let silent = database
+        .token(token)
+        .is_none_or(|at| endings[at.predicate].is_silent());
+    if silent {
+        if open {
+            database.end(token, at)?;
+        }
+        return Ok(open);
+    }
     let timed_out = database
         .longest(token)
         .is_some_and(|longest| database.start(token).min.saturating_add(longest) == at);
-    let open = finish.min != finish.max;
     if open {
         database.end(token, at)?;
     }
@@ -97,6 +111,15 @@ pub(super) fn close(
         Ending::Preempted
     };
     Ok(say_ending(database, endings, token, ending)? || open)
+}
+
+/// Whether a token has ended, and no status is to say how.
+pub(super) fn is_closed(database: &Database, endings: &[Endings], token: TokenId) -> bool {
+    let finish = database.finish(token);
+    let silent = database
+        .token(token)
+        .is_none_or(|at| endings[at.predicate].is_silent());
+    silent && finish.min == finish.max
 }
 
 /// Ends the present token of a timeline, if it is not over: the token after which a new one comes.

@@ -16,6 +16,8 @@ use crate::temporal::Span;
 #[derive(Clone, Debug)]
 pub(super) struct Now {
     pub(super) tick: Ticks,
+    /// The timelines of states, which have no gaps.
+    states: Vec<TimelineId>,
     /// By timeline: by place of a predicate on it: how early its subgoals come.
     order: Vec<Vec<u32>>,
     /// By predicate: what its statuses say if no status comes.
@@ -47,8 +49,11 @@ impl Now {
     /// For a model, at tick 0.
     pub(super) fn of(model: &Model) -> Self {
         let predicates = 0..model.predicates.len();
+        let states = model.timelines.iter().enumerate();
+        let states = states.filter(|(_, at)| at.kind == TimelineKind::State);
         Now {
             tick: 0,
+            states: states.map(|(timeline, _)| timeline).collect(),
             order: subgoal_order(model),
             endings: predicates.map(|at| Endings::of(model, at)).collect(),
             guards: 0,
@@ -99,11 +104,7 @@ impl Now {
 
     /// A timeline of states whose last token is over, and nothing follows.
     fn gap(&self, database: &Database) -> Option<Flaw> {
-        let timelines = database.model().timelines.iter().enumerate();
-        for (timeline, at) in timelines {
-            if at.kind != TimelineKind::State {
-                continue;
-            }
+        for &timeline in &self.states {
             let after = database.last(timeline);
             let over = match after {
                 Some(last) => database.finish(last).max <= self.tick,
