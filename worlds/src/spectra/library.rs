@@ -117,10 +117,10 @@ impl SpectralLibrary {
     /// Adds the sample of one line.
     fn read_row(&mut self, header: &Header, line: usize, row: &str) -> Result<(), LibraryError> {
         let expected = header.names.len();
-        let fields = fields_of(line, row, expected)?;
-        if fields.len() != expected {
+        let (fields, actual) = fields_of(line, row, expected)?;
+        if actual != expected {
             let problem = LibraryProblem::FieldCount {
-                actual: fields.len(),
+                actual,
                 expected,
                 missing: header.names.get(fields.len()).map(|name| shown(name)),
             };
@@ -208,7 +208,7 @@ impl Header {
     }
 
     fn read(line: usize, text: &str) -> Result<Header, LibraryError> {
-        let fields = fields_of(line, text, 1 + MAX_MINERALS + MAX_BANDS)?;
+        let (fields, count) = fields_of(line, text, 1 + MAX_MINERALS + MAX_BANDS)?;
         let names: Vec<String> = fields.into_iter().map(Cow::into_owned).collect();
         let unknown = |name: &str, expected, nearest: String| {
             field(
@@ -249,7 +249,9 @@ impl Header {
             wavelengths_nm.push(wavelength_nm);
         }
         let minerals = names.len() - 1 - wavelengths_nm.len();
-        let problem = match (minerals, wavelengths_nm.len()) {
+        // Columns that were counted and not kept are too many of something already.
+        let beyond = count - names.len();
+        let problem = match (minerals, wavelengths_nm.len() + beyond) {
             (0, _) => LibraryProblem::NoMineral,
             (actual, _) if actual > MAX_MINERALS => LibraryProblem::TooManyMinerals { actual },
             (_, actual) if !(2..=MAX_BANDS).contains(&actual) => {
@@ -330,30 +332,37 @@ fn text_of(bytes: &[u8]) -> Result<&str, LibraryError> {
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
-/// The fields of a line, trimmed and without their quotes; one more than `most`, if there are more.
-fn fields_of(line: usize, text: &str, most: usize) -> Result<Vec<Cow<'_, str>>, LibraryError> {
+/// The fields of a line, trimmed and without their quotes, at most `most` and one of them; and how
+/// many there are.
+fn fields_of(
+    line: usize,
+    text: &str,
+    most: usize,
+) -> Result<(Vec<Cow<'_, str>>, usize), LibraryError> {
     let quotes = || {
         let problem = LibraryProblem::Quotes;
         LibraryError::Line { line, problem }
     };
-    let mut fields = Vec::new();
+    let (mut fields, mut count) = (Vec::new(), 0);
     let mut rest = Some(text);
     while let Some(text) = rest.take() {
-        if fields.len() > most {
-            break;
-        }
+        count += 1;
+        let is_kept = fields.len() <= most;
         let Some(quoted) = text.trim_start().strip_prefix('"') else {
             let (plain, after) = text
                 .split_once(',')
                 .map_or((text, None), |(a, b)| (a, Some(b)));
-            fields.push(Cow::Borrowed(plain.trim()));
+            if is_kept {
+                fields.push(Cow::Borrowed(plain.trim()));
+            }
             rest = after;
             continue;
         };
         let end = closing_quote(quoted).ok_or_else(quotes)?;
-        fields.push(Cow::Owned(
-            quoted[..end].replace("\"\"", "\"").trim().to_owned(),
-        ));
+        if is_kept {
+            let text = quoted[..end].replace("\"\"", "\"");
+            fields.push(Cow::Owned(text.trim().to_owned()));
+        }
         let after = quoted[end + 1..].trim_start();
         match after.strip_prefix(',') {
             Some(next) => rest = Some(next),
@@ -361,7 +370,7 @@ fn fields_of(line: usize, text: &str, most: usize) -> Result<Vec<Cow<'_, str>>, 
             None => return Err(quotes()),
         }
     }
-    Ok(fields)
+    Ok((fields, count))
 }
 
 /// Where a quoted field ends: at its first quote that is not doubled.

@@ -163,7 +163,7 @@ fn each_fault_of_a_library_has_its_error() {
     check(
         3,
         "A-2,0.5,0.5,1,1,1,1,1",
-        "line 3: 7 fields: expected 6, as the header has",
+        "line 3: 8 fields: expected 6, as the header has",
     );
     check(
         1,
@@ -270,6 +270,13 @@ fn what_is_no_library_is_an_error() {
     let wide = format!("id,{},r450,r470\n", minerals.join(","));
     let error = read(wide.as_bytes()).unwrap_err();
     assert!(error.to_string().contains("at most 64"), "{error}");
+    let bands: Vec<String> = (1..=5000).map(|nm| format!("r{nm}")).collect();
+    let long = format!("id,olivine,{}\n", bands.join(","));
+    let error = read(long.as_bytes()).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "line 1: 5000 bands: expected 2 to 4096 columns `rNNN`, NNN being nanometres"
+    );
 }
 
 proptest! {
