@@ -1,8 +1,9 @@
 //! Where a rover is, where it believes to be, and how both change as it drives.
 //!
 //! The truth slips and strays, the estimate counts turns of wheels. Driving is cut into steps, a turn
-//! or a leg of at most the model's `leg`, each in a straight line at constant speed: how it will go
-//! is decided at its beginning, with draws by the step's number, and it may be broken off at any time.
+//! or a leg of at most the model's `leg`, each in a straight line at constant speed. How it will go
+//! is decided at its beginning, with draws by the step's number; it may be broken off at any time.
+//! A rover is a point here: what its middle may not be on, blocks it.
 
 use std::f64::consts::{PI, TAU};
 

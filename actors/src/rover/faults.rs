@@ -156,8 +156,8 @@ settings! {
 }
 
 settings! {
-    /// The `[rover.fault_rates]` table: how often each kind of fault comes by chance, for each rover and
-    /// sol. The times are drawn for each rover and kind by themselves, so that a higher rate of one
+    /// The `[rover.fault_rates]` table: how often each kind of fault comes by chance, for each
+    /// rover and sol. The times are drawn for each rover and kind by themselves, so that a higher rate of one
     /// leaves the others where they were.
     pub struct FaultRates {
         /// How long they last in the mean; the time is exponential.

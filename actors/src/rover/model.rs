@@ -29,8 +29,8 @@ const PARTS: [&str; 5] = ["wheels", "mast", "radio", "heater", "body"];
 const INSTRUMENTS: &str = "instrument";
 
 settings! {
-    /// A rover: the `[rover]` table, or whatever a system calls it. Keys that are not given are those of
-    /// the model.
+    /// A rover: the `[rover]` table, or whatever a system calls it. Keys that are not given are
+    /// those of the model.
     pub struct RoverModel {
         /// The model whose keys hold where none are given.
         pub model: String = "mer".to_owned(), one_of(&NAMES);
@@ -38,7 +38,8 @@ settings! {
         pub mass_kg: f64 = 174.0, in_unit("kg", 0.1..=10_000.0);
         /// How far apart its wheels are, in front and behind, left and right: what roll and pitch are
         /// measured over.
-        pub wheelbase_m as "wheelbase": f64 [with = "units::length_m"] = 1.4, in_unit("m", 0.05..=10.0);
+        pub wheelbase_m as "wheelbase": f64 [with = "units::length_m"] = 1.4,
+            in_unit("m", 0.05..=10.0);
         /// How fast it drives on level ground without rocks.
         pub speed_m_per_s as "speed": f64 [with = "units::speed_m_per_s"] = 0.05,
             in_unit("m/s", 1e-4..=10.0);
@@ -163,7 +164,8 @@ settings! {
     /// An instrument of a rover: `[[rover.instrument]]`.
     pub struct InstrumentModel {
         /// Its name: commands name it so.
-        pub name: String, such_that("a name", |_| "missing".to_owned(), |name: &String| !name.is_empty());
+        pub name: String,
+            such_that("a name", |_| "missing".to_owned(), |name: &String| !name.is_empty());
         /// What it yields.
         pub kind: InstrumentKind, one_of(&["camera", "spectrometer"]);
         /// Whether it is on the mast; if not, it looks straight ahead, a little down.

@@ -1,4 +1,4 @@
-//! A rover's electricity: solar array, battery and loads. It knows no commands and no clock of its own.
+//! A rover's electricity: solar array, battery and loads. It knows no commands.
 //!
 //! Sunlight is taken at [`NODE_NS`] apart, and straight between; loads are constant between
 //! events. So what flows is linear in pieces, every integral is exact, and it does not matter when

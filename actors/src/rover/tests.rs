@@ -130,8 +130,8 @@ impl Bench {
         self.out.iter().filter_map(incident).collect()
     }
 
-    /// Gives a command and waits for its end, or for a sol; how long it took \[s\], to a second, and how it
-    /// ended.
+    /// Gives a command and waits for its end, a sol at most; how long it took \[s\], to a second,
+    /// and how it ended.
     pub(super) fn done(&mut self, command: Command) -> (f64, CommandReport) {
         let (begun_s, id) = (self.now_s, self.give(command));
         loop {

@@ -8,7 +8,7 @@ use farside_worlds::{
 };
 
 /// The noise of close readings: of a reflectance as a share of itself, and of textures.
-pub const NOISE: f64 = 0.01;
+pub(crate) const NOISE: f64 = 0.01;
 
 /// The classes that stretched fields are made of: kinds that are far apart, so that it is their shape
 /// that makes them hard.
@@ -22,7 +22,7 @@ const STRETCHED: [&str; 4] = [
 /// Field `seed` of a measurement: 90 rocks of 4 classes, laid out by the four stories in turn. Those
 /// whose number divides by 5 are stretched: classes vary four times as much in composition, and in one
 /// statistic of texture.
-pub fn field(seed: u64, rocks: usize) -> RockField {
+pub(crate) fn field(seed: u64, rocks: usize) -> RockField {
     let stretched = || {
         let mut classes: Vec<RockClass> = STRETCHED
             .iter()
@@ -49,7 +49,7 @@ pub fn field(seed: u64, rocks: usize) -> RockField {
 }
 
 /// What a close spectrum of a rock says, with noise of this share of each reflectance.
-pub fn spectral(
+pub(crate) fn spectral(
     field: &RockField,
     basis: &SpectralBasis,
     rock: usize,
@@ -68,7 +68,7 @@ pub fn spectral(
 }
 
 /// What an image of a rock says.
-pub fn textural(field: &RockField, rock: usize, noise: f64, stream: &mut Stream) -> Textural {
+pub(crate) fn textural(field: &RockField, rock: usize, noise: f64, stream: &mut Stream) -> Textural {
     let features = field.texture(rock);
     Textural {
         features: features.map(|value| (value + stream.normal(0.0, noise)) as f32),
@@ -77,7 +77,7 @@ pub fn textural(field: &RockField, rock: usize, noise: f64, stream: &mut Stream)
 }
 
 /// A reading of a rock that says where it is, and what it is told to.
-pub fn row(
+pub(crate) fn row(
     field: &RockField,
     ordinal: usize,
     rock: usize,
@@ -103,7 +103,7 @@ pub fn row(
 }
 
 /// A spectrum and an image of each rock, from near.
-pub fn survey(field: &RockField, basis: &SpectralBasis, noise: f64) -> Vec<Row> {
+pub(crate) fn survey(field: &RockField, basis: &SpectralBasis, noise: f64) -> Vec<Row> {
     let mut stream = RandomKey::new(field.settings().seed)
         .text("survey")
         .stream();
@@ -117,7 +117,7 @@ pub fn survey(field: &RockField, basis: &SpectralBasis, noise: f64) -> Vec<Row> 
 }
 
 /// The true class of each rock.
-pub fn truth(field: &RockField) -> Vec<usize> {
+pub(crate) fn truth(field: &RockField) -> Vec<usize> {
     field
         .truth()
         .classes()

@@ -23,7 +23,7 @@ const ROUNDS: usize = 10;
 
 /// What is to be found out, and so what is measured; more is better of each.
 #[derive(Clone, Copy, Debug)]
-pub enum Aim {
+pub(crate) enum Aim {
     /// The adjusted Rand index of all rocks.
     Distribution,
     /// The regret of the rock named, negative.
@@ -34,36 +34,44 @@ pub enum Aim {
 
 /// Whose spectrum comes next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Choice {
+pub(crate) enum Choice {
     Ranked,
     Random,
 }
 
 /// What all fields are read with.
-pub struct Lab {
+pub(crate) struct Lab {
     basis: SpectralBasis,
     gauges: Vec<MineralGauge>,
     stories: Stories,
-    pub settings: PrioritiserSettings,
+    pub(crate) settings: PrioritiserSettings,
 }
 
 impl Lab {
-    pub fn new() -> Result<Lab, Box<dyn Error>> {
+    pub(crate) fn new() -> Result<Lab, Box<dyn Error>> {
         let library = ReferenceLibrary::mixed(&wavelength_grid_nm(), 300);
         let basis = library.basis()?;
         // Hematite is a trace in most classes.
         let minerals = 0..MINERALS.len() - 1;
         let gauges = minerals.map(|mineral| library.gauge(&basis, mineral));
+        let g = |n: &str, d: f64| std::env::var(n).map_or(d, |v| v.parse().unwrap());
         Ok(Lab {
             gauges: gauges.collect::<Result<_, _>>()?,
             basis,
-            stories: Stories::new(StorySettings::default()),
-            settings: PrioritiserSettings::default(),
+            stories: Stories::new(StorySettings {
+                draws: g("DRAWS", 400.0) as usize,
+                ..StorySettings::default()
+            }),
+            settings: PrioritiserSettings {
+                texture_kernel: g("TK", 0.5),
+                position_kernel_m: g("PK", 15.0),
+                ..PrioritiserSettings::default()
+            },
         })
     }
 
     /// The mean over the rounds of what is measured.
-    pub fn mean(
+    pub(crate) fn mean(
         &mut self,
         field: &RockField,
         aim: Aim,
@@ -81,7 +89,12 @@ impl Lab {
         let mut stream = key.text("images").stream();
         let mut rows: Vec<Row> = (0..rocks)
             .map(|rock| {
-                let image = textural(field, rock, 3.0 * NOISE, &mut stream);
+                let image = textural(
+                    field,
+                    rock,
+                    std::env::var("IMG").map_or(3.0, |v| v.parse().unwrap()) * NOISE,
+                    &mut stream,
+                );
                 row(field, rock, rock, None, Some(image))
             })
             .collect();
@@ -93,10 +106,11 @@ impl Lab {
         }
         let mut next = BEFORE;
         let mut sum = 0.0;
+        let mut curve = vec![];
         let seed = field.settings().seed as usize;
         let mineral = seed % self.gauges.len();
+        let mut learned = Learned::from_rows(&rows, &FitSettings::default())?;
         for _ in 0..ROUNDS {
-            let learned = Learned::from_rows(&rows, &FitSettings::default())?;
             let belief = match (aim, choice) {
                 (Aim::Process, Choice::Ranked) => Some(self.stories.weigh(&learned)),
                 _ => None,
@@ -117,8 +131,8 @@ impl Lab {
             for rock in chosen {
                 add(&mut rows, rock);
             }
-            let learned = Learned::from_rows(&rows, &FitSettings::default())?;
-            sum += match aim {
+            learned = Learned::from_rows(&rows, &FitSettings::default())?;
+            let v = match aim {
                 Aim::Distribution => adjusted_rand_index(&learned.hard_classes(), &truth(field)),
                 Aim::Mineral => {
                     let fraction = |rock| field.truth().rock(rock).fractions[mineral];
@@ -127,13 +141,25 @@ impl Lab {
                 }
                 Aim::Process => self.stories.weigh(&learned).log_score(field.story()),
             };
+            curve.push(v);
+            sum += v;
+        }
+        if std::env::var("CURVE").is_ok() {
+            println!(
+                "{aim:?} {choice:?} {}",
+                curve
+                    .iter()
+                    .map(|v| format!("{v:.3}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
+            );
         }
         Ok(sum / ROUNDS as f64)
     }
 }
 
 /// The mean difference of pairs, and how many of its standard errors it is.
-pub fn paired(a: &[f64], b: &[f64]) -> (f64, f64) {
+pub(crate) fn paired(a: &[f64], b: &[f64]) -> (f64, f64) {
     let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / count;

@@ -150,8 +150,8 @@ fn a_stop_is_obeyed_in_one_event() {
     );
 }
 
-/// Every kind of fault in one run of three sols, on a rover that is kept busy.
-fn troubled(executor: Executor) -> (Report, RoverFigures, Vec<String>) {
+/// Every kind of fault in one run of three sols, on two rovers that are kept busy.
+fn troubled(executor: Executor) -> (Report, [RoverFigures; 2], Vec<String>) {
     let mut sim = Simulation::new(4);
     let mut config = config();
     for (number, kind) in (0..).zip(FaultKind::ALL) {
@@ -167,12 +167,19 @@ fn troubled(executor: Executor) -> (Report, RoverFigures, Vec<String>) {
         plan.push((at_s + 400, image(View::Point)));
         plan.push((at_s + 500, spectrum(View::Point)));
     }
-    let spec = RoverSpec {
-        seed: 4,
-        ..spec(level_field(60), config)
-    };
-    let tally = spec.tally.clone();
-    add(&mut sim, spec, &plan);
+    let field = level_field(60);
+    let mut tallies = Vec::new();
+    for number in 3..5 {
+        let spec = RoverSpec {
+            number,
+            name: format!("rover_{number:02}"),
+            seed: 4,
+            ..spec(field.clone(), config.clone())
+        };
+        tallies.push(spec.tally.clone());
+        let (host, _) = add(&mut sim, spec, &plan);
+        sim.heavy(host);
+    }
     let told: Arc<Mutex<Vec<String>>> = Arc::default();
     let seen = told.clone();
     sim.observe(move |record: &Record<'_>| {
@@ -187,7 +194,8 @@ fn troubled(executor: Executor) -> (Report, RoverFigures, Vec<String>) {
     sim.stop_at(SimTime::from_secs(3 * 88_775), "three sols");
     let report = sim.run(executor).unwrap();
     let told = told.lock().unwrap().clone();
-    (report, tally.figures(), told)
+    let figures = [0, 1].map(|rover: usize| tallies[rover].figures());
+    (report, figures, told)
 }
 
 #[test]
@@ -198,10 +206,13 @@ fn faults_are_told_end_no_run_and_change_no_executor() {
         .iter()
         .filter(|kind| kind.ends_with("FaultBegins"))
         .count();
-    assert_eq!(begun, figures.faults as usize);
-    assert!(begun >= 11);
-    assert!(figures.failed > 0 && figures.done > 20, "{figures:?}");
-    assert!(figures.imbalance <= 1e-9, "{}", figures.imbalance);
+    assert_eq!(begun, (figures[0].faults + figures[1].faults) as usize);
+    assert!(begun >= 22);
+    for figures in &figures {
+        assert!(figures.failed > 0 && figures.done > 20, "{figures:?}");
+        assert!(figures.imbalance <= 1e-9, "{}", figures.imbalance);
+    }
+    assert_ne!(figures[0], figures[1]);
     let (again, ..) = troubled(Executor::Kameo { threads: 2 });
     assert_eq!(again.digest, report.digest);
     assert_eq!(again.counts, report.counts);

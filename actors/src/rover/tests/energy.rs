@@ -147,6 +147,36 @@ proptest! {
         prop_assert!(refused <= 2 * given);
     }
 
+    /// Who asks for the state, and how often, changes nothing.
+    #[test]
+    fn asking_changes_nothing(
+        commands in prop::collection::vec((command(), 0.0..2000.0f64), 1..20),
+        asks_s in 1.0..500.0f64,
+    ) {
+        let run = |asks_s: Option<f64>| {
+            let mut config = RoverConfig::named("mer").expect("a model");
+            (config.battery_j, config.lease) = (1e9, SimDuration::ZERO);
+            let mut bench = Bench::new(spec(level_field(20), config));
+            for (command, wait_s) in &commands {
+                let end_s = bench.now_s + wait_s;
+                while let Some(asks_s) = asks_s.filter(|asks_s| bench.now_s + asks_s < end_s) {
+                    bench.pass(asks_s);
+                    bench.state();
+                }
+                bench.now_s = end_s;
+                bench.pass(0.0);
+                bench.give(command.clone());
+            }
+            let energy = bench.hardware.figures().energy;
+            (bench.reports(), energy)
+        };
+        let ((quiet, energy), (asked, again)) = (run(None), run(Some(asks_s)));
+        // By their texts: what is no number is unlike itself.
+        prop_assert_eq!(format!("{quiet:?}"), format!("{asked:?}"));
+        prop_assert!((energy.stored_j - again.stored_j).abs() < 1e-9 * energy.total_j());
+        prop_assert!((energy.wheels_j - again.wheels_j).abs() < 1e-9 * energy.total_j());
+    }
+
     /// Under loads that change, against a battery that is stepped by the second.
     #[test]
     fn a_battery_does_what_small_steps_do(

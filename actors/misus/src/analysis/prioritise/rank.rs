@@ -12,8 +12,8 @@
 //! known of the rock, the second how rare its kind is. The `p_k` of a rock without a spectrum are
 //! those of measured ones like it, weighted by `κ`.
 //!
-//! For a mineral it is the expected improvement on the richest rock measured, times novelty; for the
-//! process the information of the rock's class about the story, times novelty (`1 / (1 + Σ κ)`).
+//! For a mineral it is the expected improvement on the richest rock measured; for the process the
+//! information of the rock's class about the story, times novelty (`1 / (1 + Σ κ)`).
 
 use super::PrioritiserSettings;
 use crate::analysis::learned::Learned;
@@ -34,6 +34,9 @@ pub struct Pick {
 
 /// How much of the field's own shares of classes is in what is expected of a rock.
 const PRIOR_WEIGHT: f64 = 0.1;
+
+/// How many rocks as the library leads to expect are in what is expected of a class.
+const PRIOR_ROCKS: f64 = 0.5;
 
 /// The best rocks without a good spectrum, at most `count`, the best first. Each is the best after
 /// those before it are had.
@@ -63,7 +66,7 @@ pub fn rank(
     count: usize,
 ) -> Vec<Pick> {
     let mut state = State::of(learned, settings);
-    let gains = Gains::of(&state, learned, objective);
+    let gains = Gains::of(learned, objective);
     let mut picks: Vec<Pick> = Vec::new();
     let mut is_open: Vec<bool> = (0..learned.rocks.len())
         .map(|index| !settings.is_measured(learned, index))
@@ -242,10 +245,10 @@ enum Gains<'a> {
 }
 
 impl<'a> Gains<'a> {
-    fn of(state: &State, learned: &Learned, objective: Objective<'a>) -> Gains<'a> {
+    fn of(learned: &Learned, objective: Objective<'a>) -> Gains<'a> {
         match objective {
             Objective::Distribution => Gains::Distribution,
-            Objective::Mineral(gauge) => Gains::Mineral(improvements(state, learned, gauge)),
+            Objective::Mineral(gauge) => Gains::Mineral(improvements(learned, gauge)),
             Objective::Process(belief) => Gains::Process(belief),
         }
     }
@@ -253,41 +256,51 @@ impl<'a> Gains<'a> {
     fn value(&self, state: &State, index: usize) -> f64 {
         match self {
             Gains::Distribution => state.distribution(index),
-            Gains::Mineral(improvements) => improvements[index] * state.novelty(index),
+            Gains::Mineral(improvements) => improvements[index],
             Gains::Process(belief) => belief.information(index) * state.novelty(index),
         }
     }
 }
 
-/// The expected improvement of each rock on the richest one: `E max(0, f - best)`, where the fraction `f`
-/// is normal, with the mean of estimates of rocks like it and a variance that shrinks with their
-/// number (D. Jones, M. Schonlau and W. Welch, "Efficient global optimization", Journal of Global
-/// Optimization 13, 1998).
-fn improvements(state: &State, learned: &Learned, gauge: &MineralGauge) -> Vec<f64> {
+/// The expected improvement of each rock on the richest one: `E max(0, f - best)` (D. Jones, M. Schonlau
+/// and W. Welch, "Efficient global optimization", Journal of Global Optimization 13, 1998). The
+/// fraction `f` is normal within each class, with the mean and the spread of its rocks' estimates, and a
+/// rock is of each class as probably as the mixture says. The spread within a class does not
+/// vanish with readings, so a class that holds the richest rock stays worth looking at.
+fn improvements(learned: &Learned, gauge: &MineralGauge) -> Vec<f64> {
     let prior = gauge.prior();
-    let estimates: Vec<_> = gauge
+    let estimates: Vec<Option<f64>> = gauge
         .estimates(&learned.rocks)
         .into_iter()
-        .map(|estimate| estimate.map(|estimate| gauge.believed(estimate)))
+        .map(|estimate| estimate.map(|estimate| gauge.believed(estimate).fraction))
         .collect();
-    let believed = estimates.iter().flatten().map(|estimate| estimate.fraction);
-    let best = believed.fold(0.0, f64::max);
-    (0..state.rocks)
-        .map(|index| {
-            let row = &state.kernel[index * state.rocks..(index + 1) * state.rocks];
-            let (mut sum, mut total) = (PRIOR_WEIGHT * prior.fraction, PRIOR_WEIGHT);
-            for ((kappa, known), estimate) in row.iter().zip(&state.known).zip(&estimates) {
-                if let Some(estimate) = estimate {
-                    sum += kappa * known * estimate.fraction;
-                    total += kappa * known;
-                }
-            }
-            let mean = sum / total;
-            let sd = prior.sd / (1.0 + total - PRIOR_WEIGHT).sqrt();
-            let z = (mean - best) / sd.max(1.0e-9);
-            let density = libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
-            let below = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
-            sd * (z * below + density)
-        })
-        .collect()
+    let best = estimates.iter().flatten().copied().fold(0.0, f64::max);
+    let of_class = |class: usize| {
+        let shares = || {
+            let known = estimates.iter().enumerate();
+            known.filter_map(|(index, e)| e.map(|e| (learned.probabilities(index)[class], e)))
+        };
+        let total: f64 = PRIOR_ROCKS + shares().map(|(share, _)| share).sum::<f64>();
+        let sum: f64 = shares().map(|(share, estimate)| share * estimate).sum();
+        let mean = (PRIOR_ROCKS * prior.fraction + sum) / total;
+        let square = |x: f64| (x - mean) * (x - mean);
+        let spread: f64 = shares()
+            .map(|(share, estimate)| share * square(estimate))
+            .sum();
+        let expected = PRIOR_ROCKS * (prior.sd * prior.sd + square(prior.fraction));
+        let sd = ((expected + spread) / total).sqrt().max(1.0e-6);
+        let z = (mean - best) / sd;
+        let density = libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
+        let below = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
+        sd * (z * below + density)
+    };
+    let of_classes: Vec<f64> = (0..learned.classes()).map(of_class).collect();
+    let expected = |index| {
+        let probabilities = learned.probabilities(index).iter();
+        probabilities
+            .zip(&of_classes)
+            .map(|(p, gain)| p * gain)
+            .sum()
+    };
+    (0..learned.rocks.len()).map(expected).collect()
 }
