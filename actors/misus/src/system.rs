@@ -10,7 +10,7 @@ use farside_actors::system::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::assemble::{Parts, assemble};
+use crate::assemble::{Parts, assemble, names};
 use crate::config::{FieldConfig, LearnConfig, TeamConfig};
 use crate::place::{Place, story};
 use crate::scene::MisusScene;
@@ -82,6 +82,9 @@ impl Settings for MisusScenario {
         story(&self.world)?;
         self.team.check("team")?;
         self.rover.check("rover")?;
+        let rovers = names(&self.team);
+        let rovers: Vec<&str> = rovers.iter().map(String::as_str).collect();
+        self.rover.check_rovers("rover", &rovers)?;
         self.learn.check("learn")
     }
 

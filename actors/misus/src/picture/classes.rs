@@ -58,3 +58,52 @@ pub(super) fn matched(model: &FieldModel, field: &RockField) -> Vec<usize> {
     let other = |class: Option<usize>| class.or_else(|| others.next()).unwrap_or(0);
     drawn.into_iter().map(other).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::RockLabel;
+    use farside_worlds::rock_field::RockFieldSettings;
+
+    fn model(classes: u32, class_of: impl Fn(usize) -> u32, rocks: usize) -> FieldModel {
+        let label = |rock| RockLabel {
+            class: class_of(rock),
+            confidence: 1.0,
+            image: true,
+            spectrum: true,
+        };
+        FieldModel {
+            classes,
+            rocks: (0..rocks).map(label).collect(),
+            ..FieldModel::default()
+        }
+    }
+
+    #[test]
+    fn learnt_classes_are_drawn_as_the_true_ones_they_are_mostly_of() {
+        let field = RockField::generate(&RockFieldSettings::default()).unwrap();
+        let truth = field.truth().classes().to_vec();
+        let all = field.classes().len() as u32;
+        // The same classes with other numbers.
+        let turned = |rock: usize| (u32::from(truth[rock]) + 1) % all;
+        let drawn = matched(&model(all, turned, truth.len()), &field);
+        for (rock, class) in truth.iter().enumerate() {
+            assert_eq!(drawn[turned(rock) as usize], usize::from(*class));
+        }
+        // One class cut in two: the smaller part is drawn as none of the true ones.
+        let cut = |rock: usize| match (truth[rock], rock % 4) {
+            (0, 0) => all,
+            (class, _) => u32::from(class),
+        };
+        let drawn = matched(&model(all + 1, cut, truth.len()), &field);
+        assert_eq!(drawn, [0, 1, 2, 3, all as usize]);
+    }
+
+    #[test]
+    fn every_class_has_a_shape_of_its_own() {
+        let shapes: std::collections::BTreeSet<String> = (0..COLOURS)
+            .map(|class| shape(class, (0.0, 0.0), 5.0))
+            .collect();
+        assert_eq!(shapes.len(), COLOURS);
+    }
+}
