@@ -68,7 +68,12 @@ pub(crate) fn spectral(
 }
 
 /// What an image of a rock says.
-pub(crate) fn textural(field: &RockField, rock: usize, noise: f64, stream: &mut Stream) -> Textural {
+pub(crate) fn textural(
+    field: &RockField,
+    rock: usize,
+    noise: f64,
+    stream: &mut Stream,
+) -> Textural {
     let features = field.texture(rock);
     Textural {
         features: features.map(|value| (value + stream.normal(0.0, noise)) as f32),
