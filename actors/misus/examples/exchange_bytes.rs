@@ -9,6 +9,7 @@
 //!     cargo run --release -p farside-misus --example exchange_bytes
 
 #[path = "support/field.rs"]
+#[allow(dead_code, reason = "other examples use the rest")]
 mod field;
 
 use std::error::Error;

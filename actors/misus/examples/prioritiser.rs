@@ -6,6 +6,7 @@
 //!     cargo run --release -p farside-misus --example prioritiser -- [FIRST_FIELD]
 
 #[path = "support/field.rs"]
+#[allow(dead_code, reason = "other examples use the rest")]
 mod field;
 #[path = "support/rounds.rs"]
 mod rounds;
