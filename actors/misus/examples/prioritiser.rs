@@ -6,6 +6,7 @@
 //!     cargo run --release -p farside-misus --example prioritiser -- [FIRST_FIELD]
 
 #[path = "support/field.rs"]
+#[allow(dead_code, reason = "other examples use the rest")]
 mod field;
 #[path = "support/rounds.rs"]
 mod rounds;
@@ -18,13 +19,7 @@ const FIELDS: u64 = 30;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let first: u64 = std::env::args().nth(1).map_or(Ok(0), |word| word.parse())?;
-    for (i, aim) in [Aim::Distribution, Aim::Mineral, Aim::Process]
-        .into_iter()
-        .enumerate()
-    {
-        if std::env::var("AIM").is_ok_and(|a| a != i.to_string()) {
-            continue;
-        }
+    for aim in [Aim::Distribution, Aim::Mineral, Aim::Process] {
         let mut lab = Lab::new()?;
         let (mut ranked, mut random) = (Vec::new(), Vec::new());
         for seed in first..first + FIELDS {

@@ -54,19 +54,14 @@ impl Lab {
         // Hematite is a trace in most classes.
         let minerals = 0..MINERALS.len() - 1;
         let gauges = minerals.map(|mineral| library.gauge(&basis, mineral));
-        let g = |n: &str, d: f64| std::env::var(n).map_or(d, |v| v.parse().unwrap());
         Ok(Lab {
             gauges: gauges.collect::<Result<_, _>>()?,
             basis,
             stories: Stories::new(StorySettings {
-                draws: g("DRAWS", 400.0) as usize,
+                draws: 60,
                 ..StorySettings::default()
             }),
-            settings: PrioritiserSettings {
-                texture_kernel: g("TK", 0.5),
-                position_kernel_m: g("PK", 15.0),
-                ..PrioritiserSettings::default()
-            },
+            settings: PrioritiserSettings::default(),
         })
     }
 
@@ -89,12 +84,7 @@ impl Lab {
         let mut stream = key.text("images").stream();
         let mut rows: Vec<Row> = (0..rocks)
             .map(|rock| {
-                let image = textural(
-                    field,
-                    rock,
-                    std::env::var("IMG").map_or(3.0, |v| v.parse().unwrap()) * NOISE,
-                    &mut stream,
-                );
+                let image = textural(field, rock, 10.0 * NOISE, &mut stream);
                 row(field, rock, rock, None, Some(image))
             })
             .collect();
@@ -106,7 +96,6 @@ impl Lab {
         }
         let mut next = BEFORE;
         let mut sum = 0.0;
-        let mut curve = vec![];
         let seed = field.settings().seed as usize;
         let mineral = seed % self.gauges.len();
         let mut learned = Learned::from_rows(&rows, &FitSettings::default())?;
@@ -132,7 +121,7 @@ impl Lab {
                 add(&mut rows, rock);
             }
             learned = Learned::from_rows(&rows, &FitSettings::default())?;
-            let v = match aim {
+            sum += match aim {
                 Aim::Distribution => adjusted_rand_index(&learned.hard_classes(), &truth(field)),
                 Aim::Mineral => {
                     let fraction = |rock| field.truth().rock(rock).fractions[mineral];
@@ -141,18 +130,6 @@ impl Lab {
                 }
                 Aim::Process => self.stories.weigh(&learned).log_score(field.story()),
             };
-            curve.push(v);
-            sum += v;
-        }
-        if std::env::var("CURVE").is_ok() {
-            println!(
-                "{aim:?} {choice:?} {}",
-                curve
-                    .iter()
-                    .map(|v| format!("{v:.3}"))
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            );
         }
         Ok(sum / ROUNDS as f64)
     }

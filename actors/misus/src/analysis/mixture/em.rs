@@ -40,10 +40,10 @@ impl<'a> Run<'a> {
         let columns = table.columns();
         let mut means = Vec::with_capacity(classes * columns);
         let mut tied = Vec::with_capacity(columns);
-        for column in 0..columns {
+        for (column, &floor) in floors.iter().enumerate() {
             let (mean, variance) = table.moments(column).unwrap_or((0.0, 1.0));
             means.push(mean);
-            tied.push(variance.max(floors[column]));
+            tied.push(variance.max(floor));
         }
         let mixture = Mixture {
             columns,

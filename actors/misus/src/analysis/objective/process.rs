@@ -244,12 +244,12 @@ impl Matching {
         let last = subsets(n, |learnt, class| logs[(n - 1 - learnt) * n + class]);
         let all = first[(1 << n) - 1];
         let mut classes = vec![0.0; n * n];
-        for subset in 0usize..1 << n {
+        for (subset, before) in first.iter().enumerate() {
             let learnt = subset.count_ones() as usize;
             for class in (0..n).filter(|class| learnt < n && subset & (1 << class) == 0) {
                 let others = !(subset | (1 << class)) & ((1 << n) - 1);
                 classes[learnt * n + class] +=
-                    first[subset] * logs[learnt * n + class] * last[others] / all;
+                    before * logs[learnt * n + class] * last[others] / all;
             }
         }
         let ways: f64 = (1..=n).map(|i| i as f64).product();
