@@ -140,7 +140,7 @@ impl Simulation {
             name: name.to_owned(),
             host,
             actor_type,
-            factory: Box::new(move |name| Boxed::new(build(name))),
+            factory: Box::new(move |name| Boxed::boxed(build(name))),
         });
         Address::new(self.actors.len() as u32 - 1)
     }

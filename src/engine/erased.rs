@@ -45,7 +45,7 @@ pub(crate) struct Boxed<A> {
 }
 
 impl<A: Actor> Boxed<A> {
-    pub(crate) fn new(actor: A) -> Box<dyn AnyActor> {
+    pub(crate) fn boxed(actor: A) -> Box<dyn AnyActor> {
         Box::new(Boxed { actor, readable: 0 })
     }
 }
