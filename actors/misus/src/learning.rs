@@ -4,10 +4,10 @@
 
 use farside_actors::system::SetupError;
 use farside_worlds::geology::StoryKind;
-use farside_worlds::spectra::SpectralLibrary;
 
 use crate::analysis::features::SpectralBasis;
 use crate::analysis::learned::Learned;
+use crate::analysis::library::ReferenceLibrary;
 use crate::analysis::mixture::{Fit, FitSettings};
 use crate::analysis::objective::{
     MineralGauge, Objective as Analysed, Stories, StoryBelief, StorySettings,
@@ -23,6 +23,9 @@ use crate::site::Site;
 /// How sure the catalogue is of where a rock lies \[m\].
 const CATALOGUE_SD_M: f32 = 0.1;
 
+/// How many mixtures of minerals rovers carry, where no library of spectra is given.
+const MIXTURES: usize = 300;
+
 /// What all rovers carry to learn with: a basis of spectra, and a gauge for the mineral of
 /// `learn.mineral`, if the library knows it.
 pub(crate) struct Tools {
@@ -31,35 +34,30 @@ pub(crate) struct Tools {
 }
 
 impl Tools {
-    /// From the scenario's library of spectra, or from the built-in one.
+    /// From the scenario's library of spectra, or from mixtures of the built-in minerals.
     pub(crate) fn new(place: &Place, learn: &LearnConfig) -> Result<Tools, SetupError> {
-        let builtin;
         let library = match &place.library {
-            Some(library) => library.as_ref(),
-            None => {
-                builtin = SpectralLibrary::builtin();
-                &builtin
-            }
+            Some(library) => ReferenceLibrary::measured(library),
+            None => ReferenceLibrary::mixed(place.field.wavelengths_nm(), MIXTURES),
         };
-        let spectra: Vec<&[f64]> = library.samples().map(|one| one.reflectance).collect();
         let wrong = |error: &dyn std::fmt::Display| SetupError::value("world.spectra", error);
-        let basis = SpectralBasis::new(library.wavelengths_nm(), &spectra);
-        let basis = basis.map_err(|error| wrong(&error))?;
+        let basis = library.basis().map_err(|error| wrong(&error))?;
         let minerals = library.minerals();
         let at = minerals.iter().position(|name| *name == learn.mineral);
-        let Some(at) = at else {
-            if learn.objective != Objective::Mineral {
-                return Ok(Tools { basis, gauge: None });
+        let gauge = match at {
+            Some(at) => {
+                let gauge = library.gauge(&basis, at);
+                Some(gauge.map_err(|error| wrong(&error))?)
             }
-            let (known, wanted) = (minerals.join(", "), &learn.mineral);
-            let hint = farside::suggest::nearest(wanted, minerals.iter().map(String::as_str));
-            let hint = farside::suggest::did_you_mean(hint.as_deref());
-            let message = format!("{wanted:?}: expected one of {known}{hint}");
-            return Err(SetupError::value("learn.mineral", message));
+            None if learn.objective != Objective::Mineral => None,
+            None => {
+                let (known, wanted) = (minerals.join(", "), &learn.mineral);
+                let hint = farside::suggest::nearest(wanted, minerals.iter().map(String::as_str));
+                let hint = farside::suggest::did_you_mean(hint.as_deref());
+                let message = format!("{wanted:?}: expected one of {known}{hint}");
+                return Err(SetupError::value("learn.mineral", message));
+            }
         };
-        let fractions: Vec<f64> = library.samples().map(|one| one.fractions[at]).collect();
-        let gauge = MineralGauge::new(&basis, &spectra, &fractions);
-        let gauge = Some(gauge.map_err(|error| wrong(&error))?);
         Ok(Tools { basis, gauge })
     }
 }
@@ -129,7 +127,7 @@ impl Lesson {
     }
 
     /// What a rover records of it.
-    pub(crate) fn model(&self, site: &Site, readings: usize) -> FieldModel {
+    pub(crate) fn model(&self, site: &Site, readings: usize, stops: u32) -> FieldModel {
         let classes = self.whole.classes();
         let rocks: Vec<RockLabel> = (0..self.whole.rocks.len())
             .map(|rock| self.label(rock))
@@ -142,6 +140,7 @@ impl Lesson {
         let richest = site.tools.gauge.as_ref();
         let richest = richest.and_then(|gauge| gauge.richest(&self.whole.rocks));
         FieldModel {
+            stops,
             readings: readings as u32,
             rocks_read: self.read.rocks.len() as u32,
             rocks_with_spectrum: spectra.count() as u32,

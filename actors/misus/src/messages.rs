@@ -30,6 +30,8 @@ pub(crate) struct Overdue {
 /// A state sample: what a rover thinks of the field.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FieldModel {
+    /// How many rocks it has been to.
+    pub stops: u32,
     /// How many readings it knows of, its own and those of others.
     pub readings: u32,
     /// How many rocks they are of.

@@ -61,6 +61,13 @@ farside_actors::documented! {
         /// The logarithm of how likely rovers think the true story is, at least that of 1e-6, mean over
         /// rovers; 0 is best. None where no story laid the field (`uniform`).
         pub log_score: Option<f64>,
+        /// `field_ari` over the course of the tours: its mean over the numbers of rocks that a rover has
+        /// been to, from one on. Only with `learn.learn_at_stops`; so are the next two.
+        pub field_ari_area: Option<f64>,
+        /// `regret` over the course of the tours.
+        pub regret_area: Option<f64>,
+        /// `log_score` over the course of the tours.
+        pub log_score_area: Option<f64>,
         /// Rocks of which some rover took a spectrum.
         pub rocks_read: u32,
         /// Rocks that rovers set out for.
@@ -125,15 +132,13 @@ fn figures(tally: &Tally, field: &RockField, learn: &LearnConfig) -> MisusMetric
     let last: Vec<&FieldModel> = tally.rovers.iter().filter_map(latest).collect();
     let read = read_by_some(&last);
     let aris: Vec<f64> = last.iter().map(|one| ari(one, field, &read)).collect();
+    let everywhere = vec![true; read.len()];
     let mean_of = |value: &dyn Fn(&FieldModel) -> f64| mean(last.iter().map(|one| value(one)));
     let errors = last.iter().map(|one| share_error(one, field));
     MisusMetrics {
         class_ari: mean(aris.iter().copied()),
         class_ari_least: aris.iter().copied().min_by(f64::total_cmp),
-        field_ari: mean(
-            last.iter()
-                .map(|one| ari(one, field, &vec![true; read.len()])),
-        ),
+        field_ari: mean(last.iter().map(|one| ari(one, field, &everywhere))),
         k: mean_of(&|one| f64::from(one.classes)),
         k_agrees: last.windows(2).all(|two| two[0].classes == two[1].classes),
         distribution_error: mean(errors),
@@ -143,6 +148,9 @@ fn figures(tally: &Tally, field: &RockField, learn: &LearnConfig) -> MisusMetric
         readings: mean_of(&|one| f64::from(one.readings)).unwrap_or(0.0),
         regret: mean(last.iter().filter_map(|one| regret_of(one))),
         log_score: mean(last.iter().filter_map(|one| story_score(one, field))),
+        field_ari_area: area(tally, learn, &|one| Some(ari(one, field, &everywhere))),
+        regret_area: area(tally, learn, &|one| regret_of(one)),
+        log_score_area: area(tally, learn, &|one| story_score(one, field)),
         rocks_read: read.iter().filter(|read| **read).count() as u32,
         stops: tally.rovers.iter().map(|rover| rover.stops).sum(),
         exchange_messages: tally.exchanged,
@@ -218,6 +226,25 @@ fn ari(model: &FieldModel, field: &RockField, over: &[bool]) -> f64 {
     let true_of = |&rock: &usize| usize::from(truth.classes()[rock]);
     let true_classes: Vec<usize> = rocks.iter().map(true_of).collect();
     adjusted_rand_index(&own, &true_classes)
+}
+
+/// The mean of a figure over the numbers of rocks that a rover has been to, and over rovers: the area
+/// under its curve. None where rovers do not learn at their stops.
+fn area(
+    tally: &Tally,
+    learn: &LearnConfig,
+    figure: &dyn Fn(&FieldModel) -> Option<f64>,
+) -> Option<f64> {
+    if !learn.learn_at_stops {
+        return None;
+    }
+    mean(tally.rovers.iter().filter_map(|rover| {
+        let models = || rover.models.iter().map(|(_, model)| model);
+        let most = models().map(|model| model.stops).max()?;
+        // The last that it thought before it came to the next rock.
+        let after = |stops: u32| models().filter(|model| model.stops == stops).last();
+        mean((1..=most).filter_map(after).filter_map(figure))
+    }))
 }
 
 /// How a team's knowledge grew: at the end of each sol, the mean over rovers of the adjusted Rand index

@@ -6,7 +6,7 @@ use farside_actors::system::MetricKind::{Number, Rate, Series};
 use farside_actors::system::SeriesIndex;
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 26] = [
+pub(crate) const ALL: [Metric; 29] = [
     Metric::new("brown_outs", "brown-outs", "", Number, Lower),
     Metric::new(
         "class_ari",
@@ -60,6 +60,13 @@ pub(crate) const ALL: [Metric; 26] = [
         Higher,
     ),
     Metric::new(
+        "field_ari_area",
+        "area under the curve of the adjusted Rand index",
+        "",
+        Number,
+        Higher,
+    ),
+    Metric::new(
         "field_ari_by_sol",
         "adjusted Rand index of the whole field",
         "",
@@ -89,6 +96,13 @@ pub(crate) const ALL: [Metric; 26] = [
         Number,
         Higher,
     ),
+    Metric::new(
+        "log_score_area",
+        "area under the curve of the log score",
+        "",
+        Number,
+        Higher,
+    ),
     Metric::new("objective", "objective function", "", Number, Neither),
     Metric::new(
         "position_error_m",
@@ -114,6 +128,13 @@ pub(crate) const ALL: [Metric; 26] = [
     Metric::new(
         "regret",
         "regret of the rock named richest",
+        "",
+        Number,
+        Lower,
+    ),
+    Metric::new(
+        "regret_area",
+        "area under the curve of the regret",
         "",
         Number,
         Lower,

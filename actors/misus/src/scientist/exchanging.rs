@@ -3,6 +3,7 @@
 use farside::prelude::*;
 use farside_actors::rover::{CommandReport, Reading as Measured};
 
+use super::touring::Logbook;
 use super::{Instrument, Scientist};
 use crate::analysis::exchange::{ExchangeError, Statistics};
 use crate::analysis::reading::{Reading, TEXTURAL, Textural};
@@ -128,10 +129,12 @@ impl Scientist {
         if !std::mem::take(&mut self.is_to_learn) {
             return;
         }
+        let stops = ctx.durable::<Logbook>().stops;
         let rows = self.exchange.rows();
         self.lesson = Lesson::of(&self.site, &mut self.stories, rows);
         if let Some(lesson) = &self.lesson {
-            ctx.sample(&lesson.model(&self.site, self.exchange.rows().len()));
+            let model = lesson.model(&self.site, self.exchange.rows().len(), stops);
+            ctx.sample(&model);
         }
     }
 

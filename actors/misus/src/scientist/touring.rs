@@ -203,6 +203,9 @@ impl Scientist {
         logbook.visited[rock as usize] = true;
         logbook.stops += 1;
         self.since_panorama = self.since_panorama.map(|rocks| rocks + 1);
+        if self.site.config.learn_at_stops {
+            self.learn(ctx);
+        }
         self.ask(ctx)
     }
 
