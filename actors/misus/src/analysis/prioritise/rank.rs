@@ -66,7 +66,7 @@ pub fn rank(
     count: usize,
 ) -> Vec<Pick> {
     let mut state = State::of(learned, settings);
-    let gains = Gains::of(learned, objective);
+    let gains = Gains::of(&state, learned, objective);
     let mut picks: Vec<Pick> = Vec::new();
     let mut is_open: Vec<bool> = (0..learned.rocks.len())
         .map(|index| !settings.is_measured(learned, index))
@@ -245,10 +245,10 @@ enum Gains<'a> {
 }
 
 impl<'a> Gains<'a> {
-    fn of(learned: &Learned, objective: Objective<'a>) -> Gains<'a> {
+    fn of(state: &State, learned: &Learned, objective: Objective<'a>) -> Gains<'a> {
         match objective {
             Objective::Distribution => Gains::Distribution,
-            Objective::Mineral(gauge) => Gains::Mineral(improvements(learned, gauge)),
+            Objective::Mineral(gauge) => Gains::Mineral(improvements(state, learned, gauge)),
             Objective::Process(belief) => Gains::Process(belief),
         }
     }
@@ -262,19 +262,51 @@ impl<'a> Gains<'a> {
     }
 }
 
+/// How many rocks like it the class of a rock counts for, in what is expected of it.
+const CLASS_ROCKS: f64 = 0.5;
+
 /// The expected improvement of each rock on the richest one: `E max(0, f - best)` (D. Jones, M. Schonlau
-/// and W. Welch, "Efficient global optimization", Journal of Global Optimization 13, 1998). The
-/// fraction `f` is normal within each class, with the mean and the spread of its rocks' estimates, and a
-/// rock is of each class as probably as the mixture says. The spread within a class does not
-/// vanish with readings, so a class that holds the richest rock stays worth looking at.
-fn improvements(learned: &Learned, gauge: &MineralGauge) -> Vec<f64> {
-    let prior = gauge.prior();
+/// and W. Welch, "Efficient global optimization", Journal of Global Optimization 13, 1998). What is
+/// expected of a rock comes from its class and from rocks like it: the mean of the estimates of both,
+/// weighted by the probability of the class and by `κ`. The less is known of rocks like it, the
+/// wider the fraction may lie, so a rock in a part of the field that nobody knows is worth a look.
+fn improvements(state: &State, learned: &Learned, gauge: &MineralGauge) -> Vec<f64> {
     let estimates: Vec<Option<f64>> = gauge
         .estimates(&learned.rocks)
         .into_iter()
         .map(|estimate| estimate.map(|estimate| gauge.believed(estimate).fraction))
         .collect();
     let best = estimates.iter().flatten().copied().fold(0.0, f64::max);
+    let of_classes = class_estimates(learned, gauge, &estimates);
+    let expected = |index: usize| {
+        let (mut weight, mut mean, mut square) = (CLASS_ROCKS, 0.0, 0.0);
+        for (p, [class_mean, class_sd]) in learned.probabilities(index).iter().zip(&of_classes) {
+            mean += CLASS_ROCKS * p * class_mean;
+            square += CLASS_ROCKS * p * (class_mean * class_mean + class_sd * class_sd);
+        }
+        let row = &state.kernel[index * state.rocks..(index + 1) * state.rocks];
+        for (kappa, estimate) in row.iter().zip(&estimates) {
+            if let Some(estimate) = estimate {
+                weight += kappa;
+                mean += kappa * estimate;
+                square += kappa * estimate * estimate;
+            }
+        }
+        mean /= weight;
+        let spread = (square / weight - mean * mean).max(0.0);
+        let sd = (spread + gauge.prior().sd * gauge.prior().sd / (1.0 + weight * weight)).sqrt();
+        improvement(mean, sd, best)
+    };
+    (0..learned.rocks.len()).map(expected).collect()
+}
+
+/// Mean and standard deviation of the fraction in rocks of each class, by its rocks' estimates.
+fn class_estimates(
+    learned: &Learned,
+    gauge: &MineralGauge,
+    estimates: &[Option<f64>],
+) -> Vec<[f64; 2]> {
+    let prior = gauge.prior();
     let of_class = |class: usize| {
         let shares = || {
             let known = estimates.iter().enumerate();
@@ -284,23 +316,18 @@ fn improvements(learned: &Learned, gauge: &MineralGauge) -> Vec<f64> {
         let sum: f64 = shares().map(|(share, estimate)| share * estimate).sum();
         let mean = (PRIOR_ROCKS * prior.fraction + sum) / total;
         let square = |x: f64| (x - mean) * (x - mean);
-        let spread: f64 = shares()
-            .map(|(share, estimate)| share * square(estimate))
-            .sum();
+        let spread = shares().map(|(share, estimate)| share * square(estimate));
         let expected = PRIOR_ROCKS * (prior.sd * prior.sd + square(prior.fraction));
-        let sd = ((expected + spread) / total).sqrt().max(1.0e-6);
-        let z = (mean - best) / sd;
-        let density = libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
-        let below = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
-        sd * (z * below + density)
+        [mean, ((expected + spread.sum::<f64>()) / total).sqrt()]
     };
-    let of_classes: Vec<f64> = (0..learned.classes()).map(of_class).collect();
-    let expected = |index| {
-        let probabilities = learned.probabilities(index).iter();
-        probabilities
-            .zip(&of_classes)
-            .map(|(p, gain)| p * gain)
-            .sum()
-    };
-    (0..learned.rocks.len()).map(expected).collect()
+    (0..learned.classes()).map(of_class).collect()
+}
+
+/// `E max(0, f - best)` of a normal `f`.
+fn improvement(mean: f64, sd: f64, best: f64) -> f64 {
+    let sd = sd.max(1.0e-6);
+    let z = (mean - best) / sd;
+    let density = libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
+    let below = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
+    sd * (z * below + density)
 }
