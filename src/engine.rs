@@ -26,7 +26,7 @@ use crate::time::SimTime;
 use crate::topology::Topology;
 
 pub(crate) use cell::{ActorCell, CellState};
-pub(crate) use erased::{AnyActor, Boxed, Core, Factory, Letter, Sealed};
+pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use parts::{FirstSample, Parts, SampleNames};

@@ -6,9 +6,10 @@ use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::actor::boxed::Boxed;
 use crate::actor::{self, Accepts, Actor, Address, Recipient};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
-use crate::engine::{Boxed, Factory, Sealed};
+use crate::engine::{Factory, Sealed};
 use crate::executor::{self, Executor};
 use crate::fault::{BuildError, LookupError};
 use crate::ids::{HostId, LinkId};

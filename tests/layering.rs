@@ -48,6 +48,7 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
             "farside-worlds",
             "farside-logs",
             "farside-actors",
+            "farside-misus",
             "farside-network",
             "farside-planning",
             "farside-traffic",

@@ -88,7 +88,7 @@ fn who_restarts_learns_again_what_the_others_know() {
 #[test]
 fn every_kind_of_fault_is_told_and_ends_no_run() {
     let (results, report, told) = run_watched("misus/faults", &[], Executor::Inline);
-    assert_eq!(report.end.name(), "until", "{:?}", report.end);
+    assert_eq!(report.end.name(), "stopped", "{:?}", report.end);
     let told = told.0.lock().unwrap();
     let all: BTreeSet<&str> = FaultKind::ALL.iter().map(|kind| kind.name()).collect();
     assert_eq!(told.0, all);
@@ -102,7 +102,7 @@ fn energy_is_accounted_for_in_every_run() {
                  never_ends = 2.0, instrument_fails = 2.0, stuck_mast = 2.0, blocked_path = 3.0 }";
     for seed in ["seed=1", "seed=2", "seed=3"] {
         let (results, report) = run("misus/learn", &["until=2sol", rates, seed]);
-        assert_eq!(report.end.name(), "until");
+        assert_eq!(report.end.name(), "stopped");
         assert!(metric(&results, "faults") > 10.0);
         let imbalance = metric(&results, "energy_imbalance");
         assert!(imbalance < 1e-9, "{seed}: {imbalance}");

@@ -4,10 +4,11 @@ use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;
 
+use super::boxed::Boxed;
 use super::context::Context;
 use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
-use crate::engine::{AnyActor, Boxed, Core, Letter, Sealed};
+use crate::engine::{AnyActor, Core, Letter, Sealed};
 use crate::fault::{LookupError, Outcome};
 use crate::payload::{Encode, Message};
 use crate::topology::{ActorType, KindEntry};

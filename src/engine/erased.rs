@@ -6,7 +6,6 @@ use smallbox::SmallBox;
 use smallbox::space::S4;
 
 use super::{CellState, Parts};
-use crate::actor::{Actor, Context};
 use crate::encoding::{DecodeError, Schema};
 use crate::fault::Outcome;
 use crate::payload::Encode;
@@ -36,28 +35,6 @@ pub(crate) trait AnyActor: Any + Send {
     ///
     /// [`Engine::read_ahead`]: super::Engine::read_ahead
     fn read_ahead(&self) -> u64;
-}
-
-/// An actor in its box, with something that can be read whatever its type is.
-pub(crate) struct Boxed<A> {
-    pub(crate) actor: A,
-    readable: u64,
-}
-
-impl<A: Actor> Boxed<A> {
-    pub(crate) fn boxed(actor: A) -> Box<dyn AnyActor> {
-        Box::new(Boxed { actor, readable: 0 })
-    }
-}
-
-impl<A: Actor> AnyActor for Boxed<A> {
-    fn started(&mut self, core: &mut Core<'_>) -> Outcome {
-        self.actor.started(&mut Context::new(core))
-    }
-
-    fn read_ahead(&self) -> u64 {
-        self.readable
-    }
 }
 
 /// The constructor of an actor, called with its name at the start and at each restart.

@@ -12,11 +12,11 @@ use farside_actors::wiring::{Wire, Wiring};
 use nalgebra::Point3;
 
 use crate::config::{LearnConfig, TeamConfig};
-use crate::learning::Tools;
 use crate::monitor::{Monitor, Tally};
 use crate::place::Place;
 use crate::scientist::Scientist;
 use crate::site::{Instruments, SharedSite, Site};
+use crate::tools::Tools;
 
 /// The distance between rovers at the start \[m\].
 const APART_M: f64 = 2.0;

@@ -19,10 +19,12 @@ mod metrics;
 mod monitor;
 mod picture;
 mod place;
+mod scenario;
 mod scene;
 mod scientist;
 mod site;
 mod system;
+mod tools;
 pub mod tour;
 
 pub use config::{FieldConfig, LearnConfig, Objective, TeamConfig, Tour};

@@ -18,7 +18,7 @@ use farside_worlds::sky::SOL_S;
 
 use crate::assemble::names;
 use crate::place::Place;
-use crate::system::MisusScenario;
+use crate::scenario::MisusScenario;
 use history::History;
 
 /// The style of pictures, beside that of all figures.

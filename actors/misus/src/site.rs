@@ -12,7 +12,7 @@ use farside_worlds::sky::SOL_S;
 use nalgebra::Point2;
 
 use crate::config::LearnConfig;
-use crate::learning::Tools;
+use crate::tools::Tools;
 use crate::tour::sector;
 
 /// What scientists share.

@@ -8,26 +8,17 @@ use farside_actors::system::{
     Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
     Settings, Setup, SetupError, System,
 };
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use crate::assemble::{Parts, assemble, names};
 use crate::config::{FieldConfig, LearnConfig, TeamConfig};
 use crate::place::{Place, story};
+use crate::scenario::MisusScenario;
 use crate::scene::MisusScene;
 use crate::{builtin, metrics, picture};
 
 /// The multi-rover integrated science understanding system.
 pub struct MisusSystem;
-
-/// The tables that it reads.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct MisusScenario {
-    pub(crate) world: FieldConfig,
-    pub(crate) team: TeamConfig,
-    pub(crate) rover: RoverConfig,
-    pub(crate) learn: LearnConfig,
-}
 
 impl System for MisusSystem {
     fn name(&self) -> &str {

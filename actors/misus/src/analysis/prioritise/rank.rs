@@ -12,7 +12,8 @@
 //! known of the rock, the second how rare its kind is. The `p_k` of a rock without a spectrum are
 //! those of measured ones like it, weighted by `κ`.
 //!
-//! For a mineral it is the expected improvement on the richest rock measured; for the process the
+//! For a mineral it is the expected improvement on the richest rock measured, less where rocks like
+//! it were chosen before; for the process the
 //! information of the rock's class about the story, times novelty (`1 / (1 + Σ κ)`).
 
 use super::PrioritiserSettings;
@@ -239,8 +240,8 @@ fn kernel(learned: &Learned, settings: &PrioritiserSettings) -> Vec<f64> {
 /// What a rock is worth besides what [`State`] knows.
 enum Gains<'a> {
     Distribution,
-    /// The expected improvement of each rock.
-    Mineral(Vec<f64>),
+    /// The expected improvement of each rock, and how far rocks like it were known at first.
+    Mineral(Vec<f64>, Vec<f64>),
     Process(&'a StoryBelief),
 }
 
@@ -248,7 +249,9 @@ impl<'a> Gains<'a> {
     fn of(state: &State, learned: &Learned, objective: Objective<'a>) -> Gains<'a> {
         match objective {
             Objective::Distribution => Gains::Distribution,
-            Objective::Mineral(gauge) => Gains::Mineral(improvements(state, learned, gauge)),
+            Objective::Mineral(gauge) => {
+                Gains::Mineral(improvements(state, learned, gauge), state.covered.clone())
+            }
             Objective::Process(belief) => Gains::Process(belief),
         }
     }
@@ -256,7 +259,10 @@ impl<'a> Gains<'a> {
     fn value(&self, state: &State, index: usize) -> f64 {
         match self {
             Gains::Distribution => state.distribution(index),
-            Gains::Mineral(improvements) => improvements[index],
+            // Those chosen already may turn out to be the richest: of rocks like them fewer are needed.
+            Gains::Mineral(improvements, covered) => {
+                improvements[index] * (1.0 + covered[index]) / (1.0 + state.covered[index])
+            }
             Gains::Process(belief) => belief.information(index) * state.novelty(index),
         }
     }
