@@ -242,7 +242,7 @@ fn area(
         let models = || rover.models.iter().map(|(_, model)| model);
         let most = models().map(|model| model.stops).max()?;
         // The last that it thought before it came to the next rock.
-        let after = |stops: u32| models().filter(|model| model.stops == stops).last();
+        let after = |stops: u32| models().rfind(|model| model.stops == stops);
         mean((1..=most).filter_map(after).filter_map(figure))
     }))
 }

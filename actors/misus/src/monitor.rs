@@ -122,7 +122,12 @@ impl Observer for Monitor {
             return Ok(Flow::Continue);
         };
         let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
-        let role = self.roles[record.sender.index()];
+        // What is told comes from outside.
+        let who = match record.class {
+            RecordClass::Told => record.receiver,
+            _ => record.sender,
+        };
+        let role = self.roles[who.index()];
         let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
         match (record.class, role, kind.name()) {
             (class, Role::Scientist(_), "Statistics") if class.is_fate() => {
