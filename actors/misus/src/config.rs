@@ -141,7 +141,7 @@ settings! {
         /// prioritised tours it is before every choice, too.
         pub learn_every: SimDuration [with = "units::duration"] = SimDuration::from_secs(4 * 3600),
             over(SimDuration::ZERO);
-        /// Whether a rover learns at each rock that it has read, too: what `field_ari_by_stop` and its like
+        /// Whether a rover learns at each rock that it has read, too: what `field_ari_area` and its like
         /// are measured by.
         pub learn_at_stops: bool;
         /// The most classes that are told apart.
