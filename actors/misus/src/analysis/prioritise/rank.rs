@@ -16,6 +16,8 @@
 //! it were chosen before; for the process the
 //! information of the rock's class about the story, times novelty (`1 / (1 + Σ κ)`).
 
+use farside::random::RandomKey;
+
 use super::PrioritiserSettings;
 use crate::analysis::learned::Learned;
 use crate::analysis::objective::{MineralGauge, Objective, StoryBelief};
@@ -268,6 +270,9 @@ impl<'a> Gains<'a> {
     }
 }
 
+/// By which share equally good rocks may differ, so that one of them comes first.
+const TIE: f64 = 1.0e-3;
+
 /// How many rocks like it the class of a rock counts for, in what is expected of it.
 const CLASS_ROCKS: f64 = 0.5;
 
@@ -301,7 +306,9 @@ fn improvements(state: &State, learned: &Learned, gauge: &MineralGauge) -> Vec<f
         mean /= weight;
         let spread = (square / weight - mean * mean).max(0.0);
         let sd = (spread + gauge.prior().sd * gauge.prior().sd / (1.0 + weight * weight)).sqrt();
-        improvement(mean, sd, best)
+        // Of equally good ones any, but all rovers the same: the first few would lie side by side.
+        let any = RandomKey::new(u64::from(learned.rocks.numbers()[index])).text("any");
+        improvement(mean, sd, best) * (1.0 + TIE * any.uniform())
     };
     (0..learned.rocks.len()).map(expected).collect()
 }
