@@ -19,8 +19,8 @@ const MOST_LEVELS: f64 = 40.0;
 /// use farside_actors::figure::relief;
 /// use farside_worlds::HeightField;
 /// use nalgebra::Point2;
-/// let bump_m = (0..49).map(|i| if i == 24 { 3.0 } else { 0.0 }).collect();
-/// let terrain = HeightField::new(Point2::origin(), 1.0, 7, bump_m)?;
+/// let slope_m = (0..400).map(|i| f64::from(i % 20)).collect();
+/// let terrain = HeightField::new(Point2::origin(), 1.0, 20, slope_m)?;
 /// let drawn = relief::draw(&terrain, 10.0, |[x, y]| (10.0 * x, 10.0 * y), |_| true);
 /// assert!(drawn.into_string().contains("class=\"relief\""));
 /// # Ok::<(), farside_worlds::TerrainError>(())
