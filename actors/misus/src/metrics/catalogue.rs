@@ -17,7 +17,7 @@ pub(crate) const ALL: [Metric; 29] = [
     ),
     Metric::new(
         "class_ari_least",
-        "the same of the worst rover",
+        "adjusted Rand index of the worst rover",
         "",
         Number,
         Higher,
