@@ -17,7 +17,7 @@ use crate::analysis::scores::{adjusted_rand_index, distribution_error};
 use crate::assemble::Team;
 use crate::config::LearnConfig;
 use crate::messages::FieldModel;
-use crate::monitor::{RoverTally, Tally};
+use crate::monitor::{RoverHistory, Tally};
 
 /// What runs can be measured by, each with what its field says.
 pub(crate) fn all() -> &'static [Metric] {
@@ -194,7 +194,7 @@ fn hardware(tally: &Tally) -> MisusMetrics {
     }
 }
 
-fn latest(rover: &RoverTally) -> Option<&FieldModel> {
+fn latest(rover: &RoverHistory) -> Option<&FieldModel> {
     rover.models.last().map(|(_, model)| model)
 }
 

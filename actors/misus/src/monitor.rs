@@ -14,7 +14,7 @@ use crate::site::SharedSite;
 #[derive(Default)]
 pub(crate) struct Tally {
     /// By the rover's number.
-    pub(crate) rovers: Vec<RoverTally>,
+    pub(crate) rovers: Vec<RoverHistory>,
     /// Exchange messages and their bytes, as they were delivered or lost.
     pub(crate) exchanged: u64,
     pub(crate) exchanged_bytes: u64,
@@ -22,7 +22,7 @@ pub(crate) struct Tally {
 
 /// What is known of a rover.
 #[derive(Default)]
-pub(crate) struct RoverTally {
+pub(crate) struct RoverHistory {
     /// What it learnt, and when, in order.
     pub(crate) models: Vec<(SimTime, FieldModel)>,
     /// Rocks that it set out for.
@@ -40,7 +40,7 @@ pub(crate) struct RoverTally {
     pub(crate) brown_outs: u32,
 }
 
-impl RoverTally {
+impl RoverHistory {
     fn place(&mut self, pose: RoverPose) {
         if let Some(before) = &self.pose {
             let (east_m, north_m) = (pose.east_m - before.east_m, pose.north_m - before.north_m);
@@ -75,7 +75,11 @@ pub(crate) struct Monitor {
 impl Monitor {
     /// A monitor, and what it will write to.
     pub(crate) fn new(site: SharedSite) -> (Monitor, Arc<Mutex<Tally>>) {
-        let rovers = site.rovers.iter().map(|_| RoverTally::default()).collect();
+        let rovers = site
+            .rovers
+            .iter()
+            .map(|_| RoverHistory::default())
+            .collect();
         let tally = Arc::new(Mutex::new(Tally {
             rovers,
             ..Tally::default()

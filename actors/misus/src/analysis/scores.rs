@@ -107,21 +107,30 @@ pub fn posterior_entropy(responsibilities: &[f64], classes: usize) -> f64 {
 /// # Panics
 /// When there are not as many learnt classes as true ones, item by item, or a class without a share.
 pub fn distribution_error(shares: &[f64], learnt: &[usize], truth: &[usize]) -> f64 {
-    let counts = contingency(learnt, truth);
-    let size = shares.len().max(counts.columns);
-    let mut gain = vec![0.0; size * size];
-    for (a, row) in counts.cells.chunks(counts.columns).enumerate() {
-        gain[a * size..a * size + row.len()].copy_from_slice(row);
-    }
     let total = (truth.len() as f64).max(1.0);
+    let counts = contingency(learnt, truth);
     let mut of_truth: Vec<f64> = counts.of_b().map(|count| count / total).collect();
-    of_truth.resize(size, 0.0);
-    let matched = best_assignment(&gain, size);
+    let matched = matched_classes(learnt, truth, shares.len());
+    of_truth.resize(matched.len(), 0.0);
     let difference = |(a, &b): (usize, &usize)| {
         let share = shares.get(a).copied().unwrap_or(0.0);
         (share - of_truth[b]).abs()
     };
     0.5 * matched.iter().enumerate().map(difference).sum::<f64>()
+}
+
+/// For each learnt class the true one that it is matched to, one to one, so that as many items as
+/// possible agree. There are as many of both as there are labels, and at least `classes`: those that
+/// only one side has match what is left over of the other.
+pub(crate) fn matched_classes(learnt: &[usize], truth: &[usize], classes: usize) -> Vec<usize> {
+    let counts = contingency(learnt, truth);
+    let rows = counts.cells.len() / counts.columns;
+    let size = rows.max(counts.columns).max(classes);
+    let mut gain = vec![0.0; size * size];
+    for (a, row) in counts.cells.chunks(counts.columns).enumerate() {
+        gain[a * size..a * size + row.len()].copy_from_slice(row);
+    }
+    best_assignment(&gain, size)
 }
 
 /// The column of each row of a square matrix such that the sum of entries is the greatest (the

@@ -4,6 +4,7 @@
 use farside_actors::figure::svg::path;
 use farside_worlds::RockField;
 
+use crate::analysis::scores::matched_classes;
 use crate::messages::FieldModel;
 
 /// How many colours there are.
@@ -33,30 +34,19 @@ pub(super) fn shape(class: usize, (x, y): (f64, f64), radius: f64) -> String {
     }
 }
 
-/// For each learnt class the true class that it is drawn as: the one that most of its rocks are of. Of
-/// several learnt classes that are mostly of one, the one with most of its rocks has it; the others
-/// get those that are left.
+/// For each learnt class the true class that it is drawn as, so that as many rocks as possible have one
+/// colour in both panels. Classes that are learnt and not there have colours of their own.
 pub(super) fn matched(model: &FieldModel, field: &RockField) -> Vec<usize> {
+    let of_rocks = model.rocks.iter().map(|label| label.class as usize);
+    let learnt: Vec<usize> = of_rocks.collect();
     let truth = field.truth();
-    let (own, all) = (model.classes as usize, field.classes().len());
-    let mut shared = vec![0_u32; own * all];
-    for (label, class) in model.rocks.iter().zip(truth.classes()) {
-        shared[label.class as usize * all + usize::from(*class)] += 1;
-    }
-    let mut drawn: Vec<Option<usize>> = vec![None; own];
-    let mut is_taken = vec![false; all];
-    for _ in 0..own.min(all) {
-        let free = (0..own * all)
-            .filter(|cell| drawn[cell / all].is_none() && !is_taken[cell % all])
-            .max_by_key(|cell| (shared[*cell], std::cmp::Reverse(*cell)));
-        if let Some(cell) = free {
-            drawn[cell / all] = Some(cell % all);
-            is_taken[cell % all] = true;
-        }
-    }
-    let mut others = all..;
-    let other = |class: Option<usize>| class.or_else(|| others.next()).unwrap_or(0);
-    drawn.into_iter().map(other).collect()
+    let truth: Vec<usize> = truth
+        .classes()
+        .iter()
+        .map(|class| usize::from(*class))
+        .collect();
+    let classes = field.classes().len().max(model.classes as usize);
+    matched_classes(&learnt, &truth, classes)
 }
 
 #[cfg(test)]
