@@ -5,5 +5,10 @@
 //! Reactive Planning", i-SAIRAS 2003. Section 2 of it is the agent; section 3 the K9 rover, which two
 //! agents control.
 
+pub mod agent;
+pub mod deliberator;
+pub mod records;
 pub mod register;
+pub mod runner;
 pub mod service;
+pub mod wording;

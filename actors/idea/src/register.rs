@@ -121,6 +121,8 @@ pub enum Acknowledged {
 /// An agent is faulty and takes no part any more.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AgentOffline {
+    /// Its name.
+    pub agent: Arc<str>,
     /// Its life, from 1.
     pub epoch: u32,
     /// The tick of its own clock at which it found out.

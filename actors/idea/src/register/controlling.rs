@@ -22,15 +22,12 @@ pub struct Controlling {
     is_over: bool,
     /// The revision of the last one's last status.
     revision: Option<u32>,
-    /// What is said again, until it is acknowledged.
-    unheard: Option<Unheard>,
-}
-
-#[derive(Clone, Debug)]
-struct Unheard {
-    load: RegisterLoad,
+    /// The last one.
+    present: Option<RegisterLoad>,
+    /// How often it was sent.
     times: u32,
-    again: SimTime,
+    /// Until it is acknowledged: when it is to be said again.
+    again: Option<SimTime>,
 }
 
 /// What a status is to the controlling side.
@@ -60,7 +57,9 @@ impl Controlling {
             superseded: 0,
             is_over: true,
             revision: None,
-            unheard: None,
+            present: None,
+            times: 0,
+            again: None,
         }
     }
 
@@ -96,29 +95,32 @@ impl Controlling {
             procedure,
             inputs,
         };
-        self.unheard = Some(Unheard {
-            load: load.clone(),
-            times: 1,
-            again: now + self.backoff.after(1),
-        });
+        self.present = Some(load.clone());
+        self.times = 1;
+        self.again = Some(now + self.backoff.after(1));
         load
     }
 
     /// When something is to be said again.
     pub fn due(&self) -> Option<SimTime> {
-        self.unheard.as_ref().map(|unheard| unheard.again)
+        self.again
     }
 
     /// What is said again now, and how often it was said before; nothing if it is not time.
     pub fn repeat(&mut self, now: SimTime) -> Option<(RegisterLoad, u32)> {
-        let unheard = self
-            .unheard
-            .as_mut()
-            .filter(|unheard| unheard.again <= now)?;
-        let before = unheard.times;
-        unheard.times = before.saturating_add(1);
-        unheard.again = now + self.backoff.after(unheard.times);
-        Some((unheard.load.clone(), before))
+        self.again.filter(|again| *again <= now)?;
+        let said = self.say_again()?;
+        self.again = Some(now + self.backoff.after(self.times));
+        Some(said)
+    }
+
+    /// The present load, to be sent though it may have been acknowledged, so that the other side
+    /// hears something, and answers; and how often it was said before.
+    pub fn say_again(&mut self) -> Option<(RegisterLoad, u32)> {
+        let load = self.present.clone()?;
+        let before = self.times;
+        self.times = before.saturating_add(1);
+        Some((load, before))
     }
 
     /// The load was acknowledged.
@@ -130,7 +132,7 @@ impl Controlling {
 
     /// The controlled side has taken the load: those that were superseded will never begin.
     fn heard_of_load(&mut self) {
-        self.unheard = None;
+        self.again = None;
         self.superseded = 0;
     }
 
