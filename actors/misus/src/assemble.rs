@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
 use farside_actors::rover::{
-    RoverConfig, RoverError, RoverSite, RoverSpec, RoverStart, RoverTally, add_hardware,
+    RoverConfig, RoverError, RoverSpec, RoverStart, RoverTally, add_hardware,
 };
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
@@ -13,10 +13,10 @@ use nalgebra::Point3;
 
 use crate::config::{LearnConfig, TeamConfig};
 use crate::monitor::{Monitor, Tally};
-use crate::place::Place;
 use crate::scientist::Scientist;
 use crate::site::{Instruments, SharedSite, Site};
 use crate::tools::Tools;
+use farside_actors::field::Place;
 
 /// The distance between rovers at the start \[m\].
 const APART_M: f64 = 2.0;
@@ -101,11 +101,7 @@ pub(crate) fn assemble(
             number,
             name: name.clone(),
             config: parts.rover.clone(),
-            site: RoverSite {
-                ground: field.clone(),
-                sky: parts.place.sky,
-                starts_s: parts.place.starts_s,
-            },
+            site: parts.place.site(),
             start,
             seed: parts.seed,
             until: parts.until,
