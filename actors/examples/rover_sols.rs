@@ -4,12 +4,15 @@
 //!
 //! `cargo run --release -p farside-actors --example rover_sols`
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 
 use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside_actors::rover::{
-    Command, CommandReport, RoverCommand, RoverConfig, RoverHardware, RoverQuery, RoverSite,
-    RoverSpec, RoverStart, RoverState, RoverTally, add_hardware, hardware_name,
+    Command, CommandEnd, CommandReport, RoverCommand, RoverConfig, RoverHardware, RoverPose,
+    RoverQuery, RoverResources, RoverSite, RoverSpec, RoverStart, RoverState, add_hardware,
+    hardware_name,
 };
 use farside_worlds::{RockField, RockFieldSettings, Sky};
 use serde::{Deserialize, Serialize};
@@ -78,20 +81,74 @@ impl Handler<RoverState> for Controller {
     }
 }
 
-/// Runs so many rovers of a model for so long; returns their figures and the count of events.
+/// What samples and reports of all rovers say, by the number of the actor that each came from.
+#[derive(Default)]
+struct Seen {
+    resources: BTreeMap<usize, RoverResources>,
+    poses: BTreeMap<usize, RoverPose>,
+    reports: u32,
+    done: u32,
+}
+
+/// Watches a run.
+struct Watch(Arc<Mutex<Seen>>);
+
+impl Observer for Watch {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: false,
+        }
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let Some(kind) = record.kind else {
+            return Ok(Flow::Continue);
+        };
+        let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
+        let mut seen = self
+            .0
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner());
+        let (rover, schema) = (record.sender.index(), kind.schema());
+        match (record.class, kind.name()) {
+            (RecordClass::Sample, "RoverResources") => {
+                let resources: RoverResources = schema.decode(record.body).map_err(failed)?;
+                let energy = &resources.energy;
+                assert!(energy.imbalance_j().abs() < 1e-9 * energy.total_j());
+                seen.resources.insert(rover, resources);
+            }
+            (RecordClass::Sample, "RoverPose") => {
+                let pose = schema.decode(record.body).map_err(failed)?;
+                seen.poses.insert(rover, pose);
+            }
+            (RecordClass::Delivered, "CommandReport") => {
+                let report: CommandReport = schema.decode(record.body).map_err(failed)?;
+                seen.reports += 1;
+                seen.done += u32::from(report.end == CommandEnd::Done);
+            }
+            _ => {}
+        }
+        Ok(Flow::Continue)
+    }
+}
+
+/// Runs so many rovers of a model for so long; returns what was seen and the count of events.
 fn run(
     model: &str,
     rovers: u32,
     period: SimDuration,
     until: SimDuration,
-) -> Result<(Vec<RoverTally>, u64), Box<dyn std::error::Error>> {
+) -> Result<(Arc<Mutex<Seen>>, u64), Box<dyn std::error::Error>> {
     let site = RoverSite {
         ground: Arc::new(RockField::generate(&RockFieldSettings::default())?),
         sky: Sky::new(-14.6, 270.0, 0.5)?,
         starts_s: 0.0,
     };
     let mut sim = Simulation::new(1);
-    let mut tallies = Vec::new();
+    let seen = Arc::new(Mutex::new(Seen::default()));
+    sim.observe(Watch(seen.clone()));
     for number in 1..=rovers {
         let rover = format!("rover_{number:02}");
         let host = sim.host(&rover);
@@ -102,8 +159,6 @@ fn run(
             asked: 0,
             drives: 0,
         });
-        let tally = RoverTally::default();
-        tallies.push(tally.clone());
         let spec = RoverSpec {
             number,
             name: rover,
@@ -116,20 +171,20 @@ fn run(
             },
             seed: 1,
             until,
-            tally,
         };
         add_hardware(&mut sim, host, spec, controller)?;
     }
     sim.stop_at(SimTime::ZERO + until, "long enough");
     let report = sim.run(Executor::Inline)?;
-    Ok((tallies, report.counts.events))
+    Ok((seen, report.counts.events))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let (tallies, events) = run("mer", 3, SimDuration::ZERO, SOL * 10)?;
+    let (seen, events) = run("mer", 3, SimDuration::ZERO, SOL * 10)?;
     println!("three idle rovers, ten sols: {events} events");
-    for tally in &tallies {
-        let energy = tally.figures().energy;
+    let seen = seen.lock().map_err(|error| error.to_string())?;
+    for resources in seen.resources.values() {
+        let energy = resources.energy;
         println!(
             "  {:.0} Wh of sunlight: {:.0} used, {:.0} not taken, {:.0} lost in charging",
             energy.solar_j / 3600.0,
@@ -137,14 +192,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             energy.not_taken_j / 3600.0,
             energy.charge_loss_j / 3600.0,
         );
-        assert!(tally.figures().imbalance < 1e-9);
     }
-    let (tallies, events) = run("k9", 1, SimDuration::from_millis(500), SOL)?;
-    let figures = tallies[0].figures();
+    let (seen, events) = run("k9", 1, SimDuration::from_millis(500), SOL)?;
+    let seen = seen.lock().map_err(|error| error.to_string())?;
+    let driven_m: f64 = seen.poses.values().map(|pose| pose.driven_m).sum();
     println!(
-        "one rover at 2 Hz, a sol: {events} events, {:.1} m driven, {} of {} commands done",
-        figures.driven_m, figures.done, figures.commands
+        "one rover at 2 Hz, a sol: {events} events, {driven_m:.1} m driven, {} of {} commands done",
+        seen.done, seen.reports
     );
-    assert!(figures.imbalance < 1e-9 && figures.commands > 100);
+    for resources in seen.resources.values() {
+        println!("  its bay is at {:.1} degC", resources.bay_c);
+    }
+    assert!(seen.reports > 100);
     Ok(())
 }

@@ -58,7 +58,6 @@
 //!     sky: Sky::new(-14.6, 270.0, 0.5)?,
 //!     starts_s: 36_000.0,
 //! };
-//! let tally = RoverTally::default();
 //! let spec = RoverSpec {
 //!     number: 1,
 //!     name: "rover_01".to_owned(),
@@ -67,7 +66,6 @@
 //!     start: RoverStart { east_m: 0.0, north_m: 0.0, yaw_rad: 0.0 },
 //!     seed: 1,
 //!     until: SimDuration::from_secs(7200),
-//!     tally: tally.clone(),
 //! };
 //! let mut sim = Simulation::new(1);
 //! let host = sim.host("rover_01");
@@ -75,17 +73,18 @@
 //! add_hardware(&mut sim, host, spec, controller)?;
 //! let report = sim.run(Executor::Inline)?;
 //! assert!(report.end.detail().ends_with("rocks seen"));
-//! assert!(tally.figures().imbalance < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod actor;
+mod bay;
 mod body;
 mod command;
 mod faults;
 mod hardware;
 mod instruments;
 mod landmarks;
+mod lifts;
 mod memory;
 mod model;
 mod power;
@@ -101,6 +100,7 @@ use crate::system::SetupError;
 use crate::system::settings::Table;
 
 pub use actor::RoverHardware;
+pub use bay::BayModel;
 pub use command::{
     Aim, Command, CommandEnd, CommandReport, Failure, Obstacle, Part, PoseEstimate, Reading,
     Refusal, RenewLease, RoverCommand, RoverQuery, RoverState, Running, StopCause, View,
@@ -108,7 +108,7 @@ pub use command::{
 pub use faults::{FaultBegins, FaultConfig, FaultEnds, FaultKind, FaultRates, PlannedFault};
 pub use model::{InstrumentKind, InstrumentModel, RoverConfig, RoverModel, ViewModel};
 pub use power::RoverEnergy;
-pub use record::{RoverFigures, RoverIncident, RoverPose, RoverResources, RoverTally};
+pub use record::{RoverIncident, RoverPose, RoverResources};
 
 /// Where rovers are: shared by all of a run.
 #[derive(Clone, Debug)]
@@ -149,8 +149,6 @@ pub struct RoverSpec {
     pub seed: u64,
     /// The end of the run: until then there are faults by chance.
     pub until: SimDuration,
-    /// Where its figures go, for the run's results.
-    pub tally: RoverTally,
 }
 
 /// Why a rover cannot be.

@@ -4,9 +4,7 @@
 use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
-use farside_actors::rover::{
-    RoverConfig, RoverError, RoverSpec, RoverStart, RoverTally, add_hardware,
-};
+use farside_actors::rover::{RoverConfig, RoverError, RoverSpec, RoverStart, add_hardware};
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
 use nalgebra::Point3;
@@ -105,7 +103,6 @@ pub(crate) fn assemble(
             start,
             seed: parts.seed,
             until: parts.until,
-            tally: RoverTally::default(),
         };
         add_hardware(sim, *host, spec, scientist).map_err(blame)?;
         let height_m = field.ground_m(start.east_m, start.north_m);

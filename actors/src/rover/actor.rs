@@ -80,7 +80,6 @@ impl RoverHardware {
         let mut out = Vec::new();
         let result = act(&mut hardware, links_j, &mut out);
         let next = hardware.next();
-        self.spec.tally.put(hardware.figures());
         ctx.durable::<Metal>().0 = Some(hardware);
         for output in out {
             match output {

@@ -13,6 +13,7 @@ use farside_worlds::{Hazard, RockField};
 use nalgebra::Point2;
 
 use super::command::Obstacle;
+use super::lifts::Lift;
 use super::model::RoverModel;
 
 /// The weight of a kilogram on Mars \[N/kg\].
@@ -108,8 +109,9 @@ pub(super) struct Attitude {
 }
 
 impl Attitude {
-    /// On the ground below its wheels, whose ends lie half a base from its middle.
-    pub(super) fn on(ground: &RockField, pose: &Pose, wheelbase_m: f64) -> Attitude {
+    /// On the ground below its wheels, whose ends lie half a base from its middle, and on what lifts
+    /// them.
+    pub(super) fn on(ground: &RockField, pose: &Pose, wheelbase_m: f64, lift: &Lift) -> Attitude {
         let height_m = |ahead_m, left_m| {
             let place_m = pose.place_at(ahead_m, left_m);
             ground.ground_m(place_m.x, place_m.y)
@@ -118,8 +120,14 @@ impl Attitude {
         let rise = |high_m: f64, low_m: f64| libm::atan2(high_m - low_m, wheelbase_m);
         Attitude {
             height_m: height_m(0.0, 0.0),
-            roll_rad: rise(height_m(0.0, half_m), height_m(0.0, -half_m)),
-            pitch_rad: rise(height_m(half_m, 0.0), height_m(-half_m, 0.0)),
+            roll_rad: rise(
+                height_m(0.0, half_m) + lift.left_m,
+                height_m(0.0, -half_m) + lift.right_m,
+            ),
+            pitch_rad: rise(
+                height_m(half_m, 0.0) + lift.front_m,
+                height_m(-half_m, 0.0) + lift.rear_m,
+            ),
         }
     }
 
@@ -144,7 +152,7 @@ pub(super) struct Step {
     truth: [Pose; 2],
     estimate: [Pose; 2],
     /// How far the wheels go \[m\]; 0 for a turn.
-    way_m: f64,
+    pub(super) way_m: f64,
     pub(super) lasts: SimDuration,
     /// What the wheels take \[W\].
     pub(super) power_w: f64,
@@ -340,7 +348,8 @@ impl Body {
         if on.field.slope_rad(place_m.x, place_m.y) > on.model.slope_limit_rad {
             return Some(Obstacle::Slope);
         }
-        let attitude = Attitude::on(on.field, at, on.model.wheelbase_m);
+        // Of the ground: what lies under a wheel now does not lie there.
+        let attitude = Attitude::on(on.field, at, on.model.wheelbase_m, &Lift::default());
         if attitude.tilt_rad() > on.model.tilt_limit_rad {
             return Some(Obstacle::Tilt);
         }
@@ -357,6 +366,11 @@ impl Body {
         [step.truth, step.estimate].map(|[from, to]| from.towards(&to, share))
     }
 
+    /// How far the wheels have gone on a step, a share of it done, since the start \[m\].
+    pub(super) fn driven_on_step_m(&self, step: &Step, share: f64) -> f64 {
+        self.driven_m + share * step.way_m
+    }
+
     /// What the rover reckons the standard deviation of its place to be on a step, a share of it
     /// done \[m\]: slip counts in full, for it errs to one side, and drift by the way since the last
     /// fix.
@@ -371,7 +385,7 @@ impl Body {
         self.sigma_m = self.sigma_on_step_m(step, share, model);
         [self.truth, self.estimate] = self.on_step(step, share);
         self.since_fix_m += share * step.way_m;
-        self.driven_m += share * step.way_m;
+        self.driven_m = self.driven_on_step_m(step, share);
     }
 
     /// What is left of an errand once a share of a step is done.
@@ -387,11 +401,5 @@ impl Body {
         self.estimate = estimate;
         self.sigma_m = sigma_m;
         self.since_fix_m = 0.0;
-    }
-
-    /// How far it is from where it believes to be \[m\].
-    pub(super) fn error_m(&self) -> f64 {
-        let error_m = self.truth.place_m() - self.estimate.place_m();
-        libm::hypot(error_m.x, error_m.y)
     }
 }

@@ -90,6 +90,13 @@ pub enum Command {
         /// For how long.
         duration: SimDuration,
     },
+    /// Fans: turn on, or off. It is open loop: done at once when the fans are told, and nothing
+    /// measures whether they run. They go on until they are told again; while the rover sleeps or lies
+    /// in a brown-out they stand still.
+    Fans {
+        /// Whether they are to run.
+        on: bool,
+    },
     /// The whole body: switch off all that can be, for a time. No part may be busy. Asleep, a rover
     /// answers questions, and obeys [`Command::Stop`].
     Sleep {
@@ -145,6 +152,8 @@ pub enum Part {
     Heater,
     /// The whole of it, for sleep.
     Body,
+    /// What cools the bay.
+    Fans,
 }
 
 /// Keeps the controller's lease without another word. Every command and every question does, too.
@@ -297,14 +306,15 @@ pub enum Refusal {
     MastStuck,
 }
 
-/// Where a rover believes to be.
+/// Where a rover believes to be, and how it stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseEstimate {
     /// To the east \[m\].
     pub east_m: f64,
     /// To the north \[m\].
     pub north_m: f64,
-    /// The heading \[rad, counted from east to north, over -pi to pi\].
+    /// The heading as the rover believes it, by its wheels and by landmarks \[rad, counted from east to
+    /// north, over -pi to pi\]. What the compass has is in [`RoverState::compass_rad`].
     pub yaw_rad: f64,
     /// As the inertial unit has it, noise and all \[rad, right side down\].
     pub roll_rad: f64,
@@ -321,6 +331,13 @@ pub struct RoverState {
     pub id: u32,
     /// Where it believes to be.
     pub pose: PoseEstimate,
+    /// The heading as the compass has it, noise and all \[rad, counted from east to north, over -pi
+    /// to pi\].
+    pub compass_rad: f64,
+    /// How warm the bay with the electronics is, noise and all \[°C\].
+    pub bay_c: f64,
+    /// Whether the fans are told to run. Whether they do, nothing measures.
+    pub fans_on: bool,
     /// Where the mast points, from straight ahead to the left \[rad\].
     pub pan_rad: f64,
     /// Where the mast points, from level upwards \[rad\].

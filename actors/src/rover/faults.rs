@@ -7,6 +7,7 @@ use farside::{Pattern, SimDuration, SimTime};
 use farside_worlds::sky::SOL_S;
 use serde::{Deserialize, Serialize};
 
+use super::lifts::{SIDES, USUAL_SIDE};
 use crate::system::SetupError;
 use crate::system::settings::{if_set, in_unit, one_of, over};
 use crate::{settings, units};
@@ -41,11 +42,22 @@ pub enum FaultKind {
     Memory,
     /// The mast does not move. A slew that is under way fails at once.
     StuckMast,
+    /// A rock is under the wheels of a side or a corner. It tilts the rover, in truth, until its
+    /// wheels have gone a distance, whichever way: backing up less than that does not help.
+    RockUnderWheel,
+    /// The inertial unit measures the pitch wrongly.
+    PitchBias,
+    /// The inertial unit measures the roll wrongly.
+    RollBias,
+    /// Something heats the bay that is not of the rover's electricity.
+    BayHeat,
+    /// The fans stand still, whatever they are told: nothing measures whether they run.
+    FansFail,
 }
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [FaultKind; 11] = [
+    pub const ALL: [FaultKind; 16] = [
         FaultKind::BlockedPath,
         FaultKind::Slip,
         FaultKind::EndsEarly,
@@ -57,6 +69,11 @@ impl FaultKind {
         FaultKind::InstrumentDrifts,
         FaultKind::Memory,
         FaultKind::StuckMast,
+        FaultKind::RockUnderWheel,
+        FaultKind::PitchBias,
+        FaultKind::RollBias,
+        FaultKind::BayHeat,
+        FaultKind::FansFail,
     ];
 
     /// Its name in scenarios.
@@ -64,13 +81,20 @@ impl FaultKind {
         NAMES[self as usize]
     }
 
-    /// Which parts it can be of: all, instruments only, or none in particular.
+    /// Which parts it can be of.
     fn parts(self) -> PartsOf {
         match self {
             FaultKind::EndsEarly | FaultKind::EndsLate | FaultKind::NeverEnds => PartsOf::All,
             FaultKind::InstrumentFails | FaultKind::InstrumentDrifts => PartsOf::Instruments,
+            FaultKind::RockUnderWheel => PartsOf::Sides,
             _ => PartsOf::None,
         }
+    }
+
+    /// How far a rover drives until it is over it \[m\], unless it is given; none for those that no
+    /// driving ends.
+    fn distance_m(self) -> Option<f64> {
+        (self == FaultKind::RockUnderWheel).then_some(1.0)
     }
 
     /// What its amount is unless it is given, and between what it may be; none for those that have
@@ -85,7 +109,13 @@ impl FaultKind {
             FaultKind::Dust => Some([0.3, 0.0, 1.0]),
             FaultKind::InstrumentDrifts => Some([0.05, -10.0, 10.0]),
             FaultKind::Memory => Some([0.25, 0.0, 1.0]),
-            FaultKind::NeverEnds | FaultKind::InstrumentFails | FaultKind::StuckMast => None,
+            FaultKind::RockUnderWheel => Some([0.3, 0.01, 2.0]),
+            FaultKind::PitchBias | FaultKind::RollBias => Some([0.6, -1.5, 1.5]),
+            FaultKind::BayHeat => Some([100.0, 0.0, 10_000.0]),
+            FaultKind::NeverEnds
+            | FaultKind::InstrumentFails
+            | FaultKind::StuckMast
+            | FaultKind::FansFail => None,
         }
     }
 }
@@ -95,11 +125,13 @@ impl FaultKind {
 enum PartsOf {
     All,
     Instruments,
+    /// Sides and corners of the rover.
+    Sides,
     None,
 }
 
 /// The names, in the order of [`FaultKind::ALL`].
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 16] = [
     "blocked-path",
     "slip",
     "ends-early",
@@ -111,6 +143,11 @@ const NAMES: [&str; 11] = [
     "instrument-drifts",
     "memory",
     "stuck-mast",
+    "rock-under-wheel",
+    "pitch-bias",
+    "roll-bias",
+    "bay-heat",
+    "fans-fail",
 ];
 
 settings! {
@@ -129,11 +166,19 @@ settings! {
     /// | `instrument-drifts` | what is added to each value | 0.05 | -10 to 10 |
     /// | `memory` | share of the memory that is out of order | 0.25 | 0 to 1 |
     /// | `stuck-mast` | | | |
+    /// | `rock-under-wheel` | how high it lifts the wheels \[m\] | 0.3 | 0.01 to 2 |
+    /// | `pitch-bias` | what is added to the pitch as measured \[rad\] | 0.6 | -1.5 to 1.5 |
+    /// | `roll-bias` | what is added to the roll as measured \[rad\] | 0.6 | -1.5 to 1.5 |
+    /// | `bay-heat` | heat in the bay \[W\] | 100 | 0 to 10,000 |
+    /// | `fans-fail` | | | |
     ///
     /// ```
     /// use farside_actors::rover::{FaultConfig, FaultKind};
     /// let fault: FaultConfig = toml::from_str("at = '2h'\nkind = 'dust'\namount = 0.6")?;
     /// assert_eq!((fault.kind, fault.duration), (FaultKind::Dust, None));
+    /// // Nose up, and still so after the rover has backed up by 1 m.
+    /// let rock = "at = '1h'\nkind = 'rock-under-wheel'\npart = 'front'\namount = 0.5\ndistance = '2m'";
+    /// assert_eq!(toml::from_str::<FaultConfig>(rock)?.distance_m, Some(2.0));
     /// # Ok::<(), toml::de::Error>(())
     /// ```
     pub struct FaultConfig {
@@ -149,9 +194,16 @@ settings! {
             if_set(over(SimDuration::ZERO));
         /// Which instrument fails or drifts; or which part's commands end early, late or never:
         /// `wheels`, `mast`, `radio`, `heater`, `body` or an instrument's name. Without, all of them.
+        /// Of a rock under wheels, which: `front`, `rear`, `left`, `right`, or a corner such as
+        /// `front-left`, which it is without.
         pub part: Option<String> [skip_serializing_if = "Option::is_none"];
         /// How bad it is; see the table.
         pub amount: Option<f64> [skip_serializing_if = "Option::is_none"];
+        /// How far the wheels go until they are off a rock under them, forwards and backwards added
+        /// up; without, 1 m.
+        pub distance_m as "distance": Option<f64>
+            [with = "units::length_m::option", skip_serializing_if = "Option::is_none"],
+            if_set(in_unit("m", 0.01..=1000.0));
     }
 }
 
@@ -185,6 +237,16 @@ settings! {
         pub memory: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
         /// The mast is stuck.
         pub stuck_mast: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
+        /// A rock is under a wheel.
+        pub rock_under_wheel: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
+        /// The pitch is measured wrongly.
+        pub pitch_bias: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
+        /// The roll is measured wrongly.
+        pub roll_bias: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
+        /// Something heats the bay.
+        pub bay_heat: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
+        /// The fans stand still.
+        pub fans_fail: f64 = 0.0, in_unit("a sol", 0.0..=1000.0);
     }
 }
 
@@ -202,6 +264,11 @@ impl FaultRates {
             FaultKind::InstrumentDrifts => self.instrument_drifts,
             FaultKind::Memory => self.memory,
             FaultKind::StuckMast => self.stuck_mast,
+            FaultKind::RockUnderWheel => self.rock_under_wheel,
+            FaultKind::PitchBias => self.pitch_bias,
+            FaultKind::RollBias => self.roll_bias,
+            FaultKind::BayHeat => self.bay_heat,
+            FaultKind::FansFail => self.fans_fail,
         }
     }
 }
@@ -217,6 +284,8 @@ pub struct FaultBegins {
     pub part: String,
     /// How bad it is, as [`FaultConfig`] says; 0 for kinds without an amount.
     pub amount: f64,
+    /// How far the wheels go until they are over it \[m\]; 0 for kinds that no driving ends.
+    pub distance_m: f64,
 }
 
 /// A fault is over: told to the hardware.
@@ -262,12 +331,17 @@ impl FaultConfig {
             }
             _ => {}
         }
+        if let (None, Some(distance_m)) = (self.kind.distance_m(), self.distance_m) {
+            let message = format!("{distance_m} m: no driving ends kind = {kind:?}");
+            return wrong("distance", message);
+        }
         let Some(part) = &self.part else {
             return Ok(());
         };
         let allowed: Vec<&str> = match self.kind.parts() {
             PartsOf::All => [parts, instruments].concat(),
             PartsOf::Instruments => instruments.to_vec(),
+            PartsOf::Sides => SIDES.to_vec(),
             PartsOf::None => {
                 return wrong("part", format!("{part:?}: kind = {kind:?} is of no part"));
             }
@@ -299,14 +373,22 @@ impl FaultConfig {
     fn planned(&self) -> PlannedFault {
         let at = SimTime::ZERO + self.at;
         let usual = self.kind.amount().map_or(0.0, |[usual, ..]| usual);
+        let part = match self.kind.parts() {
+            PartsOf::Sides => USUAL_SIDE,
+            _ => "",
+        };
         PlannedFault {
             at,
             ends: self.duration.map(|duration| at.saturating_add(duration)),
             begins: FaultBegins {
                 number: 0,
                 kind: self.kind,
-                part: self.part.clone().unwrap_or_default(),
+                part: self.part.clone().unwrap_or_else(|| part.to_owned()),
                 amount: self.amount.unwrap_or(usual),
+                distance_m: self
+                    .distance_m
+                    .or(self.kind.distance_m())
+                    .unwrap_or_default(),
             },
         }
     }

@@ -1,10 +1,12 @@
 //! The hardware as a state machine: what runs, what happens next, what it takes. It reads no clock,
 //! sends nothing and knows no simulator; the actor next door gives it the time and takes what comes
-//! out. How commands begin is in `begin`, how they end in `end`, what faults do in `broken`.
+//! out. How commands begin is in `begin`, how they end in `end`, what faults do in `broken`,
+//! what it tells of itself in `told`.
 
 mod begin;
 mod broken;
 mod end;
+mod told;
 
 use std::sync::Arc;
 
@@ -14,15 +16,15 @@ use farside::{SimDuration, SimTime};
 use super::RoverSpec;
 use super::body::{Attitude, Body, Errand, Ground, Pose, Step};
 use super::command::{
-    Command, CommandEnd, CommandReport, Failure, Part, PoseEstimate, Reading, RoverCommand,
-    RoverState, Running, StopCause, View,
+    Command, CommandEnd, CommandReport, Failure, Part, Reading, RoverCommand, StopCause, View,
 };
 use super::faults::FaultBegins;
 use super::landmarks::Landmarks;
+use super::lifts::Lifts;
 use super::memory::Memory;
 use super::model::InstrumentKind;
 use super::power::{CONSUMERS, Consumer, Power};
-use super::record::{RoverFigures, RoverIncident, RoverPose, RoverResources};
+use super::record::{RoverIncident, RoverPose, RoverResources};
 
 /// The places of parts in [`Hardware::runs`]; instruments follow.
 const WHEELS: usize = 0;
@@ -30,10 +32,14 @@ const MAST: usize = 1;
 const RADIO: usize = 2;
 const HEATER: usize = 3;
 const BODY: usize = 4;
-const FIRST_INSTRUMENT: usize = 5;
+const FANS: usize = 5;
+const FIRST_INSTRUMENT: usize = 6;
 
 /// The names of those parts, as faults give them.
-const NAMES: [&str; FIRST_INSTRUMENT] = ["wheels", "mast", "radio", "heater", "body"];
+const NAMES: [&str; FIRST_INSTRUMENT] = ["wheels", "mast", "radio", "heater", "body", "fans"];
+
+/// A way that is as good as none \[m\].
+const NO_WAY_M: f64 = 1e-9;
 
 /// What comes out of the hardware.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,6 +106,8 @@ enum Due {
     Level(bool),
     /// The step of the command on this part ends.
     Step(usize),
+    /// The wheels are off the rock that this fault had put under them.
+    OffRock(u32),
     /// The controller's lease ends.
     Lease,
     /// The state is to be recorded.
@@ -117,6 +125,9 @@ pub(super) struct Hardware {
     power: Power,
     memory: Memory,
     landmarks: Landmarks,
+    lifts: Lifts,
+    /// What the fans were told last.
+    fans_on: bool,
     /// Where the mast points: pan and tilt \[rad\].
     mast_rad: [f64; 2],
     /// By part.
@@ -135,7 +146,8 @@ pub(super) struct Hardware {
     is_stale: bool,
     /// Its computer is being restarted: commands end with their steps and nobody is told.
     is_deaf: bool,
-    figures: RoverFigures,
+    /// How many readings were taken: each has a number.
+    readings: u32,
 }
 
 impl Hardware {
@@ -146,7 +158,6 @@ impl Hardware {
             north_m: spec.start.north_m,
             yaw_rad: super::body::wrapped(spec.start.yaw_rad),
         };
-        let power = Power::new(model, &spec.site);
         let every = model.record_every;
         Hardware {
             key: RandomKey::new(spec.seed).text("rover").text(&spec.name),
@@ -154,6 +165,8 @@ impl Hardware {
             body: Body::new(start),
             memory: Memory::new(model.memory_bytes),
             landmarks: Landmarks::from_orbit(&spec.site.ground, model.known_from_m),
+            lifts: Lifts::default(),
+            fans_on: false,
             mast_rad: [0.0; 2],
             runs: vec![None; FIRST_INSTRUMENT + model.instruments.len()],
             faults: Vec::new(),
@@ -163,11 +176,8 @@ impl Hardware {
             level: (SimTime::ZERO, false),
             is_stale: true,
             is_deaf: false,
-            figures: RoverFigures {
-                least_stored_j: power.stored_j(),
-                ..RoverFigures::default()
-            },
-            power,
+            readings: 0,
+            power: Power::new(model, &spec.site),
             spec,
         }
     }
@@ -192,7 +202,6 @@ impl Hardware {
         if let Command::Stop { part } = command {
             self.stop(id, part, out);
         } else {
-            self.figures.commands += 1;
             if let Err((part, reason)) = self.begin(id, command, out) {
                 let end = CommandEnd::Refused { reason };
                 self.report(id, part, end, Vec::new(), out);
@@ -213,51 +222,6 @@ impl Hardware {
         self.next_due().map(|(at, _)| at)
     }
 
-    /// The figures so far.
-    pub(super) fn figures(&mut self) -> &RoverFigures {
-        let energy = self.power.energy();
-        let figures = &mut self.figures;
-        let imbalance = (energy.imbalance_j() / energy.total_j().max(1.0)).abs();
-        figures.imbalance = figures.imbalance.max(imbalance);
-        figures.least_stored_j = figures.least_stored_j.min(energy.stored_j);
-        figures.energy = energy;
-        figures.driven_m = self.body.driven_m;
-        figures.position_error_m = self.body.error_m();
-        figures.max_position_error_m = figures.max_position_error_m.max(figures.position_error_m);
-        figures.memory_used_bytes = self.memory.used_bytes();
-        figures.stored_bytes = self.memory.stored_bytes;
-        figures.sent_bytes = self.memory.sent_bytes;
-        figures.lost_bytes = self.memory.lost_bytes;
-        figures
-    }
-
-    /// What the rover says of itself.
-    pub(super) fn state(&mut self, id: u32) -> RoverState {
-        self.settle();
-        let [solar_w, load_w] = self.power.now_w();
-        let [pan_rad, tilt_rad] = self.mast_now_rad();
-        let runs = self.runs.iter().enumerate();
-        let running = runs.filter_map(|(place, run)| {
-            let (part, id) = (self.part(place), run.as_ref()?.id);
-            Some(Running { part, id })
-        });
-        RoverState {
-            id,
-            pose: self.pose_estimate(),
-            pan_rad,
-            tilt_rad,
-            battery_j: self.power.stored_j(),
-            battery_capacity_j: self.spec.config.battery_j,
-            solar_w,
-            load_w,
-            memory_used_bytes: self.memory.used_bytes(),
-            memory_size_bytes: self.memory.capacity_bytes(),
-            asleep: self.runs[BODY].is_some(),
-            brown_out: self.power.is_cut_off(),
-            running: running.collect(),
-        }
-    }
-
     /// The next thing that happens by itself. Of those at one time the first of this order.
     fn next_due(&self) -> Option<(SimTime, Due)> {
         let (at, is_crossed) = self.level;
@@ -269,6 +233,9 @@ impl Hardware {
         };
         for (place, run) in self.runs.iter().enumerate() {
             consider(run.as_ref().and_then(|run| run.ends), Due::Step(place));
+        }
+        if let Some((at, fault)) = self.off_rock() {
+            consider(Some(at), Due::OffRock(fault));
         }
         consider(self.lease_end(), Due::Lease);
         consider(self.records, Due::Record);
@@ -283,6 +250,27 @@ impl Hardware {
         (!lease.is_zero() && held.next().is_some()).then(|| self.heard.saturating_add(lease))
     }
 
+    /// When the wheels are off the next of the rocks under them, if the present step brings them so far;
+    /// and of which fault it is.
+    fn off_rock(&self) -> Option<(SimTime, u32)> {
+        let (fault, until_m) = self.lifts.next()?;
+        let left_m = until_m - self.body.driven_m;
+        if left_m <= NO_WAY_M {
+            return Some((self.now, fault));
+        }
+        let run = self.runs[WHEELS].as_ref()?;
+        let (Activity::Drive { step, .. }, Some(ends)) = (&run.activity, run.ends) else {
+            return None;
+        };
+        if step.way_m < left_m {
+            return None;
+        }
+        let lasts_ns = ends.since(run.begun).as_nanos() as f64;
+        let after_ns = libm::ceil(lasts_ns * (left_m / step.way_m)) as u64;
+        let at = run.begun.saturating_add(SimDuration::from_nanos(after_ns));
+        Some((at.min(ends), fault))
+    }
+
     fn advance(&mut self, now: SimTime, out: &mut Vec<Output>) {
         self.settle();
         while let Some((at, due)) = self.next_due().filter(|(at, _)| *at <= now) {
@@ -291,6 +279,7 @@ impl Hardware {
                 Due::Level(true) => self.cross(out),
                 Due::Level(false) => self.is_stale = true,
                 Due::Step(place) => self.complete(place, out),
+                Due::OffRock(fault) => self.leave_rock(fault, out),
                 Due::Lease => self.end_lease(out),
                 Due::Record => {
                     self.records = Some(at.saturating_add(self.spec.config.record_every));
@@ -314,9 +303,22 @@ impl Hardware {
             return;
         }
         self.is_stale = false;
+        self.set_loads();
+        self.level = self.power.next_crossing();
+    }
+
+    /// Sets what takes power and what heats the bay to what runs.
+    fn set_loads(&mut self) {
         let loads_w = self.loads_w();
         self.power.set_loads(loads_w);
-        self.level = self.power.next_crossing();
+        let (fans_run, fault_w) = (self.fans_run(), self.bay_heat_w());
+        self.power.bay.set(fans_run, fault_w);
+    }
+
+    /// Whether the fans run, whatever they are told.
+    fn fans_run(&self) -> bool {
+        let has_power = self.runs[BODY].is_none() && !self.power.is_cut_off();
+        self.fans_on && has_power && !self.are_fans_failed()
     }
 
     fn loads_w(&self) -> [f64; CONSUMERS] {
@@ -328,6 +330,9 @@ impl Hardware {
             false => model.awake_power_w,
         };
         loads_w[Consumer::Fault as usize] = self.extra_power_w();
+        if self.fans_run() {
+            loads_w[Consumer::Fans as usize] = model.bay.fan_power_w;
+        }
         for (place, run) in self.runs.iter().enumerate() {
             let consumer = match place {
                 WHEELS => Consumer::Wheels,
@@ -335,6 +340,7 @@ impl Hardware {
                 RADIO => Consumer::Radio,
                 HEATER => Consumer::Heater,
                 BODY => Consumer::Body,
+                FANS => Consumer::Fans,
                 _ => Consumer::Instruments,
             };
             loads_w[consumer as usize] += run.as_ref().map_or(0.0, |run| run.power_w);
@@ -350,6 +356,7 @@ impl Hardware {
             RADIO => Part::Radio,
             HEATER => Part::Heater,
             BODY => Part::Body,
+            FANS => Part::Fans,
             instrument => Part::Instrument {
                 name: self.spec.config.instruments[instrument - FIRST_INSTRUMENT]
                     .name
@@ -391,30 +398,22 @@ impl Hardware {
         })
     }
 
+    /// How far the wheels went since the start \[m\].
+    fn driven_m(&self) -> f64 {
+        self.driving().map_or(self.body.driven_m, |(step, share)| {
+            self.body.driven_on_step_m(step, share)
+        })
+    }
+
     fn attitude(&self, truth: &Pose) -> Attitude {
-        Attitude::on(&self.spec.site.ground, truth, self.spec.config.wheelbase_m)
+        let (ground, wheelbase_m) = (&self.spec.site.ground, self.spec.config.wheelbase_m);
+        Attitude::on(ground, truth, wheelbase_m, &self.lifts.sum())
     }
 
     fn mast_now_rad(&self) -> [f64; 2] {
         match &self.runs[MAST] {
             Some(run) => slewed(&run.activity, run.share(self.now)).unwrap_or(self.mast_rad),
             None => self.mast_rad,
-        }
-    }
-
-    /// Where it believes to be. The inertial unit is as wrong whoever asks, and how often.
-    fn pose_estimate(&self) -> PoseEstimate {
-        let [truth, estimate] = self.poses();
-        let attitude = self.attitude(&truth);
-        let key = self.key.text("imu").number(self.now.as_nanos());
-        let (mut draws, sigma_rad) = (key.stream(), self.spec.config.imu_sigma_rad);
-        PoseEstimate {
-            east_m: estimate.east_m,
-            north_m: estimate.north_m,
-            yaw_rad: estimate.yaw_rad,
-            roll_rad: draws.normal(attitude.roll_rad, sigma_rad),
-            pitch_rad: draws.normal(attitude.pitch_rad, sigma_rad),
-            position_sigma_m: self.position_sigma_m(),
         }
     }
 
@@ -426,12 +425,6 @@ impl Hardware {
         readings: Vec<Reading>,
         out: &mut Vec<Output>,
     ) {
-        match &end {
-            CommandEnd::Done => self.figures.done += 1,
-            CommandEnd::Stopped { .. } => self.figures.stopped += 1,
-            CommandEnd::Failed { .. } => self.figures.failed += 1,
-            CommandEnd::Refused { .. } => self.figures.refused += 1,
-        }
         if self.is_deaf {
             return;
         }
@@ -442,39 +435,6 @@ impl Hardware {
             end,
             readings,
             pose,
-        }));
-    }
-
-    fn record_pose(&self, out: &mut Vec<Output>) {
-        let [truth, estimate] = self.poses();
-        let attitude = self.attitude(&truth);
-        out.push(Output::Pose(RoverPose {
-            east_m: truth.east_m,
-            north_m: truth.north_m,
-            height_m: attitude.height_m,
-            yaw_rad: truth.yaw_rad,
-            roll_rad: attitude.roll_rad,
-            pitch_rad: attitude.pitch_rad,
-            estimated_east_m: estimate.east_m,
-            estimated_north_m: estimate.north_m,
-            estimated_yaw_rad: estimate.yaw_rad,
-            position_sigma_m: self.position_sigma_m(),
-        }));
-    }
-
-    fn record_resources(&mut self, out: &mut Vec<Output>) {
-        let loads_w = self.loads_w();
-        self.power.set_loads(loads_w);
-        let [solar_w, load_w] = self.power.now_w();
-        out.push(Output::Resources(RoverResources {
-            solar_w,
-            load_w,
-            battery_capacity_j: self.spec.config.battery_j,
-            memory_used_bytes: self.memory.used_bytes(),
-            memory_size_bytes: self.memory.capacity_bytes(),
-            asleep: self.runs[BODY].is_some(),
-            brown_out: self.power.is_cut_off(),
-            energy: self.power.energy(),
         }));
     }
 }

@@ -271,6 +271,7 @@ mod tests {
     use farside_worlds::rock_field::FieldRocks;
     use proptest::prelude::*;
 
+    use super::super::lifts::Lift;
     use super::*;
 
     fn hills() -> RockField {
@@ -298,7 +299,7 @@ mod tests {
                 north_m,
                 yaw_rad: 0.0,
             };
-            let attitude = Attitude::on(&field, &pose, 1.0);
+            let attitude = Attitude::on(&field, &pose, 1.0, &Lift::default());
             // Facing east, north is to the left.
             assert!((attitude.pitch_rad - libm::atan(rise.x)).abs() < 0.05);
             assert!((attitude.roll_rad - libm::atan(rise.y)).abs() < 0.05);
@@ -307,7 +308,7 @@ mod tests {
                 yaw_rad: std::f64::consts::PI,
                 ..pose
             };
-            let turned = Attitude::on(&field, &back, 1.0);
+            let turned = Attitude::on(&field, &back, 1.0, &Lift::default());
             assert!((turned.roll_rad + attitude.roll_rad).abs() < 1e-9);
             assert!((turned.pitch_rad + attitude.pitch_rad).abs() < 1e-9);
         }
@@ -326,7 +327,7 @@ mod tests {
         ) {
             let field = hills();
             let pose = Pose { east_m, north_m, yaw_rad };
-            let eye = Eye::on(&pose, &Attitude::on(&field, &pose, 1.4), 1.5);
+            let eye = Eye::on(&pose, &Attitude::on(&field, &pose, 1.4, &Lift::default()), 1.5);
             let place_m = Pose { yaw_rad: bearing_rad, ..pose }.ahead(range_m).place_m();
             let aims_m = field.terrain().antenna_m(place_m.x, place_m.y, 0.0);
             let above_m = aims_m + (eye.from_m - aims_m) * 0.02;

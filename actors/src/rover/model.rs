@@ -7,6 +7,7 @@ use farside::SimDuration;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::bay::BayModel;
 use super::faults::{FaultConfig, FaultRates};
 use crate::system::settings::{Table, Within, if_set, in_unit, one_of, over, such_that};
 use crate::system::{Section, SetupError};
@@ -21,7 +22,7 @@ const NAMES: [&str; 3] = ["mer", "fido", "k9"];
 /// The most instruments of a rover.
 const MAX_INSTRUMENTS: usize = 32;
 
-/// The names of parts that every rover has, as faults give them.
+/// The names of parts whose commands take time and that every rover has, as faults give them.
 const PARTS: [&str; 5] = ["wheels", "mast", "radio", "heater", "body"];
 
 /// The keys of a table in which one is known by its `name`: an entry of a scenario changes the
@@ -76,6 +77,9 @@ settings! {
             in_unit("rad", 0.0..=0.5);
         /// The standard deviation of roll and pitch as the inertial unit measures them.
         pub imu_sigma_rad as "imu_sigma": f64 [with = "units::angle_rad"] = deg(0.2),
+            in_unit("rad", 0.0..=0.5);
+        /// The standard deviation of the heading as the compass measures it.
+        pub compass_sigma_rad as "compass_sigma": f64 [with = "units::angle_rad"] = deg(2.0),
             in_unit("rad", 0.0..=0.5);
         /// Rocks of this diameter or more are known from orbit: images place the rover among them.
         pub known_from_m as "known_from": f64 [with = "units::length_m"] = 1.5,
@@ -140,7 +144,10 @@ settings! {
             such_that("0s, or 1s and more", SimDuration::to_string, |every: &SimDuration| {
                 every.is_zero() || *every >= SimDuration::from_secs(1)
             });
-        /// Its cameras and spectrometers. One of a name that the model has changes that one.
+        /// The bay with its electronics.
+        pub bay: BayModel, Within;
+        /// Its cameras and spectrometers. A pair of stereo cameras is one instrument: its image has
+        /// what both see, distances among it. One of a name that the model has changes that one.
         pub instruments as "instrument": Vec<InstrumentModel>, Within;
         /// Faults at times of one's own choice.
         pub faults as "fault": Vec<FaultConfig> [skip_serializing_if = "Vec::is_empty"], Within;
@@ -308,6 +315,11 @@ impl RoverModel {
                 self.recovery, self.cutoff
             );
             return Err(SetupError::value(&format!("{name}.recovery"), message));
+        }
+        if self.bay.air_low_k > self.bay.air_high_k {
+            let [low_k, high_k] = [self.bay.air_low_k, self.bay.air_high_k];
+            let message = format!("{low_k} K: expected at most air_high, which is {high_k} K");
+            return Err(SetupError::value(&format!("{name}.bay.air_low"), message));
         }
         if self.instruments.len() > MAX_INSTRUMENTS {
             let found = self.instruments.len();

@@ -1,4 +1,5 @@
-//! A rover's electricity: solar array, battery and loads. It knows no commands.
+//! A rover's electricity: solar array, battery and loads; what they turn into heat goes into the bay. It
+//! knows no commands.
 //!
 //! Sunlight is taken at [`NODE_NS`] apart, and straight between; loads are constant between
 //! events. So what flows is linear in pieces, every integral is exact, and it does not matter when
@@ -11,6 +12,7 @@ use farside_worlds::sky::SOL_S;
 use serde::{Deserialize, Serialize};
 
 use super::RoverSite;
+use super::bay::Bay;
 use super::model::RoverModel;
 
 /// The time between two looks at the Sun \[ns\].
@@ -33,6 +35,7 @@ pub(super) enum Consumer {
     Radio,
     /// The heater, when told, and what keeps the rover warm at night.
     Heater,
+    Fans,
     /// A fault.
     Fault,
     /// What links charge the host for sending and receiving.
@@ -40,7 +43,10 @@ pub(super) enum Consumer {
 }
 
 /// How many consumers there are.
-pub(super) const CONSUMERS: usize = 8;
+pub(super) const CONSUMERS: usize = 9;
+
+/// What takes its power outside the bay.
+const OUTSIDE: [Consumer; 3] = [Consumer::Wheels, Consumer::Mast, Consumer::Instruments];
 
 /// Where a rover's energy came from and went to, since the start \[J\].
 ///
@@ -66,6 +72,8 @@ pub struct RoverEnergy {
     pub radio_j: f64,
     /// What heating took, by command and at night.
     pub heater_j: f64,
+    /// What fans took.
+    pub fans_j: f64,
     /// What faults took.
     pub fault_j: f64,
     /// What links charged all actors of the rover's host for sending and receiving.
@@ -91,6 +99,7 @@ impl RoverEnergy {
             + self.instruments_j
             + self.radio_j
             + self.heater_j
+            + self.fans_j
             + self.fault_j
             + self.links_j
     }
@@ -192,6 +201,7 @@ pub(super) struct Power {
     energy: RoverEnergy,
     /// What links had charged when one last looked \[J\].
     links_j: f64,
+    pub(super) bay: Bay,
 }
 
 impl Power {
@@ -222,6 +232,7 @@ impl Power {
                 ..RoverEnergy::default()
             },
             links_j: 0.0,
+            bay: Bay::new(&model.bay, site.starts_s),
         }
     }
 
@@ -272,6 +283,7 @@ impl Power {
             instruments_j: used_j(Consumer::Instruments),
             radio_j: used_j(Consumer::Radio),
             heater_j: used_j(Consumer::Heater),
+            fans_j: used_j(Consumer::Fans),
             fault_j: used_j(Consumer::Fault),
             links_j: used_j(Consumer::Links),
             stored_j: self.stored_j,
@@ -306,6 +318,7 @@ impl Power {
     fn pass(&mut self, to: SimTime) {
         let lasts_s = to.since(self.now).as_nanos() as f64 * 1e-9;
         let [solar_w, taken_w] = self.ends_w(to);
+        self.warm(to, taken_w);
         self.energy.solar_j += 0.5 * (solar_w[0] + solar_w[1]) * lasts_s;
         if !self.is_cut_off {
             for (used_j, load_w) in self.used_j.iter_mut().zip(self.loads_w) {
@@ -328,6 +341,18 @@ impl Power {
                 self.discharge(-energy_j);
             }
         }
+    }
+
+    /// What of the power that is taken now and at a later time \[W\] becomes heat in the bay until
+    /// then.
+    fn warm(&mut self, to: SimTime, taken_w: [f64; 2]) {
+        let outside = OUTSIDE.map(|consumer| self.loads_w[consumer as usize]);
+        let inside_w = match self.is_cut_off {
+            true => [0.0; 2],
+            false => taken_w.map(|taken_w| taken_w - outside.iter().sum::<f64>()),
+        };
+        let [from_s, to_s] = [self.now, to].map(|at| at.as_nanos() as f64 * 1e-9);
+        self.bay.pass(from_s, to_s, inside_w);
     }
 
     /// What the array yields and what is taken \[W\], each now and at a later time within the same

@@ -1,14 +1,13 @@
-//! What a rover's hardware leaves to logs, pictures and metrics: samples of its state, and figures.
+//! What a rover's hardware leaves to logs, pictures and metrics: samples of its state.
 //! Nothing here reaches the controller.
-
-use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
 use super::power::RoverEnergy;
 
 /// A sample: where a rover is, and where it believes to be. Recorded at the start, at the end of
-/// each step of driving, when an image corrects the estimate, and every `record_every`.
+/// each step of driving, when an image corrects the estimate, when a rock comes under its wheels or is
+/// left behind, and every `record_every`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RoverPose {
     /// In truth, to the east \[m\].
@@ -31,6 +30,8 @@ pub struct RoverPose {
     pub estimated_yaw_rad: f64,
     /// The standard deviation that the rover reckons with \[m\].
     pub position_sigma_m: f64,
+    /// How far the wheels went since the start, forwards and backwards \[m\].
+    pub driven_m: f64,
 }
 
 /// A sample: what a rover has left, and what it lives on. Recorded when commands begin and end and
@@ -47,6 +48,16 @@ pub struct RoverResources {
     pub memory_used_bytes: u64,
     /// What memory can hold \[byte\].
     pub memory_size_bytes: u64,
+    /// All that was ever read \[byte\].
+    pub stored_bytes: u64,
+    /// All that was transmitted of it \[byte\].
+    pub sent_bytes: u64,
+    /// All that was lost of it \[byte\].
+    pub lost_bytes: u64,
+    /// In truth, how warm the bay with the electronics is \[°C\].
+    pub bay_c: f64,
+    /// In truth, whether the fans run.
+    pub fans_run: bool,
     /// Whether it sleeps.
     pub asleep: bool,
     /// Whether it lies in a brown-out.
@@ -85,70 +96,11 @@ pub enum RoverIncident {
         /// How far the estimate moved \[m\].
         moved_m: f64,
     },
-}
-
-/// What a rover did until the end of a run, for metrics.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RoverFigures {
-    /// Where energy came from and went to.
-    pub energy: RoverEnergy,
-    /// The greatest share of all energy that came in that was ever not accounted for.
-    pub imbalance: f64,
-    /// The least charge that the battery had \[J\].
-    pub least_stored_j: f64,
-    /// How far the wheels went \[m\].
-    pub driven_m: f64,
-    /// How far the rover is from where it believes to be \[m\].
-    pub position_error_m: f64,
-    /// The furthest that it ever was \[m\].
-    pub max_position_error_m: f64,
-    /// Commands that came, other than to stop.
-    pub commands: u32,
-    /// Commands that were done.
-    pub done: u32,
-    /// Commands that were stopped.
-    pub stopped: u32,
-    /// Commands that failed.
-    pub failed: u32,
-    /// Commands that were refused.
-    pub refused: u32,
-    /// Readings taken.
-    pub readings: u32,
-    /// Faults that began.
-    pub faults: u32,
-    /// Brown-outs.
-    pub brown_outs: u32,
-    /// Times that the controller's lease ended while something ran.
-    pub lease_ends: u32,
-    /// Times that an image placed the rover.
-    pub placed: u32,
-    /// What is in memory \[byte\].
-    pub memory_used_bytes: u64,
-    /// All that was ever read \[byte\].
-    pub stored_bytes: u64,
-    /// All that was transmitted of it \[byte\].
-    pub sent_bytes: u64,
-    /// All that was lost of it \[byte\].
-    pub lost_bytes: u64,
-}
-
-/// Where a rover's hardware puts its figures after each event; clones are the same.
-///
-/// ```
-/// use farside_actors::rover::RoverTally;
-/// let tally = RoverTally::default();
-/// assert_eq!(tally.clone().figures().commands, 0);
-/// ```
-#[derive(Clone, Debug, Default)]
-pub struct RoverTally(Arc<Mutex<RoverFigures>>);
-
-impl RoverTally {
-    /// The figures so far.
-    pub fn figures(&self) -> RoverFigures {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn put(&self, figures: &RoverFigures) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = *figures;
-    }
+    /// The wheels have left the rock behind that tilted the rover.
+    OffRock {
+        /// The fault that had put it there, by its number.
+        fault: u32,
+        /// How far the wheels went since the start, forwards and backwards \[m\].
+        driven_m: f64,
+    },
 }

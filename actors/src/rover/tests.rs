@@ -2,10 +2,12 @@
 //! commands at times and collects what comes out.
 
 mod actor;
+mod bay;
 mod commands;
 mod energy;
 mod faults;
 mod refusals;
+mod tilts;
 
 use std::sync::Arc;
 
@@ -47,7 +49,6 @@ pub(super) fn spec(field: RockField, config: RoverConfig) -> RoverSpec {
         },
         seed: 11,
         until: SimDuration::from_secs(10 * 88_775),
-        tally: RoverTally::default(),
     }
 }
 
@@ -70,6 +71,7 @@ pub(super) struct Bench {
     pub(super) now_s: f64,
     out: Vec<Output>,
     ids: u32,
+    faults: u32,
 }
 
 impl Bench {
@@ -79,6 +81,7 @@ impl Bench {
             now_s: 0.0,
             out: Vec::new(),
             ids: 0,
+            faults: 0,
         };
         bench.pass(0.0);
         bench
@@ -161,18 +164,35 @@ impl Bench {
         }
     }
 
+    /// How many incidents of a kind there were.
+    pub(super) fn count(&self, which: impl Fn(&RoverIncident) -> bool) -> usize {
+        self.incidents().iter().filter(|one| which(one)).count()
+    }
+
+    /// Where energy came from and went to.
+    pub(super) fn energy(&mut self) -> RoverEnergy {
+        self.hardware.resources().energy
+    }
+
+    /// How far the rover is from where it believes to be \[m\].
+    pub(super) fn error_m(&self) -> f64 {
+        error_m(&self.hardware.pose())
+    }
+
     pub(super) fn state(&mut self) -> RoverState {
         self.hardware.state(0)
     }
 
     pub(super) fn fails(&mut self, kind: FaultKind, part: &str, amount: f64) -> u32 {
-        let number = 100 + self.hardware.figures().faults;
+        let number = 100 + self.faults;
+        self.faults += 1;
         let part = part.to_owned();
         let fault = FaultBegins {
             number,
             kind,
             part,
             amount,
+            distance_m: 1.0,
         };
         self.hardware.fault_begins(fault, &mut self.out);
         number
@@ -181,6 +201,14 @@ impl Bench {
     pub(super) fn mended(&mut self, number: u32) {
         self.hardware.fault_ends(number, &mut self.out);
     }
+}
+
+/// How far a rover is from where it believes to be \[m\].
+pub(super) fn error_m(pose: &RoverPose) -> f64 {
+    libm::hypot(
+        pose.east_m - pose.estimated_east_m,
+        pose.north_m - pose.estimated_north_m,
+    )
 }
 
 pub(super) fn drive(east_m: f64, north_m: f64) -> Command {

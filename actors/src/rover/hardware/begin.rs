@@ -48,6 +48,7 @@ impl Hardware {
             Command::Transmit { size_bytes, .. } => self.begin_transmitting(id, size_bytes, out),
             Command::Heat { duration } => self.begin_rest(id, HEATER, duration, out),
             Command::Sleep { duration } => self.begin_rest(id, BODY, duration, out),
+            Command::Fans { on } => self.tell_fans(id, on, out),
             // The caller obeys it before anything is asked.
             Command::Stop { .. } => Ok(()),
         }
@@ -318,6 +319,20 @@ impl Hardware {
         let transmit = Activity::Transmit { size_bytes };
         let run = self.step(id, RADIO, transmit, lasts_s, model.radio_power_w);
         self.run(RADIO, run, out);
+        Ok(())
+    }
+
+    /// Tells the fans to run or not, and is done.
+    fn tell_fans(&mut self, id: u32, on: bool, out: &mut Vec<Output>) -> Result<(), Refused> {
+        if self.spec.config.bay.fan_conductance_w_per_k == 0.0 {
+            let (found, nearest) = (NAMES[FANS].to_owned(), None);
+            return Err((None, Refusal::NoSuchPart { found, nearest }));
+        }
+        self.check_awake(FANS)?;
+        self.fans_on = on;
+        self.is_stale = true;
+        self.report(id, Some(Part::Fans), CommandEnd::Done, Vec::new(), out);
+        self.record_resources(out);
         Ok(())
     }
 

@@ -10,9 +10,11 @@ impl Hardware {
             return;
         }
         self.begun_faults.push(fault.number);
-        self.figures.faults += 1;
         self.is_stale = true;
         let (kind, number, amount) = (fault.kind, fault.number, fault.amount);
+        if kind == FaultKind::RockUnderWheel {
+            self.lift(&fault, out);
+        }
         self.faults.push(fault);
         match kind {
             FaultKind::BlockedPath => {
@@ -40,8 +42,19 @@ impl Hardware {
         self.is_stale = true;
         self.faults.retain(|fault| fault.number != number);
         self.body.clear(number);
+        if self.lifts.clear(number) {
+            self.record_pose(out);
+        }
         self.apply_shares(out);
         self.advance(self.now, out);
+    }
+
+    /// A rock comes under the wheels.
+    fn lift(&mut self, fault: &FaultBegins, out: &mut Vec<Output>) {
+        let until_m = self.driven_m() + fault.distance_m;
+        self.lifts
+            .put(fault.number, &fault.part, fault.amount, until_m);
+        self.record_pose(out);
     }
 
     /// Dust and broken memory are as bad as all faults of them together.
@@ -80,9 +93,13 @@ impl Hardware {
         let name = self.part_name(place);
         let faults = self.faults.iter();
         let is_of_part = move |fault: &&FaultBegins| match kind {
+            FaultKind::EndsEarly
+            | FaultKind::EndsLate
+            | FaultKind::NeverEnds
+            | FaultKind::InstrumentFails
+            | FaultKind::InstrumentDrifts => fault.part.is_empty() || fault.part == name,
             // Of kinds that are of no part, all are.
-            FaultKind::Dust | FaultKind::Memory | FaultKind::ExtraPower | FaultKind::Slip => true,
-            _ => fault.part.is_empty() || fault.part == name,
+            _ => true,
         };
         let of_kind = faults.filter(move |fault| fault.kind == kind);
         of_kind.filter(is_of_part).map(|fault| fault.amount)
@@ -100,6 +117,23 @@ impl Hardware {
 
     pub(super) fn extra_power_w(&self) -> f64 {
         self.of_kind(FaultKind::ExtraPower, BODY).sum()
+    }
+
+    /// Heat in the bay that is not of the rover's electricity \[W\].
+    pub(super) fn bay_heat_w(&self) -> f64 {
+        self.of_kind(FaultKind::BayHeat, BODY).sum()
+    }
+
+    pub(super) fn are_fans_failed(&self) -> bool {
+        self.of_kind(FaultKind::FansFail, FANS).next().is_some()
+    }
+
+    pub(super) fn pitch_bias_rad(&self) -> f64 {
+        self.of_kind(FaultKind::PitchBias, BODY).sum()
+    }
+
+    pub(super) fn roll_bias_rad(&self) -> f64 {
+        self.of_kind(FaultKind::RollBias, BODY).sum()
     }
 
     pub(super) fn more_slip(&self) -> f64 {

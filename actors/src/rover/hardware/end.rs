@@ -85,8 +85,15 @@ impl Hardware {
     pub(super) fn end_lease(&mut self, out: &mut Vec<Output>) {
         let by = StopCause::Lease;
         let ended = self.end_all(is_leased, || CommandEnd::Stopped { by }, out);
-        self.figures.lease_ends += 1;
         out.push(Output::Incident(RoverIncident::LeaseEnded { ended }));
+    }
+
+    /// The wheels are off the rock that a fault had put under them.
+    pub(super) fn leave_rock(&mut self, fault: u32, out: &mut Vec<Output>) {
+        self.lifts.clear(fault);
+        let driven_m = self.driven_m();
+        out.push(Output::Incident(RoverIncident::OffRock { fault, driven_m }));
+        self.record_pose(out);
     }
 
     /// The battery comes to the level of a brown-out, or of its end.
@@ -101,7 +108,6 @@ impl Hardware {
             };
             let ended = self.end_all(|_| true, reason, out);
             self.power.cut_off(true);
-            self.figures.brown_outs += 1;
             out.push(Output::Incident(RoverIncident::BrownOut { ended }));
         }
         self.record_resources(out);
@@ -204,10 +210,10 @@ impl Hardware {
             out.push(Output::Incident(RoverIncident::DataLost { bytes }));
             return Err(Failure::MemoryFull);
         }
-        let number = u64::from(self.figures.readings);
+        let number = u64::from(self.readings);
         let key = self.key.text("reading");
         let measured = self.gaze(place).read(view, &model, key, number);
-        self.figures.readings += measured.len() as u32;
+        self.readings += measured.len() as u32;
         let instrument = &self.spec.config.instruments[place - FIRST_INSTRUMENT];
         let (name, kind) = (instrument.name.clone(), instrument.kind);
         if kind == InstrumentKind::Camera {
@@ -243,7 +249,6 @@ impl Hardware {
             let way_m = pose.place_m() - self.body.estimate.place_m();
             let moved_m = libm::hypot(way_m.x, way_m.y);
             self.body.fix(pose, sigma_m);
-            self.figures.placed += 1;
             out.push(Output::Incident(RoverIncident::Placed { moved_m }));
             self.record_pose(out);
         }

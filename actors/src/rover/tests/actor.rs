@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use farside::carrier::{Carriage, NoChange};
 use farside::prelude::*;
-use farside::record::{Record, RecordClass};
-use farside::{Carrier, Parcel, Report, Verdicts};
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::{Carrier, Parcel, Report, RunInfo, Verdicts};
 use serde::{Deserialize, Serialize};
 
 use super::*;
@@ -77,6 +77,72 @@ fn add(sim: &mut Simulation, spec: RoverSpec, plan: &[(u64, Command)]) -> (HostI
     });
     add_hardware(sim, host, spec, controller).expect("a rover on its terrain");
     (host, log)
+}
+
+/// What the samples of one rover say.
+#[derive(Clone, Default, PartialEq, Debug)]
+struct Sampled {
+    resources: RoverResources,
+    pose: RoverPose,
+    /// The greatest share of all energy that was not accounted for.
+    imbalance: f64,
+    incidents: Vec<RoverIncident>,
+}
+
+/// Watches the samples of a rover's hardware.
+fn watch(sim: &mut Simulation, rover: &str) -> Arc<Mutex<Sampled>> {
+    let sampled: Arc<Mutex<Sampled>> = Arc::default();
+    let name = hardware_name(rover);
+    let into = sampled.clone();
+    let entity = 0;
+    sim.observe(Samples { name, entity, into });
+    sampled
+}
+
+struct Samples {
+    name: String,
+    entity: usize,
+    into: Arc<Mutex<Sampled>>,
+}
+
+impl Observer for Samples {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: false,
+        }
+    }
+
+    fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        let place = run.entities.iter().position(|one| one.name == self.name);
+        self.entity = place.expect("the hardware");
+        Ok(())
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let of_it = record.sender.index() == self.entity;
+        let Some(kind) = record
+            .kind
+            .filter(|_| of_it && record.class == RecordClass::Sample)
+        else {
+            return Ok(Flow::Continue);
+        };
+        let (schema, body) = (kind.schema(), record.body);
+        let mut sampled = self.into.lock().unwrap();
+        match kind.name() {
+            "RoverResources" => {
+                sampled.resources = schema.decode(body).unwrap();
+                let energy = sampled.resources.energy;
+                let share = energy.imbalance_j().abs() / energy.total_j();
+                sampled.imbalance = sampled.imbalance.max(share);
+            }
+            "RoverPose" => sampled.pose = schema.decode(body).unwrap(),
+            "RoverIncident" => sampled.incidents.push(schema.decode(body).unwrap()),
+            other => panic!("{other}"),
+        }
+        Ok(Flow::Continue)
+    }
 }
 
 fn config() -> RoverConfig {
@@ -150,8 +216,16 @@ fn a_stop_is_obeyed_in_one_event() {
     );
 }
 
+/// What a rover had at the end of a run, and how many of its commands ended in which way.
+#[derive(Debug, PartialEq)]
+struct Ended {
+    sampled: Sampled,
+    done: usize,
+    failed: usize,
+}
+
 /// Every kind of fault in one run of three sols, on two rovers that are kept busy.
-fn troubled(executor: Executor) -> (Report, [RoverFigures; 2], Vec<String>) {
+fn troubled(executor: Executor) -> (Report, [Ended; 2], Vec<String>) {
     let mut sim = Simulation::new(4);
     let mut config = config();
     for (number, kind) in (0..).zip(FaultKind::ALL) {
@@ -168,7 +242,7 @@ fn troubled(executor: Executor) -> (Report, [RoverFigures; 2], Vec<String>) {
         plan.push((at_s + 500, spectrum(View::Point)));
     }
     let field = level_field(60);
-    let mut tallies = Vec::new();
+    let mut watched = Vec::new();
     for number in 3..5 {
         let spec = RoverSpec {
             number,
@@ -176,9 +250,10 @@ fn troubled(executor: Executor) -> (Report, [RoverFigures; 2], Vec<String>) {
             seed: 4,
             ..spec(field.clone(), config.clone())
         };
-        tallies.push(spec.tally.clone());
-        let (host, _) = add(&mut sim, spec, &plan);
+        let sampled = watch(&mut sim, &spec.name);
+        let (host, reports) = add(&mut sim, spec, &plan);
         sim.heavy(host);
+        watched.push((sampled, reports));
     }
     let told: Arc<Mutex<Vec<String>>> = Arc::default();
     let seen = told.clone();
@@ -194,25 +269,37 @@ fn troubled(executor: Executor) -> (Report, [RoverFigures; 2], Vec<String>) {
     sim.stop_at(SimTime::from_secs(3 * 88_775), "three sols");
     let report = sim.run(executor).unwrap();
     let told = told.lock().unwrap().clone();
-    let figures = [0, 1].map(|rover: usize| tallies[rover].figures());
-    (report, figures, told)
+    let ended = [0, 1].map(|rover: usize| {
+        let (sampled, reports) = &watched[rover];
+        let reports = reports.lock().unwrap();
+        let count = |which: fn(&CommandEnd) -> bool| {
+            let ends = reports.iter().map(|(_, report)| &report.end);
+            ends.filter(|end| which(end)).count()
+        };
+        Ended {
+            sampled: sampled.lock().unwrap().clone(),
+            done: count(|end| matches!(end, CommandEnd::Done)),
+            failed: count(|end| matches!(end, CommandEnd::Failed { .. })),
+        }
+    });
+    (report, ended, told)
 }
 
 #[test]
 fn faults_are_told_end_no_run_and_change_no_executor() {
-    let (report, figures, told) = troubled(Executor::Inline);
+    let (report, ended, told) = troubled(Executor::Inline);
     assert_eq!(report.end.name(), "stopped");
     let begun = told
         .iter()
         .filter(|kind| kind.ends_with("FaultBegins"))
         .count();
-    assert_eq!(begun, (figures[0].faults + figures[1].faults) as usize);
-    assert!(begun >= 22);
-    for figures in &figures {
-        assert!(figures.failed > 0 && figures.done > 20, "{figures:?}");
-        assert!(figures.imbalance <= 1e-9, "{}", figures.imbalance);
+    assert!(begun >= 2 * FaultKind::ALL.len());
+    for ended in &ended {
+        assert!(ended.failed > 0 && ended.done > 20, "{ended:?}");
+        let imbalance = ended.sampled.imbalance;
+        assert!(imbalance <= 1e-9, "{imbalance}");
     }
-    assert_ne!(figures[0], figures[1]);
+    assert_ne!(ended[0], ended[1]);
     let (again, ..) = troubled(Executor::Kameo { threads: 2 });
     assert_eq!(again.digest, report.digest);
     assert_eq!(again.counts, report.counts);
@@ -222,14 +309,14 @@ fn faults_are_told_end_no_run_and_change_no_executor() {
 fn ten_sols_of_three_idle_rovers_are_cheap() {
     let mut sim = Simulation::new(1);
     let field = level_field(90);
-    let mut tallies = Vec::new();
+    let mut watched = Vec::new();
     for number in 0..3 {
         let spec = RoverSpec {
             number,
             name: format!("rover_{number:02}"),
             ..spec(field.clone(), config())
         };
-        tallies.push(spec.tally.clone());
+        watched.push(watch(&mut sim, &spec.name));
         add(&mut sim, spec, &[]);
     }
     #[derive(Default)]
@@ -254,29 +341,27 @@ fn ten_sols_of_three_idle_rovers_are_cheap() {
         "{bytes} bytes a sol, in {} records",
         seen.records
     );
-    for tally in tallies {
-        let figures = tally.figures();
-        assert!(figures.imbalance <= 1e-9 && figures.brown_outs == 0);
-        assert!(figures.energy.not_taken_j > 0.0 && figures.energy.heater_j > 0.0);
+    for sampled in watched {
+        let sampled = sampled.lock().unwrap();
+        assert!(sampled.imbalance <= 1e-9 && sampled.incidents.is_empty());
+        let energy = sampled.resources.energy;
+        assert!(energy.not_taken_j > 0.0 && energy.heater_j > 0.0);
     }
 
     struct Bytes(Arc<Mutex<Seen>>);
-    impl farside::record::Observer for Bytes {
-        fn wants(&self) -> farside::record::Wants {
-            farside::record::Wants {
+    impl Observer for Bytes {
+        fn wants(&self) -> Wants {
+            Wants {
                 bodies: true,
                 samples: true,
                 checkpoints: false,
             }
         }
-        fn record(
-            &mut self,
-            record: &Record<'_>,
-        ) -> Result<farside::record::Flow, farside::record::ObserverError> {
+        fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
             let mut seen = self.0.lock().unwrap();
             seen.records += 1;
             seen.bytes += record.body.len() as u64;
-            Ok(farside::record::Flow::Continue)
+            Ok(Flow::Continue)
         }
     }
 }
@@ -337,7 +422,7 @@ impl Handler<Word> for Chatter {
 fn what_links_charge_the_host_comes_from_the_battery() {
     let mut sim = Simulation::new(1);
     let rover = spec(level_field(1), config());
-    let tally = rover.tally.clone();
+    let sampled = watch(&mut sim, &rover.name);
     let (host, _) = add(&mut sim, rover, &[]);
     let base = sim.host("base");
     sim.actor(host, "rover_03/chatter", |_| Chatter("base/chatter"));
@@ -346,7 +431,7 @@ fn what_links_charge_the_host_comes_from_the_battery() {
     sim.link(base, host, "base-rover_03", Costly);
     sim.stop_at(SimTime::from_secs(7200), "two hours");
     sim.run(Executor::Inline).unwrap();
-    let energy = tally.figures().energy;
+    let energy = sampled.lock().unwrap().resources.energy;
     assert_eq!(energy.links_j, 570.0);
     assert!(energy.imbalance_j().abs() <= 1e-9 * energy.total_j());
 }
@@ -362,25 +447,19 @@ fn a_crash_of_the_computer_stops_the_rover_and_forgets_no_metal() {
         (180, drive(10.0, 0.0)),
     ];
     let rover = spec(level_field(1), config);
-    let tally = rover.tally.clone();
+    let sampled = watch(&mut sim, &rover.name);
     let (host, told) = add(&mut sim, rover, &plan);
     sim.crash_host_at(SimTime::from_secs(230), host);
     sim.restart_host_at(SimTime::from_secs(400), host);
     sim.stop_at(SimTime::from_secs(405), "seen enough");
     sim.run(Executor::Inline).unwrap();
-    let figures = tally.figures();
+    let sampled = sampled.lock().unwrap().clone();
     // The leg that was under way at 230 s ended at 3 m, within the slip's draws.
-    assert!(
-        (2.9..3.1).contains(&figures.driven_m),
-        "{}",
-        figures.driven_m
-    );
-    assert_eq!(
-        (figures.readings, figures.memory_used_bytes),
-        (1, 1_000_000)
-    );
+    let driven_m = sampled.pose.driven_m;
+    assert!((2.9..3.1).contains(&driven_m), "{driven_m}");
+    assert_eq!(sampled.resources.memory_used_bytes, 1_000_000);
     // Told in vain at 250 s, found at the restart.
-    assert_eq!((figures.faults, figures.energy.fault_j), (1, 150.0 * 20.0));
+    assert_eq!(sampled.resources.energy.fault_j, 150.0 * 20.0);
     // Nobody was told of the drive; the controller began again, and points the mast once more.
     let ids: Vec<u32> = told
         .lock()

@@ -22,10 +22,9 @@ fn a_drive_takes_its_time_and_ends_at_its_place() {
     assert_near(report.pose.north_m, 5.0, 1e-9);
     assert_near(report.pose.east_m, 0.0, 1e-9);
     assert_near(report.pose.yaw_rad, FRAC_PI_2, 1e-9);
-    let figures = *bench.hardware.figures();
-    assert_near(figures.driven_m, 5.0, 1e-9);
-    assert_near(figures.position_error_m, 0.0, 1e-9);
-    assert_near(figures.energy.wheels_j, 145.0 * 100.0, 0.5);
+    assert_near(bench.hardware.pose().driven_m, 5.0, 1e-9);
+    assert_near(bench.error_m(), 0.0, 1e-9);
+    assert_near(bench.energy().wheels_j, 145.0 * 100.0, 0.5);
 }
 
 #[test]
@@ -69,7 +68,7 @@ fn a_drive_is_stopped_where_it_is() {
     assert_eq!(ended, [(drives, stopped()), (stops, CommandEnd::Done)]);
     bench.pass(100.0);
     assert_near(bench.state().pose.east_m, 1.5, 1e-9);
-    assert_near(bench.hardware.figures().driven_m, 1.5, 1e-9);
+    assert_near(bench.hardware.pose().driven_m, 1.5, 1e-9);
 }
 
 #[test]
@@ -107,7 +106,7 @@ fn it_sleeps_and_wakes() {
         (report.part, report.end),
         (Some(Part::Body), CommandEnd::Done)
     );
-    assert_near(bench.hardware.figures().energy.body_j, 300.0, 1e-9);
+    assert_near(bench.energy().body_j, 300.0, 1e-9);
     bench.give(Command::Sleep { duration });
     assert!(bench.state().asleep);
     bench.pass(1.0);
@@ -120,7 +119,7 @@ fn it_heats() {
     let mut bench = Bench::exact();
     let duration = SimDuration::from_secs(100);
     bench.done(Command::Heat { duration });
-    assert_near(bench.hardware.figures().energy.heater_j, 2200.0, 1e-6);
+    assert_near(bench.energy().heater_j, 2200.0, 1e-6);
 }
 
 #[test]
@@ -293,17 +292,18 @@ fn the_estimate_strays_with_distance_and_an_image_brings_it_back() {
     let mut errors_m = vec![0.0];
     for (east_m, north_m) in [(4.0, 1.0), (9.0, 0.0), (14.0, 2.0), (19.0, 0.0)] {
         bench.done(drive(east_m, north_m));
-        errors_m.push(bench.hardware.figures().position_error_m);
+        errors_m.push(bench.error_m());
     }
     let before_m = *errors_m.last().unwrap();
     assert!(errors_m[1] > 0.02 && before_m > errors_m[1], "{errors_m:?}");
     let sigma_m = bench.state().pose.position_sigma_m;
     assert!(sigma_m > errors_m[1]);
     let (_, report) = bench.done(image(View::Panorama));
-    let after_m = bench.hardware.figures().position_error_m;
+    let after_m = bench.error_m();
     assert!(after_m < 0.3 * before_m, "{after_m} after {before_m}");
     assert!(report.pose.position_sigma_m < 0.3 * sigma_m);
-    assert_eq!(bench.hardware.figures().placed, 1);
+    let placed = |one: &RoverIncident| matches!(one, RoverIncident::Placed { .. });
+    assert_eq!(bench.count(placed), 1);
     let placed = |incident: &RoverIncident| matches!(incident, RoverIncident::Placed { .. });
     assert!(bench.incidents().iter().any(placed));
 }
@@ -359,7 +359,7 @@ fn slopes_tilt_it_slow_it_and_cost_power() {
         lasts_s > level_s + 1.0,
         "{lasts_s} s, and {level_s} s on level ground"
     );
-    let energy_j = bench.hardware.figures().energy.wheels_j;
+    let energy_j = bench.energy().wheels_j;
     assert!(energy_j > 100.0 * lasts_s - 200.0);
     let tilted = bench.out.iter().filter_map(|output| match output {
         Output::Pose(pose) => Some(pose.pitch_rad.abs() + pose.roll_rad.abs()),

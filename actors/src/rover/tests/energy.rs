@@ -29,6 +29,7 @@ fn command() -> impl Strategy<Value = Command> {
         1 => (-7.0..7.0f64).prop_map(|yaw_rad| Command::Turn { yaw_rad }),
         1 => (-1.0..5.0f64).prop_map(|distance_m| Command::BackUp { distance_m }),
         1 => Just(STOP),
+        1 => any::<bool>().prop_map(|on| Command::Fans { on }),
         1 => Just(Command::Stop { part: Some(Part::Wheels) }),
         1 => (metre(), metre()).prop_map(|(east_m, north_m)| at(east_m, north_m)),
         2 => (-4.0..4.0f64, -1.5..1.0f64).prop_map(|(pan, tilt)| angles(pan, tilt)),
@@ -46,13 +47,23 @@ fn command() -> impl Strategy<Value = Command> {
 
 fn deed() -> impl Strategy<Value = Deed> {
     let kind = prop::sample::select(FaultKind::ALL.to_vec());
-    let part = prop::sample::select(vec!["", "wheels", "mast", "pancam", "mini_tes"]);
+    let part = vec![
+        "",
+        "wheels",
+        "mast",
+        "pancam",
+        "mini_tes",
+        "front",
+        "rear-left",
+    ];
+    let part = prop::sample::select(part);
     let fault = (kind, part, 0.0..1.0f64).prop_map(|(kind, part, share)| {
         let amount = match kind {
             FaultKind::EndsLate => 1.0 + 10.0 * share,
             FaultKind::EndsEarly => 0.01 + 0.99 * share,
             FaultKind::ExtraPower => 300.0 * share,
             FaultKind::BlockedPath => 0.01 + 3.0 * share,
+            FaultKind::BayHeat => 300.0 * share,
             _ => 0.95 * share,
         };
         Deed::Fail(kind, part, amount)
@@ -68,8 +79,8 @@ fn deed() -> impl Strategy<Value = Deed> {
 
 /// What must hold after everything.
 fn check(bench: &mut Bench) -> Result<(), TestCaseError> {
-    let figures = *bench.hardware.figures();
-    let energy = figures.energy;
+    let resources = bench.hardware.resources();
+    let energy = resources.energy;
     prop_assert!(
         energy.imbalance_j().abs() <= 1e-9 * energy.total_j(),
         "{:?}",
@@ -78,7 +89,7 @@ fn check(bench: &mut Bench) -> Result<(), TestCaseError> {
     let state = bench.state();
     prop_assert!(state.battery_j >= 0.0 && state.battery_j <= state.battery_capacity_j);
     prop_assert!(state.memory_used_bytes <= state.memory_size_bytes);
-    let held = figures.stored_bytes - figures.sent_bytes - figures.lost_bytes;
+    let held = resources.stored_bytes - resources.sent_bytes - resources.lost_bytes;
     prop_assert_eq!(held, state.memory_used_bytes);
     // Below the cutoff only in a brown-out, and then nothing runs.
     let cutoff_j = 0.15 * state.battery_capacity_j;
@@ -87,12 +98,27 @@ fn check(bench: &mut Bench) -> Result<(), TestCaseError> {
     let incidents = bench.incidents();
     let unsupplied = |one: &RoverIncident| matches!(one, RoverIncident::Unsupplied { .. });
     prop_assert_eq!(energy.unsupplied_j > 0.0, incidents.iter().any(unsupplied));
-    let browned = |one: &&RoverIncident| matches!(one, RoverIncident::BrownOut { .. });
-    prop_assert_eq!(
-        incidents.iter().filter(browned).count(),
-        figures.brown_outs as usize
+    // Between two brown-outs the battery recovers.
+    let mut browned = false;
+    for one in &incidents {
+        match one {
+            RoverIncident::BrownOut { .. } => prop_assert!(!std::mem::replace(&mut browned, true)),
+            RoverIncident::Recovered => prop_assert!(std::mem::replace(&mut browned, false)),
+            _ => {}
+        }
+    }
+    prop_assert_eq!(browned, state.brown_out);
+    let pose = bench.hardware.pose();
+    prop_assert!(
+        error_m(&pose).is_finite() && pose.roll_rad.abs() < 1.5 && pose.pitch_rad.abs() < 1.5
     );
-    prop_assert!(figures.max_position_error_m.is_finite());
+    // The air's coldest, and what all power at once could heat.
+    prop_assert!(
+        (-77.0..2500.0).contains(&resources.bay_c),
+        "{} °C",
+        resources.bay_c
+    );
+    prop_assert!(!resources.fans_run || (state.fans_on && !state.asleep && !state.brown_out));
     let mut parts: Vec<_> = state.running.iter().map(|running| &running.part).collect();
     let running = parts.len();
     parts.dedup();
@@ -113,6 +139,7 @@ proptest! {
         let mut config = RoverConfig::named("mer").expect("a model");
         config.battery_j = battery_j;
         config.memory_bytes = 20_000_000;
+        config.bay.fan_conductance_w_per_k = 0.5;
         config.lease = SimDuration::from_secs(lease_s);
         let spec = RoverSpec { seed, ..spec(level_field(40), config) };
         let mut bench = Bench::new(spec);
@@ -167,7 +194,7 @@ proptest! {
                 bench.pass(0.0);
                 bench.give(command.clone());
             }
-            let energy = bench.hardware.figures().energy;
+            let energy = bench.energy();
             (bench.reports(), energy)
         };
         let ((quiet, energy), (asked, again)) = (run(None), run(Some(asks_s)));
