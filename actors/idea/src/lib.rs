@@ -6,7 +6,10 @@
 //! agents control.
 
 pub mod agent;
+mod config;
 pub mod deliberator;
+pub mod metrics;
+mod monitor;
 pub mod records;
 pub mod register;
 pub mod runner;

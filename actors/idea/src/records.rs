@@ -41,6 +41,17 @@ pub struct TimelineSays {
     pub before: Vec<String>,
 }
 
+/// A contract that somebody else had asked for has ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GoalEnded {
+    /// The register.
+    pub register: String,
+    /// The procedure with its inputs, as `ImageAt(120 -35 10 0 hawk_eye)`.
+    pub goal: String,
+    /// Its outputs, `?` where one is not known.
+    pub outputs: Vec<String>,
+}
+
 /// An agent is faulty: it takes no part any more.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AgentFaulty {

@@ -178,6 +178,8 @@ pub struct Cycle {
     pub begun: Vec<Started>,
     /// Tokens that have ended.
     pub ended: Vec<Ended>,
+    /// Contracts of others that have ended: which register, and how.
+    pub answered: Vec<(Arc<str>, Ended)>,
     /// What deliberation has to say to people.
     pub remarks: Vec<String>,
 }
@@ -460,6 +462,7 @@ impl Cycle {
             out: Vec::new(),
             begun: Vec::new(),
             ended: Vec::new(),
+            answered: Vec::new(),
             remarks: Vec::new(),
         }
     }

@@ -8,7 +8,7 @@ use farside_planning::model::{Model, PredicateId, Value};
 use smallvec::SmallVec;
 
 use super::Agent;
-use crate::records::TimelineSays;
+use crate::records::{GoalEnded, TimelineSays};
 use crate::runner::Cycle;
 use crate::wording;
 
@@ -34,11 +34,18 @@ impl Saying {
         }
     }
 
-    /// Records what begins to say something else.
+    /// Records what begins to say something else, and what has become of others' goals.
     pub(super) fn record(&mut self, cycle: &Cycle, ctx: &mut Context<'_, Agent>) {
         let Some(model) = &self.model else {
             return;
         };
+        for (register, ended) in &cycle.answered {
+            ctx.sample(&GoalEnded {
+                register: register.to_string(),
+                goal: wording::words(model, ended.predicate, &ended.parameters),
+                outputs: wording::output_words(model, ended.predicate, &ended.parameters),
+            });
+        }
         for token in &cycle.begun {
             let timeline = usize::from(token.contract.timeline);
             let inputs = model.predicates[token.predicate].inputs;

@@ -177,6 +177,7 @@ impl Runner {
                     value.map(|value| wording::encode(&model, ended.predicate, place, value))
                 })
                 .collect();
+            cycle.answered.push((one.setup.name.clone(), ended.clone()));
             let status = memory[at].say(outputs, ContractEnd::Ended, now);
             cycle
                 .out
