@@ -1,7 +1,8 @@
-//! What systems of actors share, for Farside: links, radios, rover hardware, processors, units,
+//! What systems of actors share, for Farside: links, radios, the fields that rovers drive on and their hardware, processors, units,
 //! teams, invariants, figures, what viewers draw with, and what a system is.
 
 pub mod drawing;
+pub mod field;
 pub mod figure;
 pub mod invariants;
 pub mod link;

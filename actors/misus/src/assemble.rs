@@ -4,19 +4,17 @@
 use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
-use farside_actors::rover::{
-    RoverConfig, RoverError, RoverSite, RoverSpec, RoverStart, add_hardware,
-};
+use farside_actors::rover::{RoverConfig, RoverError, RoverSpec, RoverStart, add_hardware};
 use farside_actors::system::SetupError;
 use farside_actors::wiring::{Wire, Wiring};
 use nalgebra::Point3;
 
 use crate::config::{LearnConfig, TeamConfig};
 use crate::monitor::{Monitor, Tally};
-use crate::place::Place;
 use crate::scientist::Scientist;
 use crate::site::{Instruments, SharedSite, Site};
 use crate::tools::Tools;
+use farside_actors::field::Place;
 
 /// The distance between rovers at the start \[m\].
 const APART_M: f64 = 2.0;
@@ -101,11 +99,7 @@ pub(crate) fn assemble(
             number,
             name: name.clone(),
             config: parts.rover.clone(),
-            site: RoverSite {
-                ground: field.clone(),
-                sky: parts.place.sky,
-                starts_s: parts.place.starts_s,
-            },
+            site: parts.place.site(),
             start,
             seed: parts.seed,
             until: parts.until,

@@ -18,7 +18,6 @@ mod messages;
 mod metrics;
 mod monitor;
 mod picture;
-mod place;
 mod scenario;
 mod scene;
 mod scientist;
@@ -27,7 +26,7 @@ mod system;
 mod tools;
 pub mod tour;
 
-pub use config::{FieldConfig, LearnConfig, Objective, TeamConfig, Tour};
+pub use config::{LearnConfig, Objective, TeamConfig, Tour};
 pub use messages::{FieldModel, RockLabel, Stop};
 pub use metrics::MisusMetrics;
 pub use system::MisusSystem;

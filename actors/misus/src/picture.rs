@@ -17,8 +17,8 @@ use farside_actors::system::{
 use farside_worlds::sky::SOL_S;
 
 use crate::assemble::names;
-use crate::place::Place;
 use crate::scenario::MisusScenario;
+use farside_actors::field::Place;
 use history::History;
 
 /// The style of pictures, beside that of all figures.

@@ -1,9 +1,10 @@
 //! What a scenario says of MISUS.
 
+use farside_actors::field::FieldConfig;
 use farside_actors::rover::RoverConfig;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{FieldConfig, LearnConfig, TeamConfig};
+use crate::config::{LearnConfig, TeamConfig};
 
 /// The tables that it reads.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

@@ -1,6 +1,7 @@
 //! MISUS as scenarios see it: `[world]`, `[team]`, `[rover]`, `[learn]`.
 
 use farside::Report;
+use farside_actors::field::{FieldConfig, Place, story};
 use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
@@ -11,8 +12,7 @@ use farside_actors::system::{
 use serde::Deserialize;
 
 use crate::assemble::{Parts, assemble, names};
-use crate::config::{FieldConfig, LearnConfig, TeamConfig};
-use crate::place::{Place, story};
+use crate::config::{LearnConfig, TeamConfig};
 use crate::scenario::MisusScenario;
 use crate::scene::MisusScene;
 use crate::{builtin, metrics, picture};

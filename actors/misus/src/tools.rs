@@ -6,7 +6,7 @@ use crate::analysis::features::SpectralBasis;
 use crate::analysis::library::ReferenceLibrary;
 use crate::analysis::objective::MineralGauge;
 use crate::config::{LearnConfig, Objective};
-use crate::place::Place;
+use farside_actors::field::Place;
 
 /// How many mixtures of minerals rovers carry, where no library of spectra is given.
 const MIXTURES: usize = 300;

@@ -10,7 +10,7 @@ use maud::{Markup, html};
 
 use super::history::{Fault, History, Level};
 use super::in_sols;
-use crate::place::Place;
+use farside_actors::field::Place;
 
 /// The width of a strip, in pixels.
 const WIDTH: f64 = 880.0;

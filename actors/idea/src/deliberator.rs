@@ -1,0 +1,39 @@
+//! Who plans further ahead than the reactive planner: processes of lower priority, which tokens of a
+//! timeline start and stop (section 2 of the IDEA paper: "controlled by the plan runner through goal
+//! registers").
+
+use farside_planning::model::{TimelineId, Value};
+
+use crate::service::{Ended, Plan, Snapshot, Started};
+
+/// A deliberative planner.
+pub trait Deliberator: Send {
+    /// The timeline whose tokens start and stop it.
+    fn timeline(&self) -> TimelineId;
+
+    /// A token of any timeline has begun: what there is to plan with may be learnt from it.
+    fn begun(&mut self, token: &Started);
+
+    /// A token of any timeline has ended.
+    fn ended(&mut self, token: &Ended);
+
+    /// A token of its own timeline has begun: what comes of the work that it asks for; nothing if it
+    /// asks for none. The work is thought to be done later, in the time that cycles leave.
+    fn work(&mut self, token: &Started, snapshot: &Snapshot) -> Option<Work>;
+}
+
+/// What deliberation came to, and what it took.
+#[derive(Clone, Debug)]
+pub struct Work {
+    /// Elementary steps of planning.
+    pub operations: u64,
+    /// The outputs of the token that asked for it, if the plan is taken.
+    pub outputs: Vec<Option<Value>>,
+    /// The plan; none if there is nothing to do, or nothing can be done.
+    pub plan: Option<Plan>,
+    /// The timelines that it relies on: if one of them says something else when the work is done, the
+    /// plan is stale.
+    pub reads: Vec<TimelineId>,
+    /// What people may want to know: which goals are left out, and why.
+    pub remarks: Vec<String>,
+}

@@ -1,0 +1,14 @@
+//! The Intelligent Distributed Execution Architecture (IDEA): agents of one structure, each of which
+//! plans what to do within a latency that it never exceeds.
+//!
+//! After M. B. Dias, S. Lemai and N. Muscettola, "A Real-Time Rover Executive Based On Model-Based
+//! Reactive Planning", i-SAIRAS 2003. Section 2 of it is the agent; section 3 the K9 rover, which two
+//! agents control.
+
+pub mod agent;
+pub mod deliberator;
+pub mod records;
+pub mod register;
+pub mod runner;
+pub mod service;
+pub mod wording;

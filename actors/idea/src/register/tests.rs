@@ -1,0 +1,292 @@
+//! Both sides of a register over a network that loses, repeats and reorders.
+
+use std::collections::BTreeMap;
+
+use farside::{SimDuration, SimTime};
+use proptest::prelude::*;
+
+use super::*;
+
+const BACKOFF: Backoff = Backoff {
+    first: SimDuration::from_millis(2000),
+    most: SimDuration::from_millis(16_000),
+};
+
+fn name() -> Arc<str> {
+    "goal".into()
+}
+
+fn at(tick: u64) -> SimTime {
+    SimTime::ZERO + SimDuration::from_millis(500 * tick)
+}
+
+#[derive(Clone, Debug)]
+enum Message {
+    Load(RegisterLoad),
+    Status(RegisterStatus),
+    Ack(RegisterAck),
+}
+
+/// What happens to the message of a number, drawn by proptest.
+#[derive(Clone, Debug)]
+struct Fate {
+    lost: bool,
+    twice: bool,
+    delay_ticks: u64,
+}
+
+/// Both sides, the network between them, and what was seen to happen.
+struct Pair {
+    controlling: Controlling,
+    controlled: Controlled,
+    fates: Vec<Fate>,
+    sent: usize,
+    /// By tick of arrival, then in the order of sending.
+    under_way: BTreeMap<(u64, usize), Message>,
+    /// The numbers of procedures that began, and of those that were carried out, in order.
+    begun: Vec<u32>,
+    done: Vec<u32>,
+    /// The procedure that is being carried out, and when it is over.
+    running: Option<(u32, u64)>,
+}
+
+impl Pair {
+    fn new(fates: Vec<Fate>) -> Self {
+        Pair {
+            controlling: Controlling::new(name(), 1, BACKOFF),
+            controlled: Controlled::new(name(), BACKOFF),
+            fates,
+            sent: 0,
+            under_way: BTreeMap::new(),
+            begun: Vec::new(),
+            done: Vec::new(),
+            running: None,
+        }
+    }
+
+    fn send(&mut self, message: Message, tick: u64) {
+        let fate = self.fates[self.sent % self.fates.len()].clone();
+        self.sent += 1;
+        if fate.lost {
+            return;
+        }
+        let arrives = (tick + fate.delay_ticks, 2 * self.sent);
+        if fate.twice {
+            let again = (arrives.0 + 3, arrives.1 + 1);
+            self.under_way.insert(again, message.clone());
+        }
+        self.under_way.insert(arrives, message);
+    }
+
+    fn load(&mut self, tick: u64) {
+        let load = self.controlling.load("Go".into(), Vec::new(), at(tick));
+        self.send(Message::Load(load), tick);
+    }
+
+    /// A tick of both sides; what the controlling side heard of the end of its contract.
+    fn step(&mut self, tick: u64) -> Option<ContractEnd> {
+        let mut end = None;
+        while let Some(entry) = self.under_way.first_entry() {
+            if entry.key().0 > tick {
+                break;
+            }
+            match entry.remove() {
+                Message::Load(load) => self.receive(&load, tick),
+                Message::Ack(ack) => {
+                    self.controlling.acknowledged(&ack);
+                    self.controlled.acknowledged(&ack);
+                }
+                Message::Status(status) => {
+                    if let Heard::News { end: news, .. } = self.controlling.status(&status) {
+                        end = Some(news);
+                    }
+                    self.send(Message::Ack(Controlling::ack(&status)), tick);
+                }
+            }
+        }
+        if let Some((number, until)) = self.running
+            && until <= tick
+        {
+            self.running = None;
+            self.done.push(number);
+            let said = self
+                .controlled
+                .say(Vec::new(), ContractEnd::Ended, at(tick));
+            said.into_iter()
+                .for_each(|status| self.send(Message::Status(status), tick));
+        }
+        if let Some((load, _)) = self.controlling.repeat(at(tick)) {
+            self.send(Message::Load(load), tick);
+        }
+        if let Some((status, _)) = self.controlled.repeat(at(tick)) {
+            self.send(Message::Status(status), tick);
+        }
+        end
+    }
+
+    fn receive(&mut self, load: &RegisterLoad, tick: u64) {
+        match self.controlled.take(load) {
+            Taken::Yes => {
+                self.begun.push(load.number);
+                self.running = Some((load.number, tick + 4));
+                let ack = self.controlled.ack();
+                self.send(Message::Ack(ack), tick);
+            }
+            Taken::Before(said) => {
+                let answer = match said {
+                    Some(status) => Message::Status(status),
+                    None => Message::Ack(self.controlled.ack()),
+                };
+                self.send(answer, tick);
+            }
+            Taken::Old | Taken::Early => {}
+        }
+    }
+
+    fn crash(&mut self, tick: u64) {
+        self.running = None;
+        let said = self.controlled.restarted(at(tick));
+        said.into_iter()
+            .for_each(|status| self.send(Message::Status(status), tick));
+    }
+
+    /// What must hold at any time.
+    fn check(&self) {
+        assert!(
+            self.begun.is_sorted_by(|a, b| a < b),
+            "each once, in order: {:?}",
+            self.begun
+        );
+        assert!(self.done.iter().all(|done| self.begun.contains(done)));
+    }
+}
+
+fn fates() -> impl Strategy<Value = Vec<Fate>> {
+    let fate = |loss: f64| {
+        (
+            proptest::bool::weighted(loss),
+            proptest::bool::weighted(0.2),
+            0_u64..12,
+        )
+            .prop_map(|(lost, twice, delay_ticks)| Fate {
+                lost,
+                twice,
+                delay_ticks,
+            })
+    };
+    (0.0..0.9).prop_flat_map(move |loss| proptest::collection::vec(fate(loss), 200..400))
+}
+
+proptest! {
+    /// Ten goals, one after the other: all are carried out, in order, none twice, whatever is lost,
+    /// repeated or comes late, and an end is never heard of before it was reached.
+    #[test]
+    fn all_goals_are_carried_out_once(fates in fates()) {
+        prop_assume!(fates.iter().any(|fate| !fate.lost));
+        let mut pair = Pair::new(fates);
+        let mut ended = 0;
+        pair.load(0);
+        for tick in 0..200_000 {
+            if let Some(end) = pair.step(tick) {
+                prop_assert_eq!(end, ContractEnd::Ended);
+                ended += 1;
+                prop_assert!(pair.done.contains(&ended), "the end of {ended} was not reached");
+                if ended == 10 {
+                    break;
+                }
+                pair.load(tick);
+            }
+            pair.check();
+        }
+        prop_assert_eq!(&pair.done, &(1..=10).collect::<Vec<u32>>());
+    }
+
+    /// Goals are taken back by others before they have ended, and the controlled side crashes: what
+    /// begins begins once and in order, and the last goal is reached in the end.
+    #[test]
+    fn goals_that_are_taken_back_do_not_block_the_next(
+        fates in fates(),
+        loads in proptest::collection::btree_set(0_u64..300, 1..20),
+        crashes in proptest::collection::btree_set(0_u64..400, 0..4),
+    ) {
+        prop_assume!(fates.iter().any(|fate| !fate.lost));
+        let mut pair = Pair::new(fates);
+        let mut open = false;
+        for tick in 0..200_000 {
+            if crashes.contains(&tick) {
+                pair.crash(tick);
+            }
+            if loads.contains(&tick) {
+                pair.load(tick);
+                open = true;
+            }
+            if let Some(end) = pair.step(tick) {
+                open = false;
+                let number = pair.controlling.number();
+                let is_done = pair.done.contains(&number);
+                prop_assert_eq!(is_done, end == ContractEnd::Ended);
+            }
+            pair.check();
+            if tick > 400 && !open {
+                break;
+            }
+        }
+        prop_assert!(!open, "the last of {} goals: {:?}", pair.controlling.number(), pair.controlled);
+    }
+}
+
+#[test]
+fn a_goal_that_must_be_done_is_not_skipped() {
+    let mut controlling = Controlling::new(name(), 1, BACKOFF);
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    let first = controlling.load("A".into(), Vec::new(), at(0));
+    assert_eq!(controlled.take(&first), Taken::Yes);
+    let said = controlled
+        .say(Vec::new(), ContractEnd::Ended, at(1))
+        .expect("it goes on");
+    assert!(matches!(controlling.status(&said), Heard::News { .. }));
+    let lost = controlling.load("B".into(), Vec::new(), at(2));
+    assert_eq!(lost.superseded, 0);
+    // Somebody's next goal that does not say that the second was given up.
+    let next = RegisterLoad {
+        number: 3,
+        superseded: 0,
+        ..lost.clone()
+    };
+    assert_eq!(controlled.take(&next), Taken::Early);
+    let given_up = controlling.load("C".into(), Vec::new(), at(3));
+    assert_eq!((given_up.number, given_up.superseded), (3, 1));
+    assert_eq!(controlled.take(&given_up), Taken::Yes);
+    assert_eq!(controlled.take(&lost), Taken::Old);
+}
+
+#[test]
+fn the_first_status_that_ends_a_contract_counts() {
+    let mut controlling = Controlling::new(name(), 1, BACKOFF);
+    let load = controlling.load("A".into(), Vec::new(), at(0));
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    controlled.take(&load);
+    let open = controlled
+        .say(vec![None], ContractEnd::Open, at(1))
+        .expect("it goes on");
+    let end = controlled
+        .say(vec![None], ContractEnd::Ended, at(2))
+        .expect("it goes on");
+    assert_eq!(controlled.say(vec![None], ContractEnd::Fault, at(3)), None);
+    assert!(matches!(controlling.status(&end), Heard::News { .. }));
+    assert_eq!(controlling.status(&open), Heard::Again);
+    assert_eq!(controlling.status(&end), Heard::Again);
+    controlling.load("B".into(), Vec::new(), at(4));
+    assert_eq!(controlling.status(&end), Heard::Stale);
+}
+
+#[test]
+fn a_new_life_begins_anew_and_the_old_one_is_not_heard() {
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
+    assert_eq!(controlled.take(&old), Taken::Yes);
+    let new = Controlling::new(name(), 2, BACKOFF).load("B".into(), Vec::new(), at(9));
+    assert_eq!(controlled.take(&new), Taken::Yes);
+    assert_eq!(controlled.contract(), (2, 1));
+    assert_eq!(controlled.take(&old), Taken::Old);
+}

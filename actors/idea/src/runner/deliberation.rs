@@ -1,0 +1,127 @@
+//! Deliberation beside the cycles: it works on a snapshot in the time that cycles leave, and its plan
+//! is taken between two cycles, if the snapshot still fits.
+
+use super::{Cycle, Runner};
+use crate::deliberator::{Deliberator, Work};
+use crate::service::{Contract, Snapshot};
+use crate::wording;
+
+/// A deliberative planner and what it is at.
+pub(super) struct Deliberation {
+    planner: Box<dyn Deliberator>,
+    job: Option<Job>,
+}
+
+/// Work that takes its time.
+struct Job {
+    /// The token that asked for it.
+    contract: Contract,
+    snapshot: Snapshot,
+    work: Work,
+    /// Operations that are still to be done.
+    left: u64,
+}
+
+impl Deliberation {
+    pub(super) fn new(planner: Box<dyn Deliberator>) -> Self {
+        Deliberation { planner, job: None }
+    }
+}
+
+impl Runner {
+    /// Tells the deliberative planner what has begun and ended, and has it begin what is asked of it.
+    /// Work whose token has ended is given up.
+    pub(super) fn begin_deliberation(&mut self, cycle: &mut Cycle) {
+        let Some(deliberation) = &mut self.deliberation else {
+            return;
+        };
+        let timeline = deliberation.planner.timeline();
+        for token in &cycle.ended {
+            deliberation.planner.ended(token);
+            if deliberation
+                .job
+                .as_ref()
+                .is_some_and(|job| job.contract == token.contract)
+            {
+                deliberation.job = None;
+            }
+        }
+        cycle
+            .begun
+            .iter()
+            .for_each(|token| deliberation.planner.begun(token));
+        let mut asked = cycle.begun.iter().rev();
+        let asked = asked.find(|token| usize::from(token.contract.timeline) == timeline);
+        let Some(token) = asked else {
+            return;
+        };
+        let snapshot = self.service.snapshot();
+        deliberation.job = deliberation.planner.work(token, &snapshot).map(|work| Job {
+            contract: token.contract,
+            snapshot,
+            left: work.operations,
+            work,
+        });
+    }
+
+    /// Lets deliberation go on for so many operations, any number with none; how many it took.
+    pub fn deliberate(&mut self, operations: Option<u64>) -> u64 {
+        let job = self.deliberation.as_mut().and_then(|all| all.job.as_mut());
+        let Some(job) = job else {
+            return 0;
+        };
+        let done = operations.map_or(job.left, |most| most.min(job.left));
+        job.left -= done;
+        done
+    }
+
+    /// Takes the plan of work that is done, or says that it is stale.
+    pub(super) fn finish_deliberation(&mut self, cycle: &mut Cycle) {
+        let Some(deliberation) = &mut self.deliberation else {
+            return;
+        };
+        let Some(job) = deliberation.job.take_if(|job| job.left == 0) else {
+            return;
+        };
+        let Job {
+            contract,
+            snapshot,
+            work,
+            ..
+        } = job;
+        cycle.remarks.extend(work.remarks);
+        let stale = work.reads.iter().find_map(|&timeline| {
+            let now = self
+                .service
+                .present(timeline)
+                .map(|present| present.contract);
+            let then = snapshot.present[timeline]
+                .as_ref()
+                .map(|present| present.contract);
+            (now != then).then(|| {
+                let name = &self.service.model().timelines[timeline].name;
+                format!("{name} says something else than when the plan was begun")
+            })
+        });
+        let stale = stale.or_else(|| {
+            let plan = work.plan?;
+            let refused = self.service.commit(&snapshot, plan).err()?;
+            Some(refused.to_string())
+        });
+        let model = self.service.model().clone();
+        let outputs = match &stale {
+            None => work.outputs,
+            Some(why) => {
+                cycle.remarks.push(format!("the plan is stale: {why}"));
+                let planning = self.service.present(usize::from(contract.timeline));
+                let planning = planning.filter(|present| present.contract == contract);
+                planning.map_or_else(Vec::new, |present| {
+                    wording::named_outputs(&model, present.predicate, "STALE")
+                })
+            }
+        };
+        if let Err(refusal) = self.service.bind(contract, &outputs, true) {
+            cycle.faults.push(refusal.to_string());
+        }
+    }
+}
