@@ -150,11 +150,11 @@ fn range_sigma_m(range_m: f64) -> f64 {
 }
 
 impl Gaze<'_> {
-    /// Where it looks: an instrument on the body looks ahead and down.
+    /// Where it looks: an instrument on the body to the side that it faces, and down.
     fn angles_rad(&self) -> [f64; 2] {
         match self.instrument.on_mast {
             true => self.mast_rad,
-            false => [0.0, BODY_TILT_RAD],
+            false => [self.instrument.faces_rad, BODY_TILT_RAD],
         }
     }
 

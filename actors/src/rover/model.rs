@@ -175,8 +175,10 @@ settings! {
             such_that("a name", |_| "missing".to_owned(), |name: &String| !name.is_empty());
         /// What it yields.
         pub kind: InstrumentKind, one_of(&["camera", "spectrometer"]);
-        /// Whether it is on the mast; if not, it looks straight ahead, a little down.
+        /// Whether it is on the mast; if not, it is on the body and looks a little down.
         pub on_mast: bool = true;
+        /// Where one on the body looks, from straight ahead to the left.
+        pub faces_rad as "faces": f64 [with = "units::angle_rad"] = 0.0, in_unit("rad", -3.2..=3.2);
         /// How far it sees.
         pub range_m as "range": f64 [with = "units::length_m"] = 50.0, in_unit("m", 0.1..=10_000.0);
         /// Up to this range the noise is what the view says; beyond, it grows in proportion.

@@ -167,6 +167,23 @@ fn a_reading_that_is_stopped_leaves_nothing() {
     assert_eq!(bench.state().memory_used_bytes, 0);
 }
 
+#[test]
+fn an_instrument_on_the_body_looks_where_it_faces() {
+    let config = RoverConfig::named("k9").expect("a model");
+    let mut spec = spec(level_field(1), config);
+    spec.start.yaw_rad = FRAC_PI_2;
+    let mut bench = Bench::new(spec);
+    for (camera, is_north) in [("haz_front", true), ("haz_rear", false)] {
+        let camera = camera.to_owned();
+        let view = View::Point;
+        let (_, report) = bench.done(Command::Image { camera, view });
+        let reading = &report.readings[0];
+        assert_eq!(reading.north_m > 0.0, is_north, "{reading:?}");
+        assert_near(reading.north_m.abs(), reading.range_m, 0.2);
+        assert_near(reading.east_m, 0.0, 0.1);
+    }
+}
+
 /// A rock of a field that nothing else is near, and a place two metres to the west of it.
 fn lonely_rock(field: &RockField) -> (u32, [f64; 2]) {
     let is_lonely = |place: &nalgebra::Point2<f64>| {
