@@ -48,6 +48,18 @@ pub struct AgentSetup {
     pub restart_after: SimDuration,
 }
 
+impl AgentSetup {
+    /// Whether its registers can be those of its model.
+    ///
+    /// # Errors
+    ///
+    /// If they share names or timelines, or a timeline cannot be a register.
+    pub fn check(&self) -> Result<(), RunnerError> {
+        let mind = (self.mind)();
+        Runner::new(self.runner, mind.service, &self.registers, 1, SimTime::ZERO).map(drop)
+    }
+}
+
 /// An IDEA agent.
 pub struct Agent {
     setup: Arc<AgentSetup>,
@@ -94,22 +106,17 @@ pub struct DecisionsLeave;
 pub struct AgentRestarts;
 
 impl Agent {
-    /// An agent.
-    ///
-    /// # Errors
-    ///
-    /// If its registers cannot be those of its model.
-    pub fn new(setup: Arc<AgentSetup>) -> Result<Self, RunnerError> {
-        let mut agent = Agent {
+    /// An agent. Its setup is to be [checked](AgentSetup::check) before: what is wrong with it ends
+    /// the run.
+    pub fn new(setup: Arc<AgentSetup>) -> Self {
+        Agent {
             setup,
             runner: None,
             peers: Vec::new(),
             leaving: Vec::new(),
             overdue: None,
             saying: Saying::default(),
-        };
-        agent.runner(1, SimTime::ZERO)?;
-        Ok(agent)
+        }
     }
 
     /// A new plan runner.

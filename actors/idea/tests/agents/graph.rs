@@ -1,0 +1,260 @@
+//! Graphs of agents whose models hand goals on: from each incoming register to some outgoing ones.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use farside::prelude::*;
+use farside_actors::processor::{Processor, Speed};
+use farside_idea::agent::{Agent, AgentSetup, Mind};
+use farside_idea::register::Backoff;
+use farside_idea::runner::{RegisterSetup, RunnerSettings, Side};
+use farside_idea::service::temporal::{Temporal, TemporalOptions};
+use farside_planning::language::{Options, read_model};
+use farside_planning::model::Model;
+
+use crate::plant::{Pace, Plant};
+
+/// An agent of a graph.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// λ.
+    pub latency: SimDuration,
+    /// How much of its latency a cycle takes, in thousandths.
+    pub load: u64,
+    /// Which of its outgoing registers each incoming one hands its goals on to. The status of a goal
+    /// is that of the first of them.
+    pub hands_on: Vec<Vec<usize>>,
+}
+
+/// Where an outgoing register leads.
+#[derive(Clone, Copy, Debug)]
+pub enum To {
+    /// To an incoming register of an agent.
+    Agent(usize, usize),
+    /// To a plant of its own.
+    Plant,
+}
+
+/// A graph: for each agent, where its outgoing registers lead.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    pub nodes: Vec<Node>,
+    pub leads: Vec<Vec<To>>,
+    /// By agent: what its name begins with.
+    pub names: Vec<String>,
+    /// The delay of every link.
+    pub delay: SimDuration,
+    pub pace: Pace,
+}
+
+/// The model of an agent with so many incoming and outgoing registers.
+pub fn model(node: &Node) -> Arc<Model> {
+    let downs: usize = node.hands_on.iter().map(Vec::len).sum();
+    let list = |name: &str, count: usize| {
+        (0..count).map(|at| format!(" {name}{at}_SV")).collect::<String>()
+    };
+    let (ups, below) = (list("Up", node.hands_on.len()), list("Down", downs));
+    let mut text = format!(
+        "(Define_Model agent :profile executive)
+(Define_Object_Class Agent :state_variables ((Goal{ups}) (Executable{below})))
+(Define_Type Status (ok failed TIMEOUT PREEMPTED FAULT))
+(Define_Predicate Idle ())
+(Define_Predicate Go ((Number ?x) -> (Status ?status)))\n"
+    );
+    for name in ups.split_whitespace().chain(below.split_whitespace()) {
+        let _ = writeln!(
+            text,
+            "(Define_Member_Values (Agent {name}) (Idle Go) :default (Idle ()))"
+        );
+    }
+    for (up, hands_on) in node.hands_on.iter().enumerate() {
+        let each: String = hands_on
+            .iter()
+            .map(|down| format!(" (starts (SINGLE ((Agent Down{down}_SV) ((Go (?x -> ?s{down}))))))"))
+            .collect();
+        let first = hands_on[0];
+        let _ = writeln!(
+            text,
+            "(Define_Compatibility
+ (SINGLE ((Agent Up{up}_SV) ((Go (?x -> ?status)))))
+ :duration_bounds [1 1000000]
+ :compatibility_spec (AND{each}))
+(Define_Compatibility
+ (SINGLE ((Agent Down{first}_SV) ((Go (?x -> ?status)))))
+ :when (!= ?status PREEMPTED)
+ :compatibility_spec (ends :condition (SINGLE ((Agent Up{up}_SV) ((Go (?x -> ?status)))))))"
+        );
+    }
+    for down in 0..downs {
+        let _ = writeln!(
+            text,
+            "(Define_Compatibility
+ (SINGLE ((Agent Down{down}_SV) ((Go))))
+ :duration_bounds [1 100000])"
+        );
+    }
+    let model = read_model("agent.ddl", &text, &Options::default()).ok();
+    Arc::new(model.unwrap_or_else(|findings| panic!("{findings}\n{text}")))
+}
+
+impl Graph {
+    pub fn agent_name(&self, at: usize) -> String {
+        format!("{}agent_{at}", self.names[at])
+    }
+
+    /// The name of a register: who controls it, and which of its outgoing ones it is.
+    pub fn register(from: &str, down: usize) -> String {
+        format!("{from}.{down}")
+    }
+
+    /// Declares all of it. `ground` are the incoming registers that somebody else controls: the agent,
+    /// its register, and that somebody's name.
+    pub fn declare(&self, sim: &mut Simulation, ground: &[(usize, usize, &str, HostId)]) -> Vec<HostId> {
+        let hosts: Vec<HostId> =
+            (0..self.nodes.len()).map(|at| sim.host(&self.agent_name(at))).collect();
+        for (at, node) in self.nodes.iter().enumerate() {
+            self.declare_agent(sim, at, node, &hosts, ground);
+        }
+        hosts
+    }
+
+    fn declare_agent(
+        &self,
+        sim: &mut Simulation,
+        at: usize,
+        node: &Node,
+        hosts: &[HostId],
+        ground: &[(usize, usize, &str, HostId)],
+    ) {
+        let (name, model) = (self.agent_name(at), model(node));
+        let timeline = |name: String| {
+            model.timelines.iter().position(|one| one.name == name).expect("it is declared")
+        };
+        let mut peers: Vec<String> = Vec::new();
+        let mut registers = Vec::new();
+        let mut register = |name: String, timeline, side, peer: String| {
+            let known = peers.iter().position(|one| *one == peer);
+            let peer = known.unwrap_or_else(|| {
+                peers.push(peer);
+                peers.len() - 1
+            });
+            let lease = SimDuration::ZERO;
+            registers.push(RegisterSetup { name: name.into(), timeline, side, peer, lease });
+        };
+        let both_ways = |sim: &mut Simulation, b: HostId, other: &str| {
+            let a = hosts[at];
+            for (from, to, names) in [(a, b, [&*name, other]), (b, a, [other, &*name])] {
+                sim.link(from, to, &names.join("-"), FixedDelay::new(self.delay));
+            }
+        };
+        for (down, to) in self.leads[at].iter().enumerate() {
+            let peer = match to {
+                To::Agent(other, _) => {
+                    let peer = self.agent_name(*other);
+                    both_ways(sim, hosts[*other], &peer);
+                    peer
+                }
+                To::Plant => {
+                    let plant = format!("{name}/plant_{down}");
+                    let host = sim.host(&plant);
+                    both_ways(sim, host, &plant);
+                    let (agent, pace) = (name.clone(), self.pace);
+                    sim.actor(host, &plant, move |_| Plant::new(&agent, pace, BACKOFF));
+                    plant
+                }
+            };
+            let at = timeline(format!("Down{down}_SV"));
+            register(Graph::register(&name, down), at, Side::Controlling, peer);
+        }
+        for up in 0..node.hands_on.len() {
+            let at_up = timeline(format!("Up{up}_SV"));
+            let from_ground = ground.iter().find(|one| (one.0, one.1) == (at, up));
+            let (controller, down) = match from_ground {
+                Some((.., name, host)) => {
+                    both_ways(sim, *host, name);
+                    ((*name).to_owned(), 0)
+                }
+                None => self.controller_of(at, up),
+            };
+            let name = Graph::register(&controller, down);
+            register(name, at_up, Side::Controlled, controller);
+        }
+        // What planning takes is small beside the overhead, which is the load that is wanted.
+        let overhead = node.load * node.latency.as_nanos() / 1000;
+        let setup = AgentSetup {
+            runner: RunnerSettings {
+                latency: node.latency,
+                horizon: 1,
+                budget: 1_000_000,
+                overhead,
+                aborts: 0,
+                backoff: BACKOFF,
+                forgets: true,
+            },
+            registers,
+            peers,
+            mind: Arc::new(move || Mind {
+                service: Box::new(
+                    Temporal::new(model.clone(), TemporalOptions::default()).expect("it fits"),
+                ),
+                deliberator: None,
+            }),
+            // Without a load decisions leave with the tick itself.
+            processor: Processor::new(match node.load {
+                0 => Speed::Unlimited,
+                _ => Speed::PerS(1_000_000_000),
+            }),
+            restart_after: SimDuration::ZERO,
+        };
+        setup.check().expect("it is right");
+        let setup = Arc::new(setup);
+        sim.actor(hosts[at], &name, move |_| Agent::new(setup.clone()));
+    }
+
+    /// The name of an agent's incoming register.
+    pub fn controls(&self, at: usize, up: usize) -> String {
+        if (at, up) == (0, 0) {
+            return Graph::register("ground", 0);
+        }
+        let (controller, down) = self.controller_of(at, up);
+        Graph::register(&controller, down)
+    }
+
+    /// The agent whose plant is behind a register; none if there is another agent.
+    pub fn plant_behind(&self, register: &str) -> Option<usize> {
+        (0..self.nodes.len()).find(|&at| {
+            let leads = self.leads[at].iter().enumerate();
+            let mut plants = leads.filter(|(_, to)| matches!(to, To::Plant));
+            plants.any(|(down, _)| Graph::register(&self.agent_name(at), down) == register)
+        })
+    }
+
+    /// The agents from the first one to another, by the longest way.
+    pub fn row_to(&self, last: usize) -> Vec<usize> {
+        let from = |other: usize| {
+            let mut leads = self.leads[other].iter();
+            leads.any(|to| matches!(to, To::Agent(at, _) if *at == last))
+        };
+        let rows = (0..self.nodes.len()).filter(|at| from(*at)).map(|at| self.row_to(at));
+        let latency = |row: &Vec<usize>| row.iter().map(|at| self.nodes[*at].latency).max();
+        let mut row = rows.max_by_key(latency).unwrap_or_default();
+        row.push(last);
+        row
+    }
+
+    fn controller_of(&self, at: usize, up: usize) -> (String, usize) {
+        for (other, leads) in self.leads.iter().enumerate() {
+            for (down, to) in leads.iter().enumerate() {
+                if matches!(to, To::Agent(a, u) if (*a, *u) == (at, up)) {
+                    return (self.agent_name(other), down);
+                }
+            }
+        }
+        panic!("nobody controls register {up} of agent {at}");
+    }
+}
+
+pub const BACKOFF: Backoff = Backoff {
+    first: SimDuration::from_secs(10),
+    most: SimDuration::from_secs(60),
+};

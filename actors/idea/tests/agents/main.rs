@@ -1,0 +1,6 @@
+//! Agents as actors, in graphs: how long an answer takes, and what holds whatever is lost.
+
+mod graph;
+mod ground;
+mod plant;
+mod response;
