@@ -9,6 +9,7 @@ pub mod agent;
 mod config;
 pub mod deliberator;
 pub mod metrics;
+pub mod models;
 mod monitor;
 pub mod records;
 pub mod register;
