@@ -9,6 +9,7 @@ pub mod agent;
 pub mod deliberator;
 pub mod records;
 pub mod register;
+pub mod relay;
 pub mod runner;
 pub mod service;
 pub mod wording;
