@@ -90,8 +90,11 @@ struct Seen {
     done: u32,
 }
 
+/// What was seen, when a run is over.
+type Shared = Arc<Mutex<Seen>>;
+
 /// Watches a run.
-struct Watch(Arc<Mutex<Seen>>);
+struct Watch(Shared);
 
 impl Observer for Watch {
     fn wants(&self) -> Wants {
@@ -140,14 +143,14 @@ fn run(
     rovers: u32,
     period: SimDuration,
     until: SimDuration,
-) -> Result<(Arc<Mutex<Seen>>, u64), Box<dyn std::error::Error>> {
+) -> Result<(Shared, u64), Box<dyn std::error::Error>> {
     let site = RoverSite {
         ground: Arc::new(RockField::generate(&RockFieldSettings::default())?),
         sky: Sky::new(-14.6, 270.0, 0.5)?,
         starts_s: 0.0,
     };
     let mut sim = Simulation::new(1);
-    let seen = Arc::new(Mutex::new(Seen::default()));
+    let seen = Shared::default();
     sim.observe(Watch(seen.clone()));
     for number in 1..=rovers {
         let rover = format!("rover_{number:02}");

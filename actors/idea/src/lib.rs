@@ -13,6 +13,7 @@ pub mod models;
 mod monitor;
 pub mod records;
 pub mod register;
+pub mod relay;
 pub mod runner;
 pub mod service;
 pub mod wording;
