@@ -59,7 +59,7 @@ use quantity::{
 };
 pub use with::{
     acceleration_m_per_s2, angle_rad, data_rate_bit_per_s, data_size_bits, data_size_bytes,
-    duration, energy_j, fraction, length_m, power_w, signed_energy_j, speed_m_per_s, temperature_k,
+    duration, energy_j, fraction, length_m, power_w, signed_energy_j, signed_length_m, speed_m_per_s, temperature_k,
 };
 
 /// What the module of that name reads, and in which units: `duration`, `length_m`. None if there is
@@ -73,7 +73,7 @@ pub use with::{
 pub fn described(module: &str) -> Option<(&'static str, Vec<&'static str>)> {
     let quantity = match module {
         "duration" => &DURATION,
-        "length_m" => &LENGTH,
+        "length_m" | "signed_length_m" => &LENGTH,
         "speed_m_per_s" => &SPEED,
         "acceleration_m_per_s2" => &ACCELERATION,
         "angle_rad" => &ANGLE,
@@ -202,6 +202,18 @@ pub fn print_duration(duration: SimDuration) -> String {
 /// When it is none, or has no unit or another quantity's.
 pub fn parse_length_m(text: &str) -> Result<f64, UnitError> {
     LENGTH.nearest(text)
+}
+
+/// Reads a length in metres that may be negative, as a coordinate.
+///
+/// ```
+/// assert_eq!(farside_actors::units::parse_signed_length_m("-30cm"), Ok(-0.3));
+/// ```
+///
+/// # Errors
+/// When it is none, or has no unit or another quantity's.
+pub fn parse_signed_length_m(text: &str) -> Result<f64, UnitError> {
+    LENGTH.nearest_signed(text)
 }
 
 /// Writes a length in metres so that it parses back to the same one.

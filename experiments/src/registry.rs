@@ -13,6 +13,7 @@
 
 use farside::suggest::nearest;
 use farside_actors::system::{Builtin, Metric, System};
+use farside_idea::IdeaSystem;
 use farside_misus::MisusSystem;
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;
@@ -102,6 +103,7 @@ impl Registry {
     pub fn builtin() -> Self {
         Registry::empty()
             .with(NetworkSystem)
+            .with(IdeaSystem)
             .with(MisusSystem)
             .with(TrafficSystem)
     }

@@ -278,7 +278,7 @@ impl Agent {
 
 /// By what a message is known again in another run: its contract, its register, its sender's life,
 /// and how often it was sent before.
-fn key(number: u32, register: u32, epoch: u32, before: u32) -> MatchKey {
+pub(crate) fn key(number: u32, register: u32, epoch: u32, before: u32) -> MatchKey {
     MatchKey::new(
         number,
         register << 24 | (epoch & 0xff) << 16 | before & 0xffff,

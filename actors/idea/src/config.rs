@@ -125,9 +125,9 @@ settings! {
         /// Whose it is: the host of a relay, or a pattern over them.
         pub rover: String = "*".to_owned();
         /// To the east of where the rover starts; rounded to decimetres.
-        pub east_m as "east": f64 [with = "units::length_m"], in_unit("m", -10_000.0..=10_000.0);
+        pub east_m as "east": f64 [with = "units::signed_length_m"], in_unit("m", -10_000.0..=10_000.0);
         /// To the north of where the rover starts; rounded to decimetres.
-        pub north_m as "north": f64 [with = "units::length_m"], in_unit("m", -10_000.0..=10_000.0);
+        pub north_m as "north": f64 [with = "units::signed_length_m"], in_unit("m", -10_000.0..=10_000.0);
         /// Where the mast points, from straight ahead to the left; rounded to degrees.
         pub pan_rad as "pan": f64 [with = "units::angle_rad"], in_unit("rad", -3.142..=3.142);
         /// Where the mast points, from level upwards; rounded to degrees.
@@ -136,8 +136,8 @@ settings! {
         pub camera: String = "wide_eye".to_owned(), one_of(&CAMERAS);
         /// When the ground sends it.
         pub at: SimDuration [with = "units::duration"];
-        /// What it is worth beside others, where not all can be done.
-        pub weight: f64 = 1.0, in_unit("of the objective", 0.0..=1e6);
+        /// What it is worth beside others, where not all can be done; 0: it must be done.
+        pub weight: u32 = 0, 0..=1_000_000;
     }
 }
 

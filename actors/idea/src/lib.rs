@@ -6,8 +6,11 @@
 //! agents control.
 
 pub mod agent;
-mod config;
+mod assemble;
+mod builtin;
+pub mod config;
 pub mod deliberator;
+mod ground;
 pub mod metrics;
 pub mod models;
 mod monitor;
@@ -16,4 +19,8 @@ pub mod register;
 pub mod relay;
 pub mod runner;
 pub mod service;
+mod system;
 pub mod wording;
+
+pub use metrics::IdeaMetrics;
+pub use system::IdeaSystem;

@@ -16,6 +16,17 @@ pub fn system() -> Arc<Model> {
         .clone()
 }
 
+/// The names of the models that are built in.
+pub const NAMES: [&str; 1] = ["k9-system"];
+
+/// The model of a name, if it is built in.
+pub fn named(name: &str) -> Option<Arc<Model>> {
+    match name {
+        "k9-system" => Some(system()),
+        _ => None,
+    }
+}
+
 fn read(name: &str, text: &str) -> Arc<Model> {
     let read = read_model(name, text, &Options::default());
     let model = read.ok().unwrap_or_else(|findings| panic!("{findings}"));

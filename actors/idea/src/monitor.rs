@@ -39,8 +39,6 @@ pub(crate) struct WatchedAgent {
     pub(crate) goals: String,
     /// Whether it gives commands to a rover.
     pub(crate) commands: bool,
-    /// Whether it is the one that the ground commands.
-    pub(crate) is_first: bool,
 }
 
 /// A rover.
@@ -50,8 +48,6 @@ pub(crate) struct WatchedRover {
     pub(crate) relay: String,
     /// Its hardware's actor.
     pub(crate) hardware: String,
-    /// Its system agent.
-    pub(crate) system: String,
     /// After so long without a word from it the rover must stand still.
     pub(crate) lease: SimDuration,
 }

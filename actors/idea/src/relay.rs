@@ -51,6 +51,7 @@
 //! ```
 
 mod action;
+mod actor;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -68,6 +69,7 @@ use crate::register::{ContractEnd, RegisterValue};
 use crate::wording;
 use table::Entry;
 
+pub use actor::{RelayActor, RelaySetup, RelayStopped, RelayWakes};
 pub use table::{RelayError, RelayProblem, RelayRegister, RelayTable};
 
 /// A contract of a register: its epoch, and its number within it.
@@ -272,6 +274,12 @@ impl Relay {
             out.push(RelayAct::Query(RoverQuery { id }));
         }
         self.last_query
+    }
+
+    /// Whether what a register says is a poll that waits for its answer.
+    pub fn is_polled(&self, register: usize) -> bool {
+        let open = self.open.get(register).and_then(Option::as_ref);
+        open.is_some_and(|open| matches!(self.table.of(open.predicate), Some(Entry::Poll(_))))
     }
 
     /// The hardware reports how a command ended.

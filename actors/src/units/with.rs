@@ -12,9 +12,9 @@ use super::{
     POWER, SPEED, TEMPERATURE, UnitError, check_fraction, parse_acceleration_m_per_s2,
     parse_angle_rad, parse_data_bits, parse_data_rate, parse_data_size, parse_duration,
     parse_energy_j, parse_fraction, parse_length_m, parse_power_w, parse_signed_energy_j,
-    parse_speed_m_per_s, parse_temperature_k, print_acceleration_m_per_s2, print_angle_rad,
-    print_data_bits, print_data_rate, print_data_size, print_energy_j, print_length_m,
-    print_power_w, print_speed_m_per_s, print_temperature_k,
+    parse_signed_length_m, parse_speed_m_per_s, parse_temperature_k, print_acceleration_m_per_s2,
+    print_angle_rad, print_data_bits, print_data_rate, print_data_size, print_energy_j,
+    print_length_m, print_power_w, print_speed_m_per_s, print_temperature_k,
 };
 
 /// How one quantity is read, from a text or from a bare number.
@@ -159,6 +159,15 @@ quantity! {
     length_m: f64, LengthM,
     expected LENGTH.expected,
     text parse_length_m,
+    number |number: f64| Err(LENGTH.no_unit(number)),
+    write |value, to| to.collect_str(&print_length_m(*value))
+}
+
+quantity! {
+    /// Lengths that may be negative, as coordinates: `"-30cm"` and metres. Bare numbers are refused.
+    signed_length_m: f64, SignedLengthM,
+    expected LENGTH.expected,
+    text parse_signed_length_m,
     number |number: f64| Err(LENGTH.no_unit(number)),
     write |value, to| to.collect_str(&print_length_m(*value))
 }

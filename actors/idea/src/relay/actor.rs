@@ -45,7 +45,7 @@ pub struct RelayActor {
     /// Whether the lease has ended since.
     is_abandoned: bool,
     /// When something is to be looked after by itself.
-    wakes: Option<SimTime>,
+    wakes: Option<(SimTime, TimerId)>,
 }
 
 #[derive(Clone, Copy)]
@@ -92,7 +92,10 @@ impl RelayActor {
 
     /// The register of a name, by its place.
     fn place(&self, register: &str) -> Option<usize> {
-        self.setup.registers.iter().position(|name| **name == *register)
+        self.setup
+            .registers
+            .iter()
+            .position(|name| **name == *register)
     }
 
     /// Sends what the relay wants sent.
@@ -130,7 +133,7 @@ impl RelayActor {
         before: u32,
         ctx: &mut Context<'_, Self>,
     ) -> Outcome {
-        let key = super::super::agent::key(status.number, register as u32, status.epoch, before);
+        let key = crate::agent::key(status.number, register as u32, status.epoch, before);
         ctx.send_keyed(self.peers()?.statuses, key, status);
         Ok(())
     }
@@ -161,14 +164,21 @@ impl RelayActor {
     /// so that not every message sets one.
     fn set_timer(&mut self, ctx: &mut Context<'_, Self>) {
         let registers = ctx.durable::<Memory>().0.iter();
-        let due = registers.filter_map(Controlled::due).chain(self.lease_ends()).min();
+        let due = registers
+            .filter_map(Controlled::due)
+            .chain(self.lease_ends())
+            .min();
         let Some(due) = due else {
             return;
         };
-        if self.wakes.is_none_or(|wakes| due < wakes) {
-            self.wakes = Some(due);
-            ctx.timer(due.since(ctx.now()), RelayWakes);
+        if let Some((wakes, timer)) = self.wakes {
+            if wakes <= due {
+                return;
+            }
+            ctx.cancel(timer);
         }
+        let timer = ctx.timer(due.since(ctx.now()), RelayWakes);
+        self.wakes = Some((due, timer));
     }
 }
 
@@ -227,7 +237,8 @@ impl Handler<RegisterLoad> for RelayActor {
                 let mut acts = Vec::new();
                 let (procedure, inputs) = (&load.procedure, &load.inputs);
                 let now = ctx.now();
-                self.relay.load(now, register, contract, procedure, inputs, &mut acts);
+                self.relay
+                    .load(now, register, contract, procedure, inputs, &mut acts);
                 // A poll's answer follows at once, and acknowledges its load.
                 if !self.relay.is_polled(register) {
                     ctx.send(self.peers()?.acks, ack);
@@ -268,7 +279,10 @@ impl Handler<AgentOffline> for RelayActor {
         if self.is_abandoned {
             return Ok(());
         }
-        self.abandon(&format!("{} is off-line: {}", offline.agent, offline.reason), ctx)
+        self.abandon(
+            &format!("{} is off-line: {}", offline.agent, offline.reason),
+            ctx,
+        )
     }
 }
 

@@ -1,0 +1,117 @@
+//! What agents plan with: models, by their names or from files, and the technology over each.
+
+use std::sync::Arc;
+
+use farside_actors::system::{Setup, SetupError};
+use farside_planning::language::{Options, read_model};
+use farside_planning::model::Model;
+
+use super::goals::Goals;
+use crate::agent::Mind;
+use crate::config::{AgentConfig, IdeaScenario, Technology};
+use crate::models;
+use crate::service::PlanService;
+use crate::service::temporal::{Temporal, TemporalOptions};
+
+/// The longest file of a model \[byte\].
+const MAX_MODEL_BYTES: u64 = 1 << 20;
+
+/// Which agent of a row it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// The one that orders goals.
+    Mission,
+    /// One that hands goals on.
+    Between,
+    /// The one that commands the rover.
+    System,
+}
+
+impl Role {
+    /// The scenario's table.
+    pub(crate) fn table(self) -> &'static str {
+        match self {
+            Role::Mission | Role::Between => "mission",
+            Role::System => "system",
+        }
+    }
+
+    /// The timeline on which it is given goals.
+    pub(crate) fn incoming(self) -> &'static str {
+        match self {
+            Role::Mission => "Ground_SV",
+            Role::Between | Role::System => "Goal_SV",
+        }
+    }
+}
+
+/// The models of a scenario.
+pub(crate) struct Minds {
+    system: (Arc<Model>, AgentConfig),
+}
+
+impl Minds {
+    /// Reads the models that a scenario names.
+    pub(crate) fn read(
+        scenario: &IdeaScenario,
+        setup: &mut Setup<'_>,
+    ) -> Result<Minds, SetupError> {
+        let system = model(&scenario.system, "system", "k9-system", setup)?;
+        Ok(Minds {
+            system: (system, scenario.system.clone()),
+        })
+    }
+
+    /// The model of an agent.
+    pub(crate) fn model(&self, _role: Role) -> &Arc<Model> {
+        &self.system.0
+    }
+
+    /// What makes an agent's mind, for each of its lives.
+    pub(crate) fn of(&self, _role: Role, _goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
+        let (model, config) = self.system.clone();
+        Arc::new(move || Mind {
+            service: service(&model, &config),
+            deliberator: None,
+        })
+    }
+}
+
+/// A model that is built in, or a file.
+fn model(
+    config: &AgentConfig,
+    table: &str,
+    usual: &str,
+    setup: &mut Setup<'_>,
+) -> Result<Arc<Model>, SetupError> {
+    let name = config.model.as_deref().unwrap_or(usual);
+    if let Some(model) = models::named(name) {
+        return Ok(model);
+    }
+    let wrong = |message: String| SetupError::value(&format!("{table}.model"), message);
+    if !name.ends_with(".ddl") {
+        let hint = farside::suggest::nearest(name, models::NAMES.into_iter());
+        let hint = farside::suggest::did_you_mean(hint.as_deref());
+        let known = models::NAMES.join(", ");
+        let message = format!("{name:?}: expected {known}, or a file called *.ddl{hint}");
+        return Err(wrong(message));
+    }
+    let bytes = setup.files.read(name, MAX_MODEL_BYTES).map_err(wrong)?;
+    let text = String::from_utf8(bytes.to_vec());
+    let text = text.map_err(|error| wrong(format!("{name}: {error}")))?;
+    let read = read_model(name, &text, &Options::default()).ok();
+    let model = read.map_err(|findings| wrong(findings.to_string()))?;
+    Ok(Arc::new(model))
+}
+
+fn service(model: &Arc<Model>, config: &AgentConfig) -> Box<dyn PlanService> {
+    match config.technology {
+        Technology::Temporal | Technology::Propositional | Technology::Compiled => {
+            let options = TemporalOptions {
+                deletes: config.deletes,
+            };
+            let service = Temporal::new(model.clone(), options);
+            Box::new(service.expect("it was checked"))
+        }
+    }
+}

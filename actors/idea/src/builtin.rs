@@ -1,0 +1,12 @@
+//! The scenarios and studies that come with the system.
+
+use farside_actors::system::Builtin;
+
+/// Sorted by name.
+pub(crate) const SCENARIOS: [Builtin; 1] = [Builtin {
+    name: "idea/k9-alone",
+    text: include_str!("../scenarios/k9-alone.toml"),
+}];
+
+/// Sorted by name.
+pub(crate) const STUDIES: [Builtin; 0] = [];

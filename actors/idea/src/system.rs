@@ -1,0 +1,120 @@
+//! IDEA as scenarios see it: `[world]`, `[rover]`, `[agents]`, `[mission]`, `[system]`, `[deliberation]`,
+//! `[relay]`, `[goals]` and `[[goal]]`.
+
+use std::sync::PoisonError;
+
+use farside::Report;
+use farside_actors::field::{FieldConfig, Place, story};
+use farside_actors::rover::RoverConfig;
+use farside_actors::system::settings::Table;
+use farside_actors::system::{
+    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+};
+use serde::Deserialize;
+
+use crate::assemble::{Minds, Parts, assemble, goals, names};
+use crate::config::{
+    AgentConfig, AgentsConfig, DeliberationConfig, GoalConfig, GoalsConfig, IdeaScenario,
+    RelayConfig,
+};
+use crate::{builtin, metrics};
+
+/// Plan-based executives that control K9 rovers.
+pub struct IdeaSystem;
+
+impl System for IdeaSystem {
+    fn name(&self) -> &str {
+        "idea"
+    }
+
+    fn about(&self) -> &str {
+        "agents that plan within a fixed latency control a K9 rover, which takes images and recovers \
+         from dangerous states"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        [
+            FieldConfig::sections("world"),
+            RoverConfig::sections("rover"),
+            AgentsConfig::sections("agents"),
+            AgentConfig::sections("mission"),
+            AgentConfig::sections("system"),
+            DeliberationConfig::sections("deliberation"),
+            RelayConfig::sections("relay"),
+            GoalsConfig::sections("goals"),
+            GoalConfig::sections("goal"),
+        ]
+        .concat()
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        metrics::all()
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &builtin::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        &builtin::STUDIES
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(IdeaScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for IdeaScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        self.world.check("world")?;
+        story(&self.world)?;
+        self.rover.check("rover")?;
+        let names = names(self);
+        let rovers: Vec<&str> = names.iter().map(|names| names.rover.as_str()).collect();
+        self.rover.check_rovers("rover", &rovers)?;
+        self.agents.check("agents")?;
+        self.mission.check("mission")?;
+        self.system.check("system")?;
+        self.deliberation.check("deliberation")?;
+        self.relay.check("relay")?;
+        self.goals.check("goals")?;
+        for (index, goal) in self.goal.iter().enumerate() {
+            goal.check(&format!("goal.{index}"))?;
+        }
+        goals(self, &names, 0).map(drop)
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        let Some(until) = setup.until else {
+            let message = "missing: agents go on planning, so a run needs an end";
+            return Err(SetupError::value("until", message));
+        };
+        let place = Place::of(&self.world, setup)?;
+        let minds = Minds::read(self, setup)?;
+        let parts = Parts {
+            scenario: self,
+            place: &place,
+            minds,
+            table: None,
+            goals: goals(self, &names(self), setup.problem_seed)?,
+            seed: setup.run_seed,
+            until,
+        };
+        let team = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
+        let assembly = Assembly::new(move |report: &Report| {
+            let mut tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
+            metrics::results(&team.watched, &mut tally, report.end_time)
+        });
+        let faults = self.rover.faults.iter().enumerate();
+        Ok(faults.fold(assembly, |assembly, (index, fault)| {
+            assembly.with_planned(format!("rover.fault.{index}"), fault.at)
+        }))
+    }
+}

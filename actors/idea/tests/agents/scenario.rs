@@ -1,0 +1,164 @@
+//! Scenarios of the whole system, as the command would run them, with what agents said.
+
+use std::sync::{Arc, Mutex};
+
+use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
+use farside::{End, Report, RunInfo};
+use farside_actors::link::{Degrade, LinksConfig};
+use farside_actors::system::{Files, Results, Seeds, Setup, System};
+use farside_actors::units;
+use farside_actors::wiring::LinkBuilder;
+use farside_idea::IdeaSystem;
+use farside_idea::records::{AgentRemark, GoalEnded, TimelineSays};
+
+/// What came of a run.
+pub struct Run {
+    pub results: Results,
+    pub report: Report,
+    pub said: Vec<Said>,
+}
+
+/// Something that an actor recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Said {
+    pub at: SimTime,
+    pub who: String,
+    pub what: What,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum What {
+    Says(TimelineSays),
+    Ended(GoalEnded),
+    Remark(String),
+    /// Any other sample that is no cycle, by its type.
+    Other(String),
+}
+
+struct Listen {
+    run: Option<Arc<RunInfo>>,
+    said: Arc<Mutex<Vec<Said>>>,
+}
+
+impl Observer for Listen {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: true,
+            samples: true,
+            checkpoints: false,
+        }
+    }
+
+    fn begin(&mut self, run: &Arc<RunInfo>) -> Result<(), ObserverError> {
+        self.run = Some(run.clone());
+        Ok(())
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        let (Some(run), Some(kind)) = (&self.run, record.kind) else {
+            return Ok(Flow::Continue);
+        };
+        if record.class != RecordClass::Sample {
+            return Ok(Flow::Continue);
+        }
+        let schema = kind.schema();
+        let what = match kind.name() {
+            "AgentCycle" | "RoverPose" | "RoverResources" => return Ok(Flow::Continue),
+            "TimelineSays" => What::Says(schema.decode(record.body).expect("it is one")),
+            "GoalEnded" => What::Ended(schema.decode(record.body).expect("it is one")),
+            "AgentRemark" => {
+                let remark: AgentRemark = schema.decode(record.body).expect("it is one");
+                What::Remark(remark.text)
+            }
+            other => What::Other(other.to_owned()),
+        };
+        let who = run.name(record.sender).to_owned();
+        let said = Said {
+            at: record.time(),
+            who,
+            what,
+        };
+        self.said.lock().expect("nobody panics").push(said);
+        Ok(Flow::Continue)
+    }
+}
+
+impl Run {
+    /// A scenario with a seed; `plan` adds to it what no key says.
+    pub fn of(text: &str, seed: u64, plan: impl FnOnce(&mut Simulation)) -> Run {
+        let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
+        let take = |table: &mut toml::Table, key: &str| table.remove(key);
+        let links = take(&mut table, "links").unwrap_or_else(|| toml::Table::new().into());
+        let links: LinksConfig = links.try_into().expect("they are links");
+        let degrades =
+            take(&mut table, "degrade").unwrap_or_else(|| Vec::<toml::Value>::new().into());
+        let degrades: Vec<Degrade> = degrades.try_into().expect("they are degradations");
+        let until = take(&mut table, "until").expect("it ends");
+        let until = units::duration::deserialize(until).expect("it is a duration");
+        for key in ["system", "description", "seed"] {
+            take(&mut table, key);
+        }
+        let text = toml::to_string(&table).expect("it was TOML");
+        let sections = toml::Deserializer::parse(&text).expect("it was TOML");
+        let settings = IdeaSystem.parse(sections).expect("these are its keys");
+        settings.check().expect("they are in their ranges");
+        let mut sim = Simulation::new(seed);
+        let mut files = Files::on_disk(".".into());
+        let links = LinkBuilder::new(&links, &degrades).expect("they are right");
+        let seeds = Seeds {
+            run: seed,
+            problem: seed,
+        };
+        let mut setup = Setup::new(seeds, Some(until), &mut sim, &mut files, links);
+        let assembly = settings.assemble(&mut setup).expect("it can be");
+        let remarks = setup.close().expect("all keys match");
+        assert!(remarks.is_empty(), "{remarks:?}");
+        sim.stop_at(SimTime::ZERO + until, "until");
+        plan(&mut sim);
+        let said = Arc::new(Mutex::new(Vec::new()));
+        sim.observe(Listen {
+            run: None,
+            said: said.clone(),
+        });
+        let report = sim.run(Executor::Inline).expect("it runs");
+        assert!(!matches!(report.end, End::Fault(_)), "{:?}", report.end);
+        let results = (assembly.conclude)(&report);
+        let said = std::mem::take(&mut *said.lock().expect("nobody panics"));
+        Run {
+            results,
+            report,
+            said,
+        }
+    }
+
+    /// A figure.
+    pub fn figure(&self, metric: &str) -> f64 {
+        let value = &self.results.metrics[metric];
+        value
+            .as_f64()
+            .unwrap_or_else(|| panic!("{metric} is {value}"))
+    }
+
+    /// What a timeline of an agent said, in order.
+    pub fn of_timeline(&self, who: &str, timeline: &str) -> Vec<(SimTime, String)> {
+        let mine = |said: &Said| match &said.what {
+            What::Says(says) if said.who == who && says.timeline == timeline => {
+                Some((said.at, says.says.clone()))
+            }
+            _ => None,
+        };
+        self.said.iter().filter_map(mine).collect()
+    }
+
+    /// All of it, for people.
+    pub fn print(&self) {
+        for said in &self.said {
+            println!("{} {} {:?}", said.at, said.who, said.what);
+        }
+        for (label, text) in &self.results.summary {
+            println!("{label}: {text}");
+        }
+        println!("{:?} {:?}", self.report.end, self.results.violations);
+    }
+}
