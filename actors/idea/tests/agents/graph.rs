@@ -51,7 +51,9 @@ pub struct Graph {
 pub fn model(node: &Node) -> Arc<Model> {
     let downs: usize = node.hands_on.iter().map(Vec::len).sum();
     let list = |name: &str, count: usize| {
-        (0..count).map(|at| format!(" {name}{at}_SV")).collect::<String>()
+        (0..count)
+            .map(|at| format!(" {name}{at}_SV"))
+            .collect::<String>()
     };
     let (ups, below) = (list("Up", node.hands_on.len()), list("Down", downs));
     let mut text = format!(
@@ -70,7 +72,9 @@ pub fn model(node: &Node) -> Arc<Model> {
     for (up, hands_on) in node.hands_on.iter().enumerate() {
         let each: String = hands_on
             .iter()
-            .map(|down| format!(" (starts (SINGLE ((Agent Down{down}_SV) ((Go (?x -> ?s{down}))))))"))
+            .map(|down| {
+                format!(" (starts (SINGLE ((Agent Down{down}_SV) ((Go (?x -> ?s{down}))))))")
+            })
             .collect();
         let first = hands_on[0];
         let _ = writeln!(
@@ -109,9 +113,14 @@ impl Graph {
 
     /// Declares all of it. `ground` are the incoming registers that somebody else controls: the agent,
     /// its register, and that somebody's name.
-    pub fn declare(&self, sim: &mut Simulation, ground: &[(usize, usize, &str, HostId)]) -> Vec<HostId> {
-        let hosts: Vec<HostId> =
-            (0..self.nodes.len()).map(|at| sim.host(&self.agent_name(at))).collect();
+    pub fn declare(
+        &self,
+        sim: &mut Simulation,
+        ground: &[(usize, usize, &str, HostId)],
+    ) -> Vec<HostId> {
+        let hosts: Vec<HostId> = (0..self.nodes.len())
+            .map(|at| sim.host(&self.agent_name(at)))
+            .collect();
         for (at, node) in self.nodes.iter().enumerate() {
             self.declare_agent(sim, at, node, &hosts, ground);
         }
@@ -128,7 +137,11 @@ impl Graph {
     ) {
         let (name, model) = (self.agent_name(at), model(node));
         let timeline = |name: String| {
-            model.timelines.iter().position(|one| one.name == name).expect("it is declared")
+            model
+                .timelines
+                .iter()
+                .position(|one| one.name == name)
+                .expect("it is declared")
         };
         let mut peers: Vec<String> = Vec::new();
         let mut registers = Vec::new();
@@ -139,7 +152,13 @@ impl Graph {
                 peers.len() - 1
             });
             let lease = SimDuration::ZERO;
-            registers.push(RegisterSetup { name: name.into(), timeline, side, peer, lease });
+            registers.push(RegisterSetup {
+                name: name.into(),
+                timeline,
+                side,
+                peer,
+                lease,
+            });
         };
         let both_ways = |sim: &mut Simulation, b: HostId, other: &str| {
             let a = hosts[at];
@@ -235,7 +254,9 @@ impl Graph {
             let mut leads = self.leads[other].iter();
             leads.any(|to| matches!(to, To::Agent(at, _) if *at == last))
         };
-        let rows = (0..self.nodes.len()).filter(|at| from(*at)).map(|at| self.row_to(at));
+        let rows = (0..self.nodes.len())
+            .filter(|at| from(*at))
+            .map(|at| self.row_to(at));
         let latency = |row: &Vec<usize>| row.iter().map(|at| self.nodes[*at].latency).max();
         let mut row = rows.max_by_key(latency).unwrap_or_default();
         row.push(last);

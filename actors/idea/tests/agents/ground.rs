@@ -40,7 +40,14 @@ impl Ground {
 }
 
 impl Actor for Ground {
-    type Accepts = (RegisterLoad, RegisterStatus, RegisterAck, AgentOffline, NextGoal, Again);
+    type Accepts = (
+        RegisterLoad,
+        RegisterStatus,
+        RegisterAck,
+        AgentOffline,
+        NextGoal,
+        Again,
+    );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         self.pause(ctx);
@@ -77,7 +84,10 @@ impl Handler<RegisterStatus> for Ground {
         if let Heard::News { .. } = self.controlling.status(&status) {
             self.pause(ctx);
         }
-        ctx.send(ctx.recipient::<RegisterAck>(&self.agent)?, Controlling::ack(&status));
+        ctx.send(
+            ctx.recipient::<RegisterAck>(&self.agent)?,
+            Controlling::ack(&status),
+        );
         Ok(())
     }
 }

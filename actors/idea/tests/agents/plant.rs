@@ -41,12 +41,19 @@ pub struct SayAgain {
 impl Plant {
     pub fn new(agent: &str, pace: Pace, backoff: Backoff) -> Self {
         let agent = agent.to_owned();
-        Plant { agent, pace, backoff }
+        Plant {
+            agent,
+            pace,
+            backoff,
+        }
     }
 
     fn register<'a>(&self, ctx: &'a mut Context<'_, Self>, name: &str) -> &'a mut Controlled {
         let new = || Controlled::new(name.into(), self.backoff);
-        ctx.durable::<Registers>().0.entry(name.to_owned()).or_insert_with(new)
+        ctx.durable::<Registers>()
+            .0
+            .entry(name.to_owned())
+            .or_insert_with(new)
     }
 
     fn say(&self, ctx: &mut Context<'_, Self>, status: RegisterStatus) -> Outcome {
@@ -58,7 +65,14 @@ impl Plant {
 }
 
 impl Actor for Plant {
-    type Accepts = (RegisterLoad, RegisterStatus, RegisterAck, AgentOffline, Done, SayAgain);
+    type Accepts = (
+        RegisterLoad,
+        RegisterStatus,
+        RegisterAck,
+        AgentOffline,
+        Done,
+        SayAgain,
+    );
 }
 
 impl Handler<RegisterLoad> for Plant {
@@ -69,7 +83,8 @@ impl Handler<RegisterLoad> for Plant {
         match taken {
             Taken::Yes => {
                 if &*load.procedure == "Go" {
-                    let [least, most] = [self.pace.least, self.pace.most].map(SimDuration::as_nanos);
+                    let [least, most] =
+                        [self.pace.least, self.pace.most].map(SimDuration::as_nanos);
                     let wait_ns = least + ctx.random("pace").below(most - least + 1);
                     let done = Done {
                         register: load.register.to_string(),

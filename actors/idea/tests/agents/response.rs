@@ -32,7 +32,11 @@ struct Watch(Arc<Mutex<Times>>);
 
 impl Observer for Watch {
     fn wants(&self) -> Wants {
-        Wants { bodies: true, samples: false, checkpoints: false }
+        Wants {
+            bodies: true,
+            samples: false,
+            checkpoints: false,
+        }
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
@@ -132,11 +136,14 @@ fn graphs() -> impl Strategy<Value = Graph> {
     (shape, proptest::collection::vec(node(), 4), names, times_ms).prop_map(
         |(shape, nodes, names, (delay_ms, least_ms, more_ms))| {
             let (hands_on, leads) = shape_of(shape);
-            let nodes = nodes.into_iter().zip(hands_on).map(|((latency_ms, load), hands_on)| Node {
-                latency: SimDuration::from_millis(latency_ms),
-                load,
-                hands_on,
-            });
+            let nodes = nodes
+                .into_iter()
+                .zip(hands_on)
+                .map(|((latency_ms, load), hands_on)| Node {
+                    latency: SimDuration::from_millis(latency_ms),
+                    load,
+                    hands_on,
+                });
             Graph {
                 nodes: nodes.collect(),
                 leads,
@@ -158,7 +165,12 @@ fn shape_of(name: &str) -> (Vec<Vec<Vec<usize>>>, Vec<Vec<To>>) {
     match name {
         "chain" => (
             vec![one(), one(), one(), one()],
-            vec![vec![Agent(1, 0)], vec![Agent(2, 0)], vec![Agent(3, 0)], vec![Plant]],
+            vec![
+                vec![Agent(1, 0)],
+                vec![Agent(2, 0)],
+                vec![Agent(3, 0)],
+                vec![Plant],
+            ],
         ),
         "tree" => (
             vec![vec![vec![0, 1, 2]], one(), one(), vec![vec![0, 1]]],
@@ -260,11 +272,18 @@ fn some_answer_takes_nearly_two_latencies() {
         leads: shape_of("chain").1,
         names: vec![String::new(); 4],
         delay: SimDuration::from_millis(137),
-        pace: Pace { least: SimDuration::from_millis(1), most: SimDuration::from_millis(3000) },
+        pace: Pace {
+            least: SimDuration::from_millis(1),
+            most: SimDuration::from_millis(3000),
+        },
     };
     for hands_on in shape_of("chain").0 {
         let (latency, load) = (SimDuration::from_millis(500), 995);
-        graph.nodes.push(Node { latency, load, hands_on });
+        graph.nodes.push(Node {
+            latency,
+            load,
+            hands_on,
+        });
     }
     let mut longest = 0.0;
     for seed in 0..20 {
