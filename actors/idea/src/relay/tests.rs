@@ -1,6 +1,7 @@
 //! Relays with a hardware that is made up: what each procedure becomes and how it ends.
 
 mod random;
+mod rover;
 mod tables;
 
 use farside::SimDuration;
