@@ -8,6 +8,9 @@ use farside_planning::model::Model;
 /// The text of the system agent's model.
 pub const SYSTEM_TEXT: &str = include_str!("../models/k9-system.ddl");
 
+/// The text of its relay's table: see [`RelayTable`](crate::relay::RelayTable).
+pub const RELAY_TEXT: &str = include_str!("../models/k9-relay.toml");
+
 /// The system agent's model.
 pub fn system() -> Arc<Model> {
     static MODEL: OnceLock<Arc<Model>> = OnceLock::new();

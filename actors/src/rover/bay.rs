@@ -21,6 +21,16 @@ const WARMEST: f64 = 14.0 / 24.0;
 
 settings! {
     /// The `[rover.bay]` table: the bay with the electronics, and its fans.
+    ///
+    /// ```
+    /// use farside_actors::rover::RoverConfig;
+    /// let text = "model = 'k9'\nbay = { start = '40degC', fan_power = '8W' }";
+    /// let rover: RoverConfig = toml::from_str(text)?;
+    /// assert_eq!((rover.bay.start_k, rover.bay.fan_power_w), (313.15, 8.0));
+    /// // What is not given is the model's.
+    /// assert_eq!(rover.bay.heat_capacity_j_per_k, 8000.0);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
     pub struct BayModel {
         /// The heat that warms the bay by one kelvin \[J/K\].
         pub heat_capacity_j_per_k: f64 = 25_000.0, in_unit("J/K", 1.0..=1e9);

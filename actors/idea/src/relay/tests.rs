@@ -1,68 +1,16 @@
 //! Relays with a hardware that is made up: what each procedure becomes and how it ends.
 
 mod random;
+mod rover;
 mod tables;
 
 use farside::SimDuration;
 use farside_actors::rover::{Aim, Failure, Obstacle, PoseEstimate, StopCause, View};
-use farside_planning::language::{Options, read_model};
-use farside_planning::model::Model;
 
 use super::*;
+use crate::models::{RELAY_TEXT, system};
 
-/// The parts of the K9's system model that its relay has to do with.
-const MODEL: &str = "
-(Define_Model k9_parts :profile executive)
-(Define_Object_Class Rover
- :state_variables
- ((Executable Location_SV Camera_SV PanTilt_SV Fans_SV)
-  (State Pitch_SV Roll_SV Temperature_SV Power_SV)))
-(Define_Type Decimetres [-1000000 1000000])
-(Define_Type Degrees [-180 180])
-(Define_Type Celsius [-150 150])
-(Define_Type Percent [0 100])
-(Define_Type Missed [0 2])
-(Define_Type Camera (wide_eye hawk_eye haz_front haz_rear))
-(Define_Type Status (ok failed TIMEOUT PREEMPTED))
-(Define_Predicate Still ())
-(Define_Predicate Stop (-> (Status ?status)))
-(Define_Predicate DriveTo ((Decimetres ?x) (Decimetres ?y) -> (Status ?status)))
-(Define_Predicate BackUp ((Decimetres ?distance) -> (Status ?status)))
-(Define_Predicate TurnInPlace ((Degrees ?angle) -> (Status ?status)))
-(Define_Predicate Shut ())
-(Define_Predicate TakeImage ((Camera ?camera) -> (Status ?status)))
-(Define_Predicate Rest ())
-(Define_Predicate Point ((Degrees ?pan) (Degrees ?tilt) -> (Status ?status)))
-(Define_Predicate FansUnchanged ())
-(Define_Predicate DeviceSetFanState ((Boolean ?state_fan) ->))
-(Define_Predicate PitchMeasure
- ((Missed ?missed) ->
-  (Boolean ?pitch_alarm) (Degrees ?pitch) (Boolean ?pitch_rcvd) (Boolean ?pitch_hard)))
-(Define_Predicate RollMeasure
- ((Missed ?missed) ->
-  (Boolean ?roll_alarm) (Degrees ?roll) (Boolean ?roll_rcvd) (Boolean ?roll_hard)))
-(Define_Predicate TempReadCompare
- (-> (Boolean ?state_fan) (Celsius ?temp) (Boolean ?temp_rcvd)))
-(Define_Predicate TempPause ())
-(Define_Predicate PowerMeasure (-> (Boolean ?power_alarm) (Percent ?power) (Boolean ?power_rcvd)))
-(Define_Predicate PowerPause ())
-(Define_Member_Values
- (Rover Location_SV) (Still Stop DriveTo BackUp TurnInPlace) :default (Still ()))
-(Define_Member_Values (Rover Camera_SV) (Shut TakeImage) :default (Shut ()))
-(Define_Member_Values (Rover PanTilt_SV) (Rest Point) :default (Rest ()))
-(Define_Member_Values (Rover Fans_SV) (FansUnchanged DeviceSetFanState)
- :default (FansUnchanged ()))
-(Define_Member_Values (Rover Pitch_SV) (PitchMeasure)
- :default (PitchMeasure (0 -> ?any ?any ?any ?any)))
-(Define_Member_Values (Rover Roll_SV) (RollMeasure)
- :default (RollMeasure (0 -> ?any ?any ?any ?any)))
-(Define_Member_Values (Rover Temperature_SV) (TempReadCompare TempPause)
- :default (TempReadCompare))
-(Define_Member_Values (Rover Power_SV) (PowerMeasure PowerPause) :default (PowerMeasure))
-";
-
-const TABLE: &str = include_str!("../../models/k9-relay.toml");
-
+/// The registers that the K9's system agent has with its relay.
 const REGISTERS: [&str; 8] = [
     "Location_SV",
     "Camera_SV",
@@ -82,13 +30,8 @@ const ROLL: usize = 5;
 const TEMPERATURE: usize = 6;
 const POWER: usize = 7;
 
-fn model() -> Arc<Model> {
-    let read = read_model("k9_parts.ddl", MODEL, &Options::default());
-    Arc::new(read.ok().expect("a model"))
-}
-
 fn table() -> RelayTable {
-    RelayTable::new(TABLE, model(), &REGISTERS).expect("the K9's table")
+    RelayTable::new(RELAY_TEXT, system(), &REGISTERS).expect("the K9's table")
 }
 
 fn number(number: i64) -> RegisterValue {
