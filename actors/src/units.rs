@@ -59,7 +59,8 @@ use quantity::{
 };
 pub use with::{
     acceleration_m_per_s2, angle_rad, data_rate_bit_per_s, data_size_bits, data_size_bytes,
-    duration, energy_j, fraction, length_m, power_w, signed_energy_j, signed_length_m, speed_m_per_s, temperature_k,
+    duration, energy_j, fraction, length_m, power_w, signed_energy_j, signed_length_m,
+    speed_m_per_s, temperature_k,
 };
 
 /// What the module of that name reads, and in which units: `duration`, `length_m`. None if there is

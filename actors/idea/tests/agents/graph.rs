@@ -16,19 +16,19 @@ use crate::plant::{Pace, Plant};
 
 /// An agent of a graph.
 #[derive(Clone, Debug)]
-pub struct Node {
+pub(crate) struct Node {
     /// λ.
-    pub latency: SimDuration,
+    pub(crate) latency: SimDuration,
     /// How much of its latency a cycle takes, in thousandths.
-    pub load: u64,
+    pub(crate) load: u64,
     /// Which of its outgoing registers each incoming one hands its goals on to. The status of a goal
     /// is that of the first of them.
-    pub hands_on: Vec<Vec<usize>>,
+    pub(crate) hands_on: Vec<Vec<usize>>,
 }
 
 /// Where an outgoing register leads.
 #[derive(Clone, Copy, Debug)]
-pub enum To {
+pub(crate) enum To {
     /// To an incoming register of an agent.
     Agent(usize, usize),
     /// To a plant of its own.
@@ -37,18 +37,18 @@ pub enum To {
 
 /// A graph: for each agent, where its outgoing registers lead.
 #[derive(Clone, Debug)]
-pub struct Graph {
-    pub nodes: Vec<Node>,
-    pub leads: Vec<Vec<To>>,
+pub(crate) struct Graph {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) leads: Vec<Vec<To>>,
     /// By agent: what its name begins with.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// The delay of every link.
-    pub delay: SimDuration,
-    pub pace: Pace,
+    pub(crate) delay: SimDuration,
+    pub(crate) pace: Pace,
 }
 
 /// The model of an agent with so many incoming and outgoing registers.
-pub fn model(node: &Node) -> Arc<Model> {
+pub(crate) fn model(node: &Node) -> Arc<Model> {
     let downs: usize = node.hands_on.iter().map(Vec::len).sum();
     let list = |name: &str, count: usize| {
         (0..count)
@@ -102,18 +102,18 @@ pub fn model(node: &Node) -> Arc<Model> {
 }
 
 impl Graph {
-    pub fn agent_name(&self, at: usize) -> String {
+    pub(crate) fn agent_name(&self, at: usize) -> String {
         format!("{}agent_{at}", self.names[at])
     }
 
     /// The name of a register: who controls it, and which of its outgoing ones it is.
-    pub fn register(from: &str, down: usize) -> String {
+    pub(crate) fn register(from: &str, down: usize) -> String {
         format!("{from}.{down}")
     }
 
     /// Declares all of it. `ground` are the incoming registers that somebody else controls: the agent,
     /// its register, and that somebody's name.
-    pub fn declare(
+    pub(crate) fn declare(
         &self,
         sim: &mut Simulation,
         ground: &[(usize, usize, &str, HostId)],
@@ -231,7 +231,7 @@ impl Graph {
     }
 
     /// The name of an agent's incoming register.
-    pub fn controls(&self, at: usize, up: usize) -> String {
+    pub(crate) fn controls(&self, at: usize, up: usize) -> String {
         if (at, up) == (0, 0) {
             return Graph::register("ground", 0);
         }
@@ -240,7 +240,7 @@ impl Graph {
     }
 
     /// The agent whose plant is behind a register; none if there is another agent.
-    pub fn plant_behind(&self, register: &str) -> Option<usize> {
+    pub(crate) fn plant_behind(&self, register: &str) -> Option<usize> {
         (0..self.nodes.len()).find(|&at| {
             let leads = self.leads[at].iter().enumerate();
             let mut plants = leads.filter(|(_, to)| matches!(to, To::Plant));
@@ -249,7 +249,7 @@ impl Graph {
     }
 
     /// The agents from the first one to another, by the longest way.
-    pub fn row_to(&self, last: usize) -> Vec<usize> {
+    pub(crate) fn row_to(&self, last: usize) -> Vec<usize> {
         let from = |other: usize| {
             let mut leads = self.leads[other].iter();
             leads.any(|to| matches!(to, To::Agent(at, _) if *at == last))
@@ -275,7 +275,7 @@ impl Graph {
     }
 }
 
-pub const BACKOFF: Backoff = Backoff {
+pub(crate) const BACKOFF: Backoff = Backoff {
     first: SimDuration::from_secs(10),
     most: SimDuration::from_secs(60),
 };

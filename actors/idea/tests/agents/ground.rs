@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::graph::BACKOFF;
 
-pub struct Ground {
+pub(crate) struct Ground {
     agent: String,
     controlling: Controlling,
     goals: i64,
@@ -17,13 +17,13 @@ pub struct Ground {
 }
 
 #[derive(Serialize, Deserialize)]
-pub struct NextGoal;
+pub(crate) struct NextGoal;
 
 #[derive(Serialize, Deserialize)]
-pub struct Again;
+pub(crate) struct Again;
 
 impl Ground {
-    pub fn new(register: &str, agent: &str, goals: i64, most_pause: SimDuration) -> Self {
+    pub(crate) fn new(register: &str, agent: &str, goals: i64, most_pause: SimDuration) -> Self {
         Ground {
             agent: agent.to_owned(),
             controlling: Controlling::new(register.into(), 1, BACKOFF),

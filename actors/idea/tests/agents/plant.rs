@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 
 /// How long a procedure takes at least and at most.
 #[derive(Clone, Copy, Debug)]
-pub struct Pace {
-    pub least: SimDuration,
-    pub most: SimDuration,
+pub(crate) struct Pace {
+    pub(crate) least: SimDuration,
+    pub(crate) most: SimDuration,
 }
 
-pub struct Plant {
+pub(crate) struct Plant {
     agent: String,
     pace: Pace,
     backoff: Backoff,
@@ -27,19 +27,19 @@ pub struct Plant {
 struct Registers(BTreeMap<String, Controlled>);
 
 #[derive(Serialize, Deserialize)]
-pub struct Done {
+pub(crate) struct Done {
     register: String,
     epoch: u32,
     number: u32,
 }
 
 #[derive(Serialize, Deserialize)]
-pub struct SayAgain {
+pub(crate) struct SayAgain {
     register: String,
 }
 
 impl Plant {
-    pub fn new(agent: &str, pace: Pace, backoff: Backoff) -> Self {
+    pub(crate) fn new(agent: &str, pace: Pace, backoff: Backoff) -> Self {
         let agent = agent.to_owned();
         Plant {
             agent,

@@ -6,6 +6,7 @@ use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{End, Report, RunInfo};
 use farside_actors::link::{Degrade, LinksConfig};
+use farside_actors::rover::{CommandEnd, CommandReport};
 use farside_actors::system::{Files, Results, Seeds, Setup, System};
 use farside_actors::units;
 use farside_actors::wiring::LinkBuilder;
@@ -13,22 +14,22 @@ use farside_idea::IdeaSystem;
 use farside_idea::records::{AgentRemark, GoalEnded, TimelineSays};
 
 /// What came of a run.
-pub struct Run {
-    pub results: Results,
-    pub report: Report,
-    pub said: Vec<Said>,
+pub(crate) struct Run {
+    pub(crate) results: Results,
+    pub(crate) report: Report,
+    pub(crate) said: Vec<Said>,
 }
 
 /// Something that an actor recorded.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Said {
-    pub at: SimTime,
-    pub who: String,
-    pub what: What,
+pub(crate) struct Said {
+    pub(crate) at: SimTime,
+    pub(crate) who: String,
+    pub(crate) what: What,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum What {
+pub(crate) enum What {
     Says(TimelineSays),
     Ended(GoalEnded),
     Remark(String),
@@ -59,10 +60,11 @@ impl Observer for Listen {
         let (Some(run), Some(kind)) = (&self.run, record.kind) else {
             return Ok(Flow::Continue);
         };
-        if record.class != RecordClass::Sample {
+        let schema = kind.schema();
+        let is_report = kind.name() == "CommandReport" && record.class == RecordClass::Delivered;
+        if record.class != RecordClass::Sample && !is_report {
             return Ok(Flow::Continue);
         }
-        let schema = kind.schema();
         let what = match kind.name() {
             "AgentCycle" | "RoverPose" | "RoverResources" => return Ok(Flow::Continue),
             "TimelineSays" => What::Says(schema.decode(record.body).expect("it is one")),
@@ -70,6 +72,13 @@ impl Observer for Listen {
             "AgentRemark" => {
                 let remark: AgentRemark = schema.decode(record.body).expect("it is one");
                 What::Remark(remark.text)
+            }
+            "CommandReport" => {
+                let report: CommandReport = schema.decode(record.body).expect("it is one");
+                match report.end {
+                    CommandEnd::Done => return Ok(Flow::Continue),
+                    end => What::Remark(format!("{:?}: {end:?}", report.part)),
+                }
             }
             other => What::Other(other.to_owned()),
         };
@@ -86,7 +95,7 @@ impl Observer for Listen {
 
 impl Run {
     /// A scenario with a seed; `plan` adds to it what no key says.
-    pub fn of(text: &str, seed: u64, plan: impl FnOnce(&mut Simulation)) -> Run {
+    pub(crate) fn of(text: &str, seed: u64, plan: impl FnOnce(&mut Simulation)) -> Run {
         let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
         let take = |table: &mut toml::Table, key: &str| table.remove(key);
         let links = take(&mut table, "links").unwrap_or_else(|| toml::Table::new().into());
@@ -133,7 +142,7 @@ impl Run {
     }
 
     /// A figure.
-    pub fn figure(&self, metric: &str) -> f64 {
+    pub(crate) fn figure(&self, metric: &str) -> f64 {
         let value = &self.results.metrics[metric];
         value
             .as_f64()
@@ -141,7 +150,7 @@ impl Run {
     }
 
     /// What a timeline of an agent said, in order.
-    pub fn of_timeline(&self, who: &str, timeline: &str) -> Vec<(SimTime, String)> {
+    pub(crate) fn of_timeline(&self, who: &str, timeline: &str) -> Vec<(SimTime, String)> {
         let mine = |said: &Said| match &said.what {
             What::Says(says) if said.who == who && says.timeline == timeline => {
                 Some((said.at, says.says.clone()))
@@ -152,7 +161,7 @@ impl Run {
     }
 
     /// All of it, for people.
-    pub fn print(&self) {
+    pub(crate) fn print(&self) {
         for said in &self.said {
             println!("{} {} {:?}", said.at, said.who, said.what);
         }
