@@ -8,6 +8,11 @@
 //! [`cancel`](PlanService::cancel), then [`solve`](PlanService::solve), then
 //! [`forget`](PlanService::forget).
 
+mod check;
+pub mod temporal;
+#[cfg(test)]
+mod tests;
+
 use std::sync::Arc;
 
 use farside_planning::Ticks;

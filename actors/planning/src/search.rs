@@ -24,7 +24,7 @@ mod tests;
 
 use crate::Ticks;
 use crate::database::{Conflict, Database, InstanceId, Open, Slot, TokenId};
-use crate::model::{End, ResourceId, TimelineId, Value};
+use crate::model::{End, ResourceId, RuleId, TimelineId, Value};
 use crate::profile::Bound;
 
 pub use both::Both;
@@ -178,6 +178,8 @@ pub struct Failure {
     pub conflicts: Vec<Conflict>,
     /// Who asks for what is missing, if a rule does.
     pub instance: Option<InstanceId>,
+    /// The rule that asks for it, which is known after what asked was undone, too.
+    pub rule: Option<RuleId>,
 }
 
 /// What a search did.

@@ -190,6 +190,11 @@ impl Database {
         &self.flats[rule].relations[relation as usize]
     }
 
+    /// The relations of a rule, in the order of the text.
+    pub fn relations(&self, rule: RuleId) -> &[Relation] {
+        &self.flats[rule].relations
+    }
+
     /// Where a relation of a rule stands.
     pub fn position_of(&self, rule: RuleId, relation: u32) -> Position {
         self.flats[rule].relations[relation as usize].position

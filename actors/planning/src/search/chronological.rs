@@ -132,13 +132,18 @@ fn go_on<S: Strategy>(
         let depth = stack.frames.len();
         if fresh && (deepest.failure.is_none() || depth > deepest.depth) {
             deepest.depth = depth;
-            deepest.failure = stack.frames.last().map(|frame| Failure {
-                flaw: frame.flaw,
-                conflicts: std::mem::take(&mut conflicts),
-                instance: match frame.flaw {
+            deepest.failure = stack.frames.last().map(|frame| {
+                let instance = match frame.flaw {
                     Flaw::Open(open) => Some(open.instance),
                     _ => None,
-                },
+                };
+                let asks = instance.and_then(|at| database.instance(at));
+                Failure {
+                    flaw: frame.flaw,
+                    conflicts: std::mem::take(&mut conflicts),
+                    instance,
+                    rule: asks.map(|at| at.rule),
+                }
             });
         }
         fresh = false;

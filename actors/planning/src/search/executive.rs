@@ -10,8 +10,10 @@
 //!
 //! [`Relation::condition`]: crate::model::Relation::condition
 
+mod ahead;
 mod endings;
 mod now;
+mod posted;
 #[cfg(test)]
 mod tests;
 
@@ -26,8 +28,10 @@ use crate::database::{Cause, Conflict, Database, Owner, Slot, Time, TokenId, Wan
 use crate::model::{End, Fact, Model, PredicateId, Problem, TimelineId, Value};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
+pub use ahead::Following;
 use endings::{close, is_closed, make_room};
 use now::Now;
+use posted::Posted;
 
 /// A plan that is extended one latency ahead.
 ///
@@ -45,6 +49,8 @@ pub struct Executive {
     now: Now,
     stack: Stack,
     begun: bool,
+    goals: Vec<Posted>,
+    cancels: Vec<TokenId>,
     /// Whether the past is deleted after each cycle.
     pub forgets: bool,
 }
@@ -58,6 +64,8 @@ impl Executive {
             now,
             stack: Stack::default(),
             begun: false,
+            goals: Vec::new(),
+            cancels: Vec::new(),
             forgets: true,
         }
     }
@@ -150,16 +158,16 @@ impl Executive {
         })
     }
 
-    /// A status came back for a token: outputs have values now, and the token ends as soon as it
-    /// may, if the status ends it.
+    /// A status came back for a token: outputs have values now, those that are given, and the token
+    /// ends as soon as it may, if the status ends it.
     ///
     /// # Errors
     ///
     /// If an output cannot have the value, or the token not end: nothing changes.
-    pub fn report(
+    pub fn report<O: Copy + Into<Option<Value>>>(
         &mut self,
         token: TokenId,
-        outputs: &[Value],
+        outputs: &[O],
         ends: bool,
         tick: Ticks,
     ) -> Result<(), Conflict> {
@@ -168,7 +176,18 @@ impl Executive {
                 return Ok(());
             };
             let inputs = database.model().predicates[at.predicate].inputs;
-            database.learn(token, inputs, outputs)?;
+            let mut known: SmallVec<[Value; 4]> = SmallVec::new();
+            for (place, &output) in (inputs..).zip(outputs) {
+                match output.into() {
+                    Some(value) => known.push(value),
+                    None => {
+                        database.learn(token, place - known.len(), &known)?;
+                        known.clear();
+                    }
+                }
+            }
+            let end = inputs + outputs.len();
+            database.learn(token, end - known.len(), &known)?;
             if ends {
                 let earliest = database.finish(token).min.max(tick);
                 database.end(token, earliest)?;
@@ -185,10 +204,14 @@ impl Executive {
         if self.begun {
             self.expire();
         }
+        self.now.ahead.begin();
+        self.take_posted();
         let verdict = chronological(&mut self.database, &mut self.now, &mut self.stack, budget);
         if matches!(verdict, Verdict::Solved) {
             self.begun = true;
             self.database.commit();
+            self.now.ahead.decided(&self.database, tick);
+            self.posted_is_done();
             if self.forgets {
                 self.database.forget(tick);
             }
@@ -196,6 +219,11 @@ impl Executive {
             self.database.pop();
         }
         verdict
+    }
+
+    /// Deletes what ended before a tick or at it, but for the present tokens and those before them.
+    pub fn forget(&mut self, before: Ticks) {
+        self.database.forget(before);
     }
 
     /// Tokens whose time is over have ended, and no status came for them.

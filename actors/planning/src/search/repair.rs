@@ -427,13 +427,16 @@ impl Work {
             self.counters.backtracks += 1;
             return Progress::Repaired;
         }
+        let instance = match flaw {
+            Flaw::Open(open) => Some(open.instance),
+            _ => None,
+        };
+        let asks = instance.and_then(|at| self.schedule.database.instance(at));
         self.failure = Some(Failure {
             flaw,
             conflicts: refusals,
-            instance: match flaw {
-                Flaw::Open(open) => Some(open.instance),
-                _ => None,
-            },
+            instance,
+            rule: asks.map(|at| at.rule),
         });
         Progress::Stuck
     }

@@ -2,10 +2,12 @@
 
 use smallvec::SmallVec;
 
+use super::ahead::Ahead;
 use super::endings::{Endings, close, make_room};
 use crate::Ticks;
 use crate::database::{
-    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Step, Time, Token, TokenId, Wanted,
+    Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Status, Step, Time, Token, TokenId,
+    Wanted,
 };
 use crate::model::{End, Model, PredicateId, Target, TimelineId, TimelineKind};
 use crate::parameters::Operand;
@@ -24,6 +26,10 @@ pub(super) struct Now {
     pub(super) endings: Vec<Endings>,
     /// Alternatives whose leading condition did not hold.
     pub(super) guards: u64,
+    /// Goals of this cycle, each with how early it comes and its timeline.
+    pub(super) goals: SmallVec<[(u32, TokenId, TimelineId); 2]>,
+    /// What was planned ahead.
+    pub(super) ahead: Ahead,
 }
 
 /// By timeline: by place of a predicate: how early its subgoals come, as the model's search control
@@ -32,7 +38,8 @@ fn subgoal_order(model: &Model) -> Vec<Vec<u32>> {
     let subgoals = &model.control.subgoals;
     let early = |timeline: TimelineId, predicate: PredicateId| {
         let named = subgoals.iter().position(|&at| at == (timeline, predicate));
-        named.unwrap_or(subgoals.len()) as u32
+        // Between those that are named and those that are not come goals.
+        named.unwrap_or(subgoals.len() + 1) as u32
     };
     let timelines = model.timelines.iter().enumerate();
     timelines
@@ -43,6 +50,14 @@ fn subgoal_order(model: &Model) -> Vec<Vec<u32>> {
                 .collect()
         })
         .collect()
+}
+
+/// How early a goal is put on its timeline: as search control says, or else after all that it names
+/// and before all that it does not.
+pub(super) fn goal_order(model: &Model, timeline: TimelineId, predicate: PredicateId) -> u32 {
+    let subgoals = &model.control.subgoals;
+    let named = subgoals.iter().position(|&at| at == (timeline, predicate));
+    2 * named.unwrap_or(subgoals.len()) as u32 + 1
 }
 
 impl Now {
@@ -57,6 +72,8 @@ impl Now {
             order: subgoal_order(model),
             endings: predicates.map(|at| Endings::of(model, at)).collect(),
             guards: 0,
+            goals: SmallVec::new(),
+            ahead: Ahead::of(model),
         }
     }
 
@@ -107,11 +124,7 @@ impl Now {
     fn gap(&self, database: &Database) -> Option<Flaw> {
         for &timeline in &self.states {
             let after = database.last(timeline);
-            let over = match after {
-                Some(last) => database.finish(last).max <= self.tick,
-                None => true,
-            };
-            if over {
+            if after.is_none_or(|last| is_over(database, last, self.tick)) {
                 return Some(Flaw::Gap { timeline, after });
             }
         }
@@ -186,17 +199,38 @@ impl Strategy for Now {
                 first = Some((early, open));
             }
         }
-        match first {
-            Some((_, open)) => Some(Flaw::Open(open)),
-            None => self.gap(database),
+        let goal = self.goals.iter().filter(|&&(_, token, _)| {
+            let at = database.token(token);
+            at.is_some_and(|at| at.status == Status::Free)
+        });
+        if let Some(&(early, token, _)) = goal.min_by_key(|goal| goal.0)
+            && first.is_none_or(|(best, _)| early < best)
+        {
+            return Some(Flaw::Goal(token));
         }
+        if let Some((_, open)) = first {
+            return Some(Flaw::Open(open));
+        }
+        self.gap(database)
+            .or_else(|| self.ahead.waiting(database, self.tick))
     }
 
     fn decisions(&mut self, database: &mut Database, flaw: Flaw, into: &mut Vec<Decision>) {
         let open = match flaw {
             Flaw::Open(open) => open,
             Flaw::Gap { timeline, after } => {
+                if let Some(step) = self.ahead.next(database, timeline, self.tick) {
+                    into.push(Decision::Alternative(step));
+                }
                 into.push(Decision::Insert(Slot { timeline, after }));
+                return;
+            }
+            Flaw::Goal(token) => {
+                let goal = self.goals.iter().find(|goal| goal.1 == token);
+                into.extend(goal.map(|&(_, _, timeline)| {
+                    let after = database.last(timeline);
+                    Decision::Insert(Slot { timeline, after })
+                }));
                 return;
             }
             _ => return,
@@ -268,11 +302,35 @@ impl Strategy for Now {
                 }
                 _ => unreachable!("the decision is one for the flaw"),
             },
-            (Flaw::Gap { .. }, Decision::Insert(slot)) => {
+            (Flaw::Goal(token), Decision::Insert(slot)) => database.attempt(|database| {
+                let after = make_room(database, &self.endings, slot.timeline, self.tick)?;
+                database.activate(token, Slot { after, ..slot })
+            }),
+            (Flaw::Gap { timeline, after }, Decision::Alternative(step)) => {
+                let slot = Slot { timeline, after };
+                if let Some(after) = after
+                    && is_over(database, after, self.tick)
+                    && close(database, &self.endings, after, self.tick)?
+                {
+                    return Ok(());
+                }
+                let after = make_room(database, &self.endings, timeline, self.tick)?;
+                let slot = Slot { after, ..slot };
+                self.ahead.start(database, slot, step, self.tick)
+            }
+            (Flaw::Gap { timeline, after }, Decision::Insert(slot)) => {
+                if after.is_some_and(|after| !is_over(database, after, self.tick)) {
+                    self.ahead.decline(database, timeline);
+                    return Ok(());
+                }
                 fill(database, &self.endings, slot, self.tick)
             }
             _ => unreachable!("the decision is one for the flaw"),
         }
+    }
+
+    fn undone(&mut self, database: &Database) {
+        self.ahead.undone(database);
     }
 
     fn is_guard(&self, database: &Database, before: Flaw, failed: Flaw) -> bool {
@@ -289,6 +347,11 @@ impl Strategy for Now {
             _ => false,
         }
     }
+}
+
+/// Whether a token has ended by a tick.
+fn is_over(database: &Database, token: TokenId, tick: Ticks) -> bool {
+    database.finish(token).max <= tick
 }
 
 /// A timeline says its default from now on, or what it says first.
