@@ -1,6 +1,9 @@
 //! The K9's models: proved, driven at random, and case by case.
 
+mod alarms;
+mod goals;
 mod random;
+mod rover;
 
 use farside_planning::language::{Options, format, read_model};
 
