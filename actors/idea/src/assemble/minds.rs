@@ -47,6 +47,8 @@ impl Role {
 
 /// The models of a scenario.
 pub(crate) struct Minds {
+    mission: (Arc<Model>, AgentConfig),
+    between: (Arc<Model>, AgentConfig),
     system: (Arc<Model>, AgentConfig),
 }
 
@@ -56,20 +58,31 @@ impl Minds {
         scenario: &IdeaScenario,
         setup: &mut Setup<'_>,
     ) -> Result<Minds, SetupError> {
+        let mission = model(&scenario.mission, "mission", "k9-mission", setup)?;
         let system = model(&scenario.system, "system", "k9-system", setup)?;
         Ok(Minds {
+            mission: (mission, scenario.mission.clone()),
+            between: (models::forward().clone(), scenario.mission.clone()),
             system: (system, scenario.system.clone()),
         })
     }
 
+    fn mind(&self, role: Role) -> &(Arc<Model>, AgentConfig) {
+        match role {
+            Role::Mission => &self.mission,
+            Role::Between => &self.between,
+            Role::System => &self.system,
+        }
+    }
+
     /// The model of an agent.
-    pub(crate) fn model(&self, _role: Role) -> &Arc<Model> {
-        &self.system.0
+    pub(crate) fn model(&self, role: Role) -> &Arc<Model> {
+        &self.mind(role).0
     }
 
     /// What makes an agent's mind, for each of its lives.
-    pub(crate) fn of(&self, _role: Role, _goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
-        let (model, config) = self.system.clone();
+    pub(crate) fn of(&self, role: Role, _goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
+        let (model, config) = self.mind(role).clone();
         Arc::new(move || Mind {
             service: service(&model, &config),
             deliberator: None,

@@ -31,7 +31,7 @@ const TEMPERATURE: usize = 6;
 const POWER: usize = 7;
 
 fn table() -> RelayTable {
-    RelayTable::new(RELAY_TEXT, system(), &REGISTERS).expect("the K9's table")
+    RelayTable::new(RELAY_TEXT, system().model.clone(), &REGISTERS).expect("the K9's table")
 }
 
 fn number(number: i64) -> RegisterValue {

@@ -5,7 +5,7 @@ use farside_actors::rover::RoverConfig;
 use super::*;
 
 fn refused(text: &str) -> String {
-    let error = RelayTable::new(text, system(), &[]).unwrap_err();
+    let error = RelayTable::new(text, system().model.clone(), &[]).unwrap_err();
     error.to_string()
 }
 
@@ -115,10 +115,10 @@ fn mistakes_in_tables_are_named() {
 
 #[test]
 fn a_table_covers_its_registers_and_a_rover_has_what_it_names() {
-    let error = RelayTable::new("procedure = {}", system(), &["Fans_SV"]).unwrap_err();
+    let error = RelayTable::new("procedure = {}", system().model.clone(), &["Fans_SV"]).unwrap_err();
     let expected = "Fans_SV can say FansUnchanged, and no entry of the relay's table does";
     assert_eq!(error.to_string(), expected);
-    let error = RelayTable::new(RELAY_TEXT, system(), &["Fan_SV"]).unwrap_err();
+    let error = RelayTable::new(RELAY_TEXT, system().model.clone(), &["Fan_SV"]).unwrap_err();
     let expected = "\"Fan_SV\" is no timeline of the model; did you mean \"Fans_SV\"?";
     assert_eq!(error.to_string(), expected);
     let k9 = RoverConfig::named("k9").unwrap();
@@ -130,7 +130,7 @@ fn a_table_covers_its_registers_and_a_rover_has_what_it_names() {
         "{error}"
     );
     let text = "[procedure.Stop]\ncommand = 'stop'\nwith = { part = 'wide_eyes' }";
-    let table = RelayTable::new(text, system(), &[]).unwrap();
+    let table = RelayTable::new(text, system().model.clone(), &[]).unwrap();
     let error = table.check_rover(&k9).unwrap_err().to_string();
     assert!(error.ends_with("did you mean \"wide_eye\"?"), "{error}");
 }
