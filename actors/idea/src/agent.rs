@@ -15,7 +15,7 @@ use farside_actors::processor::{Processor, ProcessorChange};
 use serde::{Deserialize, Serialize};
 
 use crate::deliberator::Deliberator;
-use crate::records::{AgentCycle, AgentFaulty, AgentRemark};
+use crate::records::{AgentCycle, AgentFaulty, AgentRemark, GoalGivenUp};
 use crate::register::{AgentOffline, Controlled, RegisterAck, RegisterLoad, RegisterStatus};
 use crate::runner::{
     Arrival, Cycle, Out, RegisterSetup, Runner, RunnerError, RunnerSettings, Verdict,
@@ -127,7 +127,7 @@ impl Agent {
         } = (self.setup.mind)();
         let (settings, registers) = (self.setup.runner, &self.setup.registers);
         let runner = Runner::new(settings, service, registers, epoch, now)?;
-        self.saying = Saying::new(runner.model());
+        self.saying = Saying::new(runner.model(), &self.setup.registers);
         self.runner = Some(match deliberator {
             Some(deliberator) => runner.with_deliberator(deliberator),
             None => runner,
@@ -252,6 +252,10 @@ impl Agent {
         let tick = cycle.tick;
         for text in cycle.faults.drain(..).chain(cycle.remarks.drain(..)) {
             ctx.sample(&AgentRemark { tick, text });
+        }
+        for given_up in cycle.given_up.drain(..) {
+            let (goal, reason) = (given_up.goal, given_up.reason);
+            ctx.sample(&GoalGivenUp { goal, reason });
         }
         if let Verdict::NoPlan(why) = cycle.verdict {
             return self.go_offline(tick, format!("the model allows nothing: {why}"), ctx);

@@ -44,6 +44,9 @@ pub(crate) const COMMANDED: [&str; 8] = [
     "Power_SV",
 ];
 
+/// Those of them that say polls.
+const POLLED: [&str; 4] = ["Pitch_SV", "Roll_SV", "Temperature_SV", "Power_SV"];
+
 /// Between rovers at the start \[m\].
 const APART_M: f64 = 6.0;
 
@@ -186,6 +189,7 @@ impl Parts<'_> {
             side: Side::Controlled,
             peer: 0,
             lease: config.lease,
+            is_polled: false,
         }];
         let outgoing: &[&str] = match role {
             Role::System => &COMMANDED,
@@ -202,6 +206,7 @@ impl Parts<'_> {
                 side: Side::Controlling,
                 peer: 1,
                 lease: config.lease,
+                is_polled: POLLED.contains(name),
             });
         }
         Ok((registers, vec![above, below]))

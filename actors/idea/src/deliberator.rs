@@ -17,6 +17,17 @@ pub trait Deliberator: Send {
     /// A token of any timeline has ended.
     fn ended(&mut self, token: &Ended);
 
+    /// The goals that it has given up since it was last asked.
+    fn gives_up(&mut self) -> Vec<GivenUp> {
+        Vec::new()
+    }
+
+    /// The timeline whose plan is not to go on, since something was taken back: a cancel wins over a
+    /// plan, also over one in the making.
+    fn drops(&mut self) -> Option<TimelineId> {
+        None
+    }
+
     /// A token of its own timeline has begun: what comes of the work that it asks for; nothing if it
     /// asks for none. The work is thought to be done later, in the time that cycles leave.
     fn work(&mut self, token: &Started, snapshot: &Snapshot) -> Option<Work>;
@@ -36,4 +47,13 @@ pub struct Work {
     pub reads: Vec<TimelineId>,
     /// What people may want to know: which goals are left out, and why.
     pub remarks: Vec<String>,
+}
+
+/// A goal that is not tried any more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GivenUp {
+    /// Its number.
+    pub goal: Value,
+    /// Why.
+    pub reason: String,
 }

@@ -26,6 +26,8 @@ farside_actors::documented! {
         pub goals_achieved: u32,
         /// Goals that were done once more after they had been done.
         pub goals_repeated: u32,
+        /// Goals that a mission agent gave up.
+        pub goals_given_up: u32,
         /// Whether all goals were achieved.
         pub complete: bool,
         /// When the last goal was achieved \[s\].
@@ -112,6 +114,7 @@ fn figures(watched: &Watched, tally: &mut Tally, end: SimTime) -> IdeaMetrics {
         goals_total,
         goals_achieved,
         goals_repeated: tally.done.values().map(|times| times - 1).sum(),
+        goals_given_up: tally.given_up,
         complete: goals_achieved == goals_total,
         achieved_after_s: tally.last_done.map(|at| at.as_secs_f64()),
         alarms: sum(|one| one.alarms.into()) as u32,

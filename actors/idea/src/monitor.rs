@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{RunInfo, SimDuration, SimTime};
 
-use crate::records::{AgentCycle, AgentFaulty, GoalEnded, TimelineSays};
+use crate::records::{AgentCycle, AgentFaulty, GoalEnded, GoalGivenUp, TimelineSays};
 pub(crate) use driving::Driving;
 pub(crate) use load::{Bin, Cause, Load};
 
@@ -61,6 +61,8 @@ pub(crate) struct Tally {
     pub(crate) driving: Vec<Driving>,
     /// Goals that a system agent reported as done, and how often.
     pub(crate) done: BTreeMap<String, u32>,
+    /// Goals that were given up.
+    pub(crate) given_up: u32,
     /// When the last of them was done for the first time.
     pub(crate) last_done: Option<SimTime>,
 }
@@ -160,6 +162,11 @@ impl Monitor {
                 let says: TimelineSays = kind.schema().decode(record.body)?;
                 tally.agents[at].hear(&says, record.time());
             }
+            "GoalGivenUp" => {
+                let _: GoalGivenUp = kind.schema().decode(record.body)?;
+                tally.given_up += 1;
+                return Ok(self.end(&tally));
+            }
             "GoalEnded" => {
                 let ended: GoalEnded = kind.schema().decode(record.body)?;
                 return Ok(self.goal(&mut tally, at, &ended, record.time()));
@@ -184,10 +191,19 @@ impl Monitor {
         if *times == 1 {
             tally.last_done = Some(now);
         }
-        match self.watched.ends && tally.done.len() == self.watched.goals {
-            true => Flow::Stop("all goals are achieved".to_owned()),
-            false => Flow::Continue,
+        self.end(tally)
+    }
+
+    /// Ends the run when all goals are settled.
+    fn end(&self, tally: &Tally) -> Flow {
+        let given_up = tally.given_up as usize;
+        if !self.watched.ends || tally.done.len() + given_up < self.watched.goals {
+            return Flow::Continue;
         }
+        Flow::Stop(match given_up {
+            0 => "all goals are achieved".to_owned(),
+            _ => format!("all goals are achieved but {given_up}, which were given up"),
+        })
     }
 
     fn rover(&self, at: usize, record: &Record<'_>) {
@@ -223,6 +239,7 @@ impl AgentTally {
             "MotionMonitor_SV" if says.says == "Nominal" && at > SimTime::ZERO => {
                 self.recoveries += 1;
             }
+            "MotionMonitor_SV" => self.load.cause(Cause::Alarm, at),
             "Location_SV" if says.says.starts_with("DriveTo") => {
                 self.load.cause(Cause::Expanded, at);
             }

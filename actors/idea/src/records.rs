@@ -52,6 +52,15 @@ pub struct GoalEnded {
     pub outputs: Vec<String>,
 }
 
+/// An agent does not try a goal any more.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GoalGivenUp {
+    /// Its number.
+    pub goal: i64,
+    /// Why.
+    pub reason: String,
+}
+
 /// An agent is faulty: it takes no part any more.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AgentFaulty {

@@ -23,7 +23,7 @@ use farside_planning::Ticks;
 use farside_planning::model::{Model, TimelineId};
 use thiserror::Error;
 
-use crate::deliberator::Deliberator;
+use crate::deliberator::{Deliberator, GivenUp};
 use crate::register::{
     AgentOffline, Backoff, Controlled, RegisterAck, RegisterLoad, RegisterStatus,
 };
@@ -73,6 +73,9 @@ pub struct RegisterSetup {
     pub peer: usize,
     /// After so long without a word from the other side its contract is faulted; with 0, never.
     pub lease: SimDuration,
+    /// Whether it says nothing but polls, again and again: then what it says is not recorded beside
+    /// the statuses.
+    pub is_polled: bool,
 }
 
 /// Why an agent cannot be.
@@ -180,6 +183,8 @@ pub struct Cycle {
     pub ended: Vec<Ended>,
     /// Contracts of others that have ended: which register, and how.
     pub answered: Vec<(Arc<str>, Ended)>,
+    /// Goals that deliberation has given up.
+    pub given_up: Vec<GivenUp>,
     /// What deliberation has to say to people.
     pub remarks: Vec<String>,
 }
@@ -463,6 +468,7 @@ impl Cycle {
             begun: Vec::new(),
             ended: Vec::new(),
             answered: Vec::new(),
+            given_up: Vec::new(),
             remarks: Vec::new(),
         }
     }

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use farside::prelude::*;
-use farside_planning::model::{Model, PredicateId, Value};
+use farside_planning::model::{Model, PredicateId, TimelineId, Value};
 use smallvec::SmallVec;
 
 use super::Agent;
 use crate::records::{GoalEnded, TimelineSays};
-use crate::runner::Cycle;
+use crate::runner::{Cycle, RegisterSetup};
 use crate::wording;
 
 /// What each timeline said last.
@@ -18,6 +18,8 @@ pub(super) struct Saying {
     model: Option<Arc<Model>>,
     /// By timeline: the predicate and its inputs.
     last: Vec<Option<Said>>,
+    /// Timelines of polls, of which statuses tell all.
+    quiet: Vec<TimelineId>,
 }
 
 #[derive(PartialEq)]
@@ -27,8 +29,10 @@ struct Said {
 }
 
 impl Saying {
-    pub(super) fn new(model: &Arc<Model>) -> Self {
+    pub(super) fn new(model: &Arc<Model>, registers: &[RegisterSetup]) -> Self {
+        let quiet = registers.iter().filter(|register| register.is_polled);
         Saying {
+            quiet: quiet.map(|register| register.timeline).collect(),
             last: model.timelines.iter().map(|_| None).collect(),
             model: Some(model.clone()),
         }
@@ -48,6 +52,9 @@ impl Saying {
         }
         for token in &cycle.begun {
             let timeline = usize::from(token.contract.timeline);
+            if self.quiet.contains(&timeline) {
+                continue;
+            }
             let inputs = model.predicates[token.predicate].inputs;
             let said = Said {
                 predicate: token.predicate,

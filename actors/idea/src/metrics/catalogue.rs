@@ -13,7 +13,7 @@ const TIME: SeriesIndex = SeriesIndex {
 };
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 24] = [
+pub(crate) const ALL: [Metric; 25] = [
     Metric::new("aborted_cycles", "aborted cycles", "", Number, Lower),
     Metric::new("achieved_after_s", "time until the last goal is achieved", "s", Number, Lower),
     Metric::new("alarms", "alarms", "", Number, Neither),
@@ -33,6 +33,7 @@ pub(crate) const ALL: [Metric; 24] = [
     Metric::new("driving_without_lease_s", "driving without a lease", "s", Number, Lower),
     Metric::new("faulty_agents", "faulty agents", "", Number, Lower),
     Metric::new("goals_achieved", "goals achieved", "", Number, Higher),
+    Metric::new("goals_given_up", "goals given up", "", Number, Lower),
     Metric::new("goals_repeated", "goals done more than once", "", Number, Lower),
     Metric::new("goals_total", "goals", "", Number, Neither),
     Metric::new("max_cycle_lambda", "longest cycle, in latencies", "", Number, Lower),
