@@ -35,6 +35,10 @@ pub const LIGHT: &str = include_str!("../models/k9-light.ddl");
 /// The text of the mission agent's model.
 pub const MISSION: &str = include_str!("../models/k9-mission.ddl");
 
+/// The text of the model with which goals are ordered. It includes `places.ddl`, which is made for each
+/// problem.
+pub const ORDERING: &str = include_str!("../models/k9-ordering.ddl");
+
 /// The system agent's model.
 pub fn system() -> &'static System {
     static SYSTEM_MODEL: LazyLock<System> =
