@@ -262,7 +262,7 @@ pub(crate) fn assemble(
     let mut watched = Watched {
         agents: Vec::new(),
         rovers: Vec::new(),
-        goals: parts.goals.iter().map(|goals| goals.orders.len()).sum(),
+        goals: parts.goals.iter().map(|goals| goals.wanted).sum(),
         ends: parts.scenario.agents.stop_when_done,
         bin: bin(parts),
     };

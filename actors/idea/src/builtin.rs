@@ -3,10 +3,16 @@
 use farside_actors::system::Builtin;
 
 /// Sorted by name.
-pub(crate) const SCENARIOS: [Builtin; 1] = [Builtin {
-    name: "idea/k9-alone",
-    text: include_str!("../scenarios/k9-alone.toml"),
-}];
+pub(crate) const SCENARIOS: [Builtin; 2] = [
+    Builtin {
+        name: "idea/k9",
+        text: include_str!("../scenarios/k9.toml"),
+    },
+    Builtin {
+        name: "idea/k9-alone",
+        text: include_str!("../scenarios/k9-alone.toml"),
+    },
+];
 
 /// Sorted by name.
 pub(crate) const STUDIES: [Builtin; 0] = [];

@@ -92,7 +92,16 @@ settings! {
         /// After so many attempts a goal is given up.
         pub attempts: u32 = 3, 1..=1000;
         /// How many operations it may take each time.
-        pub budget: u64 = 1_000_000, 1..=1_000_000_000_000;
+        pub budget: u64 = 20_000_000, 1..=1_000_000_000_000;
+        /// Up to so many goals the best order is proven; beyond, it is the best that repair finds.
+        pub few: u32 = 6, 0..=12;
+        /// How fast it thinks the rover drives.
+        pub speed_m_per_s as "speed": f64 [with = "units::speed_m_per_s"] = 0.1,
+            in_unit("m/s", 1e-3..=10.0);
+        /// What it thinks a drive takes, as a share of the battery for each metre.
+        pub drive_per_m: f64 = 0.0016, in_unit("of the battery a metre", 0.0..=1.0);
+        /// How much of the battery it thinks has to stay.
+        pub reserve: f64 [with = "units::fraction"] = 0.2;
     }
 }
 
@@ -136,6 +145,9 @@ settings! {
         pub camera: String = "wide_eye".to_owned(), one_of(&CAMERAS);
         /// When the ground sends it.
         pub at: SimDuration [with = "units::duration"];
+        /// When the ground takes it back, if it does; only where a mission agent orders goals.
+        pub recalled: Option<SimDuration>
+            [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
         /// What it is worth beside others, where not all can be done; 0: it must be done.
         pub weight: u32 = 0, 0..=1_000_000;
     }

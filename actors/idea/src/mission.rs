@@ -9,7 +9,7 @@ use farside_planning::model::{TimelineId, Value};
 
 use crate::deliberate::{Begin, Settings, Target, deliberate};
 use crate::deliberator::{Deliberator, GivenUp, Work};
-use crate::models::{self, Mission};
+use crate::models::Mission;
 use crate::service::{Ended, Snapshot, Started};
 
 /// A goal that the ground has asked for.
@@ -22,7 +22,7 @@ struct Wanted {
 
 /// What orders a mission agent's goals.
 pub struct MissionPlanner {
-    mission: &'static Mission,
+    mission: Mission,
     settings: Settings,
     /// After so many attempts a goal is given up.
     attempts: u32,
@@ -41,9 +41,9 @@ const BATTERY: Value = 90_000;
 
 impl MissionPlanner {
     /// A planner that knows no goal, for a rover that starts at a place \[dm\].
-    pub fn new(settings: Settings, attempts: u32, at_dm: [Value; 2]) -> Self {
+    pub fn new(mission: Mission, settings: Settings, attempts: u32, at_dm: [Value; 2]) -> Self {
         MissionPlanner {
-            mission: models::mission(),
+            mission,
             settings,
             attempts,
             wanted: Vec::new(),
@@ -68,7 +68,11 @@ impl MissionPlanner {
             camera,
             weight: u32::try_from(weight).ok().filter(|weight| *weight > 0),
         };
-        match self.wanted.iter_mut().find(|one| one.target.number == number) {
+        match self
+            .wanted
+            .iter_mut()
+            .find(|one| one.target.number == number)
+        {
             Some(known) => known.target = target,
             None => self.wanted.push(Wanted {
                 target,
@@ -92,8 +96,8 @@ impl MissionPlanner {
 
     /// A goal has ended with a status.
     fn goal_ended(&mut self, inputs: &[Value], status: Option<Value>) {
-        let (most, statuses) = (self.attempts, &self.mission.statuses);
-        let (ok, preempted) = (statuses.ok, statuses.preempted);
+        let most = self.attempts;
+        let (ok, preempted) = (self.mission.statuses.ok, self.mission.statuses.preempted);
         let symbols = &self.mission.model.symbols;
         let name = status.and_then(|at| symbols.get(usize::try_from(at).ok()?));
         let name = name.cloned().unwrap_or_else(|| "nothing".to_owned());
@@ -109,7 +113,10 @@ impl MissionPlanner {
             if goal.attempts >= most {
                 goal.is_settled = true;
                 let reason = format!("{most} attempts, the last ended with {name}");
-                self.given_up.push(GivenUp { goal: number, reason });
+                self.given_up.push(GivenUp {
+                    goal: number,
+                    reason,
+                });
             }
         }
     }
@@ -117,7 +124,11 @@ impl MissionPlanner {
 
 /// The values of a token's inputs.
 fn inputs(parameters: &[Option<Value>], count: usize) -> Vec<Value> {
-    parameters.iter().take(count).map_while(|value| *value).collect()
+    parameters
+        .iter()
+        .take(count)
+        .map_while(|value| *value)
+        .collect()
 }
 
 impl Deliberator for MissionPlanner {
@@ -180,7 +191,7 @@ impl Deliberator for MissionPlanner {
             battery: BATTERY,
         };
         let statuses = &self.mission.planned;
-        match deliberate(self.mission, &left, &begin, h0, &self.settings) {
+        match deliberate(&self.mission, &left, &begin, h0, &self.settings) {
             Ok(found) => {
                 let remarks = found.ordering.left_out.iter().map(|out| {
                     let number = left[out.target].number;

@@ -24,7 +24,7 @@ use farside_planning::language::{Options, read_model};
 use farside_planning::model::Model;
 
 pub use handles::{
-    Mission, MissionPredicates, MissionTimelines, Statuses, System, SystemPredicates,
+    Mission, MissionPredicates, MissionTimelines, Planned, Statuses, System, SystemPredicates,
     SystemTimelines,
 };
 
@@ -40,6 +40,10 @@ pub const FORWARD: &str = include_str!("../models/k9-forward.ddl");
 
 /// The text of the system agent's relay's table: see [`RelayTable`](crate::relay::RelayTable).
 pub const RELAY_TEXT: &str = include_str!("../models/k9-relay.toml");
+
+/// The text of the model with which goals are ordered. It includes `places.ddl`, which is made for each
+/// problem.
+pub const ORDERING: &str = include_str!("../models/k9-ordering.ddl");
 
 /// The system agent's model.
 pub fn system() -> &'static System {
@@ -64,8 +68,7 @@ pub fn mission() -> &'static Mission {
 
 /// What an agent between the mission agent and the system agent knows: it hands goals on.
 pub fn forward() -> &'static Arc<Model> {
-    static FORWARD_MODEL: LazyLock<Arc<Model>> =
-        LazyLock::new(|| read("k9-forward.ddl", FORWARD));
+    static FORWARD_MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| read("k9-forward.ddl", FORWARD));
     &FORWARD_MODEL
 }
 

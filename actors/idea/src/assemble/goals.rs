@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use farside::Pattern;
-use farside::SimDuration;
 use farside::random::RandomKey;
 use farside_actors::system::SetupError;
 
@@ -15,9 +14,13 @@ use crate::register::RegisterValue;
 /// The goals of a rover.
 #[derive(Clone, Debug)]
 pub(crate) struct Goals {
+    /// How many are wanted until the end.
+    pub(crate) wanted: usize,
     pub(crate) orders: Vec<Order>,
     /// What the ground says when it wants nothing.
     pub(crate) nothing: Arc<str>,
+    /// Where the rover starts \[dm\].
+    pub(crate) start_dm: [i64; 2],
 }
 
 /// The goals of all rovers.
@@ -31,6 +34,14 @@ pub(crate) fn goals(
 ) -> Result<Vec<Goals>, SetupError> {
     let mut of_rover: Vec<Vec<GoalConfig>> = vec![Vec::new(); names.len()];
     for (index, goal) in scenario.goal.iter().enumerate() {
+        if goal.recalled.is_some() && scenario.agents.layers == 1 {
+            let message = "the system agent alone takes goals one after the other, and cannot be asked to \
+                           forget one: expected agents.layers above 1";
+            return Err(SetupError::value(
+                &format!("goal.{index}.recalled"),
+                message,
+            ));
+        }
         let wrong = |message: String| SetupError::value(&format!("goal.{index}.rover"), message);
         let pattern = Pattern::over_names(&goal.rover).map_err(|error| wrong(error.to_string()))?;
         let mut is_somebodys = false;
@@ -79,29 +90,45 @@ fn by_chance(scenario: &IdeaScenario, problem_seed: u64, rover: u32) -> Vec<Goal
     each.collect()
 }
 
-/// Goals as the first agent's model has them.
+/// Goals as the first agent's model has them. What is to be sent first comes first; of what is sent at
+/// one time, what the scenario has first.
 fn in_words(scenario: &IdeaScenario, rover: u32, goals: Vec<GoalConfig>) -> Goals {
+    let is_ordered = scenario.agents.layers > 1;
     let from = start(rover, scenario.agents.rovers);
-    let mut latest = SimDuration::ZERO;
-    let orders = goals.iter().map(|goal| {
-        latest = latest.max(goal.at);
-        let number = |value: f64| RegisterValue::Number(libm::round(value) as i64);
-        let east_dm = 10.0 * (from.east_m + goal.east_m);
-        let north_dm = 10.0 * (from.north_m + goal.north_m);
-        Order {
-            at: latest,
-            procedure: "ImageAt".into(),
-            inputs: vec![
-                number(east_dm),
-                number(north_dm),
-                number(goal.pan_rad.to_degrees()),
-                number(goal.tilt_rad.to_degrees()),
-                RegisterValue::Symbol(goal.camera.as_str().into()),
-            ],
+    let number = |value: f64| RegisterValue::Number(libm::round(value) as i64);
+    let mut orders = Vec::new();
+    for (index, goal) in (1..).zip(&goals) {
+        let mut image = vec![
+            number(10.0 * (from.east_m + goal.east_m)),
+            number(10.0 * (from.north_m + goal.north_m)),
+            number(goal.pan_rad.to_degrees()),
+            number(goal.tilt_rad.to_degrees()),
+            RegisterValue::Symbol(goal.camera.as_str().into()),
+        ];
+        if is_ordered {
+            image.insert(0, RegisterValue::Number(index));
         }
-    });
+        if let Some(at) = goal.recalled.filter(|_| is_ordered) {
+            orders.push(Order {
+                at,
+                procedure: "Recall".into(),
+                inputs: image.clone(),
+            });
+        }
+        if is_ordered {
+            image.push(RegisterValue::Number(goal.weight.into()));
+        }
+        orders.push(Order {
+            at: goal.at,
+            procedure: if is_ordered { "Request" } else { "ImageAt" }.into(),
+            inputs: image,
+        });
+    }
+    orders.sort_by_key(|order| order.at);
     Goals {
-        orders: orders.collect(),
-        nothing: "NoGoal".into(),
+        wanted: goals.iter().filter(|goal| goal.recalled.is_none()).count(),
+        orders,
+        nothing: if is_ordered { "Quiet" } else { "NoGoal" }.into(),
+        start_dm: [from.east_m, from.north_m].map(|m| libm::round(10.0 * m) as i64),
     }
 }

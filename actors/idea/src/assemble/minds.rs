@@ -2,14 +2,18 @@
 
 use std::sync::Arc;
 
+use farside::SimDuration;
 use farside_actors::system::{Setup, SetupError};
 use farside_planning::language::{Options, read_model};
 use farside_planning::model::Model;
 
 use super::goals::Goals;
 use crate::agent::Mind;
-use crate::config::{AgentConfig, IdeaScenario, Technology};
-use crate::models;
+use crate::config::{AgentConfig, DeliberationConfig, IdeaScenario, Technology};
+use crate::deliberate::Settings;
+use crate::deliberator::Deliberator;
+use crate::mission::MissionPlanner;
+use crate::models::{self, Mission};
 use crate::service::PlanService;
 use crate::service::temporal::{Temporal, TemporalOptions};
 
@@ -50,6 +54,7 @@ pub(crate) struct Minds {
     mission: (Arc<Model>, AgentConfig),
     between: (Arc<Model>, AgentConfig),
     system: (Arc<Model>, AgentConfig),
+    deliberation: DeliberationConfig,
 }
 
 impl Minds {
@@ -64,6 +69,7 @@ impl Minds {
             mission: (mission, scenario.mission.clone()),
             between: (models::forward().clone(), scenario.mission.clone()),
             system: (system, scenario.system.clone()),
+            deliberation: scenario.deliberation.clone(),
         })
     }
 
@@ -81,12 +87,37 @@ impl Minds {
     }
 
     /// What makes an agent's mind, for each of its lives.
-    pub(crate) fn of(&self, role: Role, _goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
+    pub(crate) fn of(&self, role: Role, goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
         let (model, config) = self.mind(role).clone();
-        Arc::new(move || Mind {
-            service: service(&model, &config),
-            deliberator: None,
+        let deliberation = self.deliberation.clone();
+        let (latency, start_dm) = (config.latency, goals.start_dm);
+        let mission = (role == Role::Mission).then(|| Mission::of(model.clone()));
+        Arc::new(move || {
+            let planner = mission.clone().map(|mission| -> Box<dyn Deliberator> {
+                let settings = settings(&deliberation, latency);
+                let attempts = deliberation.attempts;
+                Box::new(MissionPlanner::new(mission, settings, attempts, start_dm))
+            });
+            Mind {
+                service: service(&model, &config),
+                deliberator: planner,
+            }
         })
+    }
+}
+
+/// How goals are ordered.
+fn settings(config: &DeliberationConfig, latency: SimDuration) -> Settings {
+    let usual = Settings::default();
+    let ticks_per_m = 1.0 / (config.speed_m_per_s * latency.as_secs_f64());
+    let ticks_per_m = libm::ceil(ticks_per_m).max(1.0);
+    Settings {
+        ticks_per_m: ticks_per_m as i64,
+        drive_energy: libm::round(100_000.0 * config.drive_per_m / ticks_per_m) as i64,
+        reserve: libm::round(100_000.0 * config.reserve) as i64,
+        few: config.few as usize,
+        operations: config.budget,
+        ..usual
     }
 }
 

@@ -156,6 +156,8 @@ places! {
         quiet = "Quiet",
         /// `Request (goal x y pan tilt camera weight -> status)`.
         request = "Request",
+        /// `Recall (goal x y pan tilt camera -> status)`.
+        recall = "Recall",
         /// `Resting ()`.
         resting = "Resting",
         /// `Planning (h0 h1 problem -> status plan)` \[ticks\].
@@ -164,6 +166,18 @@ places! {
         no_goal = "NoGoal",
         /// `ImageAt (x y pan tilt camera -> status)` \[dm, dm, degrees, degrees\].
         image_at = "ImageAt",
+    }
+}
+
+places! {
+    /// The symbols with which deliberation ends.
+    Planned: Value, symbol {
+        /// A plan was taken.
+        planned = "planned",
+        /// There is nothing to plan, or nothing can be.
+        nothing_to_do = "nothing_to_do",
+        /// What the plan relied on had changed.
+        stale = "STALE",
     }
 }
 
@@ -207,6 +221,8 @@ pub struct Mission {
     pub predicates: MissionPredicates,
     /// How goals end.
     pub statuses: Statuses,
+    /// How deliberation ends.
+    pub planned: Planned,
 }
 
 impl Mission {
@@ -220,6 +236,7 @@ impl Mission {
             timelines: MissionTimelines::of(&model),
             predicates: MissionPredicates::of(&model),
             statuses: Statuses::of(&model),
+            planned: Planned::of(&model),
             model,
         }
     }

@@ -158,6 +158,7 @@ impl Graph {
                 side,
                 peer,
                 lease,
+                is_polled: false,
             });
         };
         let both_ways = |sim: &mut Simulation, b: HostId, other: &str| {

@@ -2,6 +2,7 @@
 
 mod alone;
 mod graph;
+mod mission;
 mod ground;
 mod plant;
 mod response;

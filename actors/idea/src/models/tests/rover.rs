@@ -4,6 +4,9 @@ use super::*;
 use crate::service::{Outcome, PlanService, Present};
 use farside_planning::model::{TimelineId, Value};
 
+/// No case takes longer.
+const MOST_TICKS: i64 = 5_000;
+
 /// The system agent's planner, and what its polls are answered.
 pub(super) struct Rover {
     pub(super) service: Temporal,
@@ -37,6 +40,7 @@ impl Rover {
 
     pub(super) fn cycle(&mut self) {
         self.tick += 1;
+        assert!(self.tick < MOST_TICKS, "it does not come to an end");
         self.service.advance(self.tick);
         let at = self.system.timelines;
         let polls = [

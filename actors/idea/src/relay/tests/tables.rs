@@ -115,7 +115,8 @@ fn mistakes_in_tables_are_named() {
 
 #[test]
 fn a_table_covers_its_registers_and_a_rover_has_what_it_names() {
-    let error = RelayTable::new("procedure = {}", system().model.clone(), &["Fans_SV"]).unwrap_err();
+    let error =
+        RelayTable::new("procedure = {}", system().model.clone(), &["Fans_SV"]).unwrap_err();
     let expected = "Fans_SV can say FansUnchanged, and no entry of the relay's table does";
     assert_eq!(error.to_string(), expected);
     let error = RelayTable::new(RELAY_TEXT, system().model.clone(), &["Fan_SV"]).unwrap_err();
