@@ -4,7 +4,7 @@
 //!
 //! Goals are ordered with the model `k9-ordering.ddl`: what is best has all goals that must be done, if
 //! the horizon and the battery allow that, else as many of them as can be; then the most weight; then
-//! then it has most goals and ends soonest. For few goals that is proven: of each selection the shortest
+//! the most goals; then the soonest end. For few goals that is proven: of each selection the shortest
 //! drives are known, and the complete planner plans the best one. Beyond, it is what the planner by
 //! repair finds. Both are bounded by operations and give the same for the same input.
 //!

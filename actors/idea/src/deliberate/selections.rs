@@ -97,11 +97,14 @@ impl Shortest {
 
 /// Whether the horizon and the battery allow a selection whose drives take so long.
 fn is_allowed(bits: usize, drives: Ticks, begin: &Begin, settings: &Settings) -> bool {
+    if bits == 0 {
+        return true;
+    }
     let images = Ticks::from(bits.count_ones());
     // The rover is a tick at least where it begins.
     let ends = 1 + drives + images * settings.image_ticks;
     let takes = settings.drive_energy * drives + settings.image_energy * images;
-    bits == 0 || (ends <= settings.horizon && begin.battery - takes >= settings.reserve)
+    ends <= settings.horizon && begin.battery - takes >= settings.reserve
 }
 
 /// The best order. Time and energy both follow the drives, so that of each selection only the shortest
