@@ -104,7 +104,13 @@ impl Runner {
             })
         });
         let stale = stale.or_else(|| {
-            let plan = work.plan?;
+            let mut plan = work.plan?;
+            // When a plan begins is a lower bound: if all that it relies on is still the case, it may
+            // begin later than it was thought to, since deliberation took longer.
+            let soonest = self.service.now() + 2;
+            for step in &mut plan.steps {
+                step.not_before = step.not_before.max(soonest);
+            }
             let refused = self.service.commit(&snapshot, plan).err()?;
             Some(refused.to_string())
         });

@@ -2,8 +2,8 @@
 
 mod alone;
 mod graph;
-mod mission;
 mod ground;
+mod mission;
 mod plant;
 mod response;
 mod scenario;

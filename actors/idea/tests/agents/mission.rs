@@ -15,5 +15,9 @@ fn all_goals_are_achieved_in_the_order_that_deliberation_finds() {
     assert!(run.figure("max_response_lambda") < 2.0);
     assert_eq!(run.figure("faulty_agents"), 0.0);
     assert_eq!(run.figure("goals_repeated"), 0.0);
-    assert!(run.results.violations.is_empty(), "{:?}", run.results.violations);
+    assert!(
+        run.results.violations.is_empty(),
+        "{:?}",
+        run.results.violations
+    );
 }
