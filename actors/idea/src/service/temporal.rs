@@ -229,7 +229,7 @@ impl Temporal {
 }
 
 /// Whether each timeline says exactly one thing at any time, and can be named by a contract.
-fn check_timelines(model: &Model) -> Result<(), Unfit> {
+pub(super) fn check_timelines(model: &Model) -> Result<(), Unfit> {
     let expected = usize::from(u16::MAX) + 1;
     let actual = model.timelines.len();
     if actual > expected {
@@ -278,13 +278,7 @@ impl PlanService for Temporal {
         let mut parameters: Parameters = inputs.iter().copied().map(Some).collect();
         check::values(&self.model, predicate, "inputs", &parameters)?;
         if self.executive.has_goal(timeline) {
-            return Err(Refusal::Rule {
-                what: self.model.predicates[predicate].name.clone(),
-                reason: format!(
-                    "{} has a goal from this cycle already",
-                    self.model.timelines[timeline].name
-                ),
-            });
+            return Err(check::two_goals(&self.model, timeline, predicate));
         }
         parameters.resize(self.model.predicates[predicate].parameters.len(), None);
         let requested = self
@@ -298,10 +292,7 @@ impl PlanService for Temporal {
         let predicate = self.predicate(token);
         let earliest = self.executive.database().finish(token).min;
         if earliest > self.now {
-            return Err(Refusal::Rule {
-                what: self.model.predicates[predicate].name.clone(),
-                reason: format!("it lasts until tick {earliest} at least"),
-            });
+            return Err(check::lasts(&self.model, predicate, earliest));
         }
         let cancelled = self.executive.cancel(token, self.now);
         cancelled.map_err(|conflict| self.refusal(predicate, &conflict))

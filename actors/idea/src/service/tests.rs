@@ -7,6 +7,7 @@ mod refusals;
 use farside_planning::language::{Options, read_model};
 use farside_planning::model::{Model, TimelineId, Value};
 
+use super::propositional::Propositional;
 use super::temporal::{Temporal, TemporalOptions};
 use super::*;
 
@@ -38,6 +39,11 @@ fn agents(text: &str) -> Vec<Agent> {
             service: Box::new(service),
         });
     }
+    let service = Propositional::new(model).expect("the model fits");
+    agents.push(Agent {
+        name: "propositional",
+        service: Box::new(service),
+    });
     for agent in &mut agents {
         agent.cycle(0);
     }

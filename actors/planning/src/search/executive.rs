@@ -28,7 +28,7 @@ use crate::database::{Cause, Conflict, Database, Owner, Slot, Time, TokenId, Wan
 use crate::model::{End, Fact, Model, PredicateId, Problem, TimelineId, Value};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
-pub use ahead::Following;
+pub use ahead::{Branch, Following};
 use endings::{close, is_closed, make_room};
 use now::Now;
 use posted::Posted;
