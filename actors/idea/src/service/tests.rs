@@ -1,7 +1,9 @@
 //! What every planning technology must do, asked of each of them.
 
 mod cycles;
+mod equal;
 mod plans;
+mod random;
 mod refusals;
 
 use farside_planning::language::{Options, read_model};
