@@ -9,6 +9,7 @@
 //! [`forget`](PlanService::forget).
 
 mod check;
+pub mod compiled;
 pub mod propositional;
 pub mod temporal;
 #[cfg(test)]

@@ -10,9 +10,9 @@
 //! model needs no backtracking.
 
 mod compact;
-mod rules;
-mod search;
-mod state;
+pub(super) mod rules;
+pub(super) mod search;
+pub(super) mod state;
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use thiserror::Error;
 pub use rules::Numeric;
 use rules::{Endings, Flat};
 use search::{Decision, Decisions, Failure, Flaw, Followed, Goal, Place, World};
-use state::{Clash, State, Token, What};
+use state::{Clash, Origin, State, Token, What};
 
 use super::temporal::Unfit;
 use super::words;
@@ -55,9 +55,9 @@ pub enum NotPropositional {
 
 /// A model, as this technology reads it.
 #[derive(Debug)]
-struct Tables {
-    model: Arc<Model>,
-    flats: Vec<Flat>,
+pub(super) struct Tables {
+    pub(super) model: Arc<Model>,
+    pub(super) flats: Vec<Flat>,
     endings: Vec<Endings>,
     /// By rule: by relation: how early its subgoal comes.
     early: Vec<Vec<u32>>,
@@ -84,7 +84,7 @@ impl Tables {
     }
 
     /// Whether a relationship holds of known values.
-    fn holds(&self, kind: RelationshipKind, values: &[Value]) -> bool {
+    pub(super) fn holds(&self, kind: RelationshipKind, values: &[Value]) -> bool {
         match kind {
             RelationshipKind::Equal => values.windows(2).all(|pair| pair[0] == pair[1]),
             RelationshipKind::Different => values[0] != values[1],
@@ -154,14 +154,16 @@ impl Tables {
 /// ```
 #[derive(Clone)]
 pub struct Propositional {
-    tables: Arc<Tables>,
-    world: World,
-    now: Ticks,
-    begun: bool,
+    pub(super) tables: Arc<Tables>,
+    pub(super) world: World,
+    pub(super) now: Ticks,
+    pub(super) begun: bool,
     /// By timeline: whether a status ended its token, though it may have to go on for a while.
-    ends: Vec<bool>,
-    goals: Vec<Goal>,
-    cancels: Vec<TimelineId>,
+    pub(super) ends: Vec<bool>,
+    pub(super) goals: Vec<Goal>,
+    /// How many statuses, goals and cancels were posted since the last cycle that was decided.
+    pub(super) posted: u16,
+    pub(super) cancels: Vec<TimelineId>,
     started: Vec<Started>,
     ended: Vec<Ended>,
     counters: ServiceCounters,
@@ -206,6 +208,7 @@ impl Propositional {
             begun: false,
             ends: vec![false; timelines],
             goals: Vec::new(),
+            posted: 0,
             cancels: Vec::new(),
             started: Vec::new(),
             ended: Vec::new(),
@@ -229,6 +232,23 @@ impl Propositional {
             put.map_err(|clash| wrong(&service.reason(clash)))?;
         }
         Ok(service)
+    }
+
+    /// Without what a copy does not need.
+    pub(super) fn shrink(&mut self) {
+        (self.started, self.ended) = (Vec::new(), Vec::new());
+        (self.goals, self.cancels) = (Vec::new(), Vec::new());
+    }
+
+    /// How large it is, about.
+    pub(super) fn bytes(&self) -> usize {
+        let state = &self.world.state;
+        size_of::<Propositional>()
+            + state.cells.capacity() * size_of::<state::Known>()
+            + state.finishes.capacity() * size_of::<state::Bounds>()
+            + state.tokens.capacity() * size_of::<state::At>()
+            + state.lanes.capacity() * size_of::<state::Lane>()
+            + state.open.capacity() * size_of::<state::Open>()
     }
 
     fn active(&self, contract: Contract) -> Result<Token, Refusal> {
@@ -260,9 +280,10 @@ impl Propositional {
     /// Whether an edit can be; it is not done.
     fn try_out(&mut self, edit: impl FnOnce(&mut World) -> Result<(), Clash>) -> Result<(), Clash> {
         let mut world = self.world.clone();
-        edit(&mut world)?;
-        let outcome = world.state.settle(&self.tables);
+        let edited = edit(&mut world);
+        let outcome = edited.and_then(|()| world.state.settle(&self.tables));
         self.world.state.operations = world.state.operations;
+        self.world.state.loose.set(world.state.loose.get());
         outcome
     }
 
@@ -285,7 +306,9 @@ impl Propositional {
                 let closed = world.close(tables, last, tick);
                 if closed.and_then(|_| world.state.settle(tables)).is_err() {
                     // If its status cannot say so, it ends without.
+                    let loose = world.state.loose.get();
                     world = before;
+                    world.state.loose.set(loose);
                     let (finish, (_, max)) =
                         (world.state.at(last).finish, world.state.finish(last));
                     let ended = world.state.within(finish, max, max, None);
@@ -302,7 +325,9 @@ impl Propositional {
                 let before = world.clone();
                 let closed = world.close(tables, last, tick);
                 if closed.and_then(|_| world.state.settle(tables)).is_err() {
+                    let loose = world.state.loose.get();
                     world = before;
+                    world.state.loose.set(loose);
                 }
             }
         }
@@ -360,7 +385,9 @@ impl Propositional {
             }
             if let Some(before) = frame.before.as_ref().filter(|_| !first) {
                 let operations = world.state.operations;
+                let loose = world.state.loose.get();
                 *world = before.clone();
+                world.state.loose.set(loose);
                 world.state.operations = operations + world.state.tokens.len() as u64;
             }
             first = false;
@@ -510,6 +537,7 @@ impl PlanService for Propositional {
 
     fn advance(&mut self, now: Ticks) {
         self.now = now.max(self.now);
+        self.world.state.tick = self.now;
     }
 
     fn bind(
@@ -526,9 +554,11 @@ impl PlanService for Propositional {
         let bound = (|| {
             let at = world.state.at(token);
             let (cells, finish) = (at.parameters.clone(), at.finish);
-            for (&cell, &value) in cells[inputs..].iter().zip(outputs) {
+            for (place, (&cell, &value)) in { cells[inputs..].iter() }.zip(outputs).enumerate() {
                 if let Some(value) = value {
-                    world.state.bind(&self.tables, cell, value, None)?;
+                    let origin = Origin::Posted(self.posted, place as u16);
+                    let from = (value, origin);
+                    world.state.bind_from(&self.tables, cell, from, None)?;
                 }
             }
             world.state.settle(&self.tables)?;
@@ -541,6 +571,7 @@ impl PlanService for Propositional {
         })();
         bound.map_err(|clash| self.refusal(predicate, clash))?;
         self.world = world;
+        self.posted += 1;
         self.ends[usize::from(contract.timeline)] |= ends;
         Ok(())
     }
@@ -562,6 +593,7 @@ impl PlanService for Propositional {
             predicate,
             inputs: inputs.iter().copied().collect(),
             early: check::goal_order(self.model(), timeline, predicate),
+            posted: self.posted,
         };
         let (tables, tick) = (self.tables.clone(), self.now);
         let tried = self.try_out(|world| {
@@ -570,6 +602,7 @@ impl PlanService for Propositional {
         });
         tried.map_err(|clash| self.refusal(predicate, clash))?;
         self.goals.push(goal);
+        self.posted += 1;
         Ok(())
     }
 
@@ -584,6 +617,7 @@ impl PlanService for Propositional {
         let tried = self.try_out(|world| world.close(&tables, token, tick).map(|_| ()));
         tried.map_err(|clash| self.refusal(predicate, clash))?;
         self.cancels.push(usize::from(contract.timeline));
+        self.posted += 1;
         Ok(())
     }
 
@@ -597,10 +631,11 @@ impl PlanService for Propositional {
             Ok(()) => {
                 self.follow_timelines(&mut world);
                 self.begun = true;
+                self.posted = 0;
                 let posted = self.goals.drain(..).map(|goal| goal.timeline);
                 let posted: Vec<TimelineId> = posted.chain(self.cancels.drain(..)).collect();
                 world.plans_go_on(self.now, &posted);
-                world.compact();
+                world.compact(2);
                 self.world = world;
                 Outcome::Decided
             }

@@ -9,6 +9,7 @@ mod refusals;
 use farside_planning::language::{Options, read_model};
 use farside_planning::model::{Model, TimelineId, Value};
 
+use super::compiled::Compiled;
 use super::propositional::Propositional;
 use super::temporal::{Temporal, TemporalOptions};
 use super::*;
@@ -41,9 +42,14 @@ fn agents(text: &str) -> Vec<Agent> {
             service: Box::new(service),
         });
     }
-    let service = Propositional::new(model).expect("the model fits");
+    let service = Propositional::new(model.clone()).expect("the model fits");
     agents.push(Agent {
         name: "propositional",
+        service: Box::new(service),
+    });
+    let service = Compiled::new(model).expect("the model fits");
+    agents.push(Agent {
+        name: "compiled",
         service: Box::new(service),
     });
     for agent in &mut agents {

@@ -14,11 +14,15 @@ struct Places {
 }
 
 impl World {
-    /// Drops what does not count any more, and gives the rest new places.
-    pub(super) fn compact(&mut self) {
+    /// Drops what does not count any more, and gives the rest new places: of each timeline the last
+    /// tokens, as many as count.
+    pub(in crate::service) fn compact(&mut self, known: usize) {
         let old = std::mem::take(&mut self.state);
         let mut new = State {
             operations: old.operations,
+            tick: old.tick,
+            exact: old.exact,
+            loose: old.loose.clone(),
             ..State::default()
         };
         let mut places = Places {
@@ -28,7 +32,7 @@ impl World {
         };
         let mut kept: Vec<Token> = Vec::with_capacity(2 * old.lanes.len());
         for lane in &old.lanes {
-            let first = lane.tokens.len().saturating_sub(2);
+            let first = lane.tokens.len().saturating_sub(known);
             let mut tokens: SmallVec<[Token; 3]> = SmallVec::new();
             for &token in &lane.tokens[first..] {
                 places.tokens[usize::from(token)] = Some(kept.len() as Token);

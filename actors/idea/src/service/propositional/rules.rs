@@ -11,29 +11,29 @@ use thiserror::Error;
 
 /// A part of a rule's body, by its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Part {
+pub(in crate::service) enum Part {
     Relation(u16),
     Choice(u16),
 }
 
 /// A rule's body without nesting.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Flat {
-    pub(super) relations: Vec<Relation>,
+pub(in crate::service) struct Flat {
+    pub(in crate::service) relations: Vec<Relation>,
     /// By choice: by alternative: its parts.
-    pub(super) choices: Vec<Vec<Vec<Part>>>,
-    pub(super) top: Vec<Part>,
+    pub(in crate::service) choices: Vec<Vec<Vec<Part>>>,
+    pub(in crate::service) top: Vec<Part>,
     /// The variables among the master's arguments, each with the first place that it has.
-    pub(super) named: Vec<(VariableId, usize)>,
+    pub(in crate::service) named: Vec<(VariableId, usize)>,
     /// Least and most ticks that the master lasts.
-    pub(super) duration: Option<[Ticks; 2]>,
+    pub(in crate::service) duration: Option<[Ticks; 2]>,
 }
 
 /// How tokens of a predicate end of which no status says how: output and value.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Endings {
-    pub(super) timed_out: SmallVec<[(usize, Value); 1]>,
-    pub(super) preempted: SmallVec<[(usize, Value); 1]>,
+pub(in crate::service) struct Endings {
+    pub(in crate::service) timed_out: SmallVec<[(usize, Value); 1]>,
+    pub(in crate::service) preempted: SmallVec<[(usize, Value); 1]>,
 }
 
 /// Why the propositional technology does not hold a model.
@@ -53,7 +53,7 @@ impl Flat {
     /// # Errors
     ///
     /// If a number of the rule couples what it speaks of.
-    pub(super) fn of(model: &Model, rule: RuleId) -> Result<Flat, Numeric> {
+    pub(in crate::service) fn of(model: &Model, rule: RuleId) -> Result<Flat, Numeric> {
         let said = &model.rules[rule];
         let coupled = |at: Position, what: &str| Numeric::Coupled {
             rule: super::super::words::rule(model, rule),
@@ -127,7 +127,7 @@ impl Flat {
 }
 
 /// A bound that is a number, or none.
-pub(super) fn constant(bound: Bound, none: Ticks) -> Option<Ticks> {
+pub(in crate::service) fn constant(bound: Bound, none: Ticks) -> Option<Ticks> {
     match bound {
         Bound::None => Some(none),
         Bound::Value(value) => Some(value),
@@ -136,7 +136,7 @@ pub(super) fn constant(bound: Bound, none: Ticks) -> Option<Ticks> {
 }
 
 /// How early a subgoal of a relation comes, as the model's search control says.
-pub(super) fn early(model: &Model, relation: &Relation) -> u32 {
+pub(in crate::service) fn early(model: &Model, relation: &Relation) -> u32 {
     let Target::New(pattern, _) = &relation.target else {
         return 0;
     };
@@ -150,7 +150,7 @@ pub(super) fn early(model: &Model, relation: &Relation) -> u32 {
 }
 
 /// By predicate: how its tokens end of which no status says how.
-pub(super) fn endings(model: &Model) -> Vec<Endings> {
+pub(in crate::service) fn endings(model: &Model) -> Vec<Endings> {
     let named = |predicate: usize, name: &str| {
         let said = &model.predicates[predicate];
         let symbol = model.symbols.iter().position(|at| at == name);
@@ -173,7 +173,7 @@ pub(super) fn endings(model: &Model) -> Vec<Endings> {
 }
 
 /// Whether a value is one of a type.
-pub(super) fn is_of(model: &Model, of: usize, value: Value) -> bool {
+pub(in crate::service) fn is_of(model: &Model, of: usize, value: Value) -> bool {
     match &model.types[of].values {
         Values::Truth => value == 0 || value == 1,
         Values::Numbers(span) => span.contains(value),

@@ -7,12 +7,12 @@ use smallvec::SmallVec;
 
 use super::Tables;
 use super::rules::Part;
-use super::state::{At, Cell, Clash, Open, State, Token, What, span};
+use super::state::{At, Cell, Clash, Open, Origin, State, Token, What, span};
 use crate::service::Step;
 
 /// What is missing.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Flaw {
+pub(in crate::service) enum Flaw {
     Open(Open),
     Goal(usize),
     Gap(TimelineId),
@@ -22,7 +22,7 @@ pub(super) enum Flaw {
 
 /// A way to put it right.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Decision {
+pub(in crate::service) enum Decision {
     Support(Token),
     Insert(TimelineId),
     Relate,
@@ -34,17 +34,19 @@ pub(super) enum Decision {
 
 /// A goal from elsewhere.
 #[derive(Clone, Debug)]
-pub(super) struct Goal {
-    pub(super) timeline: TimelineId,
-    pub(super) predicate: usize,
-    pub(super) inputs: SmallVec<[Value; 4]>,
+pub(in crate::service) struct Goal {
+    pub(in crate::service) timeline: TimelineId,
+    pub(in crate::service) predicate: usize,
+    pub(in crate::service) inputs: SmallVec<[Value; 4]>,
     /// How early it comes.
-    pub(super) early: u32,
+    pub(in crate::service) early: u32,
+    /// How many statuses, goals and cancels were posted before it.
+    pub(in crate::service) posted: u16,
 }
 
 /// Where a plan is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(in crate::service) enum Place {
     Before(usize),
     /// The step is this token.
     At(usize, Token),
@@ -52,20 +54,20 @@ pub(super) enum Place {
 
 /// What was planned ahead for a timeline.
 #[derive(Clone, Debug)]
-pub(super) struct Followed {
-    pub(super) steps: std::sync::Arc<[Step]>,
-    pub(super) place: Place,
+pub(in crate::service) struct Followed {
+    pub(in crate::service) steps: std::sync::Arc<[Step]>,
+    pub(in crate::service) place: Place,
 }
 
 /// All that a search changes.
 #[derive(Clone, Debug, Default)]
-pub(super) struct World {
-    pub(super) state: State,
+pub(in crate::service) struct World {
+    pub(in crate::service) state: State,
     /// Goals of this cycle that are not on their timelines yet.
-    pub(super) goals: SmallVec<[Option<Goal>; 2]>,
-    pub(super) plans: Vec<Option<Followed>>,
+    pub(in crate::service) goals: SmallVec<[Option<Goal>; 2]>,
+    pub(in crate::service) plans: Vec<Option<Followed>>,
     /// Timelines whose plans wait, or that have a goal or a cancel in this cycle.
-    pub(super) barred: SmallVec<[TimelineId; 2]>,
+    pub(in crate::service) barred: SmallVec<[TimelineId; 2]>,
 }
 
 impl World {
@@ -93,6 +95,9 @@ impl World {
             }
             let (least, most) = self.state.time(anchor, distance.from);
             let (min, _) = span(distance);
+            if distance.from == End::Start && least < self.state.tick && min > 1 {
+                self.state.loose.set(true);
+            }
             if least != most || most > tick || (min != -Ticks::MAX && least + min > tick) {
                 return None;
             }
@@ -102,7 +107,7 @@ impl World {
     }
 
     /// What is missing next; nothing, if each timeline says something and nothing is due.
-    pub(super) fn flaw(&self, tables: &Tables, tick: Ticks) -> Option<Flaw> {
+    pub(in crate::service) fn flaw(&self, tables: &Tables, tick: Ticks) -> Option<Flaw> {
         let mut first: Option<(u32, Open)> = None;
         for &open in &self.state.open {
             if let Some(early) = self.urgency(tables, tick, open)
@@ -126,7 +131,7 @@ impl World {
     }
 
     /// A cycle was decided: plans go on, or are over where a timeline says something else.
-    pub(super) fn plans_go_on(&mut self, tick: Ticks, posted: &[TimelineId]) {
+    pub(in crate::service) fn plans_go_on(&mut self, tick: Ticks, posted: &[TimelineId]) {
         for timeline in 0..self.plans.len() {
             if posted.contains(&timeline) {
                 self.plans[timeline] = None;
@@ -154,17 +159,22 @@ impl World {
 
 /// The longest way of a search, and why it did not go on.
 #[derive(Clone, Debug)]
-pub(super) struct Failure {
-    pub(super) flaw: Flaw,
-    pub(super) rule: Option<RuleId>,
-    pub(super) goal: Option<Goal>,
-    pub(super) clashes: Vec<Clash>,
+pub(in crate::service) struct Failure {
+    pub(in crate::service) flaw: Flaw,
+    pub(in crate::service) rule: Option<RuleId>,
+    pub(in crate::service) goal: Option<Goal>,
+    pub(in crate::service) clashes: Vec<Clash>,
 }
 
 impl World {
     /// The decisions that may put a flaw right, the best one first; how many are ruled out by their
     /// guards.
-    pub(super) fn decisions(&self, tables: &Tables, tick: Ticks, flaw: Flaw) -> (Decisions, u64) {
+    pub(in crate::service) fn decisions(
+        &self,
+        tables: &Tables,
+        tick: Ticks,
+        flaw: Flaw,
+    ) -> (Decisions, u64) {
         let mut decisions = Decisions::new();
         let mut guards = 0;
         match flaw {
@@ -231,7 +241,7 @@ impl World {
         }
     }
 
-    pub(super) fn rule(&self, open: Open) -> RuleId {
+    pub(in crate::service) fn rule(&self, open: Open) -> RuleId {
         self.state.at(open.token).instances[usize::from(open.instance)].rule
     }
 
@@ -284,6 +294,9 @@ impl World {
             let from = self.state.time(anchor, distance.from);
             let to = self.state.time(token, distance.to);
             let (min, max) = span(distance);
+            let starts = (self.state.at(anchor).start, at.start);
+            self.state
+                .judge((distance.from, distance.to), starts, (min, max));
             to.1.saturating_sub(from.0) >= min && to.0.saturating_sub(from.1) <= max
         });
         let may_be = |argument: &Argument, cell: Cell| match *argument {
@@ -308,7 +321,14 @@ impl World {
     }
 
     fn may_equal(&self, tables: &Tables, one: Cell, other: Cell) -> bool {
+        if self.state.root(one) == self.state.root(other) {
+            return true;
+        }
         match (self.state.value(one), self.state.value(other)) {
+            (Some(one_is), Some(other_is)) => {
+                self.state.compare(tables, one, other);
+                one_is == other_is
+            }
             (Some(value), _) => self.may_be(tables, other, value),
             (_, Some(value)) => self.may_be(tables, one, value),
             (None, None) => true,
@@ -316,7 +336,7 @@ impl World {
     }
 
     /// Carries a decision out. What follows is settled by the caller.
-    pub(super) fn decide(
+    pub(in crate::service) fn decide(
         &mut self,
         tables: &Tables,
         tick: Ticks,
@@ -347,7 +367,12 @@ impl World {
                 self.make_room(tables, timeline, tick)?;
                 let values: SmallVec<[Option<Value>; 6]> =
                     goal.inputs.iter().copied().map(Some).collect();
-                self.put(tables, timeline, goal.predicate, &values, tick);
+                let token = self.put(tables, timeline, goal.predicate, &values, tick);
+                for place in 0..values.len() {
+                    let cell = self.state.at(token).parameters[place];
+                    let origin = Origin::Posted(goal.posted, place as u16);
+                    self.state.cells[usize::from(cell)].origin = origin;
+                }
                 Ok(())
             }
             (_, Decision::Follow(timeline, step)) => self.follow(tables, timeline, step, tick),
@@ -361,7 +386,7 @@ impl World {
     }
 
     /// A token with known values starts now.
-    pub(super) fn put(
+    pub(in crate::service) fn put(
         &mut self,
         tables: &Tables,
         timeline: TimelineId,
@@ -483,7 +508,7 @@ impl World {
 
     /// Ends a token at a tick, or when it had to end before, with the status that says how, if none
     /// came; whether there was anything to say.
-    pub(super) fn close(
+    pub(in crate::service) fn close(
         &mut self,
         tables: &Tables,
         token: Token,
@@ -509,7 +534,7 @@ impl World {
     }
 
     /// Whether a token's end, or how it ended, is not known yet.
-    pub(super) fn is_open(&self, tables: &Tables, token: Token, tick: Ticks) -> bool {
+    pub(in crate::service) fn is_open(&self, tables: &Tables, token: Token, tick: Ticks) -> bool {
         let (min, max) = self.state.finish(token);
         let says = self.says(tables, token, max.min(tick));
         let parameters = &self.state.at(token).parameters;
@@ -555,7 +580,7 @@ impl World {
     }
 
     /// Whether a timeline's last token has ended by a tick, or there is none.
-    pub(super) fn is_over(&self, timeline: TimelineId, tick: Ticks) -> bool {
+    pub(in crate::service) fn is_over(&self, timeline: TimelineId, tick: Ticks) -> bool {
         let last = self.state.last(timeline);
         last.is_none_or(|last| self.state.finish(last).1 <= tick)
     }
@@ -576,7 +601,7 @@ impl World {
     }
 
     /// The step of a timeline's plan that comes next, if its branch holds.
-    pub(super) fn following(&self, timeline: TimelineId) -> Option<usize> {
+    pub(in crate::service) fn following(&self, timeline: TimelineId) -> Option<usize> {
         let plan = self.plans[timeline].as_ref()?;
         let (step, token) = match plan.place {
             Place::Before(step) => return Some(step),
@@ -628,7 +653,7 @@ impl World {
     }
 
     /// A timeline that says its default though the next step's time has come.
-    pub(super) fn waiting(&self, tick: Ticks) -> Option<Flaw> {
+    pub(in crate::service) fn waiting(&self, tick: Ticks) -> Option<Flaw> {
         for (timeline, plan) in self.plans.iter().enumerate() {
             let Some(Followed {
                 steps,
@@ -653,4 +678,4 @@ impl World {
     }
 }
 
-pub(super) type Decisions = SmallVec<[Decision; 4]>;
+pub(in crate::service) type Decisions = SmallVec<[Decision; 4]>;

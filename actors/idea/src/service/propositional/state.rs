@@ -8,62 +8,88 @@
 use farside_planning::Ticks;
 use farside_planning::model::{
     Argument, End, Model, Operand, PredicateId, RelationshipKind, RuleId, TimelineId, TypeId,
-    Value, VariableId,
+    Value, Values, VariableId,
 };
 use smallvec::SmallVec;
 
 use super::Tables;
 use super::rules::{Part, constant, is_of};
 
-pub(super) type Cell = u16;
-pub(super) type Finish = u16;
-pub(super) type Token = u16;
+pub(in crate::service) type Cell = u16;
+pub(in crate::service) type Finish = u16;
+pub(in crate::service) type Token = u16;
 
 /// Why something cannot be, and by which rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Clash {
-    pub(super) what: What,
-    pub(super) rule: Option<RuleId>,
+pub(in crate::service) struct Clash {
+    pub(in crate::service) what: What,
+    pub(in crate::service) rule: Option<RuleId>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum What {
+pub(in crate::service) enum What {
     Times,
     Values,
     Kind,
 }
 
+/// Where a value is from, for a table of what follows from what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(in crate::service) enum Origin {
+    /// The model, or what values of the same classes give.
+    #[default]
+    Model,
+    /// A function's number: it is of no class.
+    Computed,
+    /// What a cell had when the cycle began.
+    Cell(u16),
+    /// What was posted in this cycle: which, and in which place.
+    Posted(u16, u16),
+}
+
+/// Where a latest end is from that lies further ahead than what rules count exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::service) enum Far {
+    /// So many ticks from now.
+    Ahead(Ticks),
+    /// What an end had when the cycle began.
+    End(u16),
+}
+
 /// A value that is known, or not yet.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Known {
-    pub(super) value: Option<Value>,
+#[derive(Clone, Debug)]
+pub(in crate::service) struct Known {
+    pub(in crate::service) value: Option<Value>,
+    pub(in crate::service) origin: Origin,
     /// Whose value it has instead, if it is equal to another.
-    pub(super) same: Option<Cell>,
-    pub(super) of: TypeId,
+    pub(in crate::service) same: Option<Cell>,
+    pub(in crate::service) of: TypeId,
     /// The type of what it was made equal to, if that is another.
-    pub(super) also: Option<TypeId>,
+    pub(in crate::service) also: Option<TypeId>,
 }
 
 /// When a token ends, at the earliest and the latest.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Bounds {
-    pub(super) min: Ticks,
-    pub(super) max: Ticks,
-    pub(super) same: Option<Finish>,
+#[derive(Clone, Debug)]
+pub(in crate::service) struct Bounds {
+    pub(in crate::service) min: Ticks,
+    pub(in crate::service) max: Ticks,
+    /// Where the latest end is from, if that is known.
+    pub(in crate::service) far: Option<Far>,
+    pub(in crate::service) same: Option<Finish>,
 }
 
 /// That one end lies so many ticks after another.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Gap {
-    pub(super) from: Finish,
-    pub(super) to: Finish,
-    pub(super) min: Ticks,
-    pub(super) max: Ticks,
-    pub(super) rule: RuleId,
+pub(in crate::service) struct Gap {
+    pub(in crate::service) from: Finish,
+    pub(in crate::service) to: Finish,
+    pub(in crate::service) min: Ticks,
+    pub(in crate::service) max: Ticks,
+    pub(in crate::service) rule: RuleId,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Guard {
+pub(in crate::service) enum Guard {
     Waiting,
     Holds,
     Void,
@@ -71,86 +97,91 @@ pub(super) enum Guard {
 
 /// A rule as it holds for a token, or waits to.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Instance {
-    pub(super) rule: RuleId,
-    pub(super) guard: Guard,
-    pub(super) variables: SmallVec<[Option<Cell>; 4]>,
-    pub(super) labels: SmallVec<[Option<Token>; 3]>,
+pub(in crate::service) struct Instance {
+    pub(in crate::service) rule: RuleId,
+    pub(in crate::service) guard: Guard,
+    pub(in crate::service) variables: SmallVec<[Option<Cell>; 4]>,
+    pub(in crate::service) labels: SmallVec<[Option<Token>; 3]>,
 }
 
 /// A token that is there, or ended in this cycle.
 #[derive(Clone, Debug)]
-pub(super) struct At {
-    pub(super) timeline: TimelineId,
-    pub(super) predicate: PredicateId,
-    pub(super) start: Ticks,
-    pub(super) finish: Finish,
-    pub(super) parameters: SmallVec<[Cell; 6]>,
-    pub(super) instances: SmallVec<[Instance; 4]>,
+pub(in crate::service) struct At {
+    pub(in crate::service) timeline: TimelineId,
+    pub(in crate::service) predicate: PredicateId,
+    pub(in crate::service) start: Ticks,
+    pub(in crate::service) finish: Finish,
+    pub(in crate::service) parameters: SmallVec<[Cell; 6]>,
+    pub(in crate::service) instances: SmallVec<[Instance; 4]>,
     /// Whether it is the default that nobody asked for.
-    pub(super) fills: bool,
+    pub(in crate::service) fills: bool,
 }
 
 /// What an instance asks for, and nobody decided yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Open {
-    pub(super) token: Token,
-    pub(super) instance: u16,
-    pub(super) part: Part,
+pub(in crate::service) struct Open {
+    pub(in crate::service) token: Token,
+    pub(in crate::service) instance: u16,
+    pub(in crate::service) part: Part,
 }
 
 /// The tokens of a timeline that count: those that began in this cycle and the one before.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Lane {
+pub(in crate::service) struct Lane {
     /// The present one, and before it those that are known still.
-    pub(super) tokens: SmallVec<[Token; 3]>,
+    pub(in crate::service) tokens: SmallVec<[Token; 3]>,
     /// How many tokens had begun before the first of these.
-    pub(super) number: u64,
+    pub(in crate::service) number: u64,
 }
 
 /// All that is known.
 #[derive(Clone, Debug, Default)]
-pub(super) struct State {
-    pub(super) cells: Vec<Known>,
-    pub(super) finishes: Vec<Bounds>,
-    pub(super) gaps: Vec<Gap>,
-    pub(super) tokens: Vec<At>,
-    pub(super) lanes: Vec<Lane>,
-    pub(super) open: Vec<Open>,
+pub(in crate::service) struct State {
+    pub(in crate::service) cells: Vec<Known>,
+    pub(in crate::service) finishes: Vec<Bounds>,
+    pub(in crate::service) gaps: Vec<Gap>,
+    pub(in crate::service) tokens: Vec<At>,
+    pub(in crate::service) lanes: Vec<Lane>,
+    pub(in crate::service) open: Vec<Open>,
     /// Tokens of which something is known anew.
-    pub(super) news: Vec<Token>,
+    pub(in crate::service) news: Vec<Token>,
     /// What was looked at.
-    pub(super) operations: u64,
+    pub(in crate::service) operations: u64,
+    pub(in crate::service) tick: Ticks,
+    /// Ends so many ticks ahead at most are counted exactly by whoever tells states apart.
+    pub(in crate::service) exact: Ticks,
+    /// Whether something was decided by numbers that such a one does not tell apart.
+    pub(in crate::service) loose: std::cell::Cell<bool>,
 }
 
 impl State {
-    pub(super) fn of(model: &Model) -> State {
+    pub(in crate::service) fn of(model: &Model) -> State {
         State {
             lanes: vec![Lane::default(); model.timelines.len()],
             ..State::default()
         }
     }
 
-    pub(super) fn last(&self, timeline: TimelineId) -> Option<Token> {
+    pub(in crate::service) fn last(&self, timeline: TimelineId) -> Option<Token> {
         self.lanes[timeline].tokens.last().copied()
     }
 
-    pub(super) fn at(&self, token: Token) -> &At {
+    pub(in crate::service) fn at(&self, token: Token) -> &At {
         &self.tokens[usize::from(token)]
     }
 
-    pub(super) fn root(&self, mut cell: Cell) -> Cell {
+    pub(in crate::service) fn root(&self, mut cell: Cell) -> Cell {
         while let Some(same) = self.cells[usize::from(cell)].same {
             cell = same;
         }
         cell
     }
 
-    pub(super) fn value(&self, cell: Cell) -> Option<Value> {
+    pub(in crate::service) fn value(&self, cell: Cell) -> Option<Value> {
         self.cells[usize::from(self.root(cell))].value
     }
 
-    pub(super) fn end(&self, mut finish: Finish) -> Finish {
+    pub(in crate::service) fn end(&self, mut finish: Finish) -> Finish {
         while let Some(same) = self.finishes[usize::from(finish)].same {
             finish = same;
         }
@@ -158,21 +189,22 @@ impl State {
     }
 
     /// When a token ends, at the earliest and the latest.
-    pub(super) fn finish(&self, token: Token) -> (Ticks, Ticks) {
+    pub(in crate::service) fn finish(&self, token: Token) -> (Ticks, Ticks) {
         let bounds = &self.finishes[usize::from(self.end(self.at(token).finish))];
         (bounds.min, bounds.max)
     }
 
-    pub(super) fn time(&self, token: Token, end: End) -> (Ticks, Ticks) {
+    pub(in crate::service) fn time(&self, token: Token, end: End) -> (Ticks, Ticks) {
         match end {
             End::Start => (self.at(token).start, self.at(token).start),
             End::Finish => self.finish(token),
         }
     }
 
-    pub(super) fn new_cell(&mut self, of: TypeId, value: Option<Value>) -> Cell {
+    pub(in crate::service) fn new_cell(&mut self, of: TypeId, value: Option<Value>) -> Cell {
         self.cells.push(Known {
             value,
+            origin: Origin::Model,
             same: None,
             of,
             also: None,
@@ -197,12 +229,23 @@ impl State {
         }
     }
 
-    /// A cell has a value.
-    pub(super) fn bind(
+    /// A cell has a value that the model gives.
+    pub(in crate::service) fn bind(
         &mut self,
         tables: &Tables,
         cell: Cell,
         value: Value,
+        rule: Option<RuleId>,
+    ) -> Result<(), Clash> {
+        self.bind_from(tables, cell, (value, Origin::Model), rule)
+    }
+
+    /// A cell has a value.
+    pub(in crate::service) fn bind_from(
+        &mut self,
+        tables: &Tables,
+        cell: Cell,
+        (value, origin): (Value, Origin),
         rule: Option<RuleId>,
     ) -> Result<(), Clash> {
         let what = What::Values;
@@ -217,13 +260,14 @@ impl State {
         if !is(known.of) || known.also.is_some_and(|of| !is(of)) {
             return Err(Clash { what, rule });
         }
-        self.cells[usize::from(cell)].value = Some(value);
+        let known = &mut self.cells[usize::from(cell)];
+        (known.value, known.origin) = (Some(value), origin);
         self.tell(cell);
         Ok(())
     }
 
     /// Two cells are equal.
-    pub(super) fn equal(
+    pub(in crate::service) fn equal(
         &mut self,
         tables: &Tables,
         one: Cell,
@@ -234,9 +278,15 @@ impl State {
         if one == other {
             return Ok(());
         }
+        let origin = |cell: Cell| self.cells[usize::from(cell)].origin;
         match (self.value(one), self.value(other)) {
-            (Some(value), _) => self.bind(tables, other, value, rule)?,
-            (None, Some(value)) => self.bind(tables, one, value, rule)?,
+            (Some(value), is) => {
+                if is.is_some() {
+                    self.compare(tables, one, other);
+                }
+                self.bind_from(tables, other, (value, origin(one)), rule)?;
+            }
+            (None, Some(value)) => self.bind_from(tables, one, (value, origin(other)), rule)?,
             (None, None) => {}
         }
         // Known ones stay apart: what they are equal to may be forgotten.
@@ -252,16 +302,60 @@ impl State {
         Ok(())
     }
 
-    /// An end lies within bounds.
-    pub(super) fn within(
+    /// Values of two cells are compared: if they are numbers, whose classes need not say whether they
+    /// are equal, that is noted.
+    pub(in crate::service) fn compare(&self, tables: &Tables, one: Cell, other: Cell) {
+        let is_number = |cell: Cell| {
+            let of = self.cells[usize::from(self.root(cell))].of;
+            matches!(tables.model.types[of].values, Values::Numbers(_))
+        };
+        if is_number(one) || is_number(other) {
+            self.loose.set(true);
+        }
+    }
+
+    /// An end lies within bounds that are near, or of which nobody knows where they are from.
+    pub(in crate::service) fn within(
         &mut self,
         finish: Finish,
         min: Ticks,
         max: Ticks,
         rule: Option<RuleId>,
     ) -> Result<(), Clash> {
+        self.within_from(finish, min, (max, None), rule)
+    }
+
+    /// Whether a time is so far ahead that it is not told apart from others.
+    fn is_far(&self, time: Ticks) -> bool {
+        time != Ticks::MAX && time > self.tick.saturating_add(self.exact)
+    }
+
+    /// An end lies within bounds.
+    pub(in crate::service) fn within_from(
+        &mut self,
+        finish: Finish,
+        min: Ticks,
+        (max, far): (Ticks, Option<Far>),
+        rule: Option<RuleId>,
+    ) -> Result<(), Clash> {
         let finish = usize::from(self.end(finish));
+        let is = &self.finishes[finish];
+        let alike = match (is.far, far) {
+            (Some(Far::Ahead(_)), Some(Far::Ahead(_))) => true,
+            (one, other) => one.is_some() && one == other,
+        };
+        let unclear = match (self.is_far(is.max), self.is_far(max)) {
+            (true, true) => !alike,
+            (false, true) => far.is_none() && is.max > max,
+            _ => false,
+        };
+        if unclear || self.is_far(min) {
+            self.loose.set(true);
+        }
         let bounds = &mut self.finishes[finish];
+        if max < bounds.max {
+            bounds.far = far;
+        }
         let (low, high) = (bounds.min.max(min), bounds.max.min(max));
         if low > high {
             let what = What::Times;
@@ -285,17 +379,29 @@ impl State {
     fn keep(&mut self, gap: &Gap) -> Result<(), Clash> {
         let bounds = |state: &State, at: Finish| {
             let at = &state.finishes[usize::from(state.end(at))];
-            (at.min, at.max)
+            (at.min, at.max, at.far)
         };
         let rule = Some(gap.rule);
-        let (min, max) = bounds(self, gap.from);
-        self.within(gap.to, later(min, gap.min), later(max, gap.max), rule)?;
-        let (min, max) = bounds(self, gap.to);
-        self.within(gap.from, later(min, -gap.max), later(max, -gap.min), rule)
+        let (min, max, far) = bounds(self, gap.from);
+        let far = far.filter(|_| gap.max == 0);
+        self.within_from(
+            gap.to,
+            later(min, gap.min),
+            (later(max, gap.max), far),
+            rule,
+        )?;
+        let (min, max, far) = bounds(self, gap.to);
+        let far = far.filter(|_| gap.min == 0);
+        self.within_from(
+            gap.from,
+            later(min, -gap.max),
+            (later(max, -gap.min), far),
+            rule,
+        )
     }
 
     /// Says what a relation says of the times of two tokens.
-    pub(super) fn relate(
+    pub(in crate::service) fn relate(
         &mut self,
         tables: &Tables,
         open: Open,
@@ -321,6 +427,8 @@ impl State {
                 self.time(target, distance.to),
             );
             let ends = (self.at(anchor).finish, self.at(target).finish);
+            let starts = (self.at(anchor).start, self.at(target).start);
+            self.judge((distance.from, distance.to), starts, (min, max));
             let rule = Some(rule);
             match (distance.from, distance.to) {
                 (End::Start, End::Start) => {
@@ -343,6 +451,32 @@ impl State {
         Ok(())
     }
 
+    /// Notes if what a distance says of two tokens depends on when they started, which is not told
+    /// apart unless it is now.
+    pub(in crate::service) fn judge(
+        &self,
+        ends: (End, End),
+        (from, to): (Ticks, Ticks),
+        (min, max): (Ticks, Ticks),
+    ) {
+        let clear = match ends {
+            (End::Start, End::Start) => match (from < self.tick, to < self.tick) {
+                (true, true) => false,
+                (true, false) => max == Ticks::MAX && min <= 1 || max <= 0,
+                (false, true) => min == -Ticks::MAX && max >= -1 || min >= 0,
+                (false, false) => true,
+            },
+            (End::Start, End::Finish) => from == self.tick || (min <= 0 && max == Ticks::MAX),
+            (End::Finish, End::Start) => {
+                to == self.tick || (min == -Ticks::MAX && max >= 0) || min >= 0
+            }
+            (End::Finish, End::Finish) => min <= 0 && max >= 0,
+        };
+        if !clear {
+            self.loose.set(true);
+        }
+    }
+
     /// Two ends lie so many ticks apart.
     fn part(
         &mut self,
@@ -352,10 +486,10 @@ impl State {
     ) -> Result<(), Clash> {
         let (from, to) = (self.end(ends.0), self.end(ends.1));
         if span == (0, 0) {
-            let Bounds { min, max, .. } = self.finishes[usize::from(to)];
-            self.within(from, min, max, rule)?;
-            let Bounds { min, max, .. } = self.finishes[usize::from(from)];
-            self.within(to, min, max, rule)?;
+            let Bounds { min, max, far, .. } = self.finishes[usize::from(to)];
+            self.within_from(from, min, (max, far), rule)?;
+            let Bounds { min, max, far, .. } = self.finishes[usize::from(from)];
+            self.within_from(to, min, (max, far), rule)?;
             if from != to && min != max {
                 self.finishes[usize::from(to)].same = Some(from);
             }
@@ -373,14 +507,14 @@ impl State {
         Ok(())
     }
 
-    pub(super) fn close(&mut self, open: Open) {
+    pub(in crate::service) fn close(&mut self, open: Open) {
         if let Some(place) = self.open.iter().position(|&at| at == open) {
             self.open.remove(place);
         }
     }
 
     /// A new token, with its rules.
-    pub(super) fn insert(
+    pub(in crate::service) fn insert(
         &mut self,
         tables: &Tables,
         timeline: TimelineId,
@@ -391,6 +525,7 @@ impl State {
         self.finishes.push(Bounds {
             min: start + 1,
             max: Ticks::MAX,
+            far: None,
             same: None,
         });
         let rules = tables.model.rules_of(timeline, predicate).iter();
@@ -417,7 +552,7 @@ impl State {
     }
 
     /// What follows from what is known anew, until nothing does.
-    pub(super) fn settle(&mut self, tables: &Tables) -> Result<(), Clash> {
+    pub(in crate::service) fn settle(&mut self, tables: &Tables) -> Result<(), Clash> {
         while let Some(token) = self.news.pop() {
             for instance in 0..self.at(token).instances.len() {
                 self.operations += 1;
@@ -458,7 +593,7 @@ impl State {
                     }
                 }
                 Argument::Variable(variable) => match named(variable) {
-                    Some(first) => self.are_equal(first, at.parameters[place]),
+                    Some(first) => self.are_equal(tables, first, at.parameters[place]),
                     None => continue,
                 },
             };
@@ -487,10 +622,11 @@ impl State {
     }
 
     /// Whether two cells are certainly equal, certainly not, or neither.
-    pub(super) fn are_equal(&self, one: Cell, other: Cell) -> Option<bool> {
+    fn are_equal(&self, tables: &Tables, one: Cell, other: Cell) -> Option<bool> {
         if self.root(one) == self.root(other) {
             return Some(true);
         }
+        self.compare(tables, one, other);
         self.value(one)
             .zip(self.value(other))
             .map(|(one, other)| one == other)
@@ -518,7 +654,9 @@ impl State {
         (at.guard, at.variables, at.labels) = (Guard::Holds, variables, labels);
         self.say(tables, token, instance)?;
         if let Some([min, max]) = flat.duration {
-            self.within(finish, later(start, min), later(start, max), Some(rule))?;
+            let far = (start == self.tick).then_some(Far::Ahead(max));
+            let most = (later(start, max), far);
+            self.within_from(finish, later(start, min), most, Some(rule))?;
         }
         let instance = instance as u16;
         for &part in &flat.top {
@@ -584,8 +722,15 @@ impl State {
                 let inputs: Option<SmallVec<[Value; 4]>> =
                     known[..known.len() - 1].iter().copied().collect();
                 let call = tables.model.functions[function].call;
-                if let Some(output) = inputs.and_then(|inputs| call(&inputs)) {
-                    is(self, known.len() - 1, output)?;
+                if let Some(output) = inputs.and_then(|inputs| call(&inputs))
+                    && let Some(cell) = cells[cells.len() - 1]
+                {
+                    let of = self.cells[usize::from(self.root(cell))].of;
+                    let origin = match tables.model.types[of].values {
+                        Values::Numbers(_) => Origin::Computed,
+                        _ => Origin::Model,
+                    };
+                    self.bind_from(tables, cell, (output, origin), Some(rule))?;
                 }
                 // An output that is known and another than the function's was refused.
                 return match known.last().copied().flatten() {
@@ -627,7 +772,7 @@ impl State {
     }
 
     /// The cell that a variable of a rule stands for; a new one, if it stands for none yet.
-    pub(super) fn variable(
+    pub(in crate::service) fn variable(
         &mut self,
         tables: &Tables,
         token: Token,
@@ -646,7 +791,7 @@ impl State {
 }
 
 /// A time and a distance, either of which may have no bound.
-pub(super) fn later(time: Ticks, by: Ticks) -> Ticks {
+pub(in crate::service) fn later(time: Ticks, by: Ticks) -> Ticks {
     match (time, by) {
         (Ticks::MIN | Ticks::MAX, _) => time,
         // The negation of no bound below is none above.
@@ -658,7 +803,7 @@ pub(super) fn later(time: Ticks, by: Ticks) -> Ticks {
 }
 
 /// Least and most ticks from one end to the other.
-pub(super) fn span(distance: &farside_planning::model::Distance) -> (Ticks, Ticks) {
+pub(in crate::service) fn span(distance: &farside_planning::model::Distance) -> (Ticks, Ticks) {
     let bound = |bound, none| constant(bound, none).unwrap_or(none);
     // One more than the least, so that it can be negated.
     let none = -Ticks::MAX;

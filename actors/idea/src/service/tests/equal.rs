@@ -81,7 +81,13 @@ fn all(model: &Arc<Model>) -> Vec<Box<dyn PlanService>> {
         Box::new(service) as Box<dyn PlanService>
     };
     let propositional = Propositional::new(model.clone()).expect("the model fits");
-    vec![temporal(true), temporal(false), Box::new(propositional)]
+    let compiled = Compiled::new(model.clone()).expect("the model fits");
+    vec![
+        temporal(true),
+        temporal(false),
+        Box::new(propositional),
+        Box::new(compiled),
+    ]
 }
 
 proptest! {
@@ -95,6 +101,7 @@ proptest! {
         let backtracks: Vec<u64> = services.iter().map(|at| at.counters().backtracks).collect();
         prop_assert_eq!(backtracks[0], backtracks[1]);
         prop_assert_eq!(backtracks[0], backtracks[2]);
+        prop_assert_eq!(backtracks[0], backtracks[3]);
     }
 }
 
@@ -107,4 +114,18 @@ fn technologies_decide_alike_on_a_rovers_model() {
         decided += run.unwrap_or_else(|failed| panic!("seed {seed}: {failed}"));
     }
     assert!(decided > 600, "{decided} cycles were decided");
+}
+
+/// What the table has met it decides alone, and as its interpreter does.
+#[test]
+fn a_table_decides_as_its_interpreter_does() {
+    let model = read(ROVER);
+    for seed in 0..4 {
+        let propositional = Propositional::new(model.clone()).expect("the model fits");
+        let compiled = Compiled::new(model.clone()).expect("the model fits");
+        let mut services: Vec<Box<dyn PlanService>> =
+            vec![Box::new(propositional), Box::new(compiled)];
+        let run = side_by_side(&mut services, seed, 3_000);
+        run.unwrap_or_else(|failed| panic!("seed {seed}: {failed}"));
+    }
 }
