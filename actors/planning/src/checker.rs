@@ -31,7 +31,7 @@
 //! use farside_planning::model::{Model, Predicate, Problem, Timeline, TimelineKind};
 //! use farside_planning::plan::{Plan, PlanToken};
 //! let mut model = Model::default();
-//! let at = Predicate { name: "At".into(), parameters: vec![], inputs: 0 };
+//! let at = Predicate { name: "At".into(), ..Predicate::default() };
 //! model.predicates.push(at);
 //! model.timelines.push(Timeline {
 //!     name: "k9.Location".into(),
@@ -39,6 +39,7 @@
 //!     kind: TimelineKind::State,
 //!     predicates: vec![0],
 //!     default: None,
+//!     initial: None,
 //! });
 //! let problem = Problem { horizon: 10, ..Problem::default() };
 //! let mut plan = Plan::new(&model, &problem);

@@ -117,7 +117,7 @@ pub enum Values {
 }
 
 /// What a token can say: a procedure P(i → s), as section 2 of the IDEA paper has it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Predicate {
     /// Its name.
     pub name: String,
@@ -125,6 +125,10 @@ pub struct Predicate {
     pub parameters: Vec<Parameter>,
     /// How many of them are inputs.
     pub inputs: usize,
+    /// What outputs are, by their places, once its time is over and no status came.
+    pub timed_out: Vec<(usize, Value)>,
+    /// What outputs are, by their places, once something else took its place and no status came.
+    pub preempted: Vec<(usize, Value)>,
 }
 
 /// A parameter of a predicate.
@@ -161,6 +165,8 @@ pub struct Timeline {
     pub predicates: Vec<PredicateId>,
     /// What a planner lets it say where nothing else is asked for.
     pub default: Option<Filler>,
+    /// What an executive lets it say first, if that is not its default.
+    pub initial: Option<Filler>,
 }
 
 /// A token that fills a timeline where nothing is asked for.

@@ -55,6 +55,7 @@ pub(super) fn model(name: &str, project: &Project) -> Model {
             name: "Activity".to_owned(),
             inputs: parameters.len(),
             parameters,
+            ..Predicate::default()
         }],
         timelines: vec![Timeline {
             name: "project.activities".to_owned(),
@@ -62,6 +63,7 @@ pub(super) fn model(name: &str, project: &Project) -> Model {
             kind: TimelineKind::Free,
             predicates: vec![0],
             default: None,
+            initial: None,
         }],
         resources: resources.collect(),
         rules_by_timeline: vec![vec![vec![0]]],

@@ -39,6 +39,7 @@ fn model(random: &mut Random) -> Model {
         kind,
         predicates: vec![0, 1],
         default: None,
+        initial: None,
     };
     let ty = |name: &str, values| Type {
         name: name.to_owned(),

@@ -71,6 +71,7 @@ pub(super) fn of(name: &str, parameters: &[(&str, usize)]) -> Predicate {
         name: name.to_owned(),
         inputs: parameters.len(),
         parameters: parameters.collect(),
+        ..Predicate::default()
     }
 }
 
@@ -99,6 +100,7 @@ pub(super) fn rover() -> Model {
         kind,
         predicates: predicates.to_vec(),
         default: None,
+        initial: None,
     };
     let mut take = rule(
         10,

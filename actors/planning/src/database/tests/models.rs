@@ -49,6 +49,7 @@ pub(super) fn random(dice: &mut Dice) -> Model {
         name: name.to_owned(),
         inputs: parameters.len(),
         parameters,
+        ..Predicate::default()
     };
     let timeline = |name: &str, kind| Timeline {
         name: name.to_owned(),
@@ -56,6 +57,7 @@ pub(super) fn random(dice: &mut Dice) -> Model {
         kind,
         predicates: vec![0, 1, 2],
         default: None,
+        initial: None,
     };
     let resource = |name: &str, kind| Resource {
         name: name.to_owned(),

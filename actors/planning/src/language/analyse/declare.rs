@@ -44,6 +44,7 @@ struct Class<'t> {
 struct Members {
     predicates: Vec<usize>,
     default: Option<Filler>,
+    initial: Option<Filler>,
 }
 
 /// The declarations read so far.
@@ -435,6 +436,7 @@ impl<'t, 'n> Declarations<'t, 'n> {
                     kind,
                     predicates: members.map_or(Vec::new(), |of| of.predicates.clone()),
                     default: members.and_then(|of| of.default.clone()),
+                    initial: members.and_then(|of| of.initial.clone()),
                 });
             }
         }

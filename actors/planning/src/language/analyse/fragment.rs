@@ -205,6 +205,7 @@ impl<'t> Names<'t> {
                 kind,
                 predicates,
                 default,
+                initial: None,
             });
         }
         for Used {
@@ -242,6 +243,7 @@ impl<'t> Names<'t> {
                 name: name.to_owned(),
                 parameters: list,
                 inputs,
+                ..Predicate::default()
             });
         }
     }

@@ -98,7 +98,8 @@ proptest! {
             "(Define_Model m :profile executive)
             (Define_Object_Class R :state_variables ((State A_SV)))
             (Define_Type S (s0 s1 s2)) (Define_Type N [0 {top}])
-            (Define_Predicate P ((Boolean ?a) (S ?b) (N ?c))) (Define_Member_Values (R A_SV) (P))\n"
+            (Define_Predicate P (-> (Boolean ?a) (S ?b) (N ?c)))
+            (Define_Member_Values (R A_SV) (P))\n"
         );
         let mut guards: Vec<([Option<Value>; 3], Option<Comparison>)> = Vec::new();
         for (literals, comparison) in rules {
@@ -116,7 +117,7 @@ proptest! {
                 std::format!(":when {}", one.text())
             });
             text += &std::format!(
-                "(Define_Compatibility (SINGLE ((R A_SV) ((P ({}))))) :duration_bounds [1 2] {when}
+                "(Define_Compatibility (SINGLE ((R A_SV) ((P (-> {}))))) :duration_bounds [1 2] {when}
                  :compatibility_spec (meets (SINGLE ((R A_SV) ((P))))))\n",
                 arguments.join(" ")
             );

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use crate::Ticks;
 use crate::database::{Conflict, Database, TokenId};
-use crate::model::{Model, PredicateId, TimelineId, TimelineKind, Value, Values};
+use crate::model::{Model, PredicateId, TimelineId, TimelineKind, Value};
 
 /// How a token ends of which no status says how.
 #[derive(Clone, Copy, Debug)]
@@ -13,8 +13,7 @@ enum Ending {
     Preempted,
 }
 
-/// The outputs of a predicate that say how a token ended, and what they say then: values of their
-/// types that are named so.
+/// The outputs of a predicate that say how a token ended, and what they say then.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Endings {
     timed_out: SmallVec<[(usize, Value); 1]>,
@@ -24,23 +23,9 @@ pub(super) struct Endings {
 impl Endings {
     pub(super) fn of(model: &Model, predicate: PredicateId) -> Endings {
         let predicate = &model.predicates[predicate];
-        let named = |name: &str| {
-            let symbol = model.symbols.iter().position(|at| at == name);
-            let outputs = predicate.parameters.iter().enumerate();
-            let outputs = outputs
-                .skip(predicate.inputs)
-                .filter_map(|(place, output)| {
-                    let symbol = symbol? as Value;
-                    match &model.types[output.of].values {
-                        Values::Symbols(all) if all.contains(&symbol) => Some((place, symbol)),
-                        _ => None,
-                    }
-                });
-            outputs.collect()
-        };
         Endings {
-            timed_out: named("TIMEOUT"),
-            preempted: named("PREEMPTED"),
+            timed_out: SmallVec::from_slice(&predicate.timed_out),
+            preempted: SmallVec::from_slice(&predicate.preempted),
         }
     }
 

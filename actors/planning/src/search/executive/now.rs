@@ -81,12 +81,13 @@ impl Now {
     fn urgency(&self, database: &Database, open: Open) -> Option<u32> {
         let at = match open.step {
             Step::Relation(at) => at,
-            // A choice is due with the first relation that it could ask for.
+            // A choice is due with the first relation that it could ask for, and comes with the first
+            // token that it could insert: what its conditions ask for is decided before.
             Step::Choice(choice) => {
                 let alternatives = database.alternatives(open.instance, choice);
                 let steps = alternatives.iter().flatten();
                 let dues = steps.filter_map(|&step| self.urgency(database, Open { step, ..open }));
-                return dues.min();
+                return dues.min_by_key(|&due| (due & 1 == 0, due));
             }
         };
         let relation = database.relation(open.instance, at);
@@ -353,7 +354,7 @@ fn is_over(database: &Database, token: TokenId, tick: Ticks) -> bool {
     database.finish(token).max <= tick
 }
 
-/// A timeline says its default from now on.
+/// A timeline says its default from now on, or what it says first.
 fn fill(
     database: &mut Database,
     endings: &[Endings],
@@ -369,7 +370,8 @@ fn fill(
     }
     let model = database.model().clone();
     let timeline = &model.timelines[slot.timeline];
-    let Some(default) = &timeline.default else {
+    let first = timeline.initial.as_ref().filter(|_| slot.after.is_none());
+    let Some(default) = first.or(timeline.default.as_ref()) else {
         let owner = match slot.after {
             Some(after) => Owner::Token(after),
             None => Owner::Past,

@@ -167,3 +167,59 @@ fn without_a_legal_continuation_the_rule_is_named_and_nothing_was_decided() {
     let after = format!("{:?} {:?}", agent.0.database, agent.0.database.open());
     assert_eq!(after, before);
 }
+
+const POLL: &str = "
+(Define_Model poll :profile executive)
+(Define_Object_Class Rover :state_variables ((State Tilt_SV Health_SV Mode_SV)))
+(Define_Predicate Measure (-> (Number ?tilt) (Boolean ?rcvd)) :timed_out (?rcvd False))
+(Define_Predicate Healthy ())
+(Define_Predicate Blind ())
+(Define_Predicate Nominal ())
+(Define_Predicate Hold ())
+(Define_Member_Values (Rover Tilt_SV) (Measure) :default (Measure))
+(Define_Member_Values (Rover Health_SV) (Healthy Blind) :default (Healthy ()))
+(Define_Member_Values (Rover Mode_SV) (Nominal Hold) :initial (Nominal ()))
+(Define_Compatibility (SINGLE ((Rover Tilt_SV) ((Measure)))) :duration_bounds [1 2])
+(Define_Compatibility
+ (SINGLE ((Rover Tilt_SV) ((Measure (-> ?tilt False)))))
+ :compatibility_spec (meets (SINGLE ((Rover Health_SV) ((Blind ()))))))
+(Define_Compatibility
+ (SINGLE ((Rover Tilt_SV) ((Measure))))
+ :compatibility_spec
+ (OR
+  (meets :condition (SINGLE ((Rover Health_SV) ((Blind ())))))
+  (meets (SINGLE ((Rover Mode_SV) ((Nominal ())))))))
+(Define_Compatibility
+ (SINGLE ((Rover Health_SV) ((Blind ()))))
+ :duration_bounds [1 1]
+ :compatibility_spec (starts (SINGLE ((Rover Mode_SV) ((Hold ()))))))
+(Define_Search_Control
+ :subgoal_order ((Rover Health_SV) Blind) ((Rover Mode_SV) Hold) ((Rover Mode_SV) Nominal))
+";
+
+/// What a model says that outputs are is what they are without a status; and a choice comes with what
+/// it may insert, after what its condition asks for.
+#[test]
+fn a_poll_without_an_answer_says_so_and_a_choice_waits_for_what_it_asks() {
+    let mut agent = Agent::new(POLL);
+    assert_eq!(agent.says(2), ("Nominal".to_owned(), 0));
+    let poll = agent.0.present(0).expect("there is a poll");
+    agent.cycle(1);
+    assert_eq!(agent.says(0), ("Measure".to_owned(), 0));
+    agent.cycle(2);
+    let database = &agent.0.database;
+    let values: Vec<Option<Value>> = { database.token(poll).expect("it is kept") }
+        .parameters
+        .iter()
+        .map(|&at| database.value(at))
+        .collect();
+    assert_eq!(values, [None, Some(0)]);
+    assert_eq!(agent.says(1), ("Blind".to_owned(), 2));
+    assert_eq!(agent.says(2), ("Hold".to_owned(), 2));
+    assert_eq!(agent.0.counters().backtracks, 0);
+    let poll = agent.0.present(0).expect("there is a poll");
+    agent.0.report(poll, &[3, 1], true, 3).expect("it can be");
+    agent.cycle(3);
+    assert_eq!(agent.says(1), ("Healthy".to_owned(), 3));
+    assert_eq!(agent.says(2), ("Nominal".to_owned(), 3));
+}

@@ -2,9 +2,10 @@
 
 use super::{Declarations, MOST_MEMBERS, Members};
 use crate::language::analyse::entry::Entry;
+use crate::language::analyse::literal::{self, Sort};
 use crate::language::findings::arguments;
 use crate::language::tree::{Form, Kind};
-use crate::model::{Filler, NUMBER, Parameter, Predicate, TimelineKind};
+use crate::model::{Filler, NUMBER, Parameter, Predicate, TimelineKind, Value};
 
 /// How many parameters a predicate, and columns a table, may have.
 const MOST_PARAMETERS: usize = 256;
@@ -40,7 +41,7 @@ impl<'t> Declarations<'t, '_> {
     }
 
     pub(super) fn predicate(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[], self.notes);
+        entry.check_options(&[":timed_out", ":preempted"], self.notes);
         let (name, list) = match *entry.values.as_slice() {
             [name] => (name, None),
             [name, list] if list.is_list() => (name, Some(list)),
@@ -82,18 +83,64 @@ impl<'t> Declarations<'t, '_> {
             }
             parameters.push(parameter);
         }
-        let inputs = inputs.unwrap_or(parameters.len());
+        let mut predicate = Predicate {
+            name: name_text.to_owned(),
+            inputs: inputs.unwrap_or(parameters.len()),
+            parameters,
+            ..Predicate::default()
+        };
+        predicate.timed_out = self.without_status(entry, ":timed_out", "TIMEOUT", &predicate);
+        predicate.preempted = self.without_status(entry, ":preempted", "PREEMPTED", &predicate);
         self.predicates
             .insert(name_text, self.model.predicates.len());
-        self.model.predicates.push(Predicate {
-            name: name_text.to_owned(),
-            parameters,
-            inputs,
-        });
+        self.model.predicates.push(predicate);
+    }
+
+    /// What outputs are if no status came, as an option says, `:timed_out (?output value) …`; an
+    /// output of which it says nothing, and whose type has the usual symbol, is that.
+    fn without_status(
+        &mut self,
+        entry: &Entry<'t>,
+        option: &str,
+        usual: &str,
+        of: &Predicate,
+    ) -> Vec<(usize, Value)> {
+        let mut said: Vec<(usize, Value)> = Vec::new();
+        for &form in entry.option(option) {
+            let parts: Vec<Form> = form.children().collect();
+            let &[name, value] = parts.as_slice() else {
+                self.notes
+                    .error(form, "an output and its value, as (?received False)");
+                continue;
+            };
+            let outputs = (of.parameters.iter().enumerate()).skip(of.inputs);
+            let named = |at: &(usize, &Parameter)| at.1.name == name.word() && !name.is_list();
+            let Some((place, output)) = outputs.clone().find(named) else {
+                let known = outputs.map(|(_, output)| output.name.as_str());
+                let expected = format!("an output of {}", of.name);
+                self.notes.unknown(name, expected, known);
+                continue;
+            };
+            if said.iter().any(|at| at.0 == place) {
+                self.notes.error(name, "each output once");
+            } else if let Some(value) = self.value_of(value, output.of) {
+                said.push((place, value));
+            }
+        }
+        if let Some(&symbol) = self.symbols.get(usual) {
+            for (place, output) in of.parameters.iter().enumerate().skip(of.inputs) {
+                let is_usual = literal::fits(&self.model, output.of, symbol, Sort::Symbol);
+                if is_usual && said.iter().all(|at| at.0 != place) {
+                    said.push((place, symbol));
+                }
+            }
+        }
+        said.sort_unstable();
+        said
     }
 
     pub(super) fn member_values(&mut self, entry: &Entry<'t>) {
-        entry.check_options(&[":default"], self.notes);
+        entry.check_options(&[":default", ":initial"], self.notes);
         let &[of, list] = entry.values.as_slice() else {
             let expected = "(Define_Member_Values (Class Name_SV) (Predicate …))";
             self.notes.error(entry.form, expected);
@@ -138,14 +185,18 @@ impl<'t> Declarations<'t, '_> {
             self.notes
                 .error(list, "one predicate or more, in parentheses");
         }
-        let default = entry.one(":default", self.notes);
-        if let (Some(form), false) = (default, is_state) {
-            self.notes.refuse(form, "no default, but of a State", "one");
-        }
-        let default = default.and_then(|form| self.filler(form, &predicates));
+        let [default, initial] = [":default", ":initial"].map(|option| {
+            let form = entry.one(option, self.notes)?;
+            if !is_state {
+                let expected = format!("no {}, but of a State", &option[1..]);
+                self.notes.refuse(form, expected, "one");
+            }
+            self.filler(form, &predicates)
+        });
         let members = Members {
             predicates,
             default,
+            initial,
         };
         if self.members.insert((class, name.word()), members).is_some() {
             self.notes

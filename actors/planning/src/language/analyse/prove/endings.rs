@@ -13,8 +13,8 @@ use crate::language::analyse::rule::Draft;
 use crate::language::findings::{Notes, Severity};
 use crate::model::{
     Argument, Body, Bound, Distance, End, Model, Operand, Position, PredicateId, Relation,
-    RelationKind, Relationship, RelationshipKind, Target, TimelineId, TimelineKind, Value, Values,
-    VariableId,
+    RelationKind, Relationship, RelationshipKind, Rule, Target, TimelineId, TimelineKind, Value,
+    Values, VariableId,
 };
 
 /// Types of numbers with at most so many values are gone through one by one.
@@ -42,6 +42,13 @@ pub(super) fn check(model: &Model, drafts: &[Draft], notes: &mut Notes) {
                 .own
                 .get(&(id, predicate))
                 .map_or(&[][..], Vec::as_slice);
+            let mut rules = own.iter().map(|&at| &drafts[at].rule);
+            if model.predicates[predicate].inputs == model.predicates[predicate].parameters.len()
+                && !index.ended.contains(&(id, predicate))
+                && !rules.any(ends_its_master)
+            {
+                continue;
+            }
             if done.insert((last_part(&timeline.name), predicate, own)) {
                 let of = Ending {
                     model,
@@ -62,6 +69,8 @@ struct Index {
     own: BTreeMap<(TimelineId, PredicateId), Vec<usize>>,
     /// The timelines on which rules of other timelines put tokens.
     put_by_others: BTreeSet<TimelineId>,
+    /// By timeline and predicate: the tokens that a relation of a rule may end.
+    ended: BTreeSet<(TimelineId, PredicateId)>,
 }
 
 impl Index {
@@ -77,9 +86,14 @@ impl Index {
                     .push(at);
             }
             look_at_relations(&draft.rule.body, &mut |relation| {
-                if let Target::New(pattern, _) = &relation.target
-                    && !relation.condition
-                {
+                let Target::New(pattern, _) = &relation.target else {
+                    return;
+                };
+                if relation.distances.iter().any(ends_its_target) {
+                    let ended = pattern.timelines.iter();
+                    index.ended.extend(ended.map(|&at| (at, pattern.predicate)));
+                }
+                if !relation.condition {
                     let others = pattern.timelines.iter().filter(|at| !masters.contains(at));
                     index.put_by_others.extend(others);
                 }
@@ -87,6 +101,28 @@ impl Index {
         }
         index
     }
+}
+
+/// Whether a rule may say until when its master lasts. A token of which nobody says so lasts until
+/// another one takes its place.
+fn ends_its_master(rule: &Rule) -> bool {
+    let mut ends = rule.duration.is_some_and(|[_, most]| most != Bound::None);
+    look_at_relations(&rule.body, &mut |relation| {
+        let mut distances = relation.distances.iter();
+        ends |= relation.anchor == 0 && distances.any(|distance| distance.from == End::Finish);
+        ends |= matches!(relation.target, Target::Label(0));
+    });
+    ends
+}
+
+/// Whether a distance says until when its target lasts.
+fn ends_its_target(distance: &Distance) -> bool {
+    let latest = if distance.backward {
+        distance.min
+    } else {
+        distance.max
+    };
+    distance.to == End::Finish && latest != Bound::None
 }
 
 fn look_at_relations(body: &Body, look: &mut impl FnMut(&Relation)) {
@@ -127,7 +163,7 @@ impl Ending<'_> {
         });
         let following = own
             .iter()
-            .filter(|draft| self.follows(&draft.rule.body, draft));
+            .filter(|draft| self.follows(&draft.rule.body, draft, false));
         let guards: Option<Vec<Guard>> = following.map(|draft| self.guard(draft)).collect();
         let uncovered = guards.and_then(|guards| self.uncovered(&guards, steps));
         let Some(uncovered) = uncovered else { return };
@@ -147,19 +183,22 @@ impl Ending<'_> {
         );
     }
 
-    /// Whether a body always puts a token on the timeline when the master ends.
-    fn follows(&self, body: &Body, draft: &Draft) -> bool {
+    /// Whether a token is on the timeline when the master ends wherever a body holds, and, but
+    /// within a choice, that it can always hold: conditions may not.
+    fn follows(&self, body: &Body, draft: &Draft, in_choice: bool) -> bool {
         match body {
-            Body::All(parts) => parts.iter().any(|part| self.follows(part, draft)),
+            Body::All(parts) => parts
+                .iter()
+                .any(|part| self.follows(part, draft, in_choice)),
             Body::Any(parts, _) => {
-                parts.iter().all(|part| self.follows(part, draft))
-                    && parts.iter().any(|part| !has_condition(part))
+                parts.iter().all(|part| self.follows(part, draft, true))
+                    && (in_choice || parts.iter().any(|part| !has_condition(part)))
             }
             Body::Relation(relation) => match &relation.target {
                 Target::New(pattern, label) => {
                     let same = draft.same_timelines[*label].is_some();
                     relation.anchor == 0
-                        && !relation.condition
+                        && (in_choice || !relation.condition)
                         && is_meeting(relation)
                         && pattern.timelines.contains(&self.timeline)
                         && (same || pattern.timelines.len() == 1)
