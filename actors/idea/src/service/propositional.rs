@@ -17,13 +17,15 @@ pub(super) mod state;
 use std::sync::Arc;
 
 use farside_planning::Ticks;
-use farside_planning::model::{Model, PredicateId, Problem, RelationshipKind, TimelineId, Value};
+use farside_planning::model::{
+    Model, PredicateId, Problem, RelationshipKind, TimelineId, TypeId, Value, Values,
+};
 use farside_planning::temporal::Span;
 use smallvec::SmallVec;
 use thiserror::Error;
 
+use rules::Flat;
 pub use rules::Numeric;
-use rules::{Endings, Flat};
 use search::{Decision, Decisions, Failure, Flaw, Followed, Goal, Place, World};
 use state::{Clash, Origin, State, Token, What};
 
@@ -53,12 +55,14 @@ pub enum NotPropositional {
     },
 }
 
+/// Numbers of a type that has no more of them are as symbols.
+const FEW_NUMBERS: i64 = 64;
+
 /// A model, as this technology reads it.
 #[derive(Debug)]
 pub(super) struct Tables {
     pub(super) model: Arc<Model>,
     pub(super) flats: Vec<Flat>,
-    endings: Vec<Endings>,
     /// By rule: by relation: how early its subgoal comes.
     early: Vec<Vec<u32>>,
 }
@@ -77,10 +81,17 @@ impl Tables {
         };
         Ok(Tables {
             early: flats.iter().map(early).collect(),
-            endings: rules::endings(&model),
             flats,
             model,
         })
+    }
+
+    /// Whether a type has more numbers than are told apart one by one.
+    pub(super) fn is_measured(&self, of: TypeId) -> bool {
+        match &self.model.types[of].values {
+            Values::Numbers(span) => span.max.saturating_sub(span.min) >= FEW_NUMBERS,
+            _ => false,
+        }
     }
 
     /// Whether a relationship holds of known values.

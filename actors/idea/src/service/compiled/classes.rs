@@ -14,6 +14,7 @@ use smallvec::SmallVec;
 
 use super::NotCompiled;
 use crate::service::propositional::Tables;
+use crate::service::propositional::state::reckon;
 use crate::service::words;
 
 /// The most numbers of a type that are sorted into classes.
@@ -26,6 +27,8 @@ pub(super) enum Classes {
     One,
     /// By number from the least one on.
     Numbers(Value, Vec<u16>),
+    /// One for each of some numbers, and one for all others.
+    Literals(Vec<Value>),
     /// By the value itself: a truth value or a symbol.
     Each,
 }
@@ -36,6 +39,10 @@ impl Classes {
         match self {
             Classes::One => 0,
             Classes::Numbers(least, classes) => u32::from(classes[(value - least) as usize]),
+            Classes::Literals(all) => match all.binary_search(&value) {
+                Ok(place) => place as u32 + 1,
+                Err(_) => 0,
+            },
             Classes::Each => value as u32,
         }
     }
@@ -45,6 +52,7 @@ impl Classes {
         match self {
             Classes::One => 1,
             Classes::Numbers(_, classes) => u64::from(classes.iter().max().map_or(0, |&at| at)) + 1,
+            Classes::Literals(all) => all.len() as u64 + 1,
             Classes::Each => model.symbols.len().max(2) as u64,
         }
     }
@@ -65,7 +73,11 @@ fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
     let Values::Numbers(span) = model.types[of].values else {
         return Ok(Classes::Each);
     };
-    let mut questions: Vec<(usize, usize)> = Vec::new();
+    if !tables.is_measured(of) {
+        let classes = 0..(span.max - span.min + 1) as u16;
+        return Ok(Classes::Numbers(span.min, classes.collect()));
+    }
+    let mut questions: Vec<(usize, VariableId)> = Vec::new();
     let mut literals: Vec<Value> = Vec::new();
     for (rule, said) in model.rules.iter().enumerate() {
         patterns(said, &tables.flats[rule].relations, |pattern| {
@@ -78,18 +90,26 @@ fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
                 }
             }
         });
-        let parameters = &model.predicates[said.master.predicate].parameters;
-        for (place, argument) in said.master.arguments.iter().enumerate() {
-            if let Argument::Variable(variable) = *argument
-                && parameters[place].of == of
-                && asks_of(said, variable)
-            {
-                questions.push((rule, place));
+        patterns(said, &tables.flats[rule].relations, |pattern| {
+            let parameters = &model.predicates[pattern.predicate].parameters;
+            for (argument, parameter) in pattern.arguments.iter().zip(parameters) {
+                if let Argument::Variable(variable) = *argument
+                    && parameter.of == of
+                    && asks_of(said, variable)
+                    && !questions.contains(&(rule, variable))
+                {
+                    questions.push((rule, variable));
+                }
             }
-        }
+        });
     }
     if questions.is_empty() && literals.is_empty() {
         return Ok(Classes::One);
+    }
+    if questions.is_empty() {
+        literals.sort_unstable();
+        literals.dedup();
+        return Ok(Classes::Literals(literals));
     }
     let count = span.max.saturating_sub(span.min).saturating_add(1);
     if count > MOST_NUMBERS {
@@ -99,16 +119,16 @@ fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
         let of = model.types[of].name.clone();
         return Err(NotCompiled::Numbers { of, rule });
     }
-    for &(rule, place) in &questions {
-        check_alone(tables, rule, place)?;
+    for &(rule, variable) in &questions {
+        check_alone(tables, rule, variable)?;
     }
     let mut known: BTreeMap<Vec<Option<Value>>, u16> = BTreeMap::new();
     let mut classes = Vec::with_capacity(count as usize);
     for value in span.min..=span.max {
         let mut answers: Vec<Option<Value>> = Vec::new();
         answers.extend(literals.iter().map(|&at| Some(Value::from(at == value))));
-        for &(rule, place) in &questions {
-            ask(tables, rule, place, value, &mut answers);
+        for &(rule, variable) in &questions {
+            ask(tables, (rule, variable), value, &mut answers);
         }
         let next = u16::try_from(known.len()).map_err(|_| NotCompiled::Numbers {
             of: model.types[of].name.clone(),
@@ -144,12 +164,9 @@ fn asks_of(rule: &Rule, variable: VariableId) -> bool {
 }
 
 /// Whether what a rule asks of a number it asks of that number alone.
-fn check_alone(tables: &Tables, rule: usize, place: usize) -> Result<(), NotCompiled> {
+fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCompiled> {
     let said = &tables.model.rules[rule];
-    let mut mine: SmallVec<[VariableId; 4]> = SmallVec::new();
-    if let Argument::Variable(variable) = said.master.arguments[place] {
-        mine.push(variable);
-    }
+    let mut mine: SmallVec<[VariableId; 4]> = smallvec::smallvec![of];
     for relationship in relationships(said) {
         let variables = relationship
             .operands
@@ -163,11 +180,8 @@ fn check_alone(tables: &Tables, rule: usize, place: usize) -> Result<(), NotComp
             continue;
         }
         let last = variables.last().copied();
-        let is_function = matches!(relationship.kind, RelationshipKind::Function(_));
-        let is_symbolic = |variable: VariableId| {
-            let of = said.variables[variable].of;
-            !matches!(tables.model.types[of].values, Values::Numbers(_))
-        };
+        let is_function = gives(relationship.kind);
+        let is_symbolic = |variable: VariableId| !tables.is_measured(said.variables[variable].of);
         let others = variables.iter().filter(|&&at| {
             !mine.contains(&at) && !(is_function && Some(at) == last) && !is_symbolic(at)
         });
@@ -184,12 +198,15 @@ fn check_alone(tables: &Tables, rule: usize, place: usize) -> Result<(), NotComp
 }
 
 /// What a rule makes of a number, if nothing else is known.
-fn ask(tables: &Tables, rule: usize, place: usize, value: Value, answers: &mut Vec<Option<Value>>) {
+fn ask(
+    tables: &Tables,
+    (rule, of): (usize, VariableId),
+    value: Value,
+    answers: &mut Vec<Option<Value>>,
+) {
     let said = &tables.model.rules[rule];
     let mut known: SmallVec<[Option<Value>; 8]> = SmallVec::from_elem(None, said.variables.len());
-    if let Argument::Variable(variable) = said.master.arguments[place] {
-        known[variable] = Some(value);
-    }
+    known[of] = Some(value);
     let seen = |known: &[Option<Value>], operand: &Operand| match *operand {
         Operand::Value(value) => Some(value),
         Operand::Variable(variable) => known[variable],
@@ -198,15 +215,17 @@ fn ask(tables: &Tables, rule: usize, place: usize, value: Value, answers: &mut V
     // As often as one function can follow another.
     for _ in 0..said.relationships.len() {
         for relationship in &said.relationships {
-            let RelationshipKind::Function(function) = relationship.kind else {
+            if !gives(relationship.kind) {
                 continue;
-            };
+            }
             let (last, inputs) = relationship.operands.split_last().expect("it has operands");
             let inputs: Option<SmallVec<[Value; 4]>> =
                 inputs.iter().map(|at| seen(&known, at)).collect();
-            let call = tables.model.functions[function].call;
             if let (Some(inputs), Operand::Variable(output)) = (inputs, *last) {
-                known[output] = call(&inputs);
+                known[output] = match relationship.kind {
+                    RelationshipKind::Function(at) => (tables.model.functions[at].call)(&inputs),
+                    kind => reckon(kind, &inputs),
+                };
             }
         }
     }
@@ -219,8 +238,7 @@ fn ask(tables: &Tables, rule: usize, place: usize, value: Value, answers: &mut V
         told
     };
     for (variable, known) in known.iter().enumerate() {
-        let is_me = said.master.arguments[place] == Argument::Variable(variable);
-        if !is_me && named(variable) {
+        if variable != of && named(variable) {
             answers.push(*known);
         }
     }
@@ -239,16 +257,10 @@ fn ask(tables: &Tables, rule: usize, place: usize, value: Value, answers: &mut V
                 let values: SmallVec<[Value; 4]> = operands.into_iter().flatten().collect();
                 answers.push(Some(Value::from(tables.holds(relationship.kind, &values))));
             }
-            [one] if !matches!(relationship.kind, RelationshipKind::Function(_)) => {
-                for symbol in 0..tables.model.symbols.len().max(2) as Value {
+            [one] if !gives(relationship.kind) => {
+                for other in others(tables, said, relationship.operands[one]) {
                     let values: SmallVec<[Value; 4]> = { operands.iter().enumerate() }
-                        .map(|(at, value)| {
-                            if at == one {
-                                symbol
-                            } else {
-                                value.unwrap_or(0)
-                            }
-                        })
+                        .map(|(at, value)| if at == one { other } else { value.unwrap_or(0) })
                         .collect();
                     answers.push(Some(Value::from(tables.holds(relationship.kind, &values))));
                 }
@@ -256,5 +268,23 @@ fn ask(tables: &Tables, rule: usize, place: usize, value: Value, answers: &mut V
             // A function of symbols, too: each number is a class of its own.
             _ => answers.push(Some(value)),
         }
+    }
+}
+
+/// Whether the last operand follows from the others.
+fn gives(kind: RelationshipKind) -> bool {
+    use RelationshipKind::{Function, Product, Sum};
+    matches!(kind, Function(_) | Sum | Product)
+}
+
+/// The values that an operand may have, of which there are few.
+fn others(tables: &Tables, rule: &Rule, operand: Operand) -> Vec<Value> {
+    let Operand::Variable(variable) = operand else {
+        return Vec::new();
+    };
+    match &tables.model.types[rule.variables[variable].of].values {
+        Values::Truth => vec![0, 1],
+        Values::Symbols(all) => all.clone(),
+        Values::Numbers(span) => (span.min..=span.max).collect(),
     }
 }

@@ -2,7 +2,7 @@
 //! make no difference to what is decided.
 
 use farside_planning::Ticks;
-use farside_planning::model::{End, Values};
+use farside_planning::model::End;
 
 use super::NotCompiled;
 use super::classes::Classes;
@@ -111,8 +111,9 @@ pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Opti
         key.push(u32::MAX - 1);
     }
     for known in &state.cells {
-        let number = matches!(is.tables.model.types[known.of].values, Values::Numbers(_));
-        if number && known.origin == crate::service::propositional::state::Origin::Computed {
+        if is.tables.is_measured(known.of)
+            && known.origin == crate::service::propositional::state::Origin::Computed
+        {
             return None;
         }
         let class = known

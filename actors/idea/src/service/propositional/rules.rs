@@ -6,7 +6,6 @@ use farside_planning::model::{
     Argument, Body, Bound, Model, Operand, Position, Relation, RelationshipKind, Rule, RuleId,
     Target, Value, Values, VariableId,
 };
-use smallvec::SmallVec;
 use thiserror::Error;
 
 /// A part of a rule's body, by its place.
@@ -27,13 +26,6 @@ pub(in crate::service) struct Flat {
     pub(in crate::service) named: Vec<(VariableId, usize)>,
     /// Least and most ticks that the master lasts.
     pub(in crate::service) duration: Option<[Ticks; 2]>,
-}
-
-/// How tokens of a predicate end of which no status says how: output and value.
-#[derive(Clone, Debug, Default)]
-pub(in crate::service) struct Endings {
-    pub(in crate::service) timed_out: SmallVec<[(usize, Value); 1]>,
-    pub(in crate::service) preempted: SmallVec<[(usize, Value); 1]>,
 }
 
 /// Why the propositional technology does not hold a model.
@@ -85,10 +77,18 @@ impl Flat {
                 return Err(coupled(said.position, "a time among values"));
             }
         }
+        let named = |operand: Option<&Operand>| match operand {
+            Some(Operand::Variable(variable)) => {
+                let is = Argument::Variable(*variable);
+                said.master.arguments.contains(&is)
+            }
+            _ => true,
+        };
         for said in &said.relationships {
+            // What only gives a number is reckoned once the others are known.
             let what = match said.kind {
-                RelationshipKind::Sum => "a sum",
-                RelationshipKind::Product => "a product",
+                RelationshipKind::Sum if named(said.operands.last()) => "a sum",
+                RelationshipKind::Product if named(said.operands.last()) => "a product",
                 RelationshipKind::Less | RelationshipKind::AtMost => "an order of numbers",
                 _ => continue,
             };
@@ -147,29 +147,6 @@ pub(in crate::service) fn early(model: &Model, relation: &Relation) -> u32 {
         subgoals.iter().position(|&at| at == wanted)
     });
     named.unwrap_or(subgoals.len() + 1) as u32
-}
-
-/// By predicate: how its tokens end of which no status says how.
-pub(in crate::service) fn endings(model: &Model) -> Vec<Endings> {
-    let named = |predicate: usize, name: &str| {
-        let said = &model.predicates[predicate];
-        let symbol = model.symbols.iter().position(|at| at == name);
-        let outputs = said.parameters.iter().enumerate().skip(said.inputs);
-        let outputs = outputs.filter_map(|(place, output)| {
-            let symbol = symbol? as Value;
-            match &model.types[output.of].values {
-                Values::Symbols(all) if all.contains(&symbol) => Some((place, symbol)),
-                _ => None,
-            }
-        });
-        outputs.collect()
-    };
-    let predicates = 0..model.predicates.len();
-    let endings = predicates.map(|predicate| Endings {
-        timed_out: named(predicate, "TIMEOUT"),
-        preempted: named(predicate, "PREEMPTED"),
-    });
-    endings.collect()
 }
 
 /// Whether a value is one of a type.

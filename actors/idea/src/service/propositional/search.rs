@@ -81,7 +81,8 @@ impl World {
                 let parts = flat.choices[usize::from(choice)].iter().flatten();
                 let dues =
                     parts.filter_map(|&part| self.urgency(tables, tick, Open { part, ..open }));
-                return dues.min();
+                // It comes with the first token that it could insert.
+                return dues.min_by_key(|&due| (due & 1 == 0, due));
             }
         };
         let said = &flat.relations[relation];
@@ -436,8 +437,12 @@ impl World {
                 Argument::Any => {}
                 Argument::Value(value) => self.state.bind(tables, cell, value, rule)?,
                 Argument::Variable(variable) => {
-                    let own = self.state.variable(tables, open.token, instance, variable);
-                    self.state.equal(tables, own, cell, rule)?;
+                    let at = &mut self.state.tokens[usize::from(open.token)].instances[instance];
+                    match at.variables[variable] {
+                        Some(own) => self.state.equal(tables, own, cell, rule)?,
+                        // It is the token's own from now on.
+                        None => self.state.stand(open.token, instance, variable, cell),
+                    }
                 }
             }
         }
@@ -545,7 +550,7 @@ impl World {
     /// What a token's outputs say if it ends at a tick and no status came.
     fn says<'a>(&self, tables: &'a Tables, token: Token, tick: Ticks) -> &'a [(usize, Value)] {
         let at = self.state.at(token);
-        let endings = &tables.endings[at.predicate];
+        let endings = &tables.model.predicates[at.predicate];
         let longest = self.longest(tables, token);
         match longest.is_some_and(|longest| at.start.saturating_add(longest) == tick) {
             true => &endings.timed_out,
@@ -591,12 +596,16 @@ impl World {
         {
             return Ok(());
         }
-        let Some(default) = &tables.model.timelines[timeline].default else {
+        let said = &tables.model.timelines[timeline];
+        let first = { said.initial.as_ref() }.filter(|_| self.state.last(timeline).is_none());
+        let default = said.default.as_ref();
+        let Some(filler) = first.or(default) else {
             let (what, rule) = (What::Kind, None);
             return Err(Clash { what, rule });
         };
-        let token = self.put(tables, timeline, default.predicate, &default.values, tick);
-        self.state.tokens[usize::from(token)].fills = true;
+        let token = self.put(tables, timeline, filler.predicate, &filler.values, tick);
+        let fills = default.is_some_and(|default| default.predicate == filler.predicate);
+        self.state.tokens[usize::from(token)].fills = fills;
         Ok(())
     }
 

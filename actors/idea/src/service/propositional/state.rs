@@ -8,7 +8,7 @@
 use farside_planning::Ticks;
 use farside_planning::model::{
     Argument, End, Model, Operand, PredicateId, RelationshipKind, RuleId, TimelineId, TypeId,
-    Value, Values, VariableId,
+    Value, VariableId,
 };
 use smallvec::SmallVec;
 
@@ -278,37 +278,37 @@ impl State {
         if one == other {
             return Ok(());
         }
-        let origin = |cell: Cell| self.cells[usize::from(cell)].origin;
-        match (self.value(one), self.value(other)) {
-            (Some(value), is) => {
-                if is.is_some() {
-                    self.compare(tables, one, other);
-                }
-                self.bind_from(tables, other, (value, origin(one)), rule)?;
+        let what = What::Values;
+        let (kept, other) = match (self.value(one), self.value(other)) {
+            (Some(is), Some(other_is)) => {
+                self.compare(tables, one, other);
+                return (is == other_is).then_some(()).ok_or(Clash { what, rule });
             }
-            (None, Some(value)) => self.bind_from(tables, one, (value, origin(other)), rule)?,
-            (None, None) => {}
-        }
-        // Known ones stay apart: what they are equal to may be forgotten.
-        if self.value(one).is_none() {
-            let of = self.cells[usize::from(other)].of;
-            let kept = &mut self.cells[usize::from(one)];
-            if kept.of != of {
-                kept.also = Some(of);
+            (None, Some(_)) => (other, one),
+            _ => (one, other),
+        };
+        let (value, of) = (self.value(kept), &self.cells[usize::from(other)]);
+        let also = (of.of, of.also);
+        if let Some(value) = value {
+            let is = |of: TypeId| is_of(&tables.model, of, value);
+            if !is(also.0) || also.1.is_some_and(|of| !is(of)) {
+                return Err(Clash { what, rule });
             }
-            self.cells[usize::from(other)].same = Some(one);
-            self.tell(one);
         }
+        let known = &mut self.cells[usize::from(kept)];
+        if known.of != also.0 && known.value.is_none() {
+            known.also = Some(also.0);
+        }
+        self.cells[usize::from(other)].same = Some(kept);
+        self.tell(kept);
         Ok(())
     }
 
     /// Values of two cells are compared: if they are numbers, whose classes need not say whether they
     /// are equal, that is noted.
     pub(in crate::service) fn compare(&self, tables: &Tables, one: Cell, other: Cell) {
-        let is_number = |cell: Cell| {
-            let of = self.cells[usize::from(self.root(cell))].of;
-            matches!(tables.model.types[of].values, Values::Numbers(_))
-        };
+        let is_number =
+            |cell: Cell| tables.is_measured(self.cells[usize::from(self.root(cell))].of);
         if is_number(one) || is_number(other) {
             self.loose.set(true);
         }
@@ -726,9 +726,9 @@ impl State {
                     && let Some(cell) = cells[cells.len() - 1]
                 {
                     let of = self.cells[usize::from(self.root(cell))].of;
-                    let origin = match tables.model.types[of].values {
-                        Values::Numbers(_) => Origin::Computed,
-                        _ => Origin::Model,
+                    let origin = match tables.is_measured(of) {
+                        true => Origin::Computed,
+                        false => Origin::Model,
                     };
                     self.bind_from(tables, cell, (output, origin), Some(rule))?;
                 }
@@ -737,6 +737,14 @@ impl State {
                     Some(last) => self.check_output(call, known, last, rule),
                     None => Ok(()),
                 };
+            }
+            RelationshipKind::Sum | RelationshipKind::Product => {
+                let (_, others) = known.split_last().expect("it has operands");
+                let others: Option<SmallVec<[Value; 4]>> = others.iter().copied().collect();
+                if let Some(value) = others.and_then(|others| reckon(kind, &others)) {
+                    is(self, known.len() - 1, value)?;
+                }
+                return Ok(());
             }
             RelationshipKind::Table(table) => {
                 for (place, value) in tables.certain(table, known) {
@@ -771,6 +779,20 @@ impl State {
         }
     }
 
+    /// A variable of a rule stands for a cell.
+    pub(in crate::service) fn stand(
+        &mut self,
+        token: Token,
+        instance: usize,
+        variable: VariableId,
+        cell: Cell,
+    ) {
+        self.tokens[usize::from(token)].instances[instance].variables[variable] = Some(cell);
+        if !self.news.contains(&token) {
+            self.news.push(token);
+        }
+    }
+
     /// The cell that a variable of a rule stands for; a new one, if it stands for none yet.
     pub(in crate::service) fn variable(
         &mut self,
@@ -787,6 +809,15 @@ impl State {
         let cell = self.new_cell(of, None);
         self.tokens[usize::from(token)].instances[instance].variables[variable] = Some(cell);
         cell
+    }
+}
+
+/// The sum or the product of numbers.
+pub(in crate::service) fn reckon(kind: RelationshipKind, values: &[Value]) -> Option<Value> {
+    let mut values = values.iter();
+    match kind {
+        RelationshipKind::Sum => values.try_fold(0, |sum: Value, &one| sum.checked_add(one)),
+        _ => values.try_fold(1, |all: Value, &one| all.checked_mul(one)),
     }
 }
 
