@@ -291,6 +291,22 @@ impl Compiled {
         })
     }
 
+    /// From the start again, with the table as it is by now.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Compiled::new).
+    pub fn restarted(self) -> Result<Self, NotCompiled> {
+        let fresh = Compiled::new(self.model.clone())?;
+        Ok(Compiled {
+            forms: self.forms,
+            by_key: self.by_key,
+            nodes: self.nodes,
+            transitions: self.transitions,
+            ..fresh
+        })
+    }
+
     /// How large the table is by now.
     pub fn size(&self) -> TableSize {
         let nodes: usize = { self.nodes.iter() }
