@@ -23,14 +23,14 @@ use farside_planning::model::{Model, PredicateId, Problem, TimelineId, Value};
 use smallvec::SmallVec;
 use thiserror::Error;
 
-use super::propositional::state::{Far, Origin};
+use super::propositional::state::{Far, Fars, Origin};
 use super::propositional::{NotPropositional, Propositional};
 use super::{
     Contract, Ended, Outcome, Plan, PlanService, Present, Refusal, ServiceCounters, Snapshot,
     Stale, Started, check,
 };
 use classes::{Classes, classes};
-use key::{check_present, exact_ticks, is_far, key};
+use key::{check_present, exact_ticks, is_far, key, longest};
 
 /// Why a model does not become a table.
 #[derive(Debug, Error)]
@@ -97,16 +97,18 @@ enum Source {
     Posted(u16, u16),
 }
 
-/// From where a latest end is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Latest {
+/// From where a bound of an end is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Bound {
     Never,
     Ahead(Ticks),
     End(u16),
+    /// The latest of some for an earliest end, the earliest for a latest.
+    Several(Box<[Far]>),
 }
 
-/// The earliest end, in ticks from now, and from where the latest is.
-type EndSource = (Ticks, Latest);
+/// From where an end's earliest and latest ticks are.
+type EndSource = [Bound; 2];
 
 /// A token that begins or ends.
 #[derive(Clone, Debug)]
@@ -141,8 +143,10 @@ struct Form {
     node: u32,
     lanes: Box<[(PredicateId, SmallVec<[u16; 4]>)]>,
     ends: Box<[bool]>,
-    /// The ends that are far.
+    /// The ends of which a bound is far.
     far: SmallVec<[u16; 8]>,
+    /// By timeline: its token's end, and how long its own rules let it last at most.
+    lasts: Box<[(u16, Ticks)]>,
     /// To be filled from the registers, and run.
     interpreter: Box<Propositional>,
 }
@@ -401,8 +405,14 @@ impl Compiled {
         }
         let ends = state.finishes.iter_mut().zip(&self.registers.ends);
         for (place, (bounds, &(min, max))) in ends.enumerate() {
+            let from = |time: Ticks| -> Fars {
+                let far = is_far(time, self.now, self.exact);
+                { far.then_some(Far::End(place as u16)) }
+                    .into_iter()
+                    .collect()
+            };
             (bounds.min, bounds.max) = (min, max);
-            bounds.far = Some(Far::End(place as u16));
+            (bounds.lows, bounds.highs) = (from(min), from(max));
         }
         for (timeline, lane) in state.lanes.iter_mut().enumerate() {
             lane.number = self.numbers[timeline];
@@ -449,22 +459,31 @@ impl Compiled {
     /// Far ends that are near now are the first that is posted.
     fn come_near(&mut self) {
         let far = &self.forms[self.state as usize].far;
-        let mut which: u64 = 0;
-        let mut near = Ticks::MAX;
+        let (mut which, mut near, mut bit) = (0_u64, Ticks::MAX, 0);
         for &end in far {
-            let (_, max) = self.registers.ends[usize::from(end)];
-            if is_far(max, self.now, self.exact) {
-                near = near.min(max - self.exact);
-            } else if end < 60 {
-                which |= 1 << end;
-            } else {
-                self.node = None;
+            let bounds = self.registers.ends[usize::from(end)];
+            for bound in [bounds.0, bounds.1] {
+                let was = is_far(bound, self.now - 1, self.exact);
+                if was && !is_far(bound, self.now, self.exact) {
+                    which |= 1 << bit;
+                }
+                bit += 1;
             }
+            near = near.min(comes_near(bounds, self.now, self.exact));
+        }
+        // How a token ends whose time is nearly over depends on whose time it is.
+        for (timeline, &(end, longest)) in self.forms[self.state as usize].lasts.iter().enumerate()
+        {
+            let (_, max) = self.registers.ends[usize::from(end)];
+            if self.starts[timeline].saturating_add(longest) == max {
+                which |= 1 << bit;
+            }
+            bit += 1;
+        }
+        if bit > 60 {
+            self.node = None;
         }
         self.near = near;
-        if which == 0 {
-            return;
-        }
         let number = NEAR << 61 | which;
         self.node = match (self.child(number), self.node) {
             (Some(child), _) => Some(child),
@@ -513,16 +532,24 @@ impl Compiled {
         self.spare.cells.extend(at.cells.iter().map(value));
         self.spare.ends.clear();
         let mut near = Ticks::MAX;
-        for &(min, latest) in &at.ends {
-            let max = match latest {
-                Latest::Never => Ticks::MAX,
-                Latest::Ahead(ticks) => now + ticks,
-                Latest::End(end) => from.ends[usize::from(end)].1,
+        for [min, max] in &at.ends {
+            let end = |at: &Far, max: bool| match *at {
+                Far::Ahead(ticks) => now + ticks,
+                Far::End(end) if max => from.ends[usize::from(end)].1,
+                Far::End(end) => from.ends[usize::from(end)].0,
             };
-            if max != Ticks::MAX && max > now + self.exact {
-                near = near.min(max - self.exact);
-            }
-            self.spare.ends.push((now + min, max));
+            let bound = |at: &Bound, max: bool| match at {
+                Bound::Never => Ticks::MAX,
+                Bound::Ahead(ticks) => now + ticks,
+                Bound::End(at) => end(&Far::End(*at), max),
+                Bound::Several(all) => {
+                    let all = all.iter().map(|at| end(at, max));
+                    { if max { all.min() } else { all.max() } }.unwrap_or(now)
+                }
+            };
+            let (min, max) = (bound(min, false), bound(max, true));
+            near = near.min(comes_near((min, max), now, self.exact));
+            self.spare.ends.push((min, max));
         }
         self.near = near;
         self.counters.decisions += u64::from(at.decisions);
@@ -629,7 +656,15 @@ impl Compiled {
             (at.predicate, at.parameters.iter().copied().collect())
         });
         let ends = 0..known.finishes.len();
-        let far = ends.filter(|&at| is_far(known.finishes[at].max, self.now, self.exact));
+        let far = ends.filter(|&at| {
+            let at = &known.finishes[at];
+            known.is_far(at.min) || known.is_far(at.max)
+        });
+        let lasts = known.lanes.iter().enumerate().map(|(timeline, lane)| {
+            let token = lane.tokens.last().expect("each timeline says something");
+            let longest = longest(is, timeline).unwrap_or(Ticks::MAX);
+            (known.end(known.at(*token).finish), longest)
+        });
         let mut interpreter = Box::new(is.clone());
         interpreter.shrink();
         self.forms.push(Form {
@@ -637,6 +672,7 @@ impl Compiled {
             lanes: lanes.collect(),
             ends: is.ends.clone().into(),
             far: far.map(|at| at as u16).collect(),
+            lasts: lasts.collect(),
             interpreter,
         });
         let state = (self.forms.len() - 1) as u32;
@@ -672,17 +708,16 @@ impl Compiled {
     fn sources(&self, is: &Propositional) -> Option<(Box<[Source]>, Box<[EndSource]>)> {
         let known = &is.world.state;
         let cells = (0..known.cells.len()).map(|cell| source(is, cell as u16));
-        let ends = known.finishes.iter().map(|at| {
-            let min = (at.min - self.now).max(0);
-            let latest = match (at.max, at.far) {
-                (Ticks::MAX, _) => Latest::Never,
-                (max, _) if !is_far(max, self.now, self.exact) => Latest::Ahead(max - self.now),
-                (_, Some(Far::Ahead(ticks))) => Latest::Ahead(ticks),
-                (_, Some(Far::End(end))) => Latest::End(end),
-                (_, None) => return None,
-            };
-            Some((min, latest))
-        });
+        let bound = |time: Ticks, fars: &[Far]| match (time, fars) {
+            (Ticks::MAX, _) => Some(Bound::Never),
+            (time, _) if !known.is_far(time) => Some(Bound::Ahead((time - self.now).max(0))),
+            (_, []) => None,
+            (_, &[Far::Ahead(ticks)]) => Some(Bound::Ahead(ticks)),
+            (_, &[Far::End(end)]) => Some(Bound::End(end)),
+            (_, several) => Some(Bound::Several(several.into())),
+        };
+        let ends = known.finishes.iter();
+        let ends = ends.map(|at| Some([bound(at.min, &at.lows)?, bound(at.max, &at.highs)?]));
         let ends: Option<Box<[_]>> = ends.collect();
         Some((cells.collect(), ends?))
     }
@@ -710,6 +745,12 @@ impl Compiled {
         }
         outcome
     }
+}
+
+/// From which tick on a bound of an end is near that is far now.
+fn comes_near((min, max): (Ticks, Ticks), now: Ticks, exact: Ticks) -> Ticks {
+    let far = [min, max].into_iter().filter(|&at| is_far(at, now, exact));
+    far.map(|at| at - exact).min().unwrap_or(Ticks::MAX)
 }
 
 /// Whether what may be posted can be numbered.

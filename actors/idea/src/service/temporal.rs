@@ -23,6 +23,7 @@ use farside_planning::database::TokenId;
 use farside_planning::model::{Model, PredicateId, Problem, TimelineId, TimelineKind, Value};
 use farside_planning::search::Verdict;
 use farside_planning::search::executive::{Executive, Following};
+pub use farside_planning::search::executive::{MergeScan, Propagation};
 use farside_planning::search::schedule::LoadError;
 use thiserror::Error;
 
@@ -37,11 +38,23 @@ use super::{
 pub struct TemporalOptions {
     /// Whether [`forget`](PlanService::forget) deletes anything.
     pub deletes: bool,
+    /// Which tokens conditions are compared with.
+    pub merge_scan: MergeScan,
+    /// What is propagated after a decision or a status.
+    pub propagation: Propagation,
+    /// Whether statuses are guessed where [`solve`](PlanService::solve) looks further than now: the
+    /// values that rules name first, as early as they may come. Else nothing is heard until then.
+    pub guess: bool,
 }
 
 impl Default for TemporalOptions {
     fn default() -> Self {
-        TemporalOptions { deletes: true }
+        TemporalOptions {
+            deletes: true,
+            merge_scan: MergeScan::Near,
+            propagation: Propagation::Incremental,
+            guess: false,
+        }
     }
 }
 
@@ -135,6 +148,7 @@ impl Temporal {
         let executive = Executive::begin(model.clone(), problem).map_err(Unfit::Facts)?;
         let mut executive = executive;
         executive.forgets = false;
+        executive.work(options.merge_scan, options.propagation);
         let lanes = vec![Lane::default(); model.timelines.len()];
         Ok(Temporal {
             executive,
@@ -298,10 +312,11 @@ impl PlanService for Temporal {
         cancelled.map_err(|conflict| self.refusal(predicate, &conflict))
     }
 
-    fn solve(&mut self, _horizon: Ticks, budget: u64) -> Outcome {
+    fn solve(&mut self, horizon: Ticks, budget: u64) -> Outcome {
         self.started.clear();
         self.ended.clear();
-        match self.executive.cycle(self.now, budget) {
+        let guess = self.options.guess;
+        match self.executive.cycle_ahead(self.now, horizon, guess, budget) {
             Verdict::Solved => {
                 self.follow_timelines();
                 Outcome::Decided

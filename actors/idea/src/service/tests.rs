@@ -1,10 +1,12 @@
 //! What every planning technology must do, asked of each of them.
 
+mod ahead;
 mod cycles;
 mod equal;
 mod plans;
 mod random;
 mod refusals;
+mod work;
 
 use farside_planning::language::{Options, read_model};
 use farside_planning::model::{Model, TimelineId, Value};
@@ -35,7 +37,10 @@ fn agents(text: &str) -> Vec<Agent> {
     let model = read(text);
     let mut agents = Vec::new();
     for deletes in [true, false] {
-        let options = TemporalOptions { deletes };
+        let options = TemporalOptions {
+            deletes,
+            ..TemporalOptions::default()
+        };
         let service = Temporal::new(model.clone(), options).expect("the model fits");
         agents.push(Agent {
             name: "temporal",

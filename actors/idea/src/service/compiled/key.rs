@@ -11,13 +11,11 @@ use crate::service::propositional::state::{Guard, Open, span};
 use crate::service::propositional::{Propositional, Tables};
 use crate::service::words;
 
-/// The most ticks that any rule counts exactly: the longest least duration or distance.
+/// The most ticks that are counted exactly: the longest distance that a relation asks for. What lies
+/// further ahead is far.
 pub(super) fn exact_ticks(tables: &Tables) -> Ticks {
     let mut most = 1;
     for flat in &tables.flats {
-        if let Some([min, _]) = flat.duration {
-            most = most.max(min);
-        }
         for distance in flat.relations.iter().flat_map(|at| &at.distances) {
             for bound in [distance.min, distance.max] {
                 if let Some(bound) = constant(bound, 0) {
@@ -78,6 +76,15 @@ pub(super) fn is_far(time: Ticks, tick: Ticks, exact: Ticks) -> bool {
     time != Ticks::MAX && time > tick + exact
 }
 
+/// How long a timeline's present token lasts at most by its own rules, if they say so.
+pub(super) fn longest(is: &Propositional, timeline: usize) -> Option<Ticks> {
+    let token = is.world.state.last(timeline)?;
+    let instances = is.world.state.at(token).instances.iter();
+    let holds = instances.filter(|at| at.guard == Guard::Holds);
+    let bounds = holds.filter_map(|at| is.tables.flats[at.rule].duration);
+    bounds.map(|[_, most]| most).min()
+}
+
 /// What is known, in numbers, but for what makes no difference; none, if it holds numbers that
 /// functions gave.
 pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Option<Vec<u32>> {
@@ -88,10 +95,9 @@ pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Opti
         let at = state.at(token);
         let (_, max) = state.finish(token);
         // Whether its end is a time-out tells how it ends.
-        let holds = at.instances.iter().filter(|at| at.guard == Guard::Holds);
-        let longest = holds.filter_map(|at| is.tables.flats[at.rule].duration);
-        let longest = longest.map(|[_, most]| most).min();
-        let own = longest.is_some_and(|longest| at.start.saturating_add(longest) == max);
+        let longest = longest(is, timeline);
+        let near = max != Ticks::MAX && !is_far(max, tick, exact);
+        let own = near && longest.is_some_and(|longest| at.start.saturating_add(longest) == max);
         key.extend([
             at.predicate as u32,
             u32::from(at.fills) | u32::from(is.ends[timeline]) << 1 | u32::from(own) << 2,
@@ -126,8 +132,10 @@ pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Opti
         ]);
     }
     for bounds in &state.finishes {
-        let least = (bounds.min - tick).max(0);
-        key.push(least as u32);
+        key.push(match bounds.min {
+            min if is_far(min, tick, exact) => u32::MAX - 1 - u32::from(bounds.min == bounds.max),
+            min => (min - tick).max(0) as u32,
+        });
         key.push(match bounds.max {
             Ticks::MAX => u32::MAX,
             max if is_far(max, tick, exact) => u32::MAX - 1,

@@ -519,8 +519,8 @@ impl World {
         token: Token,
         tick: Ticks,
     ) -> Result<bool, Clash> {
-        let (min, max) = self.state.finish(token);
-        let open = min != max;
+        let (_, max) = self.state.finish(token);
+        let open = !self.state.is_fixed(self.state.at(token).finish);
         let at = max.min(tick);
         let says = self.says(tables, token, at);
         if open {

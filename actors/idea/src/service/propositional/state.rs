@@ -47,7 +47,7 @@ pub(in crate::service) enum Origin {
     Posted(u16, u16),
 }
 
-/// Where a latest end is from that lies further ahead than what rules count exactly.
+/// Where an end is from that lies further ahead than what is counted exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::service) enum Far {
     /// So many ticks from now.
@@ -55,6 +55,9 @@ pub(in crate::service) enum Far {
     /// What an end had when the cycle began.
     End(u16),
 }
+
+/// Where a time is from, of several that say so.
+pub(in crate::service) type Fars = SmallVec<[Far; 2]>;
 
 /// A value that is known, or not yet.
 #[derive(Clone, Debug)]
@@ -73,8 +76,10 @@ pub(in crate::service) struct Known {
 pub(in crate::service) struct Bounds {
     pub(in crate::service) min: Ticks,
     pub(in crate::service) max: Ticks,
-    /// Where the latest end is from, if that is known.
-    pub(in crate::service) far: Option<Far>,
+    /// Where a far earliest end is from: it is the latest of these.
+    pub(in crate::service) lows: Fars,
+    /// Where a far latest end is from: it is the earliest of these.
+    pub(in crate::service) highs: Fars,
     pub(in crate::service) same: Option<Finish>,
 }
 
@@ -322,49 +327,66 @@ impl State {
         max: Ticks,
         rule: Option<RuleId>,
     ) -> Result<(), Clash> {
-        self.within_from(finish, min, (max, None), rule)
+        self.within_from(finish, (min, &[]), (max, &[]), rule)
     }
 
     /// Whether a time is so far ahead that it is not told apart from others.
-    fn is_far(&self, time: Ticks) -> bool {
+    pub(in crate::service) fn is_far(&self, time: Ticks) -> bool {
         time != Ticks::MAX && time > self.tick.saturating_add(self.exact)
     }
 
-    /// An end lies within bounds.
+    /// Whether a token's end is known; notes if that depends on times that are not told apart.
+    pub(in crate::service) fn is_fixed(&self, finish: Finish) -> bool {
+        let at = &self.finishes[usize::from(self.end(finish))];
+        if self.is_far(at.min) && !are_comparable(&at.lows, &at.highs) {
+            self.loose.set(true);
+        }
+        at.min == at.max
+    }
+
+    /// An end lies within bounds, which are from somewhere if they are far.
     pub(in crate::service) fn within_from(
         &mut self,
         finish: Finish,
-        min: Ticks,
-        (max, far): (Ticks, Option<Far>),
+        (min, lows): (Ticks, &[Far]),
+        (max, highs): (Ticks, &[Far]),
         rule: Option<RuleId>,
     ) -> Result<(), Clash> {
         let finish = usize::from(self.end(finish));
-        let is = &self.finishes[finish];
-        let alike = match (is.far, far) {
-            (Some(Far::Ahead(_)), Some(Far::Ahead(_))) => true,
-            (one, other) => one.is_some() && one == other,
-        };
-        let unclear = match (self.is_far(is.max), self.is_far(max)) {
-            (true, true) => !alike,
-            (false, true) => far.is_none() && is.max > max,
-            _ => false,
-        };
-        if unclear || self.is_far(min) {
+        let far = (self.is_far(min), self.is_far(max));
+        if (far.0 && lows.is_empty()) || (far.1 && highs.is_empty()) {
             self.loose.set(true);
         }
+        let is = &self.finishes[finish];
+        let was_far = (self.is_far(is.min), self.is_far(is.max));
+        let known = (is.lows.len(), is.highs.len());
         let bounds = &mut self.finishes[finish];
-        if max < bounds.max {
-            bounds.far = far;
+        let before = (bounds.min, bounds.max);
+        match (far.0, was_far.0) {
+            (true, true) => join(&mut bounds.lows, lows),
+            (true, false) => bounds.lows = SmallVec::from_slice(lows),
+            _ => {}
         }
-        let (low, high) = (bounds.min.max(min), bounds.max.min(max));
+        match (far.1, was_far.1) {
+            (true, true) => join(&mut bounds.highs, highs),
+            (true, false) if max < bounds.max => bounds.highs = SmallVec::from_slice(highs),
+            (false, _) if max < bounds.max => bounds.highs.clear(),
+            _ => {}
+        }
+        (bounds.min, bounds.max) = (bounds.min.max(min), bounds.max.min(max));
+        let (low, high) = (bounds.min, bounds.max);
+        let unclear = !are_comparable(&bounds.lows, &bounds.highs);
+        let same = before == (low, high) && known == (bounds.lows.len(), bounds.highs.len());
+        if self.is_far(low) && self.is_far(high) && unclear {
+            self.loose.set(true);
+        }
         if low > high {
             let what = What::Times;
             return Err(Clash { what, rule });
         }
-        if (low, high) == (bounds.min, bounds.max) {
+        if same {
             return Ok(());
         }
-        (bounds.min, bounds.max) = (low, high);
         self.operations += 1;
         for place in 0..self.gaps.len() {
             let gap = self.gaps[place].clone();
@@ -377,27 +399,19 @@ impl State {
     }
 
     fn keep(&mut self, gap: &Gap) -> Result<(), Clash> {
-        let bounds = |state: &State, at: Finish| {
-            let at = &state.finishes[usize::from(state.end(at))];
-            (at.min, at.max, at.far)
-        };
         let rule = Some(gap.rule);
-        let (min, max, far) = bounds(self, gap.from);
-        let far = far.filter(|_| gap.max == 0);
-        self.within_from(
-            gap.to,
-            later(min, gap.min),
-            (later(max, gap.max), far),
-            rule,
-        )?;
-        let (min, max, far) = bounds(self, gap.to);
-        let far = far.filter(|_| gap.min == 0);
-        self.within_from(
-            gap.from,
-            later(min, -gap.max),
-            (later(max, -gap.min), far),
-            rule,
-        )
+        // Times that are moved are of no known origin.
+        let from_there = |fars: Fars, by: Ticks| if by == 0 { fars } else { Fars::new() };
+        let at = self.finishes[usize::from(self.end(gap.from))].clone();
+        let (lows, highs) = (from_there(at.lows, gap.min), from_there(at.highs, gap.max));
+        let low = (later(at.min, gap.min), &lows[..]);
+        let high = (later(at.max, gap.max), &highs[..]);
+        self.within_from(gap.to, low, high, rule)?;
+        let at = self.finishes[usize::from(self.end(gap.to))].clone();
+        let (lows, highs) = (from_there(at.lows, gap.max), from_there(at.highs, gap.min));
+        let low = (later(at.min, -gap.max), &lows[..]);
+        let high = (later(at.max, -gap.min), &highs[..]);
+        self.within_from(gap.from, low, high, rule)
     }
 
     /// Says what a relation says of the times of two tokens.
@@ -470,6 +484,7 @@ impl State {
             (End::Finish, End::Start) => {
                 to == self.tick || (min == -Ticks::MAX && max >= 0) || min >= 0
             }
+            // What is near is told apart.
             (End::Finish, End::Finish) => min <= 0 && max >= 0,
         };
         if !clear {
@@ -486,11 +501,11 @@ impl State {
     ) -> Result<(), Clash> {
         let (from, to) = (self.end(ends.0), self.end(ends.1));
         if span == (0, 0) {
-            let Bounds { min, max, far, .. } = self.finishes[usize::from(to)];
-            self.within_from(from, min, (max, far), rule)?;
-            let Bounds { min, max, far, .. } = self.finishes[usize::from(from)];
-            self.within_from(to, min, (max, far), rule)?;
-            if from != to && min != max {
+            for (one, other) in [(to, from), (from, to)] {
+                let at = self.finishes[usize::from(one)].clone();
+                self.within_from(other, (at.min, &at.lows), (at.max, &at.highs), rule)?;
+            }
+            if from != to && !self.is_fixed(from) {
                 self.finishes[usize::from(to)].same = Some(from);
             }
             return Ok(());
@@ -525,7 +540,8 @@ impl State {
         self.finishes.push(Bounds {
             min: start + 1,
             max: Ticks::MAX,
-            far: None,
+            lows: Fars::new(),
+            highs: Fars::new(),
             same: None,
         });
         let rules = tables.model.rules_of(timeline, predicate).iter();
@@ -654,9 +670,13 @@ impl State {
         (at.guard, at.variables, at.labels) = (Guard::Holds, variables, labels);
         self.say(tables, token, instance)?;
         if let Some([min, max]) = flat.duration {
-            let far = (start == self.tick).then_some(Far::Ahead(max));
-            let most = (later(start, max), far);
-            self.within_from(finish, later(start, min), most, Some(rule))?;
+            let ahead = |ticks| match start == self.tick {
+                true => smallvec::smallvec![Far::Ahead(ticks)],
+                false => Fars::new(),
+            };
+            let (lows, highs): (Fars, Fars) = (ahead(min), ahead(max));
+            let (low, high) = (later(start, min), later(start, max));
+            self.within_from(finish, (low, &lows), (high, &highs), Some(rule))?;
         }
         let instance = instance as u16;
         for &part in &flat.top {
@@ -810,6 +830,21 @@ impl State {
         self.tokens[usize::from(token)].instances[instance].variables[variable] = Some(cell);
         cell
     }
+}
+
+/// Takes over from where a time may be, too.
+fn join(fars: &mut Fars, others: &[Far]) {
+    for &other in others {
+        if !fars.contains(&other) {
+            fars.push(other);
+        }
+    }
+}
+
+/// Whether a far earliest and a far latest end can be compared without knowing when they are.
+fn are_comparable(lows: &[Far], highs: &[Far]) -> bool {
+    let all_ahead = { lows.iter().chain(highs) }.all(|at| matches!(at, Far::Ahead(_)));
+    all_ahead || (lows.len() == 1 && lows == highs)
 }
 
 /// The sum or the product of numbers.

@@ -79,7 +79,10 @@ pub(super) fn side_by_side(
 /// A technology of each kind.
 fn all(model: &Arc<Model>) -> Vec<Box<dyn PlanService>> {
     let temporal = |deletes| {
-        let options = TemporalOptions { deletes };
+        let options = TemporalOptions {
+            deletes,
+            ..TemporalOptions::default()
+        };
         let service = Temporal::new(model.clone(), options).expect("the model fits");
         Box::new(service) as Box<dyn PlanService>
     };
