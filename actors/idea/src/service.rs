@@ -9,9 +9,12 @@
 //! [`forget`](PlanService::forget).
 
 mod check;
+pub mod compiled;
+pub mod propositional;
 pub mod temporal;
 #[cfg(test)]
 mod tests;
+mod words;
 
 use std::sync::Arc;
 

@@ -308,6 +308,51 @@ impl Database {
         self.steps + work.points + work.inequalities + self.store.work().operations()
     }
 
+    /// Counts what was looked at elsewhere on the database's behalf.
+    pub(crate) fn spend(&mut self, operations: u64) {
+        self.steps += operations;
+    }
+
+    /// Asks everything again: the guard of each rule of each token, and what it says of the token's
+    /// times and parameters, without asking what changed. It is what a database without incremental
+    /// propagation does at each edit; it finds what is known already, and costs what there is.
+    ///
+    /// # Errors
+    ///
+    /// If something does not hold, which incremental propagation missed.
+    pub fn propagate_fully(&mut self) -> Result<(), InstanceId> {
+        let mut looked = self.tokens.len() as u64;
+        let mut wrong = None;
+        for (id, at) in self.instances.iter() {
+            let rule = &self.model.rules[at.rule];
+            looked += 1 + rule.master.arguments.len() as u64;
+            if self.guard(id) != at.guard {
+                wrong = wrong.or(Some(id));
+            }
+            if at.guard != Guard::Holds {
+                continue;
+            }
+            for said in &rule.relationships {
+                looked += said.operands.len() as u64;
+                if self.is_broken(at, said) {
+                    wrong = wrong.or(Some(id));
+                }
+            }
+            if let (Some([min, max]), Some(token)) = (rule.duration, self.tokens.get(at.master)) {
+                looked += 1;
+                let span = self.span(id, min, max, false);
+                let (start, finish) = (self.bounds_of(token.start), self.bounds_of(token.finish));
+                let lasts = Span::new(finish.min - start.max, finish.max.saturating_sub(start.min));
+                if lasts.max < span.min || lasts.min > span.max {
+                    wrong = wrong.or(Some(id));
+                }
+            }
+            looked += at.times.len() as u64;
+        }
+        self.steps += looked;
+        wrong.map_or(Ok(()), Err)
+    }
+
     /// The value of an operand, if it has one only.
     pub fn value(&self, operand: Operand) -> Option<i64> {
         match operand {

@@ -15,7 +15,9 @@ use crate::deliberator::Deliberator;
 use crate::mission::MissionPlanner;
 use crate::models::{self, Mission};
 use crate::service::PlanService;
-use crate::service::temporal::{Temporal, TemporalOptions};
+use crate::service::compiled::Compiled;
+use crate::service::propositional::Propositional;
+use crate::service::temporal::{MergeScan, Propagation, Temporal, TemporalOptions};
 
 /// The longest file of a model \[byte\].
 const MAX_MODEL_BYTES: u64 = 1 << 20;
@@ -65,6 +67,8 @@ impl Minds {
     ) -> Result<Minds, SetupError> {
         let mission = model(&scenario.mission, "mission", "k9-mission", setup)?;
         let system = model(&scenario.system, "system", "k9-system", setup)?;
+        service(&mission, &scenario.mission, "mission")?;
+        service(&system, &scenario.system, "system")?;
         Ok(Minds {
             mission: (mission, scenario.mission.clone()),
             between: (models::forward().clone(), scenario.mission.clone()),
@@ -90,7 +94,7 @@ impl Minds {
     pub(crate) fn of(&self, role: Role, goals: &Goals) -> Arc<dyn Fn() -> Mind + Send + Sync> {
         let (model, config) = self.mind(role).clone();
         let deliberation = self.deliberation.clone();
-        let (latency, start_dm) = (config.latency, goals.start_dm);
+        let (latency, start_dm, table) = (config.latency, goals.start_dm, role.table());
         let mission = (role == Role::Mission).then(|| Mission::of(model.clone()));
         Arc::new(move || {
             let planner = mission.clone().map(|mission| -> Box<dyn Deliberator> {
@@ -99,7 +103,7 @@ impl Minds {
                 Box::new(MissionPlanner::new(mission, settings, attempts, start_dm))
             });
             Mind {
-                service: service(&model, &config),
+                service: service(&model, &config, table).expect("it was checked"),
                 deliberator: planner,
             }
         })
@@ -148,14 +152,53 @@ fn model(
     Ok(Arc::new(model))
 }
 
-fn service(model: &Arc<Model>, config: &AgentConfig) -> Box<dyn PlanService> {
-    match config.technology {
-        Technology::Temporal | Technology::Propositional | Technology::Compiled => {
-            let options = TemporalOptions {
-                deletes: config.deletes,
-            };
-            let service = Temporal::new(model.clone(), options);
-            Box::new(service.expect("it was checked"))
+/// The technology that a scenario names, over a model.
+///
+/// # Errors
+/// When the technology cannot hold the model, or a key is not for it.
+fn service(
+    model: &Arc<Model>,
+    config: &AgentConfig,
+    table: &str,
+) -> Result<Box<dyn PlanService>, SetupError> {
+    let wrong = |key: &str, message: String| SetupError::value(&format!("{table}.{key}"), message);
+    let technology = |error: String| wrong("technology", error);
+    if config.technology != Technology::Temporal {
+        let keys = [
+            ("horizon", config.horizon > 1),
+            ("guess", config.guess),
+            ("propagates_all", config.propagates_all),
+            ("searches_all", config.searches_all),
+        ];
+        if let Some((key, _)) = keys.into_iter().find(|(_, is_set)| *is_set) {
+            let message = "only the technology \"temporal\" does that".to_owned();
+            return Err(wrong(key, message));
         }
     }
+    Ok(match config.technology {
+        Technology::Temporal => {
+            let options = TemporalOptions {
+                deletes: config.deletes,
+                guess: config.guess,
+                merge_scan: match config.searches_all {
+                    false => MergeScan::Near,
+                    true => MergeScan::All,
+                },
+                propagation: match config.propagates_all {
+                    false => Propagation::Incremental,
+                    true => Propagation::Full,
+                },
+            };
+            let service = Temporal::new(model.clone(), options);
+            Box::new(service.map_err(|error| technology(error.to_string()))?)
+        }
+        Technology::Propositional => {
+            let service = Propositional::new(model.clone());
+            Box::new(service.map_err(|error| technology(error.to_string()))?)
+        }
+        Technology::Compiled => {
+            let service = Compiled::new(model.clone());
+            Box::new(service.map_err(|error| technology(error.to_string()))?)
+        }
+    })
 }

@@ -127,3 +127,30 @@ pub(super) fn plan(model: &Model, plan: &Plan, now: Ticks) -> Result<(), Stale> 
     }
     Ok(())
 }
+
+/// That a token may not end yet.
+pub(super) fn lasts(model: &Model, predicate: PredicateId, earliest: Ticks) -> Refusal {
+    Refusal::Rule {
+        what: model.predicates[predicate].name.clone(),
+        reason: format!("it lasts until tick {earliest} at least"),
+    }
+}
+
+/// That a timeline has a goal from this cycle already.
+pub(super) fn two_goals(model: &Model, timeline: TimelineId, predicate: PredicateId) -> Refusal {
+    Refusal::Rule {
+        what: model.predicates[predicate].name.clone(),
+        reason: format!(
+            "{} has a goal from this cycle already",
+            model.timelines[timeline].name
+        ),
+    }
+}
+
+/// How early a goal is put on its timeline: as search control says, or else after all that it names
+/// and before all that it does not.
+pub(super) fn goal_order(model: &Model, timeline: TimelineId, predicate: PredicateId) -> u32 {
+    let subgoals = &model.control.subgoals;
+    let named = subgoals.iter().position(|&at| at == (timeline, predicate));
+    2 * named.unwrap_or(subgoals.len()) as u32 + 1
+}

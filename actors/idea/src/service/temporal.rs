@@ -23,6 +23,7 @@ use farside_planning::database::TokenId;
 use farside_planning::model::{Model, PredicateId, Problem, TimelineId, TimelineKind, Value};
 use farside_planning::search::Verdict;
 use farside_planning::search::executive::{Executive, Following};
+pub use farside_planning::search::executive::{MergeScan, Propagation};
 use farside_planning::search::schedule::LoadError;
 use thiserror::Error;
 
@@ -37,11 +38,23 @@ use super::{
 pub struct TemporalOptions {
     /// Whether [`forget`](PlanService::forget) deletes anything.
     pub deletes: bool,
+    /// Which tokens conditions are compared with.
+    pub merge_scan: MergeScan,
+    /// What is propagated after a decision or a status.
+    pub propagation: Propagation,
+    /// Whether statuses are guessed where [`solve`](PlanService::solve) looks further than now: the
+    /// values that rules name first, as early as they may come. Else nothing is heard until then.
+    pub guess: bool,
 }
 
 impl Default for TemporalOptions {
     fn default() -> Self {
-        TemporalOptions { deletes: true }
+        TemporalOptions {
+            deletes: true,
+            merge_scan: MergeScan::Near,
+            propagation: Propagation::Incremental,
+            guess: false,
+        }
     }
 }
 
@@ -135,6 +148,7 @@ impl Temporal {
         let executive = Executive::begin(model.clone(), problem).map_err(Unfit::Facts)?;
         let mut executive = executive;
         executive.forgets = false;
+        executive.work(options.merge_scan, options.propagation);
         let lanes = vec![Lane::default(); model.timelines.len()];
         Ok(Temporal {
             executive,
@@ -229,7 +243,7 @@ impl Temporal {
 }
 
 /// Whether each timeline says exactly one thing at any time, and can be named by a contract.
-fn check_timelines(model: &Model) -> Result<(), Unfit> {
+pub(super) fn check_timelines(model: &Model) -> Result<(), Unfit> {
     let expected = usize::from(u16::MAX) + 1;
     let actual = model.timelines.len();
     if actual > expected {
@@ -278,13 +292,7 @@ impl PlanService for Temporal {
         let mut parameters: Parameters = inputs.iter().copied().map(Some).collect();
         check::values(&self.model, predicate, "inputs", &parameters)?;
         if self.executive.has_goal(timeline) {
-            return Err(Refusal::Rule {
-                what: self.model.predicates[predicate].name.clone(),
-                reason: format!(
-                    "{} has a goal from this cycle already",
-                    self.model.timelines[timeline].name
-                ),
-            });
+            return Err(check::two_goals(&self.model, timeline, predicate));
         }
         parameters.resize(self.model.predicates[predicate].parameters.len(), None);
         let requested = self
@@ -298,19 +306,17 @@ impl PlanService for Temporal {
         let predicate = self.predicate(token);
         let earliest = self.executive.database().finish(token).min;
         if earliest > self.now {
-            return Err(Refusal::Rule {
-                what: self.model.predicates[predicate].name.clone(),
-                reason: format!("it lasts until tick {earliest} at least"),
-            });
+            return Err(check::lasts(&self.model, predicate, earliest));
         }
         let cancelled = self.executive.cancel(token, self.now);
         cancelled.map_err(|conflict| self.refusal(predicate, &conflict))
     }
 
-    fn solve(&mut self, _horizon: Ticks, budget: u64) -> Outcome {
+    fn solve(&mut self, horizon: Ticks, budget: u64) -> Outcome {
         self.started.clear();
         self.ended.clear();
-        match self.executive.cycle(self.now, budget) {
+        let guess = self.options.guess;
+        match self.executive.cycle_ahead(self.now, horizon, guess, budget) {
             Verdict::Solved => {
                 self.follow_timelines();
                 Outcome::Decided

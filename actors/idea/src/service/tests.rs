@@ -1,12 +1,18 @@
 //! What every planning technology must do, asked of each of them.
 
+mod ahead;
 mod cycles;
+mod equal;
 mod plans;
+mod random;
 mod refusals;
+mod work;
 
 use farside_planning::language::{Options, read_model};
 use farside_planning::model::{Model, TimelineId, Value};
 
+use super::compiled::Compiled;
+use super::propositional::Propositional;
 use super::temporal::{Temporal, TemporalOptions};
 use super::*;
 
@@ -31,13 +37,26 @@ fn agents(text: &str) -> Vec<Agent> {
     let model = read(text);
     let mut agents = Vec::new();
     for deletes in [true, false] {
-        let options = TemporalOptions { deletes };
+        let options = TemporalOptions {
+            deletes,
+            ..TemporalOptions::default()
+        };
         let service = Temporal::new(model.clone(), options).expect("the model fits");
         agents.push(Agent {
             name: "temporal",
             service: Box::new(service),
         });
     }
+    let service = Propositional::new(model.clone()).expect("the model fits");
+    agents.push(Agent {
+        name: "propositional",
+        service: Box::new(service),
+    });
+    let service = Compiled::new(model).expect("the model fits");
+    agents.push(Agent {
+        name: "compiled",
+        service: Box::new(service),
+    });
     for agent in &mut agents {
         agent.cycle(0);
     }

@@ -160,6 +160,18 @@ impl Database {
         self.store.entailed(&self.kind(when), &operands)
     }
 
+    /// Whether a relationship of a rule that holds certainly does not hold.
+    pub(super) fn is_broken(&self, at: &Instance, said: &Relationship) -> bool {
+        let operands: Option<SmallVec<[Operand; 4]>> = { said.operands.iter() }
+            .map(|term| match *term {
+                Term::Value(value) => Some(Operand::Value(value)),
+                Term::Variable(variable) => at.variable(variable),
+                _ => None,
+            })
+            .collect();
+        operands.is_some_and(|all| self.store.entailed(&self.kind(said), &all) == Some(false))
+    }
+
     /// Whether variables changed that nobody was told of.
     pub(super) fn has_news(&self) -> bool {
         self.store.has_changed() || !self.told.is_empty() || !self.equalities.is_empty()

@@ -12,6 +12,7 @@
 
 mod ahead;
 mod endings;
+mod later;
 mod now;
 mod posted;
 #[cfg(test)]
@@ -28,9 +29,10 @@ use crate::database::{Cause, Conflict, Database, Owner, Slot, Time, TokenId, Wan
 use crate::model::{End, Fact, Model, PredicateId, Problem, TimelineId, Value};
 use crate::parameters::Operand;
 use crate::temporal::{FURTHEST, Span};
-pub use ahead::Following;
-use endings::{close, is_closed, make_room};
-use now::Now;
+pub use ahead::{Branch, Following};
+use endings::make_room;
+pub use now::{MergeScan, Propagation};
+use now::{Now, expire};
 use posted::Posted;
 
 /// A plan that is extended one latency ahead.
@@ -171,6 +173,10 @@ impl Executive {
         ends: bool,
         tick: Ticks,
     ) -> Result<(), Conflict> {
+        if self.now.propagation == Propagation::Full {
+            let missed = self.database.propagate_fully();
+            debug_assert!(missed.is_ok(), "{missed:?}");
+        }
         self.database.attempt(|database| {
             let Some(at) = database.token(token) else {
                 return Ok(());
@@ -196,17 +202,46 @@ impl Executive {
         })
     }
 
+    /// Which tokens conditions are compared with, and what is propagated.
+    pub fn work(&mut self, scan: MergeScan, propagation: Propagation) {
+        (self.now.scan, self.now.propagation) = (scan, propagation);
+    }
+
     /// A cycle: all tokens whose time is over end, and what follows is decided, with at most so
     /// many operations. If it cannot be, nothing was decided.
     pub fn cycle(&mut self, tick: Ticks, budget: u64) -> Verdict {
-        self.now.tick = tick;
-        self.database.push();
-        if self.begun {
-            self.expire();
+        self.cycle_ahead(tick, 1, false, budget)
+    }
+
+    /// As [`cycle`](Self::cycle), so that what is decided now lets the plan go on until so many ticks
+    /// from now are over: until then no status comes, or, if statuses are guessed, the one that rules
+    /// name first and that lets the plan go on, as early as it may. If nothing lets it go on, it is
+    /// decided for now alone.
+    pub fn cycle_ahead(
+        &mut self,
+        tick: Ticks,
+        horizon: Ticks,
+        guess: bool,
+        budget: u64,
+    ) -> Verdict {
+        self.now.later.guess = guess;
+        let limit = self.database.operations().saturating_add(budget);
+        let mut script = Vec::new();
+        if horizon > 1 {
+            let verdict = self.attempt_cycle(tick, horizon, budget);
+            script = self.now.later.take_script();
+            self.now.tick = tick;
+            self.database.pop();
+            match verdict {
+                Verdict::OverBudget => return verdict,
+                Verdict::Impossible(_) => script.clear(),
+                Verdict::Solved => {}
+            }
         }
-        self.now.ahead.begin();
-        self.take_posted();
-        let verdict = chronological(&mut self.database, &mut self.now, &mut self.stack, budget);
+        let left = limit.saturating_sub(self.database.operations());
+        self.now.later.begin(tick, tick);
+        self.now.later.script = script;
+        let verdict = self.attempt_again(tick, left);
         if matches!(verdict, Verdict::Solved) {
             self.begun = true;
             self.database.commit();
@@ -221,29 +256,26 @@ impl Executive {
         verdict
     }
 
+    /// Looks ahead; all of it is to be undone by a pop.
+    fn attempt_cycle(&mut self, tick: Ticks, horizon: Ticks, budget: u64) -> Verdict {
+        let until = tick.saturating_add(horizon - 1);
+        self.now.later.begin(tick, until);
+        self.attempt_again(tick, budget)
+    }
+
+    fn attempt_again(&mut self, tick: Ticks, budget: u64) -> Verdict {
+        self.now.tick = tick;
+        self.database.push();
+        if self.begun {
+            expire(&mut self.database, &self.now.endings, tick);
+        }
+        self.now.ahead.begin();
+        self.take_posted();
+        chronological(&mut self.database, &mut self.now, &mut self.stack, budget)
+    }
+
     /// Deletes what ended before a tick or at it, but for the present tokens and those before them.
     pub fn forget(&mut self, before: Ticks) {
         self.database.forget(before);
-    }
-
-    /// Tokens whose time is over have ended, and no status came for them.
-    fn expire(&mut self) {
-        for timeline in 0..self.database.lanes() {
-            let Some(last) = self.database.last(timeline) else {
-                continue;
-            };
-            if self.database.finish(last).max <= self.now.tick
-                && !is_closed(&self.database, &self.now.endings, last)
-            {
-                let (database, endings) = (&mut self.database, &self.now.endings);
-                // If its status cannot say so, it ends without.
-                let closed = database.attempt(|at| close(at, endings, last, self.now.tick));
-                if closed.is_err() {
-                    let latest = self.database.finish(last).max;
-                    let ended = self.database.end(last, latest);
-                    debug_assert!(ended.is_ok(), "it can last as long as it can");
-                }
-            }
-        }
     }
 }

@@ -201,7 +201,7 @@ fn over_budget_nothing_is_decided_and_what_was_posted_stands() {
             .bind(poll, &outputs, true)
             .expect("it is active");
         let before = agent.service.snapshot();
-        assert_eq!(agent.service.solve(1, 5), Outcome::OverBudget);
+        assert_eq!(agent.service.solve(1, 0), Outcome::OverBudget);
         assert_eq!(agent.service.snapshot(), before);
         assert!(agent.service.started().is_empty() && agent.ended().is_empty());
         agent.cycle(1);

@@ -9,6 +9,10 @@ use crate::model::{Model, PredicateId, TimelineId, Value};
 use crate::parameters::Operand;
 use crate::search::Flaw;
 
+/// The output, by its place among the parameters, and its value that a branch asks for, if it asks
+/// for any; and the step that follows.
+pub type Branch = (Option<(usize, Value)>, usize);
+
 /// A token of a plan that was made ahead.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Following {
@@ -18,9 +22,8 @@ pub struct Following {
     pub parameters: SmallVec<[Option<Value>; 4]>,
     /// It does not start before this tick.
     pub not_before: Ticks,
-    /// What follows it, by its place in the plan: the first whose output (by its place among the
-    /// parameters) has the value, or that asks for none.
-    pub branches: SmallVec<[(Option<(usize, Value)>, usize); 2]>,
+    /// What follows it: the first branch that holds.
+    pub branches: SmallVec<[Branch; 2]>,
 }
 
 /// Where a plan is.

@@ -1,9 +1,12 @@
 //! How an executive decides what each timeline says now.
 
+use std::cell::Cell;
+
 use smallvec::SmallVec;
 
 use super::ahead::Ahead;
-use super::endings::{Endings, close, make_room};
+use super::endings::{Endings, close, is_closed, make_room};
+use super::later::Later;
 use crate::Ticks;
 use crate::database::{
     Cause, Conflict, Database, InstanceId, Open, Owner, Slot, Status, Step, Time, Token, TokenId,
@@ -30,6 +33,34 @@ pub(super) struct Now {
     pub(super) goals: SmallVec<[(u32, TokenId, TimelineId); 2]>,
     /// What was planned ahead.
     pub(super) ahead: Ahead,
+    /// The ticks after this cycle's that are looked at, and what was decided.
+    pub(super) later: Later,
+    /// Which tokens a relation is compared with.
+    pub(super) scan: MergeScan,
+    pub(super) propagation: Propagation,
+    /// How many tokens were looked at, and not counted yet.
+    pub(super) looked: Cell<u64>,
+}
+
+/// Which tokens of a timeline a condition is compared with: a factor of what cycles cost without
+/// deletion (Figures 6 and 7 of the IDEA paper).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MergeScan {
+    /// The present one and the one before it.
+    #[default]
+    Near,
+    /// All that are known, from the present one back.
+    All,
+}
+
+/// What is propagated after a decision or a status: the other factor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Propagation {
+    /// What changed.
+    #[default]
+    Incremental,
+    /// Everything that is known, as [`Database::propagate_fully`] does.
+    Full,
 }
 
 /// By timeline: by place of a predicate: how early its subgoals come, as the model's search control
@@ -74,6 +105,10 @@ impl Now {
             guards: 0,
             goals: SmallVec::new(),
             ahead: Ahead::of(model),
+            later: Later::of(model),
+            scan: MergeScan::Near,
+            propagation: Propagation::Incremental,
+            looked: Cell::new(0),
         }
     }
 
@@ -131,6 +166,22 @@ impl Now {
         None
     }
 
+    /// The next tick that is looked at: nothing is heard until then, or what is guessed. What is
+    /// missing then; nothing at the end.
+    fn look_on(&mut self, database: &mut Database) -> Option<Flaw> {
+        while self.tick < self.later.until {
+            if let Some(flaw) = self.later.unbound(database, self.tick) {
+                return Some(flaw);
+            }
+            self.later.step(database, &mut self.tick);
+            expire(database, &self.endings, self.tick);
+            if let Some(flaw) = self.flaw(database) {
+                return Some(flaw);
+            }
+        }
+        None
+    }
+
     /// Whether a token can be what a relation asks for, as far as its times and each of its
     /// parameters, taken alone, say.
     fn fits(&self, database: &Database, open: (InstanceId, u32), token: TokenId) -> bool {
@@ -168,10 +219,17 @@ impl Now {
             let known = database.token(token).filter(|_| said.condition);
             known.and_then(Token::before)
         };
-        let all = timelines
-            .iter()
-            .flat_map(move |&timeline| std::iter::successors(database.last(timeline), before));
-        all.filter(move |&token| self.fits(database, open, token))
+        let all = timelines.iter().flat_map(move |&timeline| {
+            let known = std::iter::successors(database.last(timeline), before);
+            known.take(match self.scan {
+                MergeScan::Near => 2,
+                MergeScan::All => usize::MAX,
+            })
+        });
+        all.filter(move |&token| {
+            self.looked.set(self.looked.get() + 1);
+            self.fits(database, open, token)
+        })
     }
 
     /// Whether the leading condition of an alternative, if it has one, may hold.
@@ -189,8 +247,9 @@ impl Now {
     }
 }
 
-impl Strategy for Now {
-    fn next(&mut self, database: &mut Database) -> Option<Flaw> {
+impl Now {
+    /// What is missing at a tick.
+    fn flaw(&self, database: &Database) -> Option<Flaw> {
         let mut first: Option<(u32, Open)> = None;
         for &open in database.open() {
             if let Some(early) = self.urgency(database, open)
@@ -214,8 +273,64 @@ impl Strategy for Now {
         self.gap(database)
             .or_else(|| self.ahead.waiting(database, self.tick))
     }
+}
+
+impl Strategy for Now {
+    fn next(&mut self, database: &mut Database) -> Option<Flaw> {
+        if self.propagation == Propagation::Full {
+            let missed = database.propagate_fully();
+            debug_assert!(missed.is_ok(), "{missed:?}");
+        }
+        let missing = self.flaw(database);
+        if missing.is_some() || self.tick >= self.later.until {
+            return missing;
+        }
+        self.look_on(database)
+    }
 
     fn decisions(&mut self, database: &mut Database, flaw: Flaw, into: &mut Vec<Decision>) {
+        match self.later.script.pop() {
+            Some(decision) => into.push(decision),
+            None => self.ways(database, flaw, into),
+        }
+        database.spend(self.looked.take());
+    }
+
+    fn decide(
+        &mut self,
+        database: &mut Database,
+        flaw: Flaw,
+        decision: Decision,
+    ) -> Result<(), Conflict> {
+        self.carry_out(database, flaw, decision)?;
+        self.later.note(database, self.tick, decision);
+        Ok(())
+    }
+
+    fn undone(&mut self, database: &Database) {
+        self.ahead.undone(database);
+        self.later.undone(database, &mut self.tick);
+    }
+
+    fn is_guard(&self, database: &Database, before: Flaw, failed: Flaw) -> bool {
+        match (before, failed) {
+            (Flaw::Open(before), Flaw::Open(failed)) => {
+                let is_choice = matches!(before.step, Step::Choice(_));
+                let Step::Relation(relation) = failed.step else {
+                    return false;
+                };
+                is_choice
+                    && before.instance == failed.instance
+                    && database.relation(failed.instance, relation).condition
+            }
+            _ => false,
+        }
+    }
+}
+
+impl Now {
+    /// The decisions that may put a flaw right, the best one first.
+    fn ways(&mut self, database: &mut Database, flaw: Flaw, into: &mut Vec<Decision>) {
         let open = match flaw {
             Flaw::Open(open) => open,
             Flaw::Gap { timeline, after } => {
@@ -223,6 +338,10 @@ impl Strategy for Now {
                     into.push(Decision::Alternative(step));
                 }
                 into.push(Decision::Insert(Slot { timeline, after }));
+                return;
+            }
+            Flaw::Unbound { token, parameter } => {
+                self.later.guesses(database, token, parameter, into);
                 return;
             }
             Flaw::Goal(token) => {
@@ -273,7 +392,7 @@ impl Strategy for Now {
         }
     }
 
-    fn decide(
+    fn carry_out(
         &mut self,
         database: &mut Database,
         flaw: Flaw,
@@ -306,6 +425,10 @@ impl Strategy for Now {
                 let after = make_room(database, &self.endings, slot.timeline, self.tick)?;
                 database.activate(token, Slot { after, ..slot })
             }),
+            (Flaw::Unbound { token, parameter }, Decision::Bind(value)) => {
+                self.later
+                    .guess(database, (token, parameter), value, self.tick)
+            }
             (Flaw::Gap { timeline, after }, Decision::Alternative(step)) => {
                 let slot = Slot { timeline, after };
                 if let Some(after) = after
@@ -326,25 +449,6 @@ impl Strategy for Now {
                 fill(database, &self.endings, slot, self.tick)
             }
             _ => unreachable!("the decision is one for the flaw"),
-        }
-    }
-
-    fn undone(&mut self, database: &Database) {
-        self.ahead.undone(database);
-    }
-
-    fn is_guard(&self, database: &Database, before: Flaw, failed: Flaw) -> bool {
-        match (before, failed) {
-            (Flaw::Open(before), Flaw::Open(failed)) => {
-                let is_choice = matches!(before.step, Step::Choice(_));
-                let Step::Relation(relation) = failed.step else {
-                    return false;
-                };
-                is_choice
-                    && before.instance == failed.instance
-                    && database.relation(failed.instance, relation).condition
-            }
-            _ => false,
         }
     }
 }
@@ -391,4 +495,23 @@ fn fill(
         })?;
         database.activate(token, slot)
     })
+}
+
+/// Tokens whose time is over have ended, and no status came for them.
+pub(super) fn expire(database: &mut Database, endings: &[Endings], tick: Ticks) {
+    for timeline in 0..database.lanes() {
+        let Some(last) = database.last(timeline) else {
+            continue;
+        };
+        if !is_over(database, last, tick) || is_closed(database, endings, last) {
+            continue;
+        }
+        // If its status cannot say so, it ends without.
+        let closed = database.attempt(|at| close(at, endings, last, tick));
+        if closed.is_err() {
+            let latest = database.finish(last).max;
+            let ended = database.end(last, latest);
+            debug_assert!(ended.is_ok(), "it can last as long as it can");
+        }
+    }
 }

@@ -88,6 +88,13 @@ impl Executive {
         self.goals.iter().any(|goal| goal.timeline == timeline)
     }
 
+    /// The first goal that waits for the next cycle: its timeline, and what it says.
+    pub fn first_goal(&self) -> Option<(TimelineId, PredicateId)> {
+        self.goals
+            .first()
+            .map(|goal| (goal.timeline, goal.predicate))
+    }
+
     /// Whether a goal or a cancel of a timeline waits for the next cycle.
     pub fn is_posted(&self, timeline: TimelineId) -> bool {
         let of = |&token: &TokenId| self.database.token(token).and_then(|at| at.timeline);
