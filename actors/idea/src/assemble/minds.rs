@@ -1,6 +1,6 @@
 //! What agents plan with: models, by their names or from files, and the technology over each.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use farside::SimDuration;
 use farside_actors::system::{Setup, SetupError};
@@ -11,7 +11,7 @@ use super::goals::Goals;
 use crate::agent::Mind;
 use crate::config::{AgentConfig, DeliberationConfig, IdeaScenario, Technology};
 use crate::deliberate::Settings;
-use crate::deliberator::Deliberator;
+use crate::deliberator::SharedDeliberator;
 use crate::mission::MissionPlanner;
 use crate::models::{self, Mission};
 use crate::service::PlanService;
@@ -97,10 +97,12 @@ impl Minds {
         let (latency, start_dm, table) = (config.latency, goals.start_dm, role.table());
         let mission = (role == Role::Mission).then(|| Mission::of(model.clone()));
         Arc::new(move || {
-            let planner = mission.clone().map(|mission| -> Box<dyn Deliberator> {
+            let planner = mission.clone().map(|mission| -> SharedDeliberator {
                 let settings = settings(&deliberation, latency);
                 let attempts = deliberation.attempts;
-                Box::new(MissionPlanner::new(mission, settings, attempts, start_dm))
+                Arc::new(Mutex::new(MissionPlanner::new(
+                    mission, settings, attempts, start_dm,
+                )))
             });
             Mind {
                 service: service(&model, &config, table).expect("it was checked"),

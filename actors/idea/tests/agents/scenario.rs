@@ -11,7 +11,7 @@ use farside_actors::system::{Files, Results, Seeds, Setup, System};
 use farside_actors::units;
 use farside_actors::wiring::LinkBuilder;
 use farside_idea::IdeaSystem;
-use farside_idea::records::{AgentRemark, GoalEnded, TimelineSays};
+use farside_idea::records::{AgentFaulty, AgentRemark, GoalEnded, TimelineSays};
 
 /// What came of a run.
 pub(crate) struct Run {
@@ -33,6 +33,8 @@ pub(crate) enum What {
     Says(TimelineSays),
     Ended(GoalEnded),
     Remark(String),
+    /// The tick, and why.
+    Faulty(u64, String),
     /// Any other sample that is no cycle, by its type.
     Other(String),
 }
@@ -79,6 +81,10 @@ impl Observer for Listen {
                     CommandEnd::Done => return Ok(Flow::Continue),
                     end => What::Remark(format!("{:?}: {end:?}", report.part)),
                 }
+            }
+            "AgentFaulty" => {
+                let faulty: AgentFaulty = schema.decode(record.body).expect("it is one");
+                What::Faulty(faulty.tick, faulty.reason)
             }
             other => What::Other(other.to_owned()),
         };
