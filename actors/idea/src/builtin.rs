@@ -23,4 +23,29 @@ pub(crate) const SCENARIOS: [Builtin; 4] = [
 ];
 
 /// Sorted by name.
-pub(crate) const STUDIES: [Builtin; 0] = [];
+pub(crate) const STUDIES: [Builtin; 6] = [
+    Builtin {
+        name: "idea/figures-6-7",
+        text: include_str!("../studies/figures-6-7.toml"),
+    },
+    Builtin {
+        name: "idea/horizon",
+        text: include_str!("../studies/horizon.toml"),
+    },
+    Builtin {
+        name: "idea/latency",
+        text: include_str!("../studies/latency.toml"),
+    },
+    Builtin {
+        name: "idea/layers",
+        text: include_str!("../studies/layers.toml"),
+    },
+    Builtin {
+        name: "idea/link-degradation",
+        text: include_str!("../studies/link-degradation.toml"),
+    },
+    Builtin {
+        name: "idea/thorough-or-light",
+        text: include_str!("../studies/thorough-or-light.toml"),
+    },
+];
