@@ -369,6 +369,18 @@ impl Compiled {
             | mixed
     }
 
+    /// What the token of an active contract says, as far as the table knows.
+    fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
+        if self.node.is_none() {
+            return Ok(None);
+        }
+        let timeline = usize::from(contract.timeline);
+        if self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline] {
+            return Err(check::dead(&self.model, contract));
+        }
+        Ok(Some(self.forms[self.state as usize].lanes[timeline].0))
+    }
+
     fn child(&self, number: u64) -> Option<u32> {
         let node = &self.nodes[self.node? as usize];
         let child = node.children.iter().find(|child| child.0 == number);
@@ -834,18 +846,15 @@ impl PlanService for Compiled {
         outputs: &[Option<Value>],
         ends: bool,
     ) -> Result<(), Refusal> {
-        let mut number = 0;
         let timeline = usize::from(contract.timeline);
-        if self.interpreter.is_none() {
-            let dead = self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline];
-            if dead {
-                return Err(check::dead(&self.model, contract));
+        let number = match self.on_table(contract)? {
+            Some(predicate) => {
+                check::values(&self.model, predicate, "outputs", outputs)?;
+                let inputs = self.model.predicates[predicate].inputs;
+                self.number(STATUS, timeline, predicate, ends, (inputs, outputs))
             }
-            let predicate = self.forms[self.state as usize].lanes[timeline].0;
-            check::values(&self.model, predicate, "outputs", outputs)?;
-            let inputs = self.model.predicates[predicate].inputs;
-            number = self.number(STATUS, timeline, predicate, ends, (inputs, outputs));
-        }
+            None => 0,
+        };
         let outputs = SmallVec::from_slice(outputs);
         self.post(number, Posted::Status(contract, outputs, ends))?;
         if let Some(at) = self.ends.get_mut(timeline) {
@@ -869,15 +878,10 @@ impl PlanService for Compiled {
 
     fn cancel(&mut self, contract: Contract) -> Result<(), Refusal> {
         let timeline = usize::from(contract.timeline);
-        let mut number = 0;
-        if self.interpreter.is_none() {
-            let dead = self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline];
-            if dead {
-                return Err(check::dead(&self.model, contract));
-            }
-            let predicate = self.forms[self.state as usize].lanes[timeline].0;
-            number = self.number(CANCEL, timeline, predicate, false, (0, &[]));
-        }
+        let number = match self.on_table(contract)? {
+            Some(predicate) => self.number(CANCEL, timeline, predicate, false, (0, &[])),
+            None => 0,
+        };
         self.post(number, Posted::Cancel(contract))
     }
 
