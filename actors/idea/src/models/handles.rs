@@ -156,6 +156,8 @@ places! {
         quiet = "Quiet",
         /// `Request (goal x y pan tilt camera weight -> status)`.
         request = "Request",
+        /// `Recall (goal -> reply)`.
+        recall = "Recall",
         /// `Resting ()`.
         resting = "Resting",
         /// `Planning (h0 h1 problem -> status plan)` \[ticks\].
@@ -164,6 +166,22 @@ places! {
         no_goal = "NoGoal",
         /// `ImageAt (x y pan tilt camera -> status)` \[dm, dm, degrees, degrees\].
         image_at = "ImageAt",
+    }
+}
+
+places! {
+    /// The symbols with which deliberation ends.
+    PlannedStatuses: Value, symbol {
+        /// There is a plan.
+        planned = "planned",
+        /// No goal is left that can be done.
+        nothing_to_do = "nothing_to_do",
+        /// What it planned for is not the case any more.
+        stale = "STALE",
+        /// Its time was over before it was done.
+        timeout = "TIMEOUT",
+        /// Something else took its place.
+        preempted = "PREEMPTED",
     }
 }
 
@@ -207,6 +225,8 @@ pub struct Mission {
     pub predicates: MissionPredicates,
     /// How goals end.
     pub statuses: Statuses,
+    /// How deliberation ends.
+    pub planned: PlannedStatuses,
 }
 
 impl Mission {
@@ -220,6 +240,7 @@ impl Mission {
             timelines: MissionTimelines::of(&model),
             predicates: MissionPredicates::of(&model),
             statuses: Statuses::of(&model),
+            planned: PlannedStatuses::of(&model),
             model,
         }
     }
