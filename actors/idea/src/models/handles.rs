@@ -46,6 +46,10 @@ places! {
         temperature = "Temperature_SV",
         /// Polls of the power.
         power = "Power_SV",
+        /// How steep the last alarming pitch was.
+        pitch_slope = "PitchSlope_SV",
+        /// How steep the last alarming roll was.
+        roll_slope = "RollSlope_SV",
         /// Which alarm there is.
         health = "MotionHealth_SV",
         /// Which step of a recovery is taken.
@@ -86,9 +90,9 @@ places! {
         fans_unchanged = "FansUnchanged",
         /// `DeviceSetFanState (on ->)`.
         set_fans = "DeviceSetFanState",
-        /// `PitchMeasure (missed -> alarm pitch received hard)` \[degrees\].
+        /// `PitchMeasure (missed -> alarm pitch received)` \[degrees\].
         pitch_measure = "PitchMeasure",
-        /// `RollMeasure (missed -> alarm roll received hard)` \[degrees\].
+        /// `RollMeasure (missed -> alarm roll received)` \[degrees\].
         roll_measure = "RollMeasure",
         /// `TempReadCompare (-> fan temperature received)` \[degrees Celsius\].
         temperature_measure = "TempReadCompare",
@@ -98,6 +102,8 @@ places! {
         power_measure = "PowerMeasure",
         /// `PowerPause ()`.
         power_pause = "PowerPause",
+        /// `Slope (size)` \[degrees\].
+        slope = "Slope",
         /// `Healthy ()`.
         healthy = "Healthy",
         /// `HardLimit ()`.

@@ -74,7 +74,7 @@ impl Chances {
 struct Answer {
     due: Ticks,
     contract: Contract,
-    outputs: [Option<Value>; 4],
+    outputs: [Option<Value>; 3],
     count: usize,
 }
 
@@ -248,7 +248,7 @@ impl<S: PlanService> Plant<S> {
         &mut self,
         tick: Ticks,
         predicate: PredicateId,
-    ) -> Option<Option<([Option<Value>; 4], usize, Ticks)>> {
+    ) -> Option<Option<([Option<Value>; 3], usize, Ticks)>> {
         let at = self.system.predicates;
         let kinds = [
             at.pitch_measure,
@@ -271,13 +271,12 @@ impl<S: PlanService> Plant<S> {
         if is_lost {
             return Some(None);
         }
-        let count = if kind < 2 { 4 } else { 3 };
         let delay = if is_late { late } else { 1 };
-        Some(Some(([None, Some(value), Some(1), None], count, delay)))
+        Some(Some(([None, Some(value), Some(1)], 3, delay)))
     }
 
     /// What a command is answered and when; nothing, if it needs no answer or that is lost.
-    fn command(&mut self, predicate: PredicateId) -> Option<([Option<Value>; 4], usize, Ticks)> {
+    fn command(&mut self, predicate: PredicateId) -> Option<([Option<Value>; 3], usize, Ticks)> {
         let (at, statuses) = (self.system.predicates, self.system.statuses);
         let mean = match predicate {
             one if one == at.stop => 2,
@@ -294,6 +293,6 @@ impl<S: PlanService> Plant<S> {
         } else {
             statuses.ok
         };
-        (!is_lost).then_some(([Some(status), None, None, None], 1, delay))
+        (!is_lost).then_some(([Some(status), None, None], 1, delay))
     }
 }

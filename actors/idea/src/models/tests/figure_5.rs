@@ -130,7 +130,7 @@ fn mistakes_are_said() {
         .present(timelines.pitch)
         .expect("there is one")
         .contract;
-    let wrong = service.bind(poll, &[None, Some(500), Some(1), None], true);
+    let wrong = service.bind(poll, &[None, Some(500), Some(1)], true);
     let wrong = wrong.expect_err("no angle is so large").to_string();
     assert!(wrong.contains("PitchMeasure: ?pitch: 500"), "{wrong}");
     let unbound = service.insert_goal(timelines.goal, predicates.image_at, &[1, 2]);
