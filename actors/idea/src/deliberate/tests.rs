@@ -214,3 +214,32 @@ fn mistakes_are_said() {
     };
     assert!(order(&targets, &begin, &wrong).is_err());
 }
+
+/// Whatever goals fail, each is tried once: also where another order is better after a failure.
+#[test]
+fn after_any_failures_each_goal_is_tried_once() {
+    let mut other_orders = 0;
+    for seed in 0..20 {
+        let (targets, begin, settings) = random_targets(seed, 5);
+        let begin = Begin {
+            battery: 100_000,
+            ..begin
+        };
+        let settings = Settings {
+            horizon: 50_000,
+            ..settings
+        };
+        let mission = crate::models::mission();
+        let found = deliberate(mission, &targets, &begin, 9, &settings).expect("it is right");
+        let plan = found.plan.expect("there are goals");
+        other_orders += usize::from(plan.steps.len() > 5);
+        for fails in 0..32_usize {
+            let mut tried = followed(&plan, |count| fails >> (count - 1) & 1 == 0);
+            tried.sort_unstable();
+            let mut all: Vec<Value> = targets.iter().map(|target| target.x_dm).collect();
+            all.sort_unstable();
+            assert_eq!(tried, all, "seed {seed}, failures {fails:b}");
+        }
+    }
+    assert!(other_orders > 5, "{other_orders}");
+}
