@@ -130,6 +130,15 @@ impl Agent {
 fn goals_are_planned_and_sent_one_at_a_time() {
     let at = mission();
     let mut agent = Agent::new();
+    // A life begins with a plan for what is known: here, nothing.
+    agent.cycle();
+    let (contract, _) = agent.planning();
+    agent.service.advance(agent.tick + 1);
+    let nothing = [Some(at.planned.nothing_to_do), Some(0)];
+    agent
+        .service
+        .bind(contract, &nothing, true)
+        .expect("it is active");
     agent.cycle();
     assert_eq!(agent.says(at.timelines.planner), "Resting");
     agent.request(1, 300);
@@ -201,20 +210,29 @@ fn a_plan_that_comes_too_late_is_made_anew() {
     assert_ne!(agent.planning().0, contract);
 }
 
+/// A goal that is taken back ends, if it is the one that is being done, and no other does.
 #[test]
-fn a_recall_is_planned_for() {
+fn a_recall_ends_its_goal_and_is_planned_for() {
     let at = mission();
-    let mut agent = Agent::new();
-    agent.request(1, 300);
-    agent.cycle();
-    agent.plan();
-    agent.service.advance(agent.tick + 1);
-    let recalled = agent
-        .service
-        .insert_goal(at.timelines.ground, at.predicates.recall, &[1]);
-    recalled.expect("the ground can recall at any time");
-    agent.cycle();
-    assert_eq!(Agent::name(agent.planning().1[2]), "recalled");
-    let requests = agent.service.ended().iter().count();
-    assert!(requests <= 3);
+    for (recalled, is_ended) in [(1, true), (2, false)] {
+        let mut agent = Agent::new();
+        agent.cycle();
+        agent.request(1, 300);
+        agent.cycle();
+        agent.plan();
+        (0..40).for_each(|_| agent.cycle());
+        assert_eq!(agent.place(), Some(300));
+        let camera = agent.targets[0].camera;
+        agent.service.advance(agent.tick + 1);
+        let inputs = [recalled, 300 * recalled, 0, 10, -10, camera];
+        let ground = at.timelines.ground;
+        let inserted = agent
+            .service
+            .insert_goal(ground, at.predicates.recall, &inputs);
+        inserted.expect("the ground can recall at any time");
+        agent.cycle();
+        assert_eq!(Agent::name(agent.planning().1[2]), "recalled");
+        let goal = agent.says(at.timelines.goal);
+        assert_eq!(goal, if is_ended { "NoGoal" } else { "ImageAt" });
+    }
 }
