@@ -130,8 +130,8 @@ impl Parts<'_> {
 
     fn config(&self, role: Role) -> &AgentConfig {
         match role {
-            Role::System => &self.scenario.system,
-            Role::Mission | Role::Between => &self.scenario.mission,
+            Role::System => &self.scenario.system_agent,
+            Role::Mission | Role::Between => &self.scenario.mission_agent,
         }
     }
 
@@ -312,7 +312,7 @@ pub(crate) fn assemble(
 /// How long a bin of the series is: some hundreds of them in a run, and of whole seconds.
 fn bin(parts: &Parts<'_>) -> SimDuration {
     const BINS: u64 = 240;
-    let latency = parts.scenario.system.latency;
+    let latency = parts.scenario.system_agent.latency;
     let wanted_s = (parts.until.as_nanos() / BINS)
         .div_ceil(1_000_000_000)
         .max(1);

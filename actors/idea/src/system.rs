@@ -1,4 +1,4 @@
-//! IDEA as scenarios see it: `[world]`, `[rover]`, `[agents]`, `[mission]`, `[system]`, `[deliberation]`,
+//! IDEA as scenarios see it: `[world]`, `[rover]`, `[agents]`, `[mission_agent]`, `[system_agent]`, `[deliberation]`,
 //! `[relay]`, `[goals]` and `[[goal]]`.
 
 use std::sync::PoisonError;
@@ -37,8 +37,8 @@ impl System for IdeaSystem {
             FieldConfig::sections("world"),
             RoverConfig::sections("rover"),
             AgentsConfig::sections("agents"),
-            AgentConfig::sections("mission"),
-            AgentConfig::sections("system"),
+            AgentConfig::sections("mission_agent"),
+            AgentConfig::sections("system_agent"),
             DeliberationConfig::sections("deliberation"),
             RelayConfig::sections("relay"),
             GoalsConfig::sections("goals"),
@@ -80,8 +80,8 @@ impl Settings for IdeaScenario {
         let rovers: Vec<&str> = names.iter().map(|names| names.rover.as_str()).collect();
         self.rover.check_rovers("rover", &rovers)?;
         self.agents.check("agents")?;
-        self.mission.check("mission")?;
-        self.system.check("system")?;
+        self.mission_agent.check("mission_agent")?;
+        self.system_agent.check("system_agent")?;
         self.deliberation.check("deliberation")?;
         self.relay.check("relay")?;
         self.goals.check("goals")?;

@@ -37,8 +37,8 @@ impl Role {
     /// The scenario's table.
     pub(crate) fn table(self) -> &'static str {
         match self {
-            Role::Mission | Role::Between => "mission",
-            Role::System => "system",
+            Role::Mission | Role::Between => "mission_agent",
+            Role::System => "system_agent",
         }
     }
 
@@ -65,14 +65,19 @@ impl Minds {
         scenario: &IdeaScenario,
         setup: &mut Setup<'_>,
     ) -> Result<Minds, SetupError> {
-        let mission = model(&scenario.mission, "mission", "k9-mission", setup)?;
-        let system = model(&scenario.system, "system", "k9-system", setup)?;
-        service(&mission, &scenario.mission, "mission")?;
-        service(&system, &scenario.system, "system")?;
+        let mission = model(
+            &scenario.mission_agent,
+            "mission_agent",
+            "k9-mission",
+            setup,
+        )?;
+        let system = model(&scenario.system_agent, "system_agent", "k9-system", setup)?;
+        service(&mission, &scenario.mission_agent, "mission_agent")?;
+        service(&system, &scenario.system_agent, "system_agent")?;
         Ok(Minds {
-            mission: (mission, scenario.mission.clone()),
-            between: (models::forward().clone(), scenario.mission.clone()),
-            system: (system, scenario.system.clone()),
+            mission: (mission, scenario.mission_agent.clone()),
+            between: (models::forward().clone(), scenario.mission_agent.clone()),
+            system: (system, scenario.system_agent.clone()),
             deliberation: scenario.deliberation.clone(),
         })
     }
