@@ -12,7 +12,7 @@ use farside_actors::system::{
 };
 use serde::Deserialize;
 
-use crate::assemble::{Minds, Parts, assemble, goals, names};
+use crate::assemble::{Minds, Parts, assemble, goals, names, text_file};
 use crate::config::{
     AgentConfig, AgentsConfig, DeliberationConfig, GoalConfig, GoalsConfig, IdeaScenario,
     RelayConfig,
@@ -98,11 +98,15 @@ impl Settings for IdeaScenario {
         };
         let place = Place::of(&self.world, setup)?;
         let minds = Minds::read(self, setup)?;
+        let table = match &self.relay.table {
+            None => None,
+            Some(name) => Some(text_file(setup, name, "relay.table")?),
+        };
         let parts = Parts {
             scenario: self,
             place: &place,
             minds,
-            table: None,
+            table,
             goals: goals(self, &names(self), setup.problem_seed)?,
             seed: setup.run_seed,
             until,

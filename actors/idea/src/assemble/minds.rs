@@ -19,8 +19,8 @@ use crate::service::compiled::Compiled;
 use crate::service::propositional::Propositional;
 use crate::service::temporal::{MergeScan, Propagation, Temporal, TemporalOptions};
 
-/// The longest file of a model \[byte\].
-const MAX_MODEL_BYTES: u64 = 1 << 20;
+/// The longest file of a model or a table \[byte\].
+const MAX_TEXT_BYTES: u64 = 1 << 20;
 
 /// Which agent of a row it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,12 +151,22 @@ fn model(
         let message = format!("{name:?}: expected {known}, or a file called *.ddl{hint}");
         return Err(wrong(message));
     }
-    let bytes = setup.files.read(name, MAX_MODEL_BYTES).map_err(wrong)?;
-    let text = String::from_utf8(bytes.to_vec());
-    let text = text.map_err(|error| wrong(format!("{name}: {error}")))?;
+    let text = text_file(setup, name, &format!("{table}.model"))?;
     let read = read_model(name, &text, &Options::default()).ok();
     let model = read.map_err(|findings| wrong(findings.to_string()))?;
     Ok(Arc::new(model))
+}
+
+/// A text that a key of the scenario names.
+pub(crate) fn text_file(
+    setup: &mut Setup<'_>,
+    name: &str,
+    key: &str,
+) -> Result<String, SetupError> {
+    let wrong = |message: String| SetupError::value(key, message);
+    let bytes = setup.files.read(name, MAX_TEXT_BYTES).map_err(wrong)?;
+    let text = String::from_utf8(bytes);
+    text.map_err(|error| wrong(format!("{name}: {error}")))
 }
 
 /// The technology that a scenario names, over a model.

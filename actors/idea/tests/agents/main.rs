@@ -6,6 +6,7 @@ mod faulty;
 mod graph;
 mod ground;
 mod mission;
+mod mistakes;
 mod plant;
 mod remote;
 mod response;

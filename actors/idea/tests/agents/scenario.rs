@@ -177,3 +177,36 @@ impl Run {
         println!("{:?} {:?}", self.report.end, self.results.violations);
     }
 }
+
+/// What is said of a scenario that cannot be.
+pub(crate) fn refused(text: &str) -> String {
+    let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
+    let links = table
+        .remove("links")
+        .unwrap_or_else(|| toml::Table::new().into());
+    let links: LinksConfig = links.try_into().expect("they are links");
+    for key in ["system", "description", "seed", "until"] {
+        table.remove(key);
+    }
+    let text = toml::to_string(&table).expect("it was TOML");
+    let sections = toml::Deserializer::parse(&text).expect("it was TOML");
+    let settings = match IdeaSystem.parse(sections) {
+        Ok(settings) => settings,
+        Err(error) => return error.message().to_owned(),
+    };
+    if let Err(error) = settings.check() {
+        return error.to_string();
+    }
+    let mut sim = Simulation::new(1);
+    let mut files = Files::on_disk(".".into());
+    let links = LinkBuilder::new(&links, &[]).expect("they are right");
+    let (seeds, until) = (
+        Seeds { run: 1, problem: 1 },
+        Some(SimDuration::from_secs(60)),
+    );
+    let mut setup = Setup::new(seeds, until, &mut sim, &mut files, links);
+    match settings.assemble(&mut setup) {
+        Ok(_) => "nothing".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
