@@ -22,6 +22,7 @@ mod place;
 mod scenario;
 mod scene;
 mod scientist;
+pub mod shac;
 mod site;
 mod system;
 mod tools;
