@@ -137,6 +137,11 @@ impl Centre {
         &self.durable
     }
 
+    /// What all participants know.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// How a goal stands; none if this centre has never been told of it.
     pub fn standing(&self, goal: GoalKey) -> Option<Standing> {
         let record = self.durable.table.get(&goal)?;

@@ -39,6 +39,18 @@ impl Contact {
         self.delay = settings.resend_first;
     }
 
+    /// It has said what it has. If it asks for an answer it has restarted, or was out of reach: what it
+    /// lacks is sent at once. If it answers, what it lacks is sent when it is time, so that two who
+    /// disagree do not answer each other without end.
+    pub(super) fn told(&mut self, settings: &Settings, now: SimTime, asks: bool) {
+        if asks {
+            self.poke(settings, now);
+        } else {
+            self.has_met = true;
+            self.due.get_or_insert(now);
+        }
+    }
+
     /// Something was sent: the next time is later, by twice the delay of this time.
     pub(super) fn sent(&mut self, settings: &Settings, now: SimTime) {
         self.due = Some(now.saturating_add(self.delay));

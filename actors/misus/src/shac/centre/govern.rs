@@ -315,8 +315,9 @@ impl Centre {
         let other = other.filter(|other| other.grant == record.grant);
         let is_dropped = match partner {
             None => record.wish.withdrawn,
-            // Half of a joint goal that may start at any time is never taken back.
-            Some(_) if holder.confirmed || !is_mine => false,
+            // Half of a joint goal that may start at any time is never taken back; an earlier centre
+            // may have confirmed what this one does not know to be confirmed.
+            Some(_) if holder.confirmed || !is_mine && !self.has_all_reports() => false,
             Some(_) => {
                 let is_alone = other.is_none_or(|other| other.holder.is_none());
                 let is_withdrawn = other.is_some_and(|other| other.wish.withdrawn);

@@ -43,9 +43,13 @@ impl Centre {
     }
 
     /// Whether nobody can have a lease of an earlier term that this centre does not know of.
-    pub(super) fn is_settled(&self, now: SimTime) -> bool {
-        let waited = now >= self.durable.office.waits_until;
-        waited || self.rovers.iter().all(|rover| rover.has_reported)
+    pub fn is_settled(&self, now: SimTime) -> bool {
+        now >= self.durable.office.waits_until || self.has_all_reports()
+    }
+
+    /// Whether all rovers support this term, and have told what they held when they began to.
+    pub(super) fn has_all_reports(&self) -> bool {
+        self.rovers.iter().all(|rover| rover.has_reported)
     }
 
     /// When something of this file is to be done.

@@ -109,10 +109,7 @@ impl Centre {
         let from = self.parties[index];
         let contact = &mut self.peers[index].contact;
         contact.has(&digest.have);
-        if !digest.asks {
-            contact.has_met = true;
-        }
-        contact.poke(&self.settings, now);
+        contact.told(&self.settings, now, digest.asks);
         if let Party::Owner(rover) = from {
             self.learn_all(now, rover, &digest.holdings, out);
         }

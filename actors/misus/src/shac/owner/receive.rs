@@ -287,10 +287,7 @@ impl Owner {
             // It may have lost what it had acknowledged.
             peer.has_status = digest.status;
         }
-        if !digest.asks {
-            peer.contact.has_met = true;
-        }
-        peer.contact.poke(&self.settings, now);
+        peer.contact.told(&self.settings, now, digest.asks);
         let supports = digest.seeks.and_then(|seeks| self.support(now, seeks, out));
         if digest.asks || digest.seeks.is_some() {
             let mut answer = self.digest(index, false);
