@@ -16,7 +16,7 @@ use super::contact::Contact;
 use super::messages::{Held, Message, Output, Support};
 use super::record::{GoalRecord, Standing};
 use super::settings::Settings;
-use super::values::{GoalKey, Grant, Party, Revision, Version};
+use super::values::{GoalKey, Grant, Party, Revision, Term, Version};
 pub use durable::{CentreDurable, CentreWrite, Office};
 pub use govern::{AssignError, Vacancy};
 pub use wishes::WishError;
@@ -39,6 +39,8 @@ pub struct Centre {
     auctions: BTreeMap<GoalKey, Auction>,
     /// What it asks rovers to promise.
     seeks: Option<Support>,
+    /// The last term for which it stood in vain.
+    renounced: Option<Term>,
     /// When it stands for the office, unless it hears of a centre.
     stands_at: SimTime,
     /// When it asks for the next promise.
@@ -120,6 +122,7 @@ impl Centre {
             strangers: BTreeMap::new(),
             auctions: BTreeMap::new(),
             seeks: None,
+            renounced: None,
             stands_at: now + patience,
             renews_at: now,
             settings,

@@ -200,6 +200,8 @@ pub struct GoalDigest {
     pub status: Option<Version>,
     /// The sender stands for the office of centre.
     pub seeks: Option<Support>,
+    /// A term for which the sender stood in vain, and will not stand again: promises of it are void.
+    pub renounces: Option<Term>,
     /// The sender supports the recipient.
     pub supports: Option<Support>,
     /// From an owner that supports the recipient: all that it has or ever had, by goal.

@@ -663,6 +663,7 @@ impl Owner {
             have: self.durable.outcomes.have(self.settings.rovers),
             status,
             seeks: None,
+            renounces: None,
             supports: None,
             holdings: Vec::new(),
             records: Vec::new(),

@@ -90,7 +90,7 @@ impl Centre {
             let is_mine = term == elected && term.centre == self.site && term.number > 0;
             let term = if is_mine { term } else { self.next_term() };
             if !is_mine {
-                self.step_to(term, out);
+                self.step_to(now, term, out);
             }
             self.renews_at = now + silence_part(silence);
             self.ask(now, term);
@@ -131,15 +131,23 @@ impl Centre {
         self.write(CentreWrite::Office(office), out);
     }
 
-    /// Another term has begun: what was promised for earlier ones does not count.
-    fn step_to(&mut self, term: Term, out: &mut Output<CentreWrite>) {
+    /// Another term has begun: what was promised for earlier ones does not count. Who has promised to
+    /// support this candidate in vain is set free, or two candidates with half of the rovers each
+    /// would keep each other out for ever.
+    fn step_to(&mut self, now: SimTime, term: Term, out: &mut Output<CentreWrite>) {
         let Office {
+            term: before,
             elected,
             waits_until,
-            ..
         } = self.durable.office;
         self.hold_office(term, elected, waits_until, out);
-        self.seeks = None;
+        if self.seeks.take().is_some() && before != elected {
+            self.renounced = Some(before);
+            for peer in &mut self.peers[..self.rovers.len()] {
+                peer.contact.owes_digest = true;
+                peer.contact.poke(&self.settings, now);
+            }
+        }
         self.auctions.clear();
         for rover in &mut self.rovers {
             rover.promised = SimTime::ZERO;
@@ -160,10 +168,10 @@ impl Centre {
         }
         let mine = self.durable.office.term;
         if digest.term > mine {
-            self.step_to(digest.term, out);
+            self.step_to(now, digest.term, out);
         }
         if digest.term.centre != self.site && digest.until > now {
-            self.let_others_go_first(now, from, digest.until);
+            self.let_others_go_first(now, from, digest.until, out);
         }
         let (Party::Owner(rover), Some(support)) = (from, digest.supports) else {
             return;
@@ -178,7 +186,13 @@ impl Centre {
     }
 
     /// There is another centre, or a rover has promised its support to one.
-    fn let_others_go_first(&mut self, now: SimTime, from: Party, until: SimTime) {
+    fn let_others_go_first(
+        &mut self,
+        now: SimTime,
+        from: Party,
+        until: SimTime,
+        out: &mut Output<CentreWrite>,
+    ) {
         let free_at = match from {
             Party::Centre(_) => until,
             Party::Owner(rover) => {
@@ -192,8 +206,9 @@ impl Centre {
             let rank = self.settings.rank(self.site) + 1;
             let then = free_at + self.settings.stagger * rank;
             self.stands_at = self.stands_at.max(then);
-            if !self.is_in_office(now) {
-                self.seeks = None;
+            let Office { term, elected, .. } = self.durable.office;
+            if self.seeks.is_some() && term != elected {
+                self.step_to(now, self.next_term(), out);
             }
         }
     }

@@ -144,6 +144,7 @@ impl Centre {
             have: self.durable.outcomes.have(self.settings.rovers),
             status: self.supports(index).and_then(|rover| rover.version),
             seeks,
+            renounces: self.renounced,
             supports: None,
             holdings: Vec::new(),
             records,

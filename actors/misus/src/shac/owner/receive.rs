@@ -288,6 +288,11 @@ impl Owner {
             peer.has_status = digest.status;
         }
         peer.contact.told(&self.settings, now, digest.asks);
+        let term = self.durable.promise.term;
+        if digest.renounces == Some(term) && self.durable.promise.until > now {
+            let until = SimTime::ZERO;
+            self.write(OwnerWrite::Promise(Promise { term, until }), out);
+        }
         let supports = digest.seeks.and_then(|seeks| self.support(now, seeks, out));
         if digest.asks || digest.seeks.is_some() {
             let mut answer = self.digest(index, false);
@@ -308,7 +313,9 @@ impl Owner {
         out: &mut Output<OwnerWrite>,
     ) -> Option<Support> {
         let Promise { term, until } = self.durable.promise;
-        let is_free = now >= until || !self.settings.rules.mandate;
+        // A centre that asks for a later term has given up its earlier one.
+        let is_its_own = seeks.term.centre == term.centre;
+        let is_free = now >= until || is_its_own || !self.settings.rules.mandate;
         if seeks.term > term && is_free {
             self.follow(seeks.term, seeks.until, out);
         } else if seeks.term == term {
