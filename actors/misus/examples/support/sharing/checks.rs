@@ -5,8 +5,8 @@ use std::fmt;
 
 use farside::SimTime;
 use farside_misus::shac::{
-    Centre, Closing, GoalKey, Holding, HoldingState, OwnerDurable, Party, Revision, Rules,
-    Standing, Version,
+    Centre, Closing, GoalKey, Holding, HoldingState, OwnerDurable, Party, Revision, Standing,
+    Version,
 };
 
 use super::world::{Seat, World};
@@ -54,7 +54,7 @@ impl Checks {
 }
 
 impl World {
-    fn violated(&self, what: &'static str, details: String) -> Result<(), Violation> {
+    pub(crate) fn violated(&self, what: &'static str, details: String) -> Result<(), Violation> {
         Err(Violation {
             at: self.now,
             what,
@@ -271,8 +271,10 @@ impl World {
                 let held = durable.held.get(&partner);
                 let closed = durable.closed.get(&partner);
                 let is_held = held.is_some_and(|held| held.grant == holding.grant);
+                // Who has failed was bound. Who dropped it knows that both halves are done already.
                 let is_over = closed.is_some_and(|closing| {
-                    let may = [HoldingState::Done, HoldingState::Failed];
+                    use HoldingState::{Done, Failed, Superseded};
+                    let may = [Done, Failed, Superseded];
                     closing.grant == holding.grant && may.contains(&closing.state)
                 });
                 other != party && (is_held || is_over)
@@ -337,6 +339,3 @@ impl World {
         Ok(())
     }
 }
-
-/// A rule to break, by name, and what has to be seen to be violated then.
-pub(crate) type Break = (&'static str, fn(&mut Rules));

@@ -83,15 +83,16 @@ impl World {
             return Ok(());
         }
         let is_calm = self.now >= CALMS;
-        if draw < 0.3 || is_calm {
+        let zeal = self.scenario.zeal;
+        if draw < zeal || is_calm {
             self.start(party, goal)?;
-        } else if draw < 0.36 {
+        } else if draw < zeal + 0.06 {
             self.decide(party, |owner, now| owner.release(now, goal, Reason::Power));
-        } else if draw < 0.365 {
+        } else if draw < zeal + 0.065 {
             self.decide(party, |owner, now| {
                 owner.failed(now, goal, Reason::Hardware)
             });
-        } else if draw < 0.5 {
+        } else if draw < zeal + 0.2 {
             let mut parameters = holding.goal.parameters;
             parameters.scheduled = Some(self.now);
             self.decide(party, |owner, now| {

@@ -47,6 +47,8 @@ pub(crate) struct Scenario {
     pub(crate) delay_s: u64,
     /// The chance that an event is a party's last before a crash.
     pub(crate) crash_at_event: f64,
+    /// The chance that a rover starts what it holds, each time its planner looks.
+    pub(crate) zeal: f64,
     pub(crate) partitions: Vec<Partition>,
     pub(crate) crashes: Vec<Crash>,
     pub(crate) wishes: Vec<Wishing>,
@@ -145,6 +147,7 @@ impl Scenario {
             duplication: draw.uniform_in(0.0, 0.5),
             delay_s: 1 + draw.below(300),
             crash_at_event: if draw.chance(0.5) { 0.004 } else { 0.0 },
+            zeal: draw.uniform_in(0.02, 0.4),
             partitions,
             crashes,
             wishes,

@@ -14,6 +14,9 @@ use farside_misus::shac::{
 use super::checks::{Checks, Violation};
 use super::scenario::{ENDS, HEALS, Scenario, Wished, is_one_place};
 
+/// No run has so many events, unless parties answer each other without end.
+const MOST_EVENTS: u64 = 300_000;
+
 /// What a run came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
@@ -138,6 +141,9 @@ impl World {
             }
             self.now = at;
             self.tally.events += 1;
+            if self.tally.events > MOST_EVENTS {
+                self.violated("messages without end", String::new())?;
+            }
             let event = self
                 .events
                 .remove(&number)
