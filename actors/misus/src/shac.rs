@@ -64,7 +64,7 @@
 //! assert_eq!(centre.vacancies(now)[0].candidates, [0, 1]);
 //! let granted = centre.assign(now, goal.key, &[1])?;
 //! for (_, message) in granted.sends.iter().filter(|(to, _)| *to == Party::Owner(1)) {
-//!     owner.receive(now, Party::Centre(0), message);
+//!     owner.receive(now, message);
 //! }
 //! // The rover's planner accepts, starts and ends it.
 //! owner.accept(now, goal.key)?;
@@ -72,7 +72,7 @@
 //! now = now + SimDuration::from_secs(600);
 //! let done = owner.done(now, goal.key)?;
 //! for (_, message) in done.sends.iter().filter(|(to, _)| *to == Party::Centre(0)) {
-//!     centre.receive(now, Party::Owner(1), message);
+//!     centre.receive(now, message);
 //! }
 //! assert_eq!(centre.standing(goal.key), Some(Standing::Achieved));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -227,6 +227,10 @@ impl Centre {
         }
     }
 
+    fn me(&self) -> Party {
+        Party::Centre(self.site)
+    }
+
     /// Sends something at once, if anything may be sent. If not, who asked asks again.
     fn reply(&self, now: SimTime, to: Party, message: Message, out: &mut Output<CentreWrite>) {
         if self.settings.windows.is_open(now) {

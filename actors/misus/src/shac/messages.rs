@@ -11,6 +11,8 @@ use super::values::{GoalKey, Grant, Party, Reason, Revision, SharedGoal, Term, V
 /// parameters have changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalAssign {
+    /// Who sends it.
+    pub from: Party,
     /// The term of the centre that sends it.
     pub by: Term,
     /// The goal.
@@ -43,6 +45,8 @@ pub enum AssignTerms {
 /// To who sent something: it came, and this is how things are now.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalAck {
+    /// Who sends it.
+    pub from: Party,
     /// What came.
     pub what: Acknowledged,
 }
@@ -91,6 +95,8 @@ pub struct Closed {
 /// acknowledged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalStatus {
+    /// Who sends it.
+    pub from: Party,
     /// The highest version holds.
     pub version: Version,
     /// The latest term that the owner knows of.
@@ -163,6 +169,8 @@ impl HoldingState {
 /// From an owner to the centre: it will not do the goal. It is repeated in each status.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalRelease {
+    /// Who sends it.
+    pub from: Party,
     /// What it had.
     pub held: Held,
 }
@@ -170,6 +178,8 @@ pub struct GoalRelease {
 /// From the centre to an owner: it is not to start the goal, if it has not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalCancel {
+    /// Who sends it.
+    pub from: Party,
     /// The term of the centre that sends it.
     pub by: Term,
     /// Which goal.
@@ -181,6 +191,8 @@ pub struct GoalCancel {
 /// From everyone to everyone: outcomes that the other may lack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalOutcome {
+    /// Who sends it.
+    pub from: Party,
     /// Which.
     pub outcomes: Vec<Outcome>,
 }
@@ -188,6 +200,8 @@ pub struct GoalOutcome {
 /// On contact, restart and election: what the sender knows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GoalDigest {
+    /// Who sends it.
+    pub from: Party,
     /// The latest term that the sender knows of.
     pub term: Term,
     /// Until when the sender supports that term, or has it.
@@ -238,6 +252,21 @@ pub enum Message {
     Outcome(GoalOutcome),
     /// See [`GoalDigest`].
     Digest(GoalDigest),
+}
+
+impl Message {
+    /// Who sends it.
+    pub fn from(&self) -> Party {
+        match self {
+            Message::Assign(message) => message.from,
+            Message::Ack(message) => message.from,
+            Message::Status(message) => message.from,
+            Message::Release(message) => message.from,
+            Message::Cancel(message) => message.from,
+            Message::Outcome(message) => message.from,
+            Message::Digest(message) => message.from,
+        }
+    }
 }
 
 /// What comes of a call: what to write, and then what to send.

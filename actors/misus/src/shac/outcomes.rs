@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::values::{GoalKey, Grant};
 
+/// How many outcomes a message holds at most.
+pub(super) const OUTCOMES_PER_MESSAGE: usize = 32;
+
 /// That a rover has carried out a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Outcome {

@@ -2,6 +2,7 @@
 
 mod durable;
 mod receive;
+mod send;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,19 +12,13 @@ use thiserror::Error;
 
 use super::contact::Contact;
 use super::definition::{Parameter, Role, Stage};
-use super::messages::{
-    Acknowledged, GoalAck, GoalDigest, GoalOutcome, GoalRelease, GoalStatus, Held, HoldingState,
-    Message, Output,
-};
+use super::messages::{Acknowledged, GoalAck, GoalRelease, Held, HoldingState, Message, Output};
 use super::outcomes::Outcome;
 use super::settings::Settings;
 use super::values::{
     GoalKey, Grant, Parameters, Party, Reason, Revision, SharedGoal, Term, Version,
 };
 pub use durable::{Closing, Holding, OwnerDurable, OwnerWrite, Promise};
-
-/// How many outcomes a message holds at most.
-pub(super) const OUTCOMES_PER_MESSAGE: usize = 32;
 
 /// A rover's side of the protocol. See [the module](super) for an example.
 #[derive(Clone, Debug)]
@@ -312,7 +307,15 @@ impl Owner {
             capacity: self.durable.capacity,
         };
         let centre = Party::Centre(call.by.centre);
-        self.reply(now, centre, Message::Ack(GoalAck { what }), &mut out);
+        self.reply(
+            now,
+            centre,
+            Message::Ack(GoalAck {
+                from: self.me(),
+                what,
+            }),
+            &mut out,
+        );
         self.finish(now, &mut out);
         Ok(out)
     }
@@ -334,7 +337,10 @@ impl Owner {
         let state = HoldingState::Released;
         self.close(goal, holding.grant, state, reason, &mut out);
         if let Some(held) = self.durable.present(goal) {
-            let release = Message::Release(GoalRelease { held });
+            let release = Message::Release(GoalRelease {
+                from: self.me(),
+                held,
+            });
             self.reply(now, self.centre(), release, &mut out);
         }
         self.finish(now, &mut out);
@@ -538,7 +544,15 @@ impl Owner {
     fn tell_holding(&self, now: SimTime, goal: GoalKey, out: &mut Output<OwnerWrite>) {
         if let Some(held) = self.durable.present(goal) {
             let what = Acknowledged::Holding(held);
-            self.reply(now, self.centre(), Message::Ack(GoalAck { what }), out);
+            self.reply(
+                now,
+                self.centre(),
+                Message::Ack(GoalAck {
+                    from: self.me(),
+                    what,
+                }),
+                out,
+            );
         }
     }
 
@@ -556,6 +570,10 @@ impl Owner {
                 self.flush(now, index, out);
             }
         }
+    }
+
+    fn me(&self) -> Party {
+        Party::Owner(self.rover)
     }
 
     fn poke_all(&mut self, now: SimTime) {
@@ -588,86 +606,6 @@ impl Owner {
             .collect();
         for (holding, state, reason) in ended {
             self.close(holding.goal.key, holding.grant, state, reason, out);
-        }
-    }
-
-    /// Sends a party what it is not known to have, if it is time.
-    fn flush(&mut self, now: SimTime, index: usize, out: &mut Output<OwnerWrite>) {
-        let to = self.parties[index];
-        if to == Party::Owner(self.rover) {
-            self.peers[index].contact.due = None;
-            return;
-        }
-        if self.peers[index].contact.due.is_none_or(|due| due > now) {
-            return;
-        }
-        let before = out.sends.len();
-        let asks = !self.peers[index].contact.has_met;
-        if asks || std::mem::take(&mut self.peers[index].contact.owes_digest) {
-            out.sends
-                .push((to, Message::Digest(self.digest(index, asks))));
-        }
-        let lacks_status = self.peers[index].has_status != Some(self.durable.version);
-        if lacks_status || to == self.centre() && self.untaken().next().is_some() {
-            out.sends.push((to, Message::Status(self.status())));
-        }
-        let has = &self.peers[index].contact.has;
-        let mine_only = !self.settings.rules.pass_outcomes_on;
-        let missing = self.durable.outcomes.beyond(has);
-        let missing = missing
-            .filter(|outcome| !mine_only || outcome.rover == self.rover && to == self.centre());
-        let outcomes: Vec<Outcome> = missing.take(OUTCOMES_PER_MESSAGE).copied().collect();
-        if !outcomes.is_empty() {
-            out.sends
-                .push((to, Message::Outcome(GoalOutcome { outcomes })));
-        }
-        let contact = &mut self.peers[index].contact;
-        if out.sends.len() == before {
-            contact.due = None;
-        } else {
-            contact.sent(&self.settings, now);
-        }
-    }
-
-    /// Ends of holdings that the centre has not taken.
-    fn untaken(&self) -> impl Iterator<Item = &Closing> {
-        let closed = self.durable.closed.values();
-        closed.filter(|closing| {
-            let taken = self.taken.get(&closing.goal);
-            taken != Some(&closing.grant)
-        })
-    }
-
-    fn status(&self) -> GoalStatus {
-        let held = self.durable.held.values();
-        let held = held.map(|holding| self.durable.of_holding(holding));
-        let mut holdings: Vec<Held> = held.chain(self.untaken().map(Closing::held)).collect();
-        holdings.sort_unstable_by_key(|held| held.goal);
-        GoalStatus {
-            version: self.durable.version,
-            term: self.durable.promise.term,
-            capacity: self.durable.capacity,
-            holdings,
-        }
-    }
-
-    fn digest(&self, index: usize, asks: bool) -> GoalDigest {
-        let status = match self.parties[index] {
-            Party::Owner(rover) => self.told_by(rover).map(|told| told.version),
-            Party::Centre(_) => None,
-        };
-        GoalDigest {
-            term: self.durable.promise.term,
-            until: self.durable.promise.until,
-            asks,
-            have: self.durable.outcomes.have(self.settings.rovers),
-            status,
-            seeks: None,
-            renounces: None,
-            supports: None,
-            holdings: Vec::new(),
-            records: Vec::new(),
-            version: self.durable.version,
         }
     }
 }

@@ -78,7 +78,9 @@ fn a_new_centre_waits_out_leases_that_it_does_not_know() {
     let mut seen = 0;
     for seed in 0..30 {
         let hasty = World::new(cut_off(seed), without("wait_out").unwrap()).run();
-        seen += u32::from(hasty.is_err_and(|seen| seen.what == "two leases"));
+        seen += u32::from(
+            hasty.is_err_and(|seen| seen.what == "a lease that its centre does not know"),
+        );
         World::new(cut_off(seed), Rules::ALL).run().unwrap();
     }
     assert!(seen > 0);

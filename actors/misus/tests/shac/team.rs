@@ -73,10 +73,10 @@ impl Team {
             let sends = match to {
                 Party::Owner(rover) => {
                     self.owners[rover as usize]
-                        .receive(self.now, from, &message)
+                        .receive(self.now, &message)
                         .sends
                 }
-                Party::Centre(_) => self.centre.receive(self.now, from, &message).sends,
+                Party::Centre(_) => self.centre.receive(self.now, &message).sends,
             };
             self.arrived.push((from, to, message));
             self.send(to, sends);

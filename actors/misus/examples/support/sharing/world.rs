@@ -53,7 +53,6 @@ pub(crate) enum Seat {
 
 enum Event {
     Deliver {
-        from: usize,
         to: usize,
         message: Message,
     },
@@ -183,7 +182,7 @@ impl World {
 
     fn handle(&mut self, event: Event) -> Result<(), Violation> {
         match event {
-            Event::Deliver { from, to, message } => self.deliver(from, to, &message),
+            Event::Deliver { to, message } => self.deliver(to, &message),
             Event::Wake(party, number) => {
                 if self.wakes[party] == number {
                     self.tick(party);
@@ -204,16 +203,16 @@ impl World {
         Ok(())
     }
 
-    fn deliver(&mut self, from: usize, to: usize, message: &Message) {
-        let (clock, sender) = (self.clock(to), self.parties[from]);
-        self.tell(|| format!("{sender:?} -> {:?}: {message:?}", self.parties[to]));
+    fn deliver(&mut self, to: usize, message: &Message) {
+        let clock = self.clock(to);
+        self.tell(|| format!("-> {:?}: {message:?}", self.parties[to]));
         match &mut self.seats[to] {
             Seat::Owner(Some(owner), _) => {
-                let out = owner.receive(clock, sender, message);
+                let out = owner.receive(clock, message);
                 self.owner_out(to, out);
             }
             Seat::Centre(Some(centre), _) => {
-                let out = centre.receive(clock, sender, message);
+                let out = centre.receive(clock, message);
                 self.centre_out(to, out);
             }
             Seat::Owner(None, _) | Seat::Centre(None, _) => {}
@@ -416,7 +415,7 @@ impl World {
             };
             let at = self.now + SimDuration::from_secs_f64(delay);
             let message = message.clone();
-            self.put(at, Event::Deliver { from, to, message });
+            self.put(at, Event::Deliver { to, message });
         }
     }
 

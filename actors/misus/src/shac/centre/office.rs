@@ -7,7 +7,7 @@
 
 use farside::SimTime;
 
-use super::{Centre, CentreWrite, Office, Rover};
+use super::{Centre, CentreWrite, Office};
 use crate::shac::messages::{GoalDigest, Output, Support};
 use crate::shac::values::{Party, Term};
 
@@ -247,11 +247,6 @@ impl Centre {
             peer.contact.owes_digest = true;
             peer.contact.poke(&self.settings, now);
         }
-    }
-
-    /// What a rover has acknowledged and promised.
-    pub(super) fn supports(&self, index: usize) -> Option<&Rover> {
-        self.rovers.get(index)
     }
 }
 

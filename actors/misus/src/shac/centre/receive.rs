@@ -12,9 +12,10 @@ use crate::shac::record::{GoalRecord, Holder, Refusal};
 use crate::shac::values::{GoalKey, Party};
 
 impl Centre {
-    /// Takes a message. From whom is said by whoever carried it.
-    pub fn receive(&mut self, now: SimTime, from: Party, message: &Message) -> Output<CentreWrite> {
+    /// Takes a message. From who takes no part, it is ignored.
+    pub fn receive(&mut self, now: SimTime, message: &Message) -> Output<CentreWrite> {
         let mut out = Output::default();
+        let from = message.from();
         let Some(index) = self.settings.index(from) else {
             return out;
         };
@@ -34,7 +35,15 @@ impl Centre {
                 }
                 let have = self.durable.outcomes.have(self.settings.rovers);
                 let what = Acknowledged::Outcomes(have);
-                self.reply(now, from, Message::Ack(GoalAck { what }), &mut out);
+                self.reply(
+                    now,
+                    from,
+                    Message::Ack(GoalAck {
+                        from: self.me(),
+                        what,
+                    }),
+                    &mut out,
+                );
             }
             (Message::Status(_) | Message::Release(_), Party::Centre(_))
             | (Message::Assign(_) | Message::Cancel(_), _) => {}
@@ -61,7 +70,15 @@ impl Centre {
         self.hear_report(rover, status.term);
         let what = Acknowledged::Status(version);
         let to = Party::Owner(rover);
-        self.reply(now, to, Message::Ack(GoalAck { what }), out);
+        self.reply(
+            now,
+            to,
+            Message::Ack(GoalAck {
+                from: self.me(),
+                what,
+            }),
+            out,
+        );
         self.learn_all(now, rover, &status.holdings, out);
     }
 
@@ -119,7 +136,15 @@ impl Centre {
         }
         if !digest.records.is_empty() {
             let what = Acknowledged::Records(digest.version);
-            self.reply(now, from, Message::Ack(GoalAck { what }), out);
+            self.reply(
+                now,
+                from,
+                Message::Ack(GoalAck {
+                    from: self.me(),
+                    what,
+                }),
+                out,
+            );
         }
         if digest.asks {
             let answer = self.digest(now, index, false);
@@ -179,7 +204,15 @@ impl Centre {
             let by = self.durable.office.term;
             let what = Acknowledged::Ends { by, ends };
             let to = Party::Owner(rover);
-            self.reply(now, to, Message::Ack(GoalAck { what }), out);
+            self.reply(
+                now,
+                to,
+                Message::Ack(GoalAck {
+                    from: self.me(),
+                    what,
+                }),
+                out,
+            );
         }
     }
 

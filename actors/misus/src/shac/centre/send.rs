@@ -6,8 +6,7 @@ use super::{Centre, CentreWrite, Told};
 use crate::shac::messages::{
     AssignTerms, GoalAssign, GoalCancel, GoalDigest, GoalOutcome, Message, Output,
 };
-use crate::shac::outcomes::Outcome;
-use crate::shac::owner::OUTCOMES_PER_MESSAGE;
+use crate::shac::outcomes::{OUTCOMES_PER_MESSAGE, Outcome};
 use crate::shac::record::{GoalRecord, Holder};
 use crate::shac::values::{GoalKey, Party, Version};
 
@@ -18,7 +17,7 @@ impl Centre {
     /// Sends a party what it is not known to have, if it is time.
     pub(super) fn flush(&mut self, now: SimTime, index: usize, out: &mut Output<CentreWrite>) {
         let to = self.parties[index];
-        if to == Party::Centre(self.site) {
+        if to == self.me() {
             self.peers[index].contact.due = None;
             return;
         }
@@ -36,8 +35,13 @@ impl Centre {
             let missing = self.durable.outcomes.beyond(&self.peers[index].contact.has);
             let outcomes: Vec<Outcome> = missing.take(OUTCOMES_PER_MESSAGE).copied().collect();
             if !outcomes.is_empty() {
-                out.sends
-                    .push((to, Message::Outcome(GoalOutcome { outcomes })));
+                out.sends.push((
+                    to,
+                    Message::Outcome(GoalOutcome {
+                        from: self.me(),
+                        outcomes,
+                    }),
+                ));
             }
         }
         if let Party::Owner(rover) = to
@@ -68,7 +72,12 @@ impl Centre {
                     continue;
                 }
                 let grant = record.grant;
-                Message::Cancel(GoalCancel { by, goal, grant })
+                Message::Cancel(GoalCancel {
+                    from: self.me(),
+                    by,
+                    goal,
+                    grant,
+                })
             } else {
                 let is_over = now >= holder.lease_end || self.durable.outcomes.achieved(goal);
                 if is_over || told.get(&goal) == Some(&to_tell(record, &holder)) {
@@ -90,7 +99,7 @@ impl Centre {
     fn offer_to(&self, now: SimTime, rover: u32, out: &mut Output<CentreWrite>) {
         for (goal, auction) in &self.auctions {
             let until = auction.until;
-            let is_asked = auction.bids.iter().any(|bid| *bid == (rover, None));
+            let is_asked = auction.bids.contains(&(rover, None));
             if let Some(record) = self.durable.table.get(goal)
                 && is_asked
                 && now < until
@@ -104,6 +113,7 @@ impl Centre {
 
     fn assignment(&self, record: &GoalRecord, terms: AssignTerms) -> GoalAssign {
         GoalAssign {
+            from: self.me(),
             by: self.durable.office.term,
             goal: record.wish.goal,
             revision: record.wish.revision,
@@ -114,7 +124,7 @@ impl Centre {
 
     /// Whether a rover has not promised what it is asked for.
     fn wants_support(&self, index: usize) -> bool {
-        let rover = self.supports(index);
+        let rover = self.rovers.get(index);
         let asks = self.seeks.zip(rover);
         asks.is_some_and(|(seeks, rover)| rover.promised < seeks.until)
     }
@@ -138,11 +148,12 @@ impl Centre {
             Party::Centre(_) => self.records_for(index),
         };
         GoalDigest {
+            from: self.me(),
             term: self.term_to_tell(),
             until: self.mandate(now),
             asks,
             have: self.durable.outcomes.have(self.settings.rovers),
-            status: self.supports(index).and_then(|rover| rover.version),
+            status: self.rovers.get(index).and_then(|rover| rover.version),
             seeks,
             renounces: self.renounced,
             supports: None,

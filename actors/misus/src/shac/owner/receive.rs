@@ -12,9 +12,10 @@ use crate::shac::outcomes::Outcome;
 use crate::shac::values::{GoalKey, Grant, Party, Reason, Term};
 
 impl Owner {
-    /// Takes a message. From whom is said by whoever carried it.
-    pub fn receive(&mut self, now: SimTime, from: Party, message: &Message) -> Output<OwnerWrite> {
+    /// Takes a message. From who takes no part, it is ignored.
+    pub fn receive(&mut self, now: SimTime, message: &Message) -> Output<OwnerWrite> {
         let mut out = Output::default();
+        let from = message.from();
         let Some(index) = self.settings.index(from) else {
             return out;
         };
@@ -76,7 +77,10 @@ impl Owner {
         let (key, from) = (assign.goal.key, self.parties[index]);
         if self.durable.outcomes.achieved(key) && self.settings.rules.drop_achieved {
             let outcomes: Vec<Outcome> = self.durable.outcomes.of(key).copied().collect();
-            let message = Message::Outcome(GoalOutcome { outcomes });
+            let message = Message::Outcome(GoalOutcome {
+                from: self.me(),
+                outcomes,
+            });
             return self.reply(now, from, message, out);
         }
         match assign.terms {
@@ -243,7 +247,15 @@ impl Owner {
         }
         let version = known.as_ref().map_or(status.version, |known| known.version);
         let what = Acknowledged::Status(version);
-        self.reply(now, from, Message::Ack(GoalAck { what }), out);
+        self.reply(
+            now,
+            from,
+            Message::Ack(GoalAck {
+                from: self.me(),
+                what,
+            }),
+            out,
+        );
     }
 
     fn on_outcome(
@@ -258,7 +270,15 @@ impl Owner {
         }
         let have = self.durable.outcomes.have(self.settings.rovers);
         let what = Acknowledged::Outcomes(have);
-        self.reply(now, from, Message::Ack(GoalAck { what }), out);
+        self.reply(
+            now,
+            from,
+            Message::Ack(GoalAck {
+                from: self.me(),
+                what,
+            }),
+            out,
+        );
     }
 
     fn learn_outcome(&mut self, now: SimTime, outcome: Outcome, out: &mut Output<OwnerWrite>) {
