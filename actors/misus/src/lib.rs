@@ -23,6 +23,7 @@ mod scenario;
 mod scene;
 mod scientist;
 pub mod shac;
+pub mod sharing;
 mod site;
 mod system;
 mod tools;

@@ -5,6 +5,7 @@
 mod sharing;
 
 mod encoding;
+mod kernel;
 mod rules;
 mod runs;
 mod situations;
