@@ -45,22 +45,35 @@ pub struct Settings {
 
 /// Which rules are kept. All of them, but in tests that show what each is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "each is named after its rule, see `RULES`")]
 pub struct Rules {
+    /// What is decided is written before it is sent (rule 1).
     pub write_first: bool,
+    /// An owner accepts a grant only if it is newer than the last it had (rule 2).
     pub newer_only: bool,
+    /// Of each rover the status with the highest version holds (rule 3).
     pub highest_status: bool,
+    /// What has started is not released (rule 4).
     pub release_binds: bool,
+    /// Only what is said of the present grant counts (rule 5).
     pub present_epoch_only: bool,
-    pub revoke_safely: bool,
-    pub start_in_lease: bool,
-    pub pass_outcomes_on: bool,
-    pub drop_achieved: bool,
-    pub wait_out: bool,
-    pub mandate: bool,
-    pub bind_pairs: bool,
+    /// Who has refused a goal is not asked again before something changes (rule 5).
     pub refusals_hold: bool,
+    /// A goal that is taken back is somebody else's only when its owner has agreed (rule 6).
+    pub revoke_safely: bool,
+    /// An activity starts only if it ends within its lease (rule 7).
+    pub start_in_lease: bool,
+    /// Everyone passes on all outcomes that it knows of (rule 8).
+    pub pass_outcomes_on: bool,
+    /// Who learns that a goal is achieved drops it, unless it has started (rule 9).
+    pub drop_achieved: bool,
+    /// A new centre waits out leases that it may not know (rule 10).
+    pub wait_out: bool,
+    /// Of two editions of a goal the later holds, whichever centre's grant is later (rule 10).
     pub withdrawn_for_good: bool,
+    /// A centre grants nothing without the promises of a majority.
+    pub mandate: bool,
+    /// Half of a joint goal starts only when another rover is bound to the other half.
+    pub bind_pairs: bool,
 }
 
 impl Rules {

@@ -92,7 +92,7 @@ impl Coordinator {
                 set_timer(ctx, &mut self.timer, wake);
                 return Ok(());
             };
-            match centre.carry(now, next) {
+            match carry(centre, now, next) {
                 Ok(out) => {
                     refused = None;
                     self.carry_out(out, ctx)?;
@@ -104,24 +104,25 @@ impl Coordinator {
     }
 }
 
-impl Centre {
-    fn carry(&mut self, now: SimTime, next: TeamMove) -> Result<Output<CentreWrite>, String> {
-        match next {
-            TeamMove::Add(goal) => self.add(now, goal).map_err(|error| error.to_string()),
-            TeamMove::Change(goal, to) => {
-                let changed = self.change(now, goal, &to);
-                changed.map_err(|error| error.to_string())
-            }
-            TeamMove::Withdraw(goal) => self.withdraw(now, goal).map_err(|error| error.to_string()),
-            TeamMove::Assign(goal, rovers) => {
-                let assigned = self.assign(now, goal, &rovers);
-                assigned.map_err(|error| error.to_string())
-            }
-            TeamMove::Revoke(goal) => self.revoke(now, goal).map_err(|error| error.to_string()),
-            TeamMove::Declare(goal, reason) => {
-                let declared = self.declare(now, goal, reason);
-                declared.map_err(|error| error.to_string())
-            }
+/// Makes a move.
+fn carry(centre: &mut Centre, now: SimTime, next: TeamMove) -> Result<Output<CentreWrite>, String> {
+    match next {
+        TeamMove::Add(goal) => centre.add(now, goal).map_err(|error| error.to_string()),
+        TeamMove::Change(goal, to) => {
+            let changed = centre.change(now, goal, &to);
+            changed.map_err(|error| error.to_string())
+        }
+        TeamMove::Withdraw(goal) => centre
+            .withdraw(now, goal)
+            .map_err(|error| error.to_string()),
+        TeamMove::Assign(goal, rovers) => {
+            let assigned = centre.assign(now, goal, &rovers);
+            assigned.map_err(|error| error.to_string())
+        }
+        TeamMove::Revoke(goal) => centre.revoke(now, goal).map_err(|error| error.to_string()),
+        TeamMove::Declare(goal, reason) => {
+            let declared = centre.declare(now, goal, reason);
+            declared.map_err(|error| error.to_string())
         }
     }
 }

@@ -100,7 +100,7 @@ impl Pursuer {
                 set_timer(ctx, &mut self.timer, wake);
                 return Ok(());
             };
-            match owner.carry(now, next) {
+            match carry(owner, now, next) {
                 Ok(out) => {
                     refused = None;
                     self.carry_out(out, ctx)?;
@@ -112,19 +112,22 @@ impl Pursuer {
     }
 }
 
-impl Owner {
-    fn carry(&mut self, now: SimTime, next: RoverMove) -> Result<Output<OwnerWrite>, OwnerError> {
-        match next {
-            RoverMove::Accept(goal) => self.accept(now, goal),
-            RoverMove::Refuse(goal, reason) => self.refuse(now, goal, reason),
-            RoverMove::Bid(goal, score) => self.bid(now, goal, score),
-            RoverMove::Release(goal, reason) => self.release(now, goal, reason),
-            RoverMove::Begin(goal) => self.begin(now, goal),
-            RoverMove::Done(goal) => self.done(now, goal),
-            RoverMove::Failed(goal, reason) => self.failed(now, goal, reason),
-            RoverMove::Set(goal, parameter, to) => self.set(now, goal, parameter, &to),
-            RoverMove::CapacityChanged => Ok(self.capacity_changed(now)),
-        }
+/// Makes a move.
+fn carry(
+    owner: &mut Owner,
+    now: SimTime,
+    next: RoverMove,
+) -> Result<Output<OwnerWrite>, OwnerError> {
+    match next {
+        RoverMove::Accept(goal) => owner.accept(now, goal),
+        RoverMove::Refuse(goal, reason) => owner.refuse(now, goal, reason),
+        RoverMove::Bid(goal, score) => owner.bid(now, goal, score),
+        RoverMove::Release(goal, reason) => owner.release(now, goal, reason),
+        RoverMove::Begin(goal) => owner.begin(now, goal),
+        RoverMove::Done(goal) => owner.done(now, goal),
+        RoverMove::Failed(goal, reason) => owner.failed(now, goal, reason),
+        RoverMove::Set(goal, parameter, to) => owner.set(now, goal, parameter, &to),
+        RoverMove::CapacityChanged => Ok(owner.capacity_changed(now)),
     }
 }
 
