@@ -106,8 +106,11 @@ impl Centre {
         };
         let peers = parties.iter().map(|_| peer()).collect();
         let rank = settings.rank(site);
+        // Who was elected before it crashed stands at once: rovers may still be bound to its term.
+        let Office { term, elected, .. } = durable.office;
+        let was_elected = term == elected && term.centre == site && term.number > 0;
         let patience = match settings.election {
-            Some(silence) if rank > 0 => silence + settings.stagger * rank,
+            Some(silence) if rank > 0 && !was_elected => silence + settings.stagger * rank,
             _ => SimDuration::ZERO,
         };
         let changed: BTreeMap<GoalKey, u32> = durable.table.keys().copied().zip(1..).collect();

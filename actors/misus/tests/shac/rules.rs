@@ -85,3 +85,22 @@ fn a_new_centre_waits_out_leases_that_it_does_not_know() {
     }
     assert!(seen > 0);
 }
+
+/// The guard is the most that clocks may differ. Here they differ by up to ten guards.
+#[test]
+fn clocks_that_differ_by_more_than_the_guard_break_leases() {
+    let mut runs = (0..60).map(|seed| Scenario {
+        skew_s: 600,
+        ..Scenario::random(seed)
+    });
+    let broken = [
+        "two leases",
+        "a lease that its centre does not know",
+        "two centres",
+    ];
+    let is_seen = runs.any(|scenario| {
+        let run = World::new(scenario, Rules::ALL).run();
+        run.is_err_and(|seen| broken.contains(&seen.what))
+    });
+    assert!(is_seen);
+}

@@ -80,7 +80,7 @@ prop_compose! {
         let pairs = if rovers > 1 { pairs } else { 0 };
         Scenario {
             seed, protocol, rovers, candidates, has_elections, has_windows, goals, pairs, loss,
-            duplication, delay_s, crash_at_event, zeal, partitions, crashes, wishes,
+            duplication, delay_s, skew_s: 60, crash_at_event, zeal, partitions, crashes, wishes,
         }
     }
 }

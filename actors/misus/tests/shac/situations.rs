@@ -127,6 +127,24 @@ fn an_activity_that_does_not_fit_into_a_lease_is_not_wished_for() {
     assert_eq!(error.to_string(), expected);
 }
 
+/// What was observed is not lost when the rover crashes before it has told anyone, and what was
+/// only offered is offered again.
+#[test]
+fn a_crash_between_observation_and_outcome_loses_nothing() {
+    let mut team = owned(settings("lease"));
+    team.centre(|centre, now| centre.add(now, goal(8)));
+    team.centre(|centre, now| centre.assign(now, key(8), &[0]));
+    team.owner(0, |owner, now| owner.begin(now, key(7)))
+        .unwrap();
+    team.pass(MINUTE * 10);
+    team.restart(0);
+    assert!(team.owners[0].durable().held[&key(7)].started.is_some());
+    team.owner(0, |owner, now| owner.done(now, key(7))).unwrap();
+    assert_eq!(team.centre.standing(key(7)), Some(Standing::Achieved));
+    team.pass(MINUTE * 20);
+    assert_eq!(team.owners[0].offers().count(), 1);
+}
+
 #[test]
 fn the_highest_bid_gets_the_goal() {
     let mut team = Team::new(settings("market"));

@@ -106,6 +106,16 @@ impl Team {
         Ok(())
     }
 
+    /// A rover crashes, and is up again with what it has written.
+    pub(crate) fn restart(&mut self, rover: u32) {
+        let settings = Arc::new(self.centre.settings().clone());
+        let durable = self.owners[rover as usize].durable().clone();
+        let (owner, out) = Owner::start(settings, rover, durable, self.now);
+        self.owners[rover as usize] = owner;
+        self.send(Party::Owner(rover), out.sends);
+        self.deliver();
+    }
+
     /// Lets time pass, in which everyone does what is due.
     pub(crate) fn pass(&mut self, time: SimDuration) {
         let until = self.now + time;

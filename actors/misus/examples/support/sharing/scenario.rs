@@ -45,6 +45,8 @@ pub(crate) struct Scenario {
     pub(crate) duplication: f64,
     /// Messages take up to so long, each its own time, so that they overtake each other.
     pub(crate) delay_s: u64,
+    /// How much two clocks may differ; the guard is a minute.
+    pub(crate) skew_s: u64,
     /// The chance that an event is a party's last before a crash.
     pub(crate) crash_at_event: f64,
     /// The chance that a rover starts what it holds, each time its planner looks.
@@ -146,6 +148,7 @@ impl Scenario {
             loss: draw.uniform_in(0.0, 0.9),
             duplication: draw.uniform_in(0.0, 0.5),
             delay_s: 1 + draw.below(300),
+            skew_s: 60,
             crash_at_event: if draw.chance(0.5) { 0.004 } else { 0.0 },
             zeal: draw.uniform_in(0.02, 0.4),
             partitions,

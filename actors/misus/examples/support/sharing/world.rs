@@ -169,15 +169,15 @@ impl World {
         key.number(self.now.as_nanos()).uniform()
     }
 
-    /// The clock of a party, which is up to a guard fast.
+    /// The clock of a party, each as much too fast as is its own.
     pub(crate) fn clock(&self, party: usize) -> SimTime {
         self.now + self.skew(party)
     }
 
     fn skew(&self, party: usize) -> SimDuration {
         let key = RandomKey::new(self.scenario.seed).text("skew");
-        let guard_s = self.settings.guard.as_secs_f64();
-        SimDuration::from_secs_f64(key.number(party as u64).uniform() * guard_s)
+        let skew_s = self.scenario.skew_s as f64;
+        SimDuration::from_secs_f64(key.number(party as u64).uniform() * skew_s)
     }
 
     fn handle(&mut self, event: Event) -> Result<(), Violation> {
