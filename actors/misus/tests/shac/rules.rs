@@ -18,7 +18,7 @@ const SEEN: [(&str, u64, &str); 13] = [
     ("revoke_safely", 2, "a lease that its centre does not know"),
     ("start_in_lease", 12, "started beyond the lease"),
     ("pass_outcomes_on", 2, "outcomes differ"),
-    ("drop_achieved", 2, "started what is known to be achieved"),
+    ("drop_achieved", 30, "started what is known to be achieved"),
     ("mandate", 2, "two centres"),
     ("bind_pairs", 4, "half a pair alone"),
     ("refusals_hold", 90, "asked again and again"),
