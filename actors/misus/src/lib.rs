@@ -8,6 +8,9 @@
 //!
 //! On each rover there are two actors: the hardware, and the scientist, who sends the rover from rock
 //! to rock, exchanges what is read with the other scientists, and learns from all of it.
+//!
+//! How goals are shared over bad links ([`shac`], its section 3.2) is there by itself, with actors
+//! ([`sharing`]) that planners are to be put into.
 
 pub mod analysis;
 mod assemble;
@@ -21,6 +24,8 @@ mod picture;
 mod scenario;
 mod scene;
 mod scientist;
+pub mod shac;
+pub mod sharing;
 mod site;
 mod system;
 mod tools;
