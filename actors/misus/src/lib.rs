@@ -19,6 +19,7 @@ mod metrics;
 mod monitor;
 mod picture;
 mod place;
+pub mod planner;
 mod scenario;
 mod scene;
 mod scientist;
