@@ -17,12 +17,11 @@
 //! | [`rounds`] | the paper's evaluation: planners synchronised after each step, links perfect |
 //! | [`plan`] | a team's plan as data, and whether it is valid: shares no code with the planners |
 
-//casper
-//central
+pub mod casper;
+pub mod central;
 pub mod chain;
 pub mod instance;
-//lns
-//plan
+pub mod plan;
 pub mod problem;
-//rounds
+pub mod rounds;
 pub mod score;

@@ -277,13 +277,23 @@ impl Chain {
     /// The place for a task with the least violation, then the least added drive, then the earliest; None
     /// if something that it requires is not in the plan. And how many places were tested.
     pub fn best_insertion(&self, instance: &Instance, visit: &Visit) -> (Option<Insertion>, u64) {
+        self.best_insertion_where(instance, visit, |_| true)
+    }
+
+    /// As [`Chain::best_insertion`], in the sols that `wanted` wants; None also if there are none.
+    pub fn best_insertion_where(
+        &self,
+        instance: &Instance,
+        visit: &Visit,
+        wanted: impl Fn(usize) -> bool,
+    ) -> (Option<Insertion>, u64) {
         let vehicle = &instance.vehicles()[self.rover];
         let mut best: Option<(f64, Insertion)> = None;
         let mut tested = 0;
         let Some((low, high)) = self.between(instance, visit.task) else {
             return (None, 1);
         };
-        for sol in 0..vehicle.sols.len() {
+        for sol in (0..vehicle.sols.len()).filter(|sol| wanted(*sol)) {
             let range = self.sol(sol);
             for index in range.start.max(low)..=range.end.min(high) {
                 tested += 1;
