@@ -31,6 +31,9 @@ fn main() {
             |r: &Rounds, at: usize| r.goals[at],
             |r: &Rounds, at: usize| r.traverse_m[at],
             |r: &Rounds, at: usize| r.operations[at],
+            |r: &Rounds, at: usize| r.iterations[at],
+            |r: &Rounds, _: usize| r.operations.iter().sum::<f64>() / 20.0,
+            |r: &Rounds, _: usize| r.iterations.iter().sum::<f64>() / 20.0,
         ] {
             for k in 0..3 {
                 let m = all[k].iter().map(|r| f(r, step - 1)).sum::<f64>() / 150.0;

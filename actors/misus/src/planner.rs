@@ -21,6 +21,7 @@ pub mod casper;
 pub mod central;
 pub mod chain;
 pub mod instance;
+pub mod lns;
 pub mod plan;
 pub mod problem;
 pub mod rounds;

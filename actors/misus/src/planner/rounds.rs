@@ -22,6 +22,8 @@ pub struct Rounds {
     pub score: Vec<f64>,
     /// By round: how many goals the team's plan achieves.
     pub goals: Vec<f64>,
+    /// By round: how many iterations all rovers had in it.
+    pub iterations: Vec<f64>,
     /// By round: what all rovers looked at in it.
     pub operations: Vec<f64>,
     /// By round: how far the team drives in all \[m\].
@@ -70,6 +72,7 @@ pub fn run(
     let mut rounds = Rounds {
         score: Vec::new(),
         goals: Vec::new(),
+        iterations: Vec::new(),
         operations: Vec::new(),
         traverse_m: Vec::new(),
         plan: TeamPlan::default(),
@@ -148,9 +151,10 @@ impl Team {
     }
 
     fn round(&mut self, instance: &Instance, rounds: &mut Rounds) -> Result<(), Unmet> {
-        let (mut operations, mut shed) = (0, Vec::new());
+        let (mut iterations, mut operations, mut shed) = (0, 0, Vec::new());
         for (number, rover) in self.rovers.iter_mut().enumerate() {
             let step = rover.step(instance);
+            iterations += step.iterations;
             operations += step.operations;
             shed.extend(step.shed.into_iter().map(|goal| (goal, number)));
         }
@@ -175,6 +179,7 @@ impl Team {
         rounds.score.push(value.score);
         rounds.goals.push(value.goals);
         rounds.traverse_m.push(value.traverse_m);
+        rounds.iterations.push(f64::from(iterations));
         rounds.operations.push(operations as f64);
         Ok(())
     }
