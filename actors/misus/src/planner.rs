@@ -26,3 +26,6 @@ pub mod plan;
 pub mod problem;
 pub mod rounds;
 pub mod score;
+
+#[cfg(test)]
+mod tests;

@@ -175,7 +175,7 @@ impl Casper {
         {
             Ok(at) if self.assigned[at] == visit => {}
             Ok(_) => {
-                self.withdraw(instance, goal);
+                self.withdraw(instance, goal)?;
                 return self.assign(instance, goal, start_ms);
             }
             Err(at) => self.assigned.insert(at, visit),
@@ -184,13 +184,20 @@ impl Casper {
         Ok(())
     }
 
-    /// The planner may not plan a goal any more; it leaves the plan, with all that requires it.
-    pub fn withdraw(&mut self, instance: &Instance, goal: usize) {
-        self.assigned.retain(|visit| visit.task != goal);
+    /// The planner may not plan a goal any more; it leaves the plan, with all that requires it, and what
+    /// cannot be reached in time without having been there.
+    ///
+    /// # Errors
+    /// When something mandatory cannot be done without having been there; the plan still has it then.
+    pub fn withdraw(&mut self, instance: &Instance, goal: usize) -> Result<(), Unmet> {
         if self.score.holds(goal) {
-            repair::delete(instance, &mut self.best, goal);
+            let mut chain = self.best.clone();
+            repair::delete(instance, &mut chain, goal);
+            self.best = self.settled(instance, chain, &mut 0)?;
             self.reset(instance);
         }
+        self.assigned.retain(|visit| visit.task != goal);
+        Ok(())
     }
 
     /// Takes a plan over, as `(sol, visit)`, from before something changed: continuous planning. Goals that
@@ -373,9 +380,16 @@ impl Casper {
             return Ok(());
         }
         let (found, _) = self.best.best_insertion(instance, &visit);
+        let Some(found) = found else {
+            // What it requires is with nobody, or with somebody else.
+            return Err(Unmet {
+                rover: self.best.rover(),
+                task: visit.task,
+                lacking: Violation::default(),
+            });
+        };
         let mut chain = self.best.clone();
-        let (sol, index) = found.map_or((0, chain.sol(0).end), |found| (found.sol, found.index));
-        chain.insert(instance, visit, sol, index);
+        chain.accept(instance, visit, &found);
         let settled = self.settled(instance, chain, &mut 0);
         self.best = settled.map_err(|unmet| Unmet {
             task: visit.task,

@@ -25,10 +25,10 @@ settings! {
     /// How the large-neighbourhood search goes.
     pub struct LnsConfig {
         /// How many operations it has: places that are tested and tasks whose times are worked out.
-        pub operations: u64 = 10_000_000, 1..=1_000_000_000_000;
+        pub operations: u64 = 50_000_000, 1..=1_000_000_000_000;
         /// Which share of the plan is taken out at the most.
-        pub removed: f64 = 0.4, 0.0..=1.0;
-        /// The temperature at the beginning, as a share of what the first plan is worth.
+        pub removed: f64 = 0.5, 0.0..=1.0;
+        /// The temperature at the beginning, as a share of what the best plan is worth.
         pub hot: f64 = 0.02, 0.0..=1.0;
         /// The temperature at the end.
         pub cold: f64 = 0.0005, 1e-9..=1.0;
@@ -69,24 +69,29 @@ pub fn plan(instance: &Instance, config: &LnsConfig, key: RandomKey) -> Result<F
     let mut draws = key.text("lns").stream();
     let powers = Powers::new();
     let mut state = mandatory(instance)?;
-    insertion::fill(instance, &mut state, &powers, &mut draws);
     let mut current = state.chains.clone();
     let mut best = state.chains.clone();
     let (mut value, mut best_value) = (state.value(), state.value());
     let mut history = vec![(state.operations, state.objective.score())];
     state.mark(&mut current);
-    let scale = value.abs().max(1.0);
     while state.operations < config.operations {
         // Never none, so that the budget is used up even where nothing can be removed.
         state.operations += 1;
         let share = state.operations as f64 / config.operations as f64;
-        let temperature =
-            scale * config.hot * libm::pow(config.cold / config.hot.max(1e-12), share);
+        let temperature = best_value.abs().max(1.0)
+            * config.hot
+            * libm::pow(config.cold / config.hot.max(1e-12), share);
         let planned: usize = state.chains.iter().map(|chain| chain.nodes().len()).sum();
         let most = (planned as f64 * config.removed) as usize;
         removal::remove(instance, &mut state, most.max(2), &mut draws);
         insertion::fill(instance, &mut state, &powers, &mut draws);
-        let found = state.value();
+        // Who has not been at a place at the end of a sol may have too far to go in the next.
+        let valid = state.chains.iter().all(|chain| chain.violation().is_none());
+        let found = if valid {
+            state.value()
+        } else {
+            f64::NEG_INFINITY
+        };
         if found >= value + temperature * libm::log(1.0 - draws.uniform()) {
             value = found;
             state.mark(&mut current);

@@ -68,7 +68,8 @@ pub fn run(
 ) -> Result<Rounds, Unmet> {
     let mut team = Team::new(instance, config, key)?;
     let first = team.central.assign_all(instance);
-    team.deliver(instance, &first)?;
+    team.deliver(instance, first)?;
+    team.refuse_hopeless(instance)?;
     let mut rounds = Rounds {
         score: Vec::new(),
         goals: Vec::new(),
@@ -84,6 +85,12 @@ pub fn run(
     for _ in 0..config.steps {
         team.round(instance, &mut rounds)?;
     }
+    team.part(instance)?;
+    // What goals for two rovers leave behind counts in the last round.
+    rounds.score.pop();
+    rounds.goals.pop();
+    rounds.traverse_m.pop();
+    team.enter(instance).push(&mut rounds);
     let chains: Vec<&Chain> = team.rovers.iter().map(Casper::plan).collect();
     rounds.plan = team_plan(problem, instance, &chains);
     rounds.deleted = team.central.deleted().collect();
@@ -91,18 +98,11 @@ pub fn run(
     Ok(rounds)
 }
 
-/// The plan of a team whose rovers have these chains. Goals that fewer rovers hold than they need are not in it.
+/// The plan of a team whose rovers have these chains.
 pub fn team_plan(problem: &Problem, instance: &Instance, chains: &[&Chain]) -> TeamPlan {
-    let holders = |goal: usize| {
-        let holders = chains.iter().filter(|chain| chain.position(goal).is_some());
-        holders.count() as u32
-    };
     let goals = instance.goals();
     let stops = |chain: &&Chain| {
-        let nodes = chain.nodes().iter().filter(|node| {
-            let task = node.visit.task;
-            task >= goals || holders(task) >= instance.task(task).rovers
-        });
+        let nodes = chain.nodes().iter();
         let stop = nodes.map(|node| {
             let task = node.visit.task;
             let name = match task.checked_sub(goals) {
@@ -125,7 +125,7 @@ pub fn team_plan(problem: &Problem, instance: &Instance, chains: &[&Chain]) -> T
 struct Team {
     rovers: Vec<Casper>,
     central: Central,
-    /// By rover: what it shed and does not plan any more.
+    /// Of the plans as they are, which no rover knows.
     truth: Score,
 }
 
@@ -140,14 +140,35 @@ impl Team {
         })
     }
 
-    /// Hands assignments to the rovers that they name.
-    fn deliver(&mut self, instance: &Instance, assigned: &[Assignment]) -> Result<(), Unmet> {
-        for assignment in assigned {
-            for &rover in &assignment.rovers {
-                self.rovers[rover].assign(instance, assignment.goal, assignment.start_ms)?;
+    /// Hands assignments to the rovers that they name, what is required before what requires it. A mandatory
+    /// goal for which a rover has no room goes to another.
+    fn deliver(&mut self, instance: &Instance, mut assigned: Vec<Assignment>) -> Result<(), Unmet> {
+        assigned.sort_by_key(|assignment| (depth(instance, assignment.goal), assignment.goal));
+        for mut assignment in assigned {
+            let goal = assignment.goal;
+            while let Err(unmet) = self.hand_over(instance, &assignment) {
+                let rover = unmet.rover;
+                assignment = self.central.shed(instance, goal, rover).ok_or(unmet)?;
             }
         }
         Ok(())
+    }
+
+    /// A mandatory goal that nobody can do at all cannot be given up.
+    fn refuse_hopeless(&mut self, instance: &Instance) -> Result<(), Unmet> {
+        let deleted = self.central.deleted().map(|(goal, _)| goal);
+        let mut mandatory = deleted.filter(|goal| instance.task(*goal).mandatory);
+        match mandatory.next() {
+            Some(goal) => self.rovers[0].assign(instance, goal, None),
+            None => Ok(()),
+        }
+    }
+
+    fn hand_over(&mut self, instance: &Instance, assignment: &Assignment) -> Result<(), Unmet> {
+        let mut rovers = assignment.rovers.iter();
+        rovers.try_for_each(|&rover| {
+            self.rovers[rover].assign(instance, assignment.goal, assignment.start_ms)
+        })
     }
 
     fn round(&mut self, instance: &Instance, rounds: &mut Rounds) -> Result<(), Unmet> {
@@ -163,9 +184,8 @@ impl Team {
         for &(goal, rover) in &shed {
             if instance.task(goal).rovers > 1 {
                 // Nobody waits for who does not come.
-                self.rovers
-                    .iter_mut()
-                    .for_each(|rover| rover.withdraw(instance, goal));
+                let mut rovers = self.rovers.iter_mut();
+                rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
             }
             assigned.extend(self.central.shed(instance, goal, rover));
         }
@@ -173,12 +193,9 @@ impl Team {
             assigned.extend(self.central.offer_pool(instance));
         }
         rounds.reassigned += assigned.len() as u64;
-        self.deliver(instance, &assigned)?;
+        self.deliver(instance, assigned)?;
         self.tell(instance);
-        let value = self.enter(instance);
-        rounds.score.push(value.score);
-        rounds.goals.push(value.goals);
-        rounds.traverse_m.push(value.traverse_m);
+        self.enter(instance).push(rounds);
         rounds.iterations.push(f64::from(iterations));
         rounds.operations.push(operations as f64);
         Ok(())
@@ -198,6 +215,19 @@ impl Team {
                 }
             }
         }
+    }
+
+    /// Takes goals out of plans for which too few rovers have found room.
+    fn part(&mut self, instance: &Instance) -> Result<(), Unmet> {
+        let joint = (0..instance.goals()).filter(|goal| instance.task(*goal).rovers > 1);
+        for goal in joint {
+            let holders = self.rovers.iter().filter(|rover| rover.score().holds(goal));
+            if holders.count() < instance.task(goal).rovers as usize {
+                let mut rovers = self.rovers.iter_mut();
+                rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
+            }
+        }
+        Ok(())
     }
 
     /// What the plans of all are worth.
@@ -220,8 +250,23 @@ impl Team {
     }
 }
 
+/// How many goals have to be achieved one after the other before a goal.
+fn depth(instance: &Instance, goal: usize) -> usize {
+    let requires = instance.requires(goal).iter();
+    let depths = requires.map(|&other| depth(instance, other) + 1);
+    depths.max().unwrap_or(0)
+}
+
 struct Value {
     score: f64,
     goals: f64,
     traverse_m: f64,
+}
+
+impl Value {
+    fn push(self, rounds: &mut Rounds) {
+        rounds.score.push(self.score);
+        rounds.goals.push(self.goals);
+        rounds.traverse_m.push(self.traverse_m);
+    }
 }

@@ -140,6 +140,19 @@ pub(super) fn resolve(problem: &Problem) -> Result<Resolved, ProblemError> {
         resolved.requires.push(requires);
     }
     refuse_circles(problem, &resolved.requires)?;
+    for (goal, requires) in problem.goals.iter().zip(&resolved.requires) {
+        let optional = requires
+            .iter()
+            .find(|other| !problem.goals[**other].mandatory);
+        if let Some(&other) = optional.filter(|_| goal.mandatory) {
+            return Err(ProblemError::Value {
+                what: format!("goal {:?}", problem.goals[other].name),
+                key: "mandatory",
+                found: "false".to_owned(),
+                expected: format!("true: {:?}, which is mandatory, requires it", goal.name),
+            });
+        }
+    }
     for combination in &problem.combinations {
         let what = format!("combination <{}>", combination.goals.join(", "));
         let members = find_all(&what, "goal", &combination.goals, &goals)?;
