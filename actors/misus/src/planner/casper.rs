@@ -260,10 +260,8 @@ impl Casper {
             }
             *operations += repair::repair(instance, &mut chain, &mut self.draws).operations;
         }
-        let mandatory = chain.nodes().iter().map(|node| node.visit.task);
-        let last = mandatory
-            .filter(|task| instance.task(*task).mandatory)
-            .last();
+        let mut tasks = chain.nodes().iter().rev().map(|node| node.visit.task);
+        let last = tasks.find(|task| instance.task(*task).mandatory);
         Err(Unmet {
             rover: chain.rover(),
             task: last.unwrap_or_default(),

@@ -215,7 +215,7 @@ pub fn score(problem: &Problem, plan: &TeamPlan) -> f64 {
     score
 }
 
-/// How far a team drives [m].
+/// How far a team drives \[m\].
 pub fn traverse_m(problem: &Problem, plan: &TeamPlan) -> f64 {
     let mut traverse_m = 0.0;
     for (rover, stops) in problem.rovers.iter().zip(&plan.rovers) {
@@ -251,104 +251,137 @@ fn drive_ms(rover: &Rover, from_m: [f64; 2], to_m: [f64; 2]) -> i64 {
     (1000 * mm + speed - 1) / speed
 }
 
+/// A rover while its plan is walked through.
+struct Walk<'a> {
+    problem: &'a Problem,
+    rover: &'a Rover,
+    at_m: [f64; 2],
+    /// In which sol it is, and when it has done what comes before.
+    ready: (usize, i64),
+    stored_bits: i64,
+    used_uj: Vec<i64>,
+    done: BTreeSet<&'a str>,
+    found: &'a mut Vec<PlanViolation>,
+}
+
 /// Walks through the plan of one rover.
 fn walk(problem: &Problem, rover: &Rover, stops: &[Stop], found: &mut Vec<PlanViolation>) {
-    let name = || rover.name.clone();
-    let mut at_m = rover.position_m;
-    let mut stored_bits = rover.stored_bits;
-    let mut used_uj = vec![0; rover.sols.len()];
-    let mut ready = (0, i64::MIN);
-    let mut done = BTreeSet::new();
+    let mut walk = Walk {
+        problem,
+        rover,
+        at_m: rover.position_m,
+        ready: (0, i64::MIN),
+        stored_bits: rover.stored_bits,
+        used_uj: vec![0; rover.sols.len()],
+        done: BTreeSet::new(),
+        found,
+    };
     for stop in stops {
-        let task = || stop.task.clone();
+        if !walk.go(stop) {
+            walk.found.push(PlanViolation::Unknown {
+                rover: rover.name.clone(),
+                task: stop.task.clone(),
+                sol: stop.sol,
+            });
+        }
+    }
+    for (number, (used_uj, sol)) in walk.used_uj.into_iter().zip(&rover.sols).enumerate() {
+        if used_uj > sol.energy_uj {
+            walk.found.push(PlanViolation::Power {
+                rover: rover.name.clone(),
+                sol: number,
+                used_uj,
+                has_uj: sol.energy_uj,
+            });
+        }
+    }
+}
+
+impl<'a> Walk<'a> {
+    /// To the next stop; false if the rover has no such task or sol, or the sol is over.
+    fn go(&mut self, stop: &Stop) -> bool {
+        let (problem, rover) = (self.problem, self.rover);
         let goal = goal_of(problem, &stop.task);
         let activity = problem
             .activities
             .iter()
             .find(|at| at.name == stop.task && at.rover == rover.name && at.sol == stop.sol);
-        let sol = rover.sols.get(stop.sol);
-        let (Some(sol), false) = (sol, goal.is_none() && activity.is_none()) else {
-            found.push(PlanViolation::Unknown {
-                rover: name(),
-                task: task(),
-                sol: stop.sol,
-            });
-            continue;
-        };
+        if stop.sol < self.ready.0 || stop.sol >= rover.sols.len() {
+            return false;
+        }
         let (duration_ms, power_mw, window_ms) = match (goal, activity) {
             (Some(goal), _) => (goal.duration_ms, goal.power_mw, goal.window_ms),
             (_, Some(other)) => (other.duration_ms, other.power_mw, Some(other.window_ms)),
-            _ => continue,
+            _ => return false,
         };
-        let to_m = goal.map_or(at_m, |goal| goal.position_m);
-        let drive_ms = drive_ms(rover, at_m, to_m);
-        if stop.sol < ready.0 {
-            found.push(PlanViolation::Unknown {
-                rover: name(),
-                task: task(),
-                sol: stop.sol,
+        let to_m = goal.map_or(self.at_m, |goal| goal.position_m);
+        let drive_ms = drive_ms(rover, self.at_m, to_m);
+        let end_ms = stop.start_ms + duration_ms;
+        self.check_times(stop, drive_ms, end_ms, window_ms);
+        self.stored_bits += goal.map_or(0, |goal| goal.memory_bits);
+        if self.stored_bits > rover.memory_bits {
+            self.found.push(PlanViolation::Memory {
+                rover: rover.name.clone(),
+                task: stop.task.clone(),
+                stored_bits: self.stored_bits,
+                has_bits: rover.memory_bits,
             });
         }
-        let free_ms = if stop.sol == ready.0 {
-            ready.1.max(sol.opens_ms)
-        } else {
-            sol.opens_ms
+        let sends_bits = activity.map_or(0, |at| at.sends_bits);
+        self.stored_bits = (self.stored_bits - sends_bits).max(0);
+        if let Some(goal) = goal {
+            self.check_order(goal);
+        }
+        self.used_uj[stop.sol] += drive_ms * rover.drive_mw + duration_ms * power_mw;
+        (self.at_m, self.ready) = (to_m, (stop.sol, end_ms));
+        true
+    }
+
+    fn check_times(
+        &mut self,
+        stop: &Stop,
+        drive_ms: i64,
+        end_ms: i64,
+        window_ms: Option<[i64; 2]>,
+    ) {
+        let sol = &self.rover.sols[stop.sol];
+        let free_ms = match stop.sol == self.ready.0 {
+            true => self.ready.1.max(sol.opens_ms),
+            false => sol.opens_ms,
         };
-        if stop.start_ms < free_ms + drive_ms {
-            found.push(PlanViolation::Early {
-                rover: name(),
-                task: task(),
-                start_ms: stop.start_ms,
+        let (rover, task, start_ms) = (&self.rover.name, &stop.task, stop.start_ms);
+        if start_ms < free_ms + drive_ms {
+            self.found.push(PlanViolation::Early {
+                rover: rover.clone(),
+                task: task.clone(),
+                start_ms,
                 ready_ms: free_ms + drive_ms,
             });
         }
-        let end_ms = stop.start_ms + duration_ms;
         let [opens_ms, closes_ms] = window_ms.unwrap_or([sol.opens_ms, sol.closes_ms]);
         let (opens_ms, closes_ms) = (opens_ms.max(sol.opens_ms), closes_ms.min(sol.closes_ms));
-        if stop.start_ms < opens_ms || end_ms > closes_ms {
-            found.push(PlanViolation::Window {
-                rover: name(),
-                task: task(),
-                start_ms: stop.start_ms,
+        if start_ms < opens_ms || end_ms > closes_ms {
+            self.found.push(PlanViolation::Window {
+                rover: rover.clone(),
+                task: task.clone(),
+                start_ms,
                 end_ms,
                 opens_ms,
                 closes_ms,
             });
         }
-        stored_bits += goal.map_or(0, |goal| goal.memory_bits);
-        if stored_bits > rover.memory_bits {
-            let has_bits = rover.memory_bits;
-            found.push(PlanViolation::Memory {
-                rover: name(),
-                task: task(),
-                stored_bits,
-                has_bits,
-            });
-        }
-        stored_bits = (stored_bits - activity.map_or(0, |at| at.sends_bits)).max(0);
-        for required in goal.iter().flat_map(|goal| &goal.requires) {
-            if !done.contains(required.as_str()) {
-                let required = required.clone();
-                found.push(PlanViolation::Order {
-                    rover: name(),
-                    task: task(),
-                    required,
+    }
+
+    fn check_order(&mut self, goal: &'a Goal) {
+        for required in &goal.requires {
+            if !self.done.contains(required.as_str()) {
+                self.found.push(PlanViolation::Order {
+                    rover: self.rover.name.clone(),
+                    task: goal.name.clone(),
+                    required: required.clone(),
                 });
             }
         }
-        done.insert(stop.task.as_str());
-        used_uj[stop.sol] += drive_ms * rover.drive_mw + duration_ms * power_mw;
-        (at_m, ready) = (to_m, (stop.sol, end_ms));
-    }
-    for (number, (used_uj, sol)) in used_uj.into_iter().zip(&rover.sols).enumerate() {
-        if used_uj > sol.energy_uj {
-            let has_uj = sol.energy_uj;
-            found.push(PlanViolation::Power {
-                rover: name(),
-                sol: number,
-                used_uj,
-                has_uj,
-            });
-        }
+        self.done.insert(&goal.name);
     }
 }

@@ -44,65 +44,33 @@ enum Candidate {
     Pair(usize, usize),
 }
 
+/// How a plan is filled this time.
+struct Manner<'a> {
+    powers: &'a Powers,
+    /// Which of the powers.
+    power: usize,
+    /// Which part of promises counts.
+    part: f64,
+    noise: f64,
+    /// Whether two goals of a combination are put in at once.
+    pairs: bool,
+}
+
 /// Puts in one goal, or two of a combination, after the other, whatever is worth most for its time, until
 /// nothing that fits is worth anything.
 pub(super) fn fill(instance: &Instance, state: &mut State, powers: &Powers, draws: &mut Stream) {
-    let power = draws.below(POWERS.len() as u64) as usize;
-    let part = PARTS[draws.below(PARTS.len() as u64) as usize];
-    let noise = NOISE * draws.uniform();
-    let pairs = draws.chance(0.5);
+    let manner = Manner {
+        powers,
+        power: draws.below(POWERS.len() as u64) as usize,
+        part: PARTS[draws.below(PARTS.len() as u64) as usize],
+        noise: NOISE * draws.uniform(),
+        pairs: draws.chance(0.5),
+    };
     // What was tried and did not fit after all is not tried again.
     let mut tried = vec![false; instance.goals()];
     loop {
         state.refresh(instance);
-        let mut best = (0.0, None);
-        for goal in 0..instance.goals() {
-            if state.has(goal) || tried[goal] {
-                continue;
-            }
-            state.operations += 1;
-            let joint = instance.task(goal).rovers > 1;
-            let fit = state.best_fit(goal);
-            let Some(cost_ms) = fit
-                .map(|(_, fit)| fit.cost_ms)
-                .or_else(|| joint.then(|| 2 * instance.task(goal).duration_ms))
-            else {
-                continue;
-            };
-            let gain = state.objective.gain(goal);
-            let worth = gain + part * state.objective.promise(goal);
-            let shaken = |worth: f64, draws: &mut Stream| worth * (1.0 - noise * draws.uniform());
-            if worth > 0.0 {
-                let rate = shaken(worth / powers.of(power, cost_ms), draws);
-                if rate > best.0 {
-                    best = (rate, Some(Candidate::One(goal)));
-                }
-            }
-            if !pairs || joint {
-                continue;
-            }
-            for &other in instance
-                .partners(goal)
-                .iter()
-                .filter(|other| **other > goal)
-            {
-                if state.has(other) || tried[other] {
-                    continue;
-                }
-                let Some((_, fit)) = state.best_fit(other) else {
-                    continue;
-                };
-                state.operations += 1;
-                state.objective.set(goal, true);
-                let worth = gain + state.objective.gain(other);
-                state.objective.set(goal, false);
-                let rate = worth / powers.of(power, cost_ms + fit.cost_ms);
-                if worth > 0.0 && shaken(rate, draws) > best.0 {
-                    best = (rate, Some(Candidate::Pair(goal, other)));
-                }
-            }
-        }
-        match best.1 {
+        match manner.choose(instance, state, &tried, draws) {
             None => break,
             Some(Candidate::One(goal)) => tried[goal] = !put(instance, state, goal),
             Some(Candidate::Pair(goal, other)) => {
@@ -113,6 +81,63 @@ pub(super) fn fill(instance: &Instance, state: &mut State, powers: &Powers, draw
         }
     }
     drop_losses(instance, state);
+}
+
+impl Manner<'_> {
+    /// What is worth most for its time, if anything is worth more than nothing.
+    fn choose(
+        &self,
+        instance: &Instance,
+        state: &mut State,
+        tried: &[bool],
+        draws: &mut Stream,
+    ) -> Option<Candidate> {
+        let mut best = (0.0, None);
+        let mut enter = |worth: f64, cost_ms: i64, candidate| {
+            if worth > 0.0 {
+                let shaken = worth * (1.0 - self.noise * draws.uniform());
+                let rate = shaken / self.powers.of(self.power, cost_ms);
+                if rate > best.0 {
+                    best = (rate, Some(candidate));
+                }
+            }
+        };
+        for goal in 0..instance.goals() {
+            if state.has(goal) || tried[goal] {
+                continue;
+            }
+            state.operations += 1;
+            let (joint, duration_ms) = {
+                let task = instance.task(goal);
+                (task.rovers > 1, task.duration_ms)
+            };
+            // Where two rovers could meet is looked for when they are to.
+            let cost_ms = match state.best_fit(goal) {
+                Some((_, fit)) => fit.cost_ms,
+                None if joint => 2 * duration_ms,
+                None => continue,
+            };
+            let gain = state.objective.gain(goal);
+            let worth = gain + self.part * state.objective.promise(goal);
+            enter(worth, cost_ms, Candidate::One(goal));
+            if !self.pairs || joint {
+                continue;
+            }
+            for &other in instance.partners(goal) {
+                if other < goal || state.has(other) || tried[other] {
+                    continue;
+                }
+                if let Some((_, fit)) = state.best_fit(other) {
+                    state.operations += 1;
+                    state.objective.set(goal, true);
+                    let worth = gain + state.objective.gain(other);
+                    state.objective.set(goal, false);
+                    enter(worth, cost_ms + fit.cost_ms, Candidate::Pair(goal, other));
+                }
+            }
+        }
+        best.1
+    }
 }
 
 /// Puts a goal in where it fits best; says whether it does.
@@ -127,11 +152,18 @@ pub(super) fn put(instance: &Instance, state: &mut State, goal: usize) -> bool {
     true
 }
 
+/// When two rovers do a goal together, and what it takes.
+struct Meeting {
+    cost_ms: i64,
+    start_ms: i64,
+    fits: [(usize, Fit); 2],
+}
+
 /// Puts a goal that two rovers have to do at one time into the plans of the two in which it takes least time,
 /// of the times at which one of them can begin earliest.
 fn put_joint(instance: &Instance, state: &mut State, goal: usize) -> bool {
     let free = Visit::new(instance, goal);
-    let mut best: Option<(i64, i64, [(usize, Fit); 2])> = None;
+    let mut best: Option<Meeting> = None;
     for second in 1..state.chains.len() {
         for first in 0..second {
             let mut starts_ms = Vec::new();
@@ -158,13 +190,18 @@ fn put_joint(instance: &Instance, state: &mut State, goal: usize) -> bool {
                     continue;
                 };
                 let cost_ms = one.cost_ms + two.cost_ms;
-                if best.as_ref().is_none_or(|best| cost_ms < best.0) {
-                    best = Some((cost_ms, start_ms, [(first, one), (second, two)]));
+                if best.as_ref().is_none_or(|best| cost_ms < best.cost_ms) {
+                    let fits = [(first, one), (second, two)];
+                    best = Some(Meeting {
+                        cost_ms,
+                        start_ms,
+                        fits,
+                    });
                 }
             }
         }
     }
-    let Some((_, start_ms, fits)) = best else {
+    let Some(Meeting { start_ms, fits, .. }) = best else {
         return false;
     };
     for (rover, fit) in fits {
