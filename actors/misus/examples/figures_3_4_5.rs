@@ -229,14 +229,7 @@ fn claims(curves: &[Curves; 3], violated: usize, incomplete: u64) {
             100.0 * (each(idgs) / each(&others[1]) - 1.0),
         ),
     );
-    for (other, name) in others.iter().zip(["simple-reward", "random"]) {
-        let (least, steps) = (at(&other.score, steps), steps as f64);
-        let share = operations_to(idgs, least) / (steps * overall(&other.operations));
-        println!(
-            "     idgs scores what {name} does in the end with {:.0} % of its operations",
-            100.0 * share
-        );
-    }
+    effort(idgs, others, steps);
     say(
         5 * incomplete >= 4 * PROBLEMS,
         "no planner achieves all goals",
@@ -247,6 +240,17 @@ fn claims(curves: &[Curves; 3], violated: usize, incomplete: u64) {
         "no plan violates anything",
         format!("{violated} violations"),
     );
+}
+
+fn effort(idgs: &Curves, others: &[Curves], steps: usize) {
+    for (other, name) in others.iter().zip(["simple-reward", "random"]) {
+        let (least, steps) = (at(&other.score, steps), steps as f64);
+        let share = operations_to(idgs, least) / (steps * overall(&other.operations));
+        println!(
+            "     idgs scores what {name} does in the end with {:.0} % of its operations",
+            100.0 * share
+        );
+    }
 }
 
 /// Operations of an iteration.

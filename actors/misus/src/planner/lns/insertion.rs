@@ -12,6 +12,8 @@ const POWERS: [f64; 4] = [0.0, 0.3, 0.7, 1.0];
 const PARTS: [f64; 3] = [0.0, 0.5, 1.0];
 /// By how much worths are made uncertain at the most, so that equal plans are filled differently.
 const NOISE: f64 = 0.2;
+/// By how much sols are made to seem longer at the most.
+const BIAS: f64 = 1.0;
 /// Times are told apart by so much \[ms\].
 const GRAIN_MS: i64 = 60_000;
 /// Longer times are as this one.
@@ -66,6 +68,7 @@ pub(super) fn fill(instance: &Instance, state: &mut State, powers: &Powers, draw
         noise: NOISE * draws.uniform(),
         pairs: draws.chance(0.5),
     };
+    state.shake(BIAS * draws.uniform(), draws);
     // What was tried and did not fit after all is not tried again.
     let mut tried = vec![false; instance.goals()];
     loop {
@@ -183,10 +186,10 @@ fn put_joint(instance: &Instance, state: &mut State, goal: usize) -> bool {
                 if visit.closes_ms > free.closes_ms {
                     continue;
                 }
-                let Some(one) = state.fit(instance, first, &visit) else {
+                let Some(one) = state.fit(instance, first, &visit, |_| true) else {
                     continue;
                 };
-                let Some(two) = state.fit(instance, second, &visit) else {
+                let Some(two) = state.fit(instance, second, &visit, |_| true) else {
                     continue;
                 };
                 let cost_ms = one.cost_ms + two.cost_ms;

@@ -1,5 +1,6 @@
 //! A team's plan in the making: who has which goal, what it is worth, and where others would fit.
 
+use farside::random::Stream;
 use farside_planning::objective::Objective;
 
 use crate::planner::chain::{Chain, Insertion, Visit};
@@ -13,12 +14,23 @@ pub(super) struct Fit {
     pub(super) found: Insertion,
 }
 
+/// A sol of a rover.
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    rover: usize,
+    sol: usize,
+    /// By how much more than it takes a goal seems to take there.
+    bias: f64,
+}
+
 /// A team's plan.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) chains: Vec<Chain>,
     pub(super) objective: Objective,
-    /// By rover and goal: where the goal fits, as far as the rover's plan is still the one it was tested with.
+    /// The sols of all rovers.
+    slots: Vec<Slot>,
+    /// By slot and goal: where the goal fits, as far as the rover's plan is still the one it was tested with.
     fits: Vec<Vec<Option<Fit>>>,
     /// By rover: whether its plan has changed since.
     stale: Vec<bool>,
@@ -31,6 +43,16 @@ impl State {
     /// With activities only.
     pub(super) fn new(instance: &Instance) -> State {
         let rovers = instance.vehicles().len();
+        let slots = instance.vehicles().iter().enumerate();
+        let slots = slots.flat_map(|(rover, vehicle)| {
+            let sols = 0..vehicle.sols.len();
+            sols.map(move |sol| Slot {
+                rover,
+                sol,
+                bias: 1.0,
+            })
+        });
+        let slots: Vec<Slot> = slots.collect();
         let combinations = instance.combinations().iter();
         let combinations = combinations.map(|(goals, weight)| (goals.as_slice(), *weight));
         State {
@@ -38,7 +60,8 @@ impl State {
                 .map(|rover| Chain::new(instance, rover))
                 .collect(),
             objective: Objective::of(instance.weights().to_vec(), combinations),
-            fits: vec![vec![None; instance.goals()]; rovers],
+            fits: vec![vec![None; instance.goals()]; slots.len()],
+            slots,
             stale: vec![true; rovers],
             changed: vec![false; rovers],
             operations: 0,
@@ -114,32 +137,57 @@ impl State {
         }
     }
 
+    /// Makes some sols of some rovers seem to take up to this much longer than they do, so that plans
+    /// are not always filled in one way.
+    pub(super) fn shake(&mut self, most: f64, draws: &mut Stream) {
+        for slot in &mut self.slots {
+            slot.bias = 1.0 + most * draws.uniform();
+        }
+    }
+
     /// Tests where all goals that are not in the plan fit into plans that have changed.
     pub(super) fn refresh(&mut self, instance: &Instance) {
-        for rover in 0..self.chains.len() {
-            if !std::mem::replace(&mut self.stale[rover], false) {
+        for at in 0..self.slots.len() {
+            let Slot { rover, sol, .. } = self.slots[at];
+            if !self.stale[rover] {
                 continue;
             }
             for goal in 0..instance.goals() {
-                self.fits[rover][goal] = match self.has(goal) || instance.task(goal).rovers > 1 {
+                let skip = self.has(goal) || instance.task(goal).rovers > 1;
+                self.fits[at][goal] = match skip {
                     true => None,
-                    false => self.fit(instance, rover, &Visit::new(instance, goal)),
+                    false => self.fit(instance, rover, &Visit::new(instance, goal), |at| at == sol),
                 };
             }
         }
+        self.stale.fill(false);
     }
 
     /// The rover into whose plan a goal fits best, and where.
     pub(super) fn best_fit(&self, goal: usize) -> Option<(usize, Fit)> {
-        let fits = self.fits.iter().enumerate();
-        let fits = fits.filter_map(|(rover, fits)| fits[goal].map(|fit| (rover, fit)));
-        fits.min_by_key(|(_, fit)| fit.cost_ms)
+        let mut best = (f64::INFINITY, None);
+        for (slot, fits) in self.slots.iter().zip(&self.fits) {
+            if let Some(fit) = fits[goal] {
+                let cost_ms = fit.cost_ms as f64 * slot.bias;
+                if cost_ms < best.0 {
+                    best = (cost_ms, Some((slot.rover, fit)));
+                }
+            }
+        }
+        best.1
     }
 
-    /// Where a goal fits best into a rover's plan.
-    pub(super) fn fit(&mut self, instance: &Instance, rover: usize, visit: &Visit) -> Option<Fit> {
+    /// Where a goal fits best into a rover's plan, in the sols that are wanted.
+    pub(super) fn fit(
+        &mut self,
+        instance: &Instance,
+        rover: usize,
+        visit: &Visit,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Option<Fit> {
         let duration_ms = instance.task(visit.task).duration_ms;
-        let (found, tested) = self.chains[rover].best_insertion(instance, visit);
+        let chain = &self.chains[rover];
+        let (found, tested) = chain.best_insertion_where(instance, visit, wanted);
         self.operations += tested;
         let found = found.filter(|found| found.violation.is_none())?;
         Some(Fit {
