@@ -263,3 +263,74 @@ fn mandatory_goals_are_planned_first_and_never_given_up() {
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("cannot do what it has to"), "{refused}");
 }
+
+/// One rover with two sols of 100 s, in which it can drive 90 m and do little besides; `x` and `y` are far
+/// away at one place, and `y` can be done only by who has spent the night there; `z` and `v` are on the way.
+fn far_away() -> Problem {
+    let config = ProblemConfig {
+        rovers: 1,
+        rocks_least: 2,
+        rocks_most: 2,
+        side_least_m: 200.0,
+        side_most_m: 200.0,
+        start_within_m: 0.0,
+        speed_m_per_s: 1.0,
+        sol_length: SimDuration::from_secs(100),
+        communication: SimDuration::from_secs(1),
+        communication_window: SimDuration::from_secs(100),
+        ..ProblemConfig::default()
+    };
+    let mut problem = generate(&config, 1).unwrap();
+    problem.combinations.clear();
+    problem.goals.truncate(4);
+    let goals = [
+        ("x", 90.0, 1, 1.0),
+        ("y", 90.0, 60, 5.0),
+        ("z", 5.0, 1, 1.0),
+        ("v", 6.0, 1, 1.0),
+    ];
+    for (goal, (name, east_m, duration_s, weight)) in problem.goals.iter_mut().zip(goals) {
+        goal.name = name.to_owned();
+        goal.position_m = [east_m, 0.0];
+        (goal.duration_ms, goal.weight) = (1000 * duration_s, weight);
+    }
+    problem
+}
+
+/// Who has not been at a place at the end of a sol does not begin the next one there.
+#[test]
+fn what_cannot_be_reached_any_more_leaves_the_plan_with_what_is_withdrawn() {
+    let problem = far_away();
+    let instance = Instance::new(&problem).unwrap();
+    let config = PlannerConfig::default();
+    let mut casper = Casper::new(&instance, 0, &config, RandomKey::new(1)).unwrap();
+    let plan = |casper: &Casper| casper.plan().goals(&instance).collect::<Vec<_>>();
+    casper.assign(&instance, 0, None).unwrap();
+    casper.step(&instance);
+    casper.assign(&instance, 1, None).unwrap();
+    casper.step(&instance);
+    assert_eq!(plan(&casper), [0, 1]);
+    casper.withdraw(&instance, 0).unwrap();
+    assert!(casper.plan().violation().is_none());
+    assert_eq!((plan(&casper), casper.score().value()), (vec![], 0.0));
+}
+
+/// `z` and `v` together make `x` worth less than nothing, but without `x` there is no `y`.
+#[test]
+fn a_search_does_not_strand_a_rover_by_dropping_what_is_worth_nothing() {
+    let mut problem = far_away();
+    for (goals, weight) in [(["z", "v"], 20.0), (["x", "z"], -10.0)] {
+        let goals = goals.map(str::to_owned).to_vec();
+        problem.combinations.push(Combination { goals, weight });
+    }
+    let instance = Instance::new(&problem).unwrap();
+    let config = LnsConfig {
+        operations: 20_000,
+        ..LnsConfig::default()
+    };
+    for seed in 0..5 {
+        let found = lns::plan(&instance, &config, RandomKey::new(seed)).unwrap();
+        assert!(found.chains[0].violation().is_none());
+        assert_eq!(found.score, 22.0);
+    }
+}
