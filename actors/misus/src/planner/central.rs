@@ -259,3 +259,6 @@ fn hopeless(instance: &Instance, goal: usize) -> Option<Reason> {
     let duration_ms = task.duration_ms;
     (!fits).then_some(Reason::NoTime { duration_ms })
 }
+
+#[cfg(test)]
+mod tests;

@@ -334,3 +334,35 @@ fn a_search_does_not_strand_a_rover_by_dropping_what_is_worth_nothing() {
         assert_eq!(found.score, 22.0);
     }
 }
+
+/// Goals for two rovers are worth much: every planner brings some pairs together, at one time.
+#[test]
+fn rovers_meet_where_two_are_needed() {
+    let config = ProblemConfig {
+        joint_share: 0.5,
+        ..ProblemConfig::default()
+    };
+    let problem = generate(&config, 3).unwrap();
+    let instance = Instance::new(&problem).unwrap();
+    let meetings = |plan: &TeamPlan| {
+        let goals = problem.goals.iter().filter(|goal| goal.rovers == 2);
+        let done = goals.filter(|goal| {
+            let mut stops = plan.rovers.iter().flatten();
+            stops.any(|stop| stop.task == goal.name)
+        });
+        done.count()
+    };
+    let rounds = planned(&problem, Choice::Idgs, 1);
+    let config = LnsConfig {
+        operations: 200_000,
+        ..LnsConfig::default()
+    };
+    let found = lns::plan(&instance, &config, RandomKey::new(1)).unwrap();
+    let chains: Vec<&Chain> = found.chains.iter().collect();
+    let searched = team_plan(&problem, &instance, &chains);
+    for plan in [&rounds.plan, &searched] {
+        assert_eq!(violations(&problem, plan), []);
+        assert!(meetings(plan) >= 2, "{}", meetings(plan));
+    }
+    assert!(found.score >= score(&problem, &rounds.plan));
+}

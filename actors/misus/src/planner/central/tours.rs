@@ -145,7 +145,8 @@ impl Tours {
         }
     }
 
-    fn length_mm(&self, instance: &Instance) -> u64 {
+    /// How long all tours are together \[mm\].
+    pub(super) fn length_mm(&self, instance: &Instance) -> u64 {
         let tours = self.goals.iter().enumerate();
         let lengths = tours.map(|(rover, tour)| {
             let mut place = instance.vehicles()[rover].start;
