@@ -118,9 +118,7 @@ class Model:
                 for at, goal in enumerate(problem["goals"])
                 if tuple(goal["position_m"]) == position
             ]
-            model.add_implication(self.visits[number, place, sol], made[0]) if len(made) == 1 else (
-                model.add(sum(made) >= self.visits[number, place, sol])
-            )
+            model.add(sum(made) >= self.visits[number, place, sol])
         activities = [
             a for a in problem["activities"] if a["rover"] == rover["name"] and a["sol"] == sol
         ]
@@ -191,9 +189,15 @@ class Model:
         solver.parameters.num_workers = workers
         solver.parameters.linearization_level = 2
         status = solver.solve(self.model)
-        found = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
-        best = solver.objective_value / GRAIN if found else 0.0
-        return best, solver.best_objective_bound / GRAIN, status == cp_model.OPTIMAL, solver.wall_time
+        if status in (cp_model.INFEASIBLE, cp_model.MODEL_INVALID):
+            sys.exit(f"{self.problem['name']}: {solver.status_name(status)}: a plan of nothing is one")
+        best, bound = 0.0, math.inf
+        if status != cp_model.UNKNOWN:
+            best = solver.objective_value / GRAIN
+        # Nothing is known before all is read in.
+        if status != cp_model.UNKNOWN or solver.best_objective_bound > 0:
+            bound = solver.best_objective_bound / GRAIN
+        return best, bound, status == cp_model.OPTIMAL, solver.wall_time
 
 
 def numbers(text):

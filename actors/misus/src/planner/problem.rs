@@ -27,8 +27,9 @@ pub const FORMAT: &str = "1.0";
 /// let text = problem.to_json();
 /// assert_eq!(Problem::from_json(&text)?, problem);
 ///
-/// let wrong = text.replace("\"rock_01_a\",", "\"rock_1_a\",");
-/// let error = Problem::from_json(&wrong).unwrap_err().to_string();
+/// let mut wrong = problem.clone();
+/// wrong.combinations[0].goals[0] = "rock_1_a".to_string();
+/// let error = Problem::from_json(&wrong.to_json()).unwrap_err().to_string();
 /// assert!(error.contains("did you mean"), "{error}");
 /// # Ok::<(), farside_misus::planner::problem::ProblemError>(())
 /// ```

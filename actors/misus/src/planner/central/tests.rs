@@ -109,12 +109,13 @@ fn two_rovers_are_appointed_for_a_time_at_which_both_are_free() {
     let central = central(&instance, 2);
     let mut meetings = Vec::new();
     for goal in 0..instance.goals() {
-        if let State::Assigned(assignment) = central.state(goal) {
-            if let Some(start_ms) = assignment.start_ms {
-                assert_eq!(assignment.rovers.len(), 2);
-                assert_ne!(assignment.rovers[0], assignment.rovers[1]);
-                meetings.push((goal, start_ms, assignment.rovers.clone()));
-            }
+        let State::Assigned(assignment) = central.state(goal) else {
+            continue;
+        };
+        if let Some(start_ms) = assignment.start_ms {
+            assert_eq!(assignment.rovers.len(), 2);
+            assert_ne!(assignment.rovers[0], assignment.rovers[1]);
+            meetings.push((goal, start_ms, assignment.rovers.clone()));
         }
     }
     assert!(meetings.len() >= 4, "{meetings:?}");
