@@ -366,3 +366,67 @@ fn rovers_meet_where_two_are_needed() {
     }
     assert!(found.score >= score(&problem, &rounds.plan));
 }
+
+/// The checker finds each thing that can be wrong with a plan that is right.
+#[test]
+fn whatever_is_wrong_with_a_plan_is_found() {
+    let problem = generate(&ProblemConfig::default(), 2).unwrap();
+    let plan = planned(&problem, Choice::Idgs, 1).plan;
+    assert_eq!(violations(&problem, &plan), []);
+    let goals = |task: &str| !task.contains("communication");
+    let at = plan.rovers[0]
+        .iter()
+        .rposition(|stop| goals(&stop.task))
+        .unwrap();
+    let name = plan.rovers[0][at].task.clone();
+    let check = |change: &dyn Fn(&mut Problem, &mut TeamPlan), expected: &str| {
+        let (mut problem, mut plan) = (problem.clone(), plan.clone());
+        change(&mut problem, &mut plan);
+        let found = violations(&problem, &plan);
+        let found: Vec<String> = found.iter().map(|one| format!("{one:?}")).collect();
+        assert!(
+            found.iter().any(|one| one.starts_with(expected)),
+            "{expected}: {found:?}"
+        );
+    };
+    check(&|_, plan| plan.rovers[0][at].start_ms -= 1, "Early");
+    check(
+        &|_, plan| plan.rovers[0][at].start_ms += 20_000_000,
+        "Window",
+    );
+    check(
+        &|problem, _| problem.rovers[0].sols[0].energy_uj = 1_000,
+        "Power",
+    );
+    check(
+        &|problem, _| problem.rovers[0].memory_bits = 1_000,
+        "Memory",
+    );
+    check(&|_, plan| plan.rovers[0][at].sol = 9, "Unknown");
+    check(
+        &|_, plan| plan.rovers[0][at].task = "nothing".to_owned(),
+        "Unknown",
+    );
+    check(&|_, plan| plan.rovers.truncate(2), "Rovers");
+    check(
+        &|_, plan| plan.rovers[0].retain(|stop| goals(&stop.task)),
+        "Missing",
+    );
+    check(
+        &|_, plan| plan.rovers[1] = plan.rovers[0].clone(),
+        "Together",
+    );
+    let absent = problem
+        .goals
+        .iter()
+        .find(|goal| plan.rovers[0].iter().all(|stop| stop.task != goal.name));
+    let absent = absent.expect("one rover does not do all").name.clone();
+    check(
+        &|problem, _| {
+            let mut goals = problem.goals.iter_mut();
+            let goal = goals.find(|goal| goal.name == name).unwrap();
+            goal.requires.push(absent.clone());
+        },
+        "Order",
+    );
+}
