@@ -25,6 +25,16 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
         &[],
     ),
     (
+        "farside-idea",
+        &[
+            "farside",
+            "farside-worlds",
+            "farside-actors",
+            "farside-planning",
+        ],
+        &[],
+    ),
+    (
         "farside-misus",
         &[
             "farside",
@@ -48,6 +58,7 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
             "farside-worlds",
             "farside-logs",
             "farside-actors",
+            "farside-idea",
             "farside-misus",
             "farside-network",
             "farside-planning",
@@ -245,7 +256,7 @@ fn misplaced_names(path: &str, source: &str) -> Vec<String> {
         "mcap" => path.starts_with("logs/") || path.starts_with("fuzz/"),
         // Who reads scenarios, runs studies and writes reports knows no system; no system knows
         // another. Manifests say the latter; a system may name itself in its own docs.
-        "farside_misus" | "farside_network" | "farside_traffic" => {
+        "farside_idea" | "farside_misus" | "farside_network" | "farside_traffic" => {
             !path.starts_with("experiments/src/") || path == "experiments/src/registry.rs"
         }
         _ => true,
@@ -254,6 +265,7 @@ fn misplaced_names(path: &str, source: &str) -> Vec<String> {
         "kameo",
         "tokio",
         "mcap",
+        "farside_idea",
         "farside_misus",
         "farside_network",
         "farside_traffic",
