@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// Each member, the crates of this workspace it may depend on, and those of others that nobody but
 /// who lists them may depend on.
-const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
+const MAY_KNOW: [(&str, &[&str], &[&str]); 11] = [
     ("farside", &[], &["kameo", "tokio"]),
     ("farside-worlds", &["farside"], &[]),
     ("farside-logs", &["farside"], &["mcap"]),
