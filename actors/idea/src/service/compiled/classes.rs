@@ -183,7 +183,8 @@ fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCo
         let is_function = gives(relationship.kind);
         let is_symbolic = |variable: VariableId| !tables.is_measured(said.variables[variable].of);
         let others = variables.iter().filter(|&&at| {
-            !mine.contains(&at) && !(is_function && Some(at) == last) && !is_symbolic(at)
+            let given = is_function && Some(at) == last;
+            !(mine.contains(&at) || given || is_symbolic(at))
         });
         if others.count() > 0 {
             return Err(NotCompiled::Several {
