@@ -5,5 +5,6 @@
 //! Reactive Planning", i-SAIRAS 2003. Section 2 of it is the agent; section 3 the K9 rover, which two
 //! agents control.
 
+pub mod deliberate;
 pub mod models;
 pub mod service;

@@ -24,8 +24,8 @@ use farside_planning::language::{Options, read_model};
 use farside_planning::model::Model;
 
 pub use handles::{
-    Mission, MissionPredicates, MissionTimelines, Statuses, System, SystemPredicates,
-    SystemTimelines,
+    Mission, MissionPredicates, MissionTimelines, PlannedStatuses, Statuses, System,
+    SystemPredicates, SystemTimelines,
 };
 
 /// The text of the system agent's model.
@@ -34,6 +34,10 @@ pub const SYSTEM: &str = include_str!("../models/k9-system.ddl");
 pub const LIGHT: &str = include_str!("../models/k9-light.ddl");
 /// The text of the mission agent's model.
 pub const MISSION: &str = include_str!("../models/k9-mission.ddl");
+
+/// The text of the model with which goals are ordered. It includes `places.ddl`, which is made for each
+/// problem.
+pub const ORDERING: &str = include_str!("../models/k9-ordering.ddl");
 
 /// The system agent's model.
 pub fn system() -> &'static System {

@@ -1,7 +1,32 @@
 //! The K9's models: proved, driven at random, and case by case.
 
+/// Makes a test of each case with the thorough model and with the light one.
+macro_rules! cases {
+    ($($name:ident,)*) => {
+        /// All of them.
+        pub(super) const CASES: &[(&str, fn(&System))] = &[$((stringify!($name), $name),)*];
+
+        mod thorough {
+            $(#[test]
+            fn $name() {
+                super::$name(crate::models::system());
+            })*
+        }
+
+        mod light {
+            $(#[test]
+            fn $name() {
+                super::$name(crate::models::light());
+            })*
+        }
+    };
+}
+
 mod alarms;
+mod figure_5;
 mod goals;
+mod mission;
+mod mutants;
 mod random;
 mod rover;
 

@@ -235,6 +235,9 @@ impl Database {
         };
         for place in 0..self.model.rules_of(timeline, predicate).len() {
             let rule = self.model.rules_of(timeline, predicate)[place];
+            if self.never_holds(rule, token) {
+                continue;
+            }
             let id = self.instances.insert(Instance {
                 rule,
                 master: token,
@@ -254,6 +257,19 @@ impl Database {
             self.reconsider(id)?;
         }
         Ok(())
+    }
+
+    /// Whether a known value of a token is another one than the guard of a rule says. A value that is
+    /// known when the token is put on its timeline does not change while it is there.
+    fn never_holds(&self, rule: RuleId, token: TokenId) -> bool {
+        let parameters = &self.at(token).parameters;
+        let arguments = &self.model.rules[rule].master.arguments;
+        { self.flats[rule].guarding.iter() }.any(|&place| {
+            matches!(
+                (arguments[place], parameters[place]),
+                (Argument::Value(says), Operand::Value(is)) if says != is
+            )
+        })
     }
 
     /// A rule that holds has variables, of which those among the master's arguments stand for the
