@@ -162,7 +162,11 @@ impl State {
                     _ => None,
                 });
             }
-            self.say_one(tables, said.kind, (&cells, &known), rule)?;
+            let told = match said.operands.last() {
+                Some(&Operand::Variable(variable)) => tables.flats[rule].told[variable],
+                _ => false,
+            };
+            self.say_one(tables, (said.kind, told), (&cells, &known), rule)?;
         }
         Ok(())
     }
@@ -171,7 +175,7 @@ impl State {
     pub(super) fn say_one(
         &mut self,
         tables: &Tables,
-        kind: RelationshipKind,
+        (kind, told): (RelationshipKind, bool),
         (cells, known): (&[Option<Cell>], &[Option<Value>]),
         rule: RuleId,
     ) -> Result<(), Clash> {
@@ -198,7 +202,7 @@ impl State {
                     && let Some(cell) = cells[cells.len() - 1]
                 {
                     let of = self.cells[usize::from(self.root(cell))].of;
-                    let origin = match tables.is_measured(of) {
+                    let origin = match tables.is_measured(of) && !told {
                         true => Origin::Computed,
                         false => Origin::Model,
                     };
