@@ -14,6 +14,9 @@
 
 mod classes;
 mod key;
+mod learn;
+mod table;
+mod walk;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,7 +33,8 @@ use super::{
     Stale, Started, check,
 };
 use classes::{Classes, classes};
-use key::{check_present, exact_ticks, is_far, key, longest};
+use key::{check_present, exact_ticks, is_far};
+use table::{Form, Names, Node, Posted, Registers, Transition};
 
 /// Why a model does not become a table.
 #[derive(Debug, Error)]
@@ -87,133 +91,6 @@ pub struct TableSize {
     pub table_bytes: usize,
     /// Cycles that the interpreter decided.
     pub interpreted: u64,
-}
-
-/// From where a register is filled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
-    Value(Option<Value>),
-    Cell(u16),
-    Posted(u16, u16),
-}
-
-/// From where a bound of an end is.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Bound {
-    Never,
-    Ahead(Ticks),
-    End(u16),
-    /// The latest of some for an earliest end, the earliest for a latest.
-    Several(Box<[Far]>),
-}
-
-/// A token that begins or ends.
-struct Change {
-    timeline: u16,
-    predicate: PredicateId,
-    parameters: SmallVec<[Source; 4]>,
-}
-
-/// What a cycle decides. All of it stands in one row of numbers, so that few lines of memory are
-/// read: how many cells, ends and tokens there are, from where each is filled, and tokens with what
-/// they say.
-#[derive(Clone, Debug)]
-struct Transition {
-    next: u32,
-    code: Box<[u32]>,
-    decisions: u32,
-    guards: u32,
-    backtracks: u32,
-}
-
-/// The highest bits of a number say what it is.
-const KIND: u32 = 30;
-const REST: u32 = (1 << KIND) - 1;
-
-/// Values and times that transitions name by their places.
-#[derive(Clone, Debug, Default)]
-struct Names {
-    values: Vec<Option<Value>>,
-    value_places: BTreeMap<Option<Value>, u32>,
-    several: Vec<Box<[Far]>>,
-}
-
-impl Names {
-    fn source(&mut self, source: Source) -> u32 {
-        match source {
-            Source::Value(value) => {
-                let next = self.values.len() as u32;
-                let place = *self.value_places.entry(value).or_insert(next);
-                if place == next {
-                    self.values.push(value);
-                }
-                place
-            }
-            Source::Cell(cell) => 1 << KIND | u32::from(cell),
-            Source::Posted(which, place) => 2 << KIND | u32::from(which) << 8 | u32::from(place),
-        }
-    }
-
-    fn bound(&mut self, bound: Bound) -> u32 {
-        match bound {
-            Bound::Never => 2 << KIND,
-            Bound::Ahead(ticks) => ticks as u32,
-            Bound::End(end) => 1 << KIND | u32::from(end),
-            Bound::Several(all) => {
-                let known = self.several.iter().position(|at| *at == all);
-                let place = known.unwrap_or(self.several.len());
-                if place == self.several.len() {
-                    self.several.push(all);
-                }
-                3 << KIND | place as u32
-            }
-        }
-    }
-}
-
-/// What may be posted next.
-#[derive(Clone, Debug, Default)]
-struct Node {
-    children: SmallVec<[(u64, u32); 1]>,
-    transition: Option<u32>,
-}
-
-/// A state's part that is the same whatever its registers hold.
-struct Form {
-    node: u32,
-    lanes: Box<[(PredicateId, SmallVec<[u16; 4]>)]>,
-    ends: Box<[bool]>,
-    /// The ends of which a bound is far.
-    far: SmallVec<[u16; 8]>,
-    /// By timeline: its token's end, and how long its own rules let it last at most.
-    lasts: Box<[(u16, Ticks)]>,
-    /// To be filled from the registers, and run.
-    interpreter: Box<Propositional>,
-}
-
-/// What was posted in this cycle.
-#[derive(Clone, Debug)]
-enum Posted {
-    Status(Contract, SmallVec<[Option<Value>; 4]>, bool),
-    Goal(TimelineId, PredicateId, SmallVec<[Option<Value>; 4]>),
-    Cancel(Contract),
-}
-
-impl Posted {
-    fn values(&self) -> &[Option<Value>] {
-        match self {
-            Posted::Status(_, values, _) | Posted::Goal(_, _, values) => values,
-            Posted::Cancel(_) => &[],
-        }
-    }
-}
-
-/// The registers of a state.
-#[derive(Clone, Debug, Default)]
-struct Registers {
-    cells: Vec<Option<Value>>,
-    /// The earliest and the latest tick of each end.
-    ends: Vec<(Ticks, Ticks)>,
 }
 
 /// A model as a table that grows as it is used.
@@ -384,49 +261,6 @@ impl Compiled {
         }
     }
 
-    /// The number of what is posted, for its node.
-    fn number(
-        &self,
-        kind: u64,
-        timeline: usize,
-        predicate: PredicateId,
-        ends: bool,
-        (first, values): (usize, &[Option<Value>]),
-    ) -> u64 {
-        let parameters = &self.model.predicates[predicate].parameters[first..];
-        let mut mixed = 0;
-        for (value, parameter) in values.iter().zip(parameters) {
-            let classes = &self.classes[parameter.of];
-            let count = self.counts[parameter.of] + 1;
-            let class = value.map_or(0, |value| 1 + u64::from(classes.of(value)));
-            mixed = mixed * count + class;
-        }
-        let predicate = if kind == GOAL { predicate as u64 } else { 0 };
-        kind << 61
-            | (timeline as u64) << 49
-            | predicate << 37
-            | u64::from(ends) << CLASS_BITS
-            | mixed
-    }
-
-    /// What the token of an active contract says, as far as the table knows.
-    fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
-        if self.node.is_none() {
-            return Ok(None);
-        }
-        let timeline = usize::from(contract.timeline);
-        if self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline] {
-            return Err(check::dead(&self.model, contract));
-        }
-        Ok(Some(self.forms[self.state as usize].lanes[timeline].0))
-    }
-
-    fn child(&self, number: u64) -> Option<u32> {
-        let node = &self.nodes[self.node? as usize];
-        let child = node.children.iter().find(|child| child.0 == number);
-        child.map(|&(_, child)| child)
-    }
-
     /// The interpreter, with what was posted in this cycle.
     fn wake(&mut self) -> &mut Propositional {
         if self.interpreter.is_none() {
@@ -508,295 +342,6 @@ impl Compiled {
         Some(child)
     }
 
-    /// Far ends that are near now are the first that is posted.
-    fn come_near(&mut self) {
-        let far = &self.forms[self.state as usize].far;
-        let (mut which, mut near, mut bit) = (0_u64, Ticks::MAX, 0);
-        for &end in far {
-            let bounds = self.registers.ends[usize::from(end)];
-            for bound in [bounds.0, bounds.1] {
-                let was = is_far(bound, self.now - 1, self.exact);
-                if was && !is_far(bound, self.now, self.exact) {
-                    which |= 1 << bit;
-                }
-                bit += 1;
-            }
-            near = near.min(comes_near(bounds, self.now, self.exact));
-        }
-        // How a token ends whose time is nearly over depends on whose time it is.
-        for (timeline, &(end, longest)) in self.forms[self.state as usize].lasts.iter().enumerate()
-        {
-            let (_, max) = self.registers.ends[usize::from(end)];
-            if self.starts[timeline].saturating_add(longest) == max {
-                which |= 1 << bit;
-            }
-            bit += 1;
-        }
-        if bit > 60 {
-            self.node = None;
-        }
-        self.near = near;
-        let number = NEAR << 61 | which;
-        self.node = match (self.child(number), self.node) {
-            (Some(child), _) => Some(child),
-            (None, Some(node)) => self.add_node(node, number),
-            (None, None) => None,
-        };
-    }
-
-    /// What the table says is decided.
-    fn follow(&mut self, transition: u32) {
-        let at = &self.transitions[transition as usize];
-        let (now, from, names) = (self.now, &self.registers, &self.names);
-        let posted = &self.posted;
-        let value = |source: &u32| {
-            let rest = source & REST;
-            match source >> KIND {
-                0 => names.values[rest as usize],
-                1 => from.cells[rest as usize],
-                _ => posted[(rest >> 8) as usize].values()[(rest & 0xff) as usize],
-            }
-        };
-        let end = |at: &Far, max: bool| match *at {
-            Far::Ahead(ticks) => now + ticks,
-            Far::End(end) if max => from.ends[usize::from(end)].1,
-            Far::End(end) => from.ends[usize::from(end)].0,
-        };
-        let bound = |bound: u32, max: bool| match bound >> KIND {
-            0 => now + Ticks::from(bound & REST),
-            1 => end(&Far::End((bound & REST) as u16), max),
-            2 => Ticks::MAX,
-            _ => {
-                let all = &names.several[(bound & REST) as usize];
-                let all = all.iter().map(|at| end(at, max));
-                { if max { all.min() } else { all.max() } }.unwrap_or(now)
-            }
-        };
-        let (counts, code) = at.code.split_at(4);
-        let (cells, code) = code.split_at(counts[0] as usize);
-        let (ends, mut code) = code.split_at(2 * counts[1] as usize);
-        for change in 0..counts[2] + counts[3] {
-            let (timeline, predicate) = ((code[0] >> 16) as u16, (code[0] & 0xffff) as usize);
-            let (parameters, rest) = code[2..].split_at(code[1] as usize);
-            code = rest;
-            let lane = usize::from(timeline);
-            let parameters = parameters.iter().map(value).collect();
-            if change < counts[2] {
-                let number = self.numbers[lane];
-                self.ended.push(Ended {
-                    contract: Contract { timeline, number },
-                    predicate,
-                    start: self.starts[lane],
-                    finish: now,
-                    parameters,
-                });
-                continue;
-            }
-            self.numbers[lane] += 1;
-            self.starts[lane] = now;
-            let number = self.numbers[lane];
-            self.started.push(Started {
-                contract: Contract { timeline, number },
-                predicate,
-                parameters,
-            });
-        }
-        self.spare.cells.clear();
-        self.spare.cells.extend(cells.iter().map(value));
-        self.spare.ends.clear();
-        let mut near = Ticks::MAX;
-        for pair in ends.chunks_exact(2) {
-            let bounds = (bound(pair[0], false), bound(pair[1], true));
-            near = near.min(comes_near(bounds, now, self.exact));
-            self.spare.ends.push(bounds);
-        }
-        self.near = near;
-        self.counters.decisions += u64::from(at.decisions);
-        self.counters.guards += u64::from(at.guards);
-        self.counters.backtracks += u64::from(at.backtracks);
-        self.state = at.next;
-        std::mem::swap(&mut self.registers, &mut self.spare);
-        self.settle_state();
-    }
-
-    /// A state is entered: nothing is posted in it yet.
-    fn settle_state(&mut self) {
-        let form = &self.forms[self.state as usize];
-        self.node = Some(form.node);
-        self.ends.copy_from_slice(&form.ends);
-        self.posted.clear();
-        self.solved = Some(self.now);
-    }
-
-    /// What the interpreter decided becomes a state, and, if it may, a transition to it.
-    fn learn(&mut self, interpreter: Box<Propositional>, before: ServiceCounters) {
-        let loose = interpreter.world.state.loose.get();
-        let ended = self.changes_of(&interpreter, true);
-        let asks = interpreter.world.state.open.len();
-        let mut stripped = interpreter.clone();
-        stripped.world.compact(1);
-        let planned = stripped.world.plans.iter().any(Option::is_some);
-        let key = key(&stripped, &self.classes, self.exact);
-        let (Some(key), false) = (key, planned || asks != stripped.world.state.open.len()) else {
-            // It goes on alone.
-            interpreter.world.state.loose.set(false);
-            (self.node, self.interpreter) = (None, Some(interpreter));
-            self.posted.clear();
-            return;
-        };
-        let next = match self.by_key.get(&key) {
-            Some(&next) => next,
-            None => self.add_form(key, &stripped),
-        };
-        let spent = interpreter.counters();
-        if let (Some(node), Some(ended), false) = (self.node, ended, loose)
-            && let Some(started) = self.changes_of(&stripped, false)
-            && let Some(code) = self.encode(&stripped, (ended, started))
-        {
-            self.nodes[node as usize].transition = Some(self.transitions.len() as u32);
-            self.transitions.push(Transition {
-                next,
-                code,
-                decisions: (spent.decisions - before.decisions) as u32,
-                guards: (spent.guards - before.guards) as u32,
-                backtracks: (spent.backtracks - before.backtracks) as u32,
-            });
-        }
-        self.read(&stripped, next);
-    }
-
-    /// The registers of a state that the interpreter is in.
-    fn read(&mut self, is: &Propositional, state: u32) {
-        let known = &is.world.state;
-        self.registers.cells.clear();
-        self.registers
-            .cells
-            .extend(known.cells.iter().map(|at| at.value));
-        self.registers.ends.clear();
-        self.registers
-            .ends
-            .extend(known.finishes.iter().map(|at| (at.min, at.max)));
-        for (timeline, lane) in known.lanes.iter().enumerate() {
-            self.numbers[timeline] = lane.number;
-            if let Some(&token) = lane.tokens.last() {
-                self.starts[timeline] = known.at(token).start;
-            }
-        }
-        let far = known
-            .finishes
-            .iter()
-            .filter(|at| is_far(at.max, self.now, self.exact));
-        self.near = far
-            .map(|at| at.max - self.exact)
-            .min()
-            .unwrap_or(Ticks::MAX);
-        self.state = state;
-        self.settle_state();
-    }
-
-    fn add_form(&mut self, key: Vec<u32>, is: &Propositional) -> u32 {
-        let node = self.nodes.len() as u32;
-        self.nodes.push(Node::default());
-        let known = &is.world.state;
-        let lanes = known.lanes.iter().map(|lane| {
-            let token = lane.tokens.last().expect("each timeline says something");
-            let at = known.at(*token);
-            (at.predicate, at.parameters.iter().copied().collect())
-        });
-        let ends = 0..known.finishes.len();
-        let far = ends.filter(|&at| {
-            let at = &known.finishes[at];
-            known.is_far(at.min) || known.is_far(at.max)
-        });
-        let lasts = known.lanes.iter().enumerate().map(|(timeline, lane)| {
-            let token = lane.tokens.last().expect("each timeline says something");
-            let longest = longest(is, timeline).unwrap_or(Ticks::MAX);
-            (known.end(known.at(*token).finish), longest)
-        });
-        let mut interpreter = Box::new(is.clone());
-        interpreter.shrink();
-        self.forms.push(Form {
-            node,
-            lanes: lanes.collect(),
-            ends: is.ends.clone().into(),
-            far: far.map(|at| at as u16).collect(),
-            lasts: lasts.collect(),
-            interpreter,
-        });
-        let state = (self.forms.len() - 1) as u32;
-        self.by_key.insert(key, state);
-        state
-    }
-
-    /// What began or ended, with where its parameters are from; none, if that is not clear.
-    fn changes_of(&self, is: &Propositional, ended: bool) -> Option<Vec<Change>> {
-        let known = &is.world.state;
-        let mut changes = Vec::new();
-        for (timeline, lane) in known.lanes.iter().enumerate() {
-            let token = match (ended, &lane.tokens[..]) {
-                (true, &[.., before, present]) if known.at(present).start == self.now => before,
-                (false, &[.., present]) if known.at(present).start == self.now => present,
-                _ => continue,
-            };
-            let at = known.at(token);
-            if ended && known.finish(token).1 != self.now {
-                return None;
-            }
-            let parameters = at.parameters.iter().map(|&cell| source(is, cell));
-            changes.push(Change {
-                timeline: timeline as u16,
-                predicate: at.predicate,
-                parameters: parameters.collect(),
-            });
-        }
-        Some(changes)
-    }
-
-    /// From where a state's registers are filled, and what began and ended, as a row of numbers;
-    /// none, if it is not clear.
-    fn encode(
-        &mut self,
-        is: &Propositional,
-        (ended, started): (Vec<Change>, Vec<Change>),
-    ) -> Option<Box<[u32]>> {
-        let known = &is.world.state;
-        let counts = [
-            known.cells.len(),
-            known.finishes.len(),
-            ended.len(),
-            started.len(),
-        ];
-        let mut code: Vec<u32> = counts.iter().map(|&at| at as u32).collect();
-        for cell in 0..known.cells.len() {
-            code.push(self.names.source(source(is, cell as u16)));
-        }
-        for at in &known.finishes {
-            for (time, fars) in [(at.min, &at.lows), (at.max, &at.highs)] {
-                let bound = match (time, &fars[..]) {
-                    (Ticks::MAX, _) => Bound::Never,
-                    (time, _) if !known.is_far(time) => Bound::Ahead((time - self.now).max(0)),
-                    (_, []) => return None,
-                    (_, &[Far::Ahead(ticks)]) if ticks > Ticks::from(REST) => return None,
-                    (_, &[Far::Ahead(ticks)]) => Bound::Ahead(ticks),
-                    (_, &[Far::End(end)]) => Bound::End(end),
-                    (_, several) => Bound::Several(several.into()),
-                };
-                code.push(self.names.bound(bound));
-            }
-        }
-        for change in ended.into_iter().chain(started) {
-            code.push(u32::from(change.timeline) << 16 | change.predicate as u32);
-            code.push(change.parameters.len() as u32);
-            code.extend(
-                change
-                    .parameters
-                    .into_iter()
-                    .map(|at| self.names.source(at)),
-            );
-        }
-        Some(code.into())
-    }
-
     /// The interpreter decides.
     fn interpret(&mut self, horizon: Ticks, budget: u64) -> Outcome {
         self.interpreted += 1;
@@ -820,12 +365,6 @@ impl Compiled {
         }
         outcome
     }
-}
-
-/// From which tick on a bound of an end is near that is far now.
-fn comes_near((min, max): (Ticks, Ticks), now: Ticks, exact: Ticks) -> Ticks {
-    let far = [min, max].into_iter().filter(|&at| is_far(at, now, exact));
-    far.map(|at| at - exact).min().unwrap_or(Ticks::MAX)
 }
 
 /// Whether what may be posted can be numbered.
@@ -867,16 +406,6 @@ fn post(interpreter: &mut Propositional, posted: &Posted) -> Result<(), Refusal>
             interpreter.insert_goal(*timeline, *predicate, &inputs)
         }
         Posted::Cancel(contract) => interpreter.cancel(*contract),
-    }
-}
-
-/// From where a cell has its value.
-fn source(is: &Propositional, cell: u16) -> Source {
-    let known = &is.world.state.cells[usize::from(is.world.state.root(cell))];
-    match (known.value, known.origin) {
-        (None, _) | (_, Origin::Model | Origin::Computed) => Source::Value(known.value),
-        (_, Origin::Cell(cell)) => Source::Cell(cell),
-        (_, Origin::Posted(which, place)) => Source::Posted(which, place),
     }
 }
 

@@ -159,8 +159,16 @@ fn relationships(rule: &Rule) -> impl Iterator<Item = &Relationship> {
 }
 
 fn asks_of(rule: &Rule, variable: VariableId) -> bool {
-    let mut operands = relationships(rule).flat_map(|said| &said.operands);
-    operands.any(|operand| *operand == Operand::Variable(variable))
+    relationships(rule).any(|said| asks(said, variable))
+}
+
+/// Whether a relationship asks of a variable, and does not just give it.
+fn asks(said: &Relationship, variable: VariableId) -> bool {
+    let is = |operand: &Operand| *operand == Operand::Variable(variable);
+    match said.operands.split_last() {
+        Some((_, inputs)) if gives(said.kind) => inputs.iter().any(is),
+        _ => said.operands.iter().any(is),
+    }
 }
 
 /// Whether what a rule asks of a number it asks of that number alone.
@@ -176,14 +184,15 @@ fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCo
                 _ => None,
             });
         let variables: SmallVec<[VariableId; 4]> = variables.collect();
-        if !variables.iter().any(|at| mine.contains(at)) {
+        if !mine.iter().any(|&at| asks(relationship, at)) {
             continue;
         }
         let last = variables.last().copied();
         let is_function = gives(relationship.kind);
         let is_symbolic = |variable: VariableId| !tables.is_measured(said.variables[variable].of);
         let others = variables.iter().filter(|&&at| {
-            !mine.contains(&at) && !(is_function && Some(at) == last) && !is_symbolic(at)
+            let given = is_function && Some(at) == last;
+            !(mine.contains(&at) || given || is_symbolic(at))
         });
         if others.count() > 0 {
             return Err(NotCompiled::Several {

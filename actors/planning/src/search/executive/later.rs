@@ -134,43 +134,44 @@ impl Later {
 /// others.
 fn guesses_of(model: &Model, predicate: usize) -> Vec<Vec<Value>> {
     let said = &model.predicates[predicate];
-    let mut guesses = vec![Vec::new(); said.parameters.len()];
-    for place in said.inputs..said.parameters.len() {
-        let all: Vec<Value> = match &model.types[said.parameters[place].of].values {
-            Values::Truth => vec![1, 0],
-            Values::Symbols(all) => all.clone(),
-            Values::Numbers(_) => continue,
-        };
-        let rules = model
-            .rules
-            .iter()
-            .filter(|at| at.master.predicate == predicate);
-        let follows = rules.clone().any(|rule| {
-            rule.relationships.iter().any(|at| {
-                let last = at.operands.last();
-                let gives = matches!(at.kind, RelationshipKind::Function(_));
-                match (last, rule.master.arguments[place]) {
-                    (Some(&Operand::Variable(one)), Argument::Variable(other)) => {
-                        gives && one == other
-                    }
-                    _ => false,
-                }
-            })
-        });
-        if follows {
-            continue;
-        }
-        let missing = |value: Value| {
-            said.timed_out.contains(&(place, value)) || said.preempted.contains(&(place, value))
-        };
-        let named = rules.filter_map(|rule| match rule.master.arguments[place] {
-            Argument::Value(value) => Some(value),
-            _ => None,
-        });
-        for value in named.chain(all) {
-            if !missing(value) && !guesses[place].contains(&value) {
-                guesses[place].push(value);
+    let parameters = 0..said.parameters.len();
+    parameters
+        .map(|place| guesses_at(model, predicate, place))
+        .collect()
+}
+
+fn guesses_at(model: &Model, predicate: usize, place: usize) -> Vec<Value> {
+    let said = &model.predicates[predicate];
+    let all: Vec<Value> = match &model.types[said.parameters[place].of].values {
+        _ if place < said.inputs => return Vec::new(),
+        Values::Truth => vec![1, 0],
+        Values::Symbols(all) => all.clone(),
+        Values::Numbers(_) => return Vec::new(),
+    };
+    let rules = { model.rules.iter() }.filter(|at| at.master.predicate == predicate);
+    let follows = rules.clone().any(|rule| {
+        rule.relationships.iter().any(|at| {
+            let gives = matches!(at.kind, RelationshipKind::Function(_));
+            match (at.operands.last(), rule.master.arguments[place]) {
+                (Some(&Operand::Variable(one)), Argument::Variable(other)) => gives && one == other,
+                _ => false,
             }
+        })
+    });
+    if follows {
+        return Vec::new();
+    }
+    let missing = |value: Value| {
+        said.timed_out.contains(&(place, value)) || said.preempted.contains(&(place, value))
+    };
+    let named = rules.filter_map(|rule| match rule.master.arguments[place] {
+        Argument::Value(value) => Some(value),
+        _ => None,
+    });
+    let mut guesses = Vec::new();
+    for value in named.chain(all) {
+        if !missing(value) && !guesses.contains(&value) {
+            guesses.push(value);
         }
     }
     guesses
