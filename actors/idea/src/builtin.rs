@@ -23,7 +23,11 @@ pub(crate) const SCENARIOS: [Builtin; 4] = [
 ];
 
 /// Sorted by name.
-pub(crate) const STUDIES: [Builtin; 6] = [
+pub(crate) const STUDIES: [Builtin; 7] = [
+    Builtin {
+        name: "idea/deliberation",
+        text: include_str!("../studies/deliberation.toml"),
+    },
     Builtin {
         name: "idea/figures-6-7",
         text: include_str!("../studies/figures-6-7.toml"),
