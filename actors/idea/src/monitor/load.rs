@@ -3,7 +3,7 @@
 
 use farside::{SimDuration, SimTime};
 
-use crate::records::AgentCycle;
+use crate::records::{AgentCycle, TimelineSays};
 
 /// The most peaks that are kept.
 const PEAKS: usize = 12;
@@ -22,6 +22,19 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
+    /// Why the cycle was dear in which a timeline of the K9's models began to say something.
+    pub(crate) fn of(says: &TimelineSays) -> Cause {
+        match says.timeline.as_str() {
+            "MotionHealth_SV" if says.is_alarm() => Cause::Alarm,
+            "MotionMonitor_SV" => match says.says.as_str() {
+                "Nominal" => Cause::None,
+                _ => Cause::Alarm,
+            },
+            "Location_SV" if says.says.starts_with("DriveTo") => Cause::Expanded,
+            _ => Cause::None,
+        }
+    }
+
     /// What it is called.
     pub(crate) fn name(self) -> &'static str {
         match self {

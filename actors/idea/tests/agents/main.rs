@@ -4,6 +4,7 @@ mod alone;
 mod graph;
 mod ground;
 mod mission;
+mod pictures;
 mod plant;
 mod response;
 mod scenario;
