@@ -71,12 +71,18 @@ impl Ground<'_> {
 
     /// Contour lines and the edge.
     pub fn draw(&self) -> Markup {
-        let inside = |at: &(f64, f64)| self.is_inside(*at);
-        let (px_per_m, px) = (self.px_per_m(), |at_m| self.px(at_m));
+        let (left, top, side) = (Px(self.left), Px(self.top), Px(self.side));
+        let lines = relief::draw(
+            self.terrain,
+            self.px_per_m(),
+            |at_m| self.px(at_m),
+            |_| true,
+        );
         html! {
-            (relief::draw(self.terrain, px_per_m, px, inside))
-            rect class="frame" x=(Px(self.left)) y=(Px(self.top)) width=(Px(self.side))
-                height=(Px(self.side)) {}
+            // A figure of its own, whose edge cuts what lies outside.
+            svg x=(left) y=(top) width=(side) height=(side)
+                viewBox={ (left) " " (top) " " (side) " " (side) } { (lines) }
+            rect class="frame" x=(left) y=(top) width=(side) height=(side) {}
         }
     }
 

@@ -13,6 +13,8 @@ const PEAKS: usize = 12;
 pub(crate) enum Cause {
     /// Nothing in particular.
     None,
+    /// The next command of a goal was given.
+    Command,
     /// A goal was received.
     Goal,
     /// A goal was expanded into commands.
@@ -31,6 +33,8 @@ impl Cause {
                 _ => Cause::Alarm,
             },
             "Location_SV" if says.says.starts_with("DriveTo") => Cause::Expanded,
+            "PanTilt_SV" if says.says.starts_with("Point") => Cause::Command,
+            "Camera_SV" if says.says.starts_with("TakeImage") => Cause::Command,
             _ => Cause::None,
         }
     }
@@ -39,6 +43,7 @@ impl Cause {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Cause::None => "nothing in particular",
+            Cause::Command => "next command",
             Cause::Goal => "goal received",
             Cause::Expanded => "goal expanded",
             Cause::Alarm => "alarm",

@@ -14,8 +14,10 @@ use super::history::{Lane, Said};
 pub(super) const HEIGHT: f64 = 22.0;
 /// How many colours and hatchings there are.
 const FAMILIES: usize = 7;
-/// What is thinner than this is drawn with its neighbours, if they are nearer than this.
+/// What is thinner than this is drawn with its neighbours.
 const THIN: f64 = 3.0;
+/// If they are nearer than this.
+const NEAR: f64 = 6.0;
 /// The size of what is written on bars.
 const TEXT: f64 = 12.0;
 /// The room left and right of a text.
@@ -100,7 +102,7 @@ fn pieces<'a>(lane: &'a Lane, along: &Along) -> Vec<Piece<'a>> {
             let is_thin = |from: f64, to: f64| to - from < THIN;
             let are_thin =
                 is_thin(from, to) && (last.said.len() > 1 || is_thin(last.from, last.to));
-            are_thin && from - last.to < THIN
+            are_thin && from - last.to < NEAR
         }) {
             last.to = to;
             last.said.push(said);
@@ -124,33 +126,32 @@ pub(super) fn has_many(lane: &Lane, along: &Along) -> bool {
     pieces(lane, along).iter().any(|piece| piece.said.len() > 1)
 }
 
-/// A lane, its upper edge at `y`.
-pub(super) fn draw(lane: &Lane, along: &Along, y: f64) -> Markup {
+/// A lane, its upper edge at `y`: its bars, and what is written on them.
+pub(super) fn draw(lane: &Lane, along: &Along, y: f64) -> (Markup, Markup) {
     let pieces = pieces(lane, along);
     let middle = y + 0.5 * HEIGHT;
     let baseline = path([(along.left, middle), (along.right, middle)]);
+    let (quiet, busy): (Vec<&Piece<'_>>, Vec<_>) = pieces.iter().partition(|piece| piece.is_quiet);
+    let bars = html! {
+        path class="nothing-said" d=(baseline) {}
+        @for piece in quiet.into_iter().chain(busy) { (bar(lane, piece, y)) }
+    };
     // Up to where something is written.
     let mut written = along.left;
-    let labels: Vec<Option<(f64, String, bool)>> = (0..pieces.len())
-        .map(|at| {
-            let piece = &pieces[at];
-            let next = pieces[at + 1..].iter().find(|piece| !piece.is_quiet);
-            let next = next.map_or(along.right, |piece| piece.from);
-            let label = label(piece, written, next)?;
-            written = label.0 + text_width(&label.1, TEXT) + BESIDE;
-            Some((label.0, label.1, piece.is_quiet))
-        })
-        .collect();
-    html! {
-        path class="nothing-said" d=(baseline) {}
-        @for piece in &pieces {
-            (bar(lane, piece, y))
+    let texts = html! {
+        @for (at, piece) in pieces.iter().enumerate() {
+            @let next = pieces[at + 1..].iter().find(|piece| !piece.is_quiet);
+            @let next = next.map_or(along.right, |piece| piece.from);
+            @if let Some((x, text)) = label(piece, written, next) {
+                @let class = if piece.is_quiet { "on-bar soft" } else { "on-bar" };
+                ({
+                    written = x + text_width(&text, TEXT) + BESIDE;
+                    over_lines(class, (x, middle + 4.2), "start", &text)
+                })
+            }
         }
-        @for (x, text, is_quiet) in labels.iter().flatten() {
-            @let class = if *is_quiet { "on-bar soft" } else { "on-bar" };
-            (over_lines(class, (*x, middle + 4.2), "start", text))
-        }
-    }
+    };
+    (bars, texts)
 }
 
 /// The colour and the hatching of a predicate of a lane.
@@ -311,7 +312,8 @@ mod tests {
         let many: Vec<usize> = found.iter().map(|piece| piece.said.len()).collect();
         assert_eq!(many, [50]);
         assert!(has_many(&lane, &along(500)));
-        let drawn = draw(&lane, &along(500), 0.0).into_string();
+        let (bars, _) = draw(&lane, &along(500), 0.0);
+        let drawn = bars.into_string();
         assert!(drawn.contains("50 x Turn from 0:00 to 8:12"), "{drawn}");
         // A pixel is a second: each apart.
         let found = pieces(&lane, &along(100));
@@ -326,7 +328,8 @@ mod tests {
             (60, 64, "Turn(30)"),
             (64, 100, "Still"),
         ]);
-        let drawn = draw(&lane, &along(100), 0.0).into_string();
+        let (_, texts) = draw(&lane, &along(100), 0.0);
+        let drawn = texts.into_string();
         // Inside of a wide bar, behind a thin one.
         assert!(
             drawn.contains(">Drive(1 2)</text>") && drawn.contains(">Turn</text>"),
@@ -334,7 +337,8 @@ mod tests {
         );
         assert!(!drawn.contains(">Still</text>"), "{drawn}");
         let escaped = self::lane(&[(0, 100, "Say(<&)")]);
-        let drawn = draw(&escaped, &along(100), 0.0).into_string();
+        let (bars, texts) = draw(&escaped, &along(100), 0.0);
+        let drawn = bars.into_string() + &texts.into_string();
         assert!(
             drawn.contains("Say(&lt;&amp;)") && !drawn.contains("(<&"),
             "{drawn}"

@@ -141,28 +141,27 @@ impl Map<'_> {
         marks.filter(move |mark| mark.kind == kind && mark.time_ns <= self.at_ns)
     }
 
-    /// The figure in a sentence or two.
+    /// The figure in a sentence.
     fn says(&self) -> String {
-        let mut text = String::new();
+        let (mut way_m, mut done, mut goals) = (0.0, 0, 0);
+        let (mut alarms, mut faults) = (0, 0);
         for (_, rover) in self.each() {
             let moments = Moment::until(&rover.moments, self.at_ns);
             let steps = moments.windows(2).map(|pair| {
                 let [[x, y], [x2, y2]] = [pair[0].true_m, pair[1].true_m];
                 libm::hypot(x2 - x, y2 - y)
             });
-            let way_m: f64 = steps.sum();
-            let done = (0..rover.goals.len())
-                .filter(|&goal| self.outcome(rover, goal) == GoalOutcome::Done)
-                .count();
-            let [alarms, faults] =
-                [MarkKind::Alarm, MarkKind::Fault].map(|kind| self.marks(rover, kind).count());
-            text.push_str(&format!(
-                "{} has gone {way_m:.1} m and done {done} of {} goals; alarms: {alarms}, faults: {faults}. ",
-                rover.name,
-                rover.goals.len()
-            ));
+            way_m += steps.sum::<f64>();
+            let is_done = |&goal: &usize| self.outcome(rover, goal) == GoalOutcome::Done;
+            done += (0..rover.goals.len()).filter(is_done).count();
+            goals += rover.goals.len();
+            alarms += self.marks(rover, MarkKind::Alarm).count();
+            faults += self.marks(rover, MarkKind::Fault).count();
         }
-        shortened(text.trim_end(), 150)
+        format!(
+            "{way_m:.1} m driven; {done} of {goals} goals done; alarms: {alarms}; faults of the hardware: \
+             {faults}."
+        )
     }
 
     fn outcome(&self, rover: &RoverHistory, goal: usize) -> GoalOutcome {
@@ -185,7 +184,11 @@ impl Map<'_> {
             y_label: String::new(),
             y_ticks: scale(south_m).ticks(8.0),
         };
+        let down = |x: f64| path([(x, TOP), (x, TOP + SIDE)]);
         html! {
+            @for tick in &frame.x_ticks {
+                path class="grid" d=(down(LEFT + SIDE * tick.at)) {}
+            }
             text class="label" x="8" y=(Px(TOP - 14.0)) { "north [m]" }
             (frame.draw())
         }

@@ -121,16 +121,8 @@ impl Strip {
         columns
     }
 
-    /// The strip, its upper edge at `top`; with the marks of time below, if they are given.
-    pub(super) fn draw(
-        &self,
-        agent: &AgentHistory,
-        along: &Along,
-        top: f64,
-        (x_label, x_ticks): (&str, &[Tick]),
-        is_last: bool,
-    ) -> Markup {
-        let columns = self.columns(agent, along);
+    /// Its scale and where it is drawn, its upper edge at `top`.
+    fn axes(&self, columns: &[Column], along: &Along, top: f64) -> (Scale, Area) {
         let most = columns.iter().map(|column| column.most).fold(0.0, f64::max);
         // Above the highest there is room for names.
         let room = if self.names_peaks { 1.3 } else { 1.1 };
@@ -141,33 +133,57 @@ impl Strip {
             width: along.right - along.left,
             height: HEIGHT,
         };
+        (scale, area)
+    }
+
+    /// The strip, its upper edge at `top`, with these marks of time below.
+    pub(super) fn draw(
+        &self,
+        agent: &AgentHistory,
+        along: &Along,
+        top: f64,
+        (x_label, x_ticks): (&str, &[Tick]),
+    ) -> Markup {
+        let columns = self.columns(agent, along);
+        let (scale, area) = self.axes(&columns, along, top);
         let frame = Frame {
             area,
-            x_label: if is_last { x_label } else { "" },
+            x_label,
             x_ticks: x_ticks.to_vec(),
             y_label: String::new(),
-            y_ticks: scale.ticks(3.0),
+            y_ticks: scale.ticks(4.0),
         };
         let line = |value: fn(&Column) -> f64| {
-            path(
-                columns
-                    .iter()
-                    .map(|column| (column.x, area.y(scale.place(value(column))))),
-            )
+            let point = |column: &Column| (column.x, area.y(scale.place(value(column))));
+            path(columns.iter().map(point))
         };
-        let is_thinned = columns.iter().any(|column| column.cycles > 1) && !self.is_level;
         html! {
             (frame.draw())
-            text class="label" x="8" y=(Px(top - 12.0)) { (self.label) }
             g class={ "s" (self.series) } {
-                path class="cost" d=(line(|column| column.most)) {
-                    title { (self.label) }
+                path class="cost" d=(line(|column| column.most)) { title { (self.label) } }
+                @if self.is_thinned(&columns) {
+                    path class="cost mean" d=(line(|column| column.mean)) {}
                 }
-                @if is_thinned { path class="cost mean" d=(line(|column| column.mean)) {} }
             }
-            @if is_thinned { (two_lines(self.series, area.x(1.0), top - 12.0)) }
+        }
+    }
+
+    /// What is written on it, over all lines.
+    pub(super) fn written(&self, agent: &AgentHistory, along: &Along, top: f64) -> Markup {
+        let columns = self.columns(agent, along);
+        let (scale, area) = self.axes(&columns, along, top);
+        html! {
+            (over_lines("label", (8.0, top - 12.0), "start", &self.label))
+            @if self.is_thinned(&columns) {
+                (two_lines(self.series, area.x(1.0), top - 12.0))
+            }
             @if self.names_peaks { (peaks(agent, along, &area, &scale)) }
         }
+    }
+
+    /// Whether its columns have more than one cycle, so that their mean says more.
+    fn is_thinned(&self, columns: &[Column]) -> bool {
+        !self.is_level && columns.iter().any(|column| column.cycles > 1)
     }
 }
 
@@ -182,7 +198,7 @@ fn two_lines(series: usize, right: f64, y: f64) -> Markup {
         }
     };
     html! {
-        (entry(right - 240.0, "cost", "dearest cycle"))
+        (entry(right - 230.0, "cost", "dearest cycle"))
         (entry(right - 106.0, "cost mean", "mean of cycles"))
     }
 }

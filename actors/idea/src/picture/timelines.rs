@@ -46,6 +46,12 @@ pub(super) fn figure(history: &History, agent: usize, (from_ns, to_ns): (u64, u6
     let first_strip = bottom + 48.0;
     let end = first_strip + strips::APART * strips.len() as f64;
     let (x_label, x_ticks) = times(from_ns, to_ns);
+    let lane_top = |row: usize| top + LANE * row as f64;
+    let strip_top = |number: usize| first_strip + strips::APART * number as f64;
+    let lanes = agent.lanes.iter().enumerate();
+    let drawn: Vec<(Markup, Markup)> = lanes
+        .map(|(row, lane)| bars::draw(lane, &along, lane_top(row)))
+        .collect();
     let title = format!(
         "{} of {}, seed {}, from {} to {}",
         agent.name,
@@ -60,29 +66,31 @@ pub(super) fn figure(history: &History, agent: usize, (from_ns, to_ns): (u64, u6
         text class="title" x="16" y="28" { (title) }
         text class="tick" x="16" y="50" { (says) }
         (legend(agent, &marks, &along))
-        (grid(&along, &x_ticks, top, bottom))
+        (grid(&along, &x_ticks, top, [bottom, end - strips::APART + strips::HEIGHT]))
         @for (row, lane) in agent.lanes.iter().enumerate() {
-            @let y = top + LANE * row as f64;
             @let name = lane.name.strip_suffix("_SV").unwrap_or(&lane.name);
-            text class="lane" x=(Px(LEFT - 10.0)) y=(Px(y + 15.5)) text-anchor="end" {
+            text class="lane" x=(Px(LEFT - 10.0)) y=(Px(lane_top(row) + 15.5)) text-anchor="end" {
                 (name)
                 title { (lane.name) }
             }
-            (bars::draw(lane, &along, y))
+            (drawn[row].0)
+        }
+        @for (number, strip) in strips.iter().enumerate() {
+            @let is_last = number + 1 == strips.len();
+            @let x = if is_last { (x_label, x_ticks.as_slice()) } else { ("", &[][..]) };
+            (strip.draw(agent, &along, strip_top(number), x))
+        }
+        (lines(&marks, &along, top, end - strips::APART + strips::HEIGHT))
+        @for (row, lane) in agent.lanes.iter().enumerate() {
+            (drawn[row].1)
             @if lane.is_polled && lane.said.is_empty() {
-                (over_lines(
-                    "on-bar soft",
-                    (LEFT + 5.0, y + 15.2),
-                    "start",
-                    "asked again and again: what came of it is in the messages",
-                ))
+                @let at = (LEFT + 5.0, lane_top(row) + 15.2);
+                (over_lines("on-bar soft", at, "start", "polls: the answers are messages"))
             }
         }
         @for (number, strip) in strips.iter().enumerate() {
-            @let y = first_strip + strips::APART * number as f64;
-            (strip.draw(agent, &along, y, (x_label, &x_ticks), number + 1 == strips.len()))
+            (strip.written(agent, &along, strip_top(number)))
         }
-        (lines(&marks, &along, top, first_strip, strips.len()))
         (names)
     };
     Figure {
@@ -105,14 +113,14 @@ fn says(agent: &AgentHistory, marks: &[&Mark], along: &Along) -> String {
         (count + 1, cost_ns + cycle.cost_ns)
     });
     let share = 100.0 * cost_ns as f64 / (count * agent.latency_ns).max(1) as f64;
-    let mut text = format!("{count} cycles, {share:.1} % of the time busy.");
+    let mut parts = vec![format!("{count} cycles, busy {share:.1} % of the time")];
     for kind in MarkKind::ALL {
         match marks.iter().filter(|mark| mark.kind == kind).count() {
             0 => {}
-            of => text.push_str(&format!(" {} x {of}.", kind.name())),
+            of => parts.push(format!("{}: {of}", kind.name())),
         }
     }
-    text
+    format!("{}.", parts.join("; "))
 }
 
 /// The marks of time, in units that fit.
@@ -127,20 +135,19 @@ fn times(from_ns: u64, to_ns: u64) -> (&'static str, Vec<Tick>) {
     (label, scale.ticks(12.0))
 }
 
-/// Thin lines at the marks of time, and the edges of the lanes.
-fn grid(along: &Along, ticks: &[Tick], top: f64, bottom: f64) -> Markup {
+/// Thin lines at the marks of time, through lanes and strips, and the edge of the lanes.
+fn grid(along: &Along, ticks: &[Tick], top: f64, [lanes_end, end]: [f64; 2]) -> Markup {
     html! {
         @for tick in ticks {
             @let x = along.left + tick.at * (along.right - along.left);
-            path class="grid" d=(path([(x, top - 4.0), (x, bottom)])) {}
+            path class="grid" d=(path([(x, top - 4.0), (x, end)])) {}
         }
-        path class="axis" d=(path([(along.left, top - 4.0), (along.left, bottom)])) {}
+        path class="axis" d=(path([(along.left, top - 4.0), (along.left, lanes_end)])) {}
     }
 }
 
-/// The lines of marks, over all lanes and strips.
-fn lines(marks: &[&Mark], along: &Along, top: f64, first_strip: f64, strips: usize) -> Markup {
-    let end = first_strip + strips::APART * strips.saturating_sub(1) as f64 + strips::HEIGHT;
+/// The lines of marks, through all lanes and strips.
+fn lines(marks: &[&Mark], along: &Along, top: f64, end: f64) -> Markup {
     html! {
         @for mark in marks {
             @let x = along.x(mark.time_ns);

@@ -8,9 +8,8 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside::scene::{Drawing, Facing, Level, Scene};
 use farside::{Report, RunInfo};
 use farside_actors::system::{
-    PictureError, PictureRequest, Recorded, Recording, RecordingEnd, Seeds, System,
+    PictureError, PictureRequest, Recorded, Recording, RecordingEnd, Seeds,
 };
-use farside_idea::IdeaSystem;
 
 use crate::mission::K9;
 use crate::scenario::Scenario;
@@ -134,10 +133,9 @@ fn drawn(
     request: &PictureRequest,
 ) -> Result<String, PictureError> {
     let scenario = Scenario::read(text);
-    // A picture declares nothing, so there are no links to close.
     let mut sim = Simulation::new(1);
-    let figure = scenario.set_up(1, &mut sim, |settings, setup| {
-        settings.draw(picture, tape, request, setup)
+    let figure = scenario.set_up(1, &mut sim, |settings, mut setup| {
+        settings.draw(picture, tape, request, &mut setup)
     })?;
     Ok(figure.standalone())
 }
@@ -166,7 +164,7 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     assert!(svg.contains("system of idea/k9 &lt;&amp;&gt;") && !svg.contains("<&"));
     // The goal that both alarms interrupt goes on; what came of it is told.
     assert!(svg.contains("ImageAt(30 -60 0 -30 wide_eye) from 0:05 to 2:48, then ok"));
-    for cause in ["goal received", "goal expanded", "alarm"] {
+    for cause in ["goal expanded", "next command", "alarm"] {
         assert!(svg.contains(&format!(">{cause}</text>")), "{cause}");
     }
     let again = drawn(K9, &tape, "timelines", &PictureRequest::default()).unwrap();
@@ -186,6 +184,7 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     let svg = drawn(K9, &tape, "timelines", &mission).unwrap();
     keep("timelines-mission.svg", &svg);
     assert_eq!(count(&svg, "class=\"lane\""), 3);
+    assert!(svg.contains(">goal received</text>"));
 }
 
 #[test]

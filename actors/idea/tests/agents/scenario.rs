@@ -50,7 +50,7 @@ impl Scenario {
         &self,
         seed: u64,
         sim: &mut Simulation,
-        build: impl FnOnce(&dyn Settings, &mut Setup<'_>) -> T,
+        build: impl FnOnce(&dyn Settings, Setup<'_>) -> T,
     ) -> T {
         let mut files = Files::on_disk(".".into());
         let links = LinkBuilder::new(&self.links, &self.degrades).expect("they are right");
@@ -58,17 +58,17 @@ impl Scenario {
             run: seed,
             problem: seed,
         };
-        let mut setup = Setup::new(seeds, Some(self.until), sim, &mut files, links);
-        let built = build(&*self.settings, &mut setup);
-        let remarks = setup.close().expect("all keys match");
-        assert!(remarks.is_empty(), "{remarks:?}");
-        built
+        let setup = Setup::new(seeds, Some(self.until), sim, &mut files, links);
+        build(&*self.settings, setup)
     }
 
     /// Puts the system together.
     pub(crate) fn assemble(&self, seed: u64, sim: &mut Simulation) -> Assembly {
-        self.set_up(seed, sim, |settings, setup| {
-            settings.assemble(setup).expect("it can be")
+        self.set_up(seed, sim, |settings, mut setup| {
+            let assembly = settings.assemble(&mut setup).expect("it can be");
+            let remarks = setup.close().expect("all keys match");
+            assert!(remarks.is_empty(), "{remarks:?}");
+            assembly
         })
     }
 }
