@@ -13,7 +13,7 @@ const PEAKS: usize = 12;
 pub(crate) enum Cause {
     /// Nothing in particular.
     None,
-    /// The next command of a goal was given.
+    /// The next command of a goal, or the next goal of a plan, was given.
     Command,
     /// A goal was received.
     Goal,
@@ -33,6 +33,7 @@ impl Cause {
                 _ => Cause::Alarm,
             },
             "Location_SV" if says.says.starts_with("DriveTo") => Cause::Expanded,
+            "Goal_SV" if says.says.starts_with("ImageAt") => Cause::Command,
             "PanTilt_SV" if says.says.starts_with("Point") => Cause::Command,
             "Camera_SV" if says.says.starts_with("TakeImage") => Cause::Command,
             _ => Cause::None,

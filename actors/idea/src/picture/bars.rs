@@ -89,7 +89,7 @@ fn pieces<'a>(lane: &'a Lane, along: &Along) -> Vec<Piece<'a>> {
     let mut busy: Option<usize> = None;
     for said in &lane.said {
         let to_ns = said.to_ns.unwrap_or(along.to_ns);
-        if to_ns < along.from_ns || said.from_ns > along.to_ns || to_ns == said.from_ns {
+        if to_ns <= along.from_ns || said.from_ns >= along.to_ns || to_ns == said.from_ns {
             continue;
         }
         let (from, to) = (along.x(said.from_ns), along.x(to_ns));
@@ -173,6 +173,7 @@ fn bar(lane: &Lane, piece: &Piece<'_>, y: f64) -> Markup {
     if piece.said.len() > 1 {
         let (most, says) = counted(piece);
         return html! {
+            rect class="paper" x=(x) y=(y) width=(width) height=(height) {}
             rect class={ "many s" (family(lane, &most)) } x=(x) y=(y) width=(width)
                 height=(height) { title { (says) } }
         };

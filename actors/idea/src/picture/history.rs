@@ -102,6 +102,17 @@ impl MarkKind {
         }
     }
 
+    /// Several of them in words.
+    pub(super) fn plural(self) -> &'static str {
+        match self {
+            MarkKind::Alarm => "alarms",
+            MarkKind::Fault => "faults of the hardware",
+            MarkKind::GivenUp => "goals given up",
+            MarkKind::Stopped => "stops by the relay",
+            MarkKind::Faulty => "faulty agents",
+        }
+    }
+
     /// Its class in the style.
     pub(super) fn class(self) -> &'static str {
         match self {

@@ -21,6 +21,10 @@ pub(super) const APART: f64 = 152.0;
 const PEAKS: usize = 8;
 /// The width in which cycles are drawn as one, in pixels.
 const COLUMN: f64 = 2.0;
+/// The whole latency \[%\].
+const LATENCY: f64 = 100.0;
+/// Where cycles are drawn that took longer \[%\]: it only matters that they did.
+const BEYOND: f64 = 110.0;
 /// The size of what is written at peaks.
 const TEXT: f64 = 12.0;
 
@@ -48,7 +52,7 @@ pub(super) fn strips(agent: &AgentHistory, along: &Along) -> Vec<Strip> {
     let mut strips = vec![Strip {
         label: "cost of a cycle [% of the latency]".to_owned(),
         series: 0,
-        value: |cycle, latency_ns| percent(cycle.cost_ns, latency_ns),
+        value: |cycle, latency_ns| percent(cycle.cost_ns, latency_ns).min(BEYOND),
         names_peaks: true,
         is_level: false,
     }];
@@ -159,6 +163,12 @@ impl Strip {
         };
         html! {
             (frame.draw())
+            @if self.names_peaks && scale.high() > LATENCY {
+                @let y = area.y(scale.place(LATENCY));
+                path class="latency" d=(path([(area.left, y), (area.x(1.0), y)])) {
+                    title { "the latency" }
+                }
+            }
             g class={ "s" (self.series) } {
                 path class="cost" d=(line(|column| column.most)) { title { (self.label) } }
                 @if self.is_thinned(&columns) {
@@ -206,17 +216,21 @@ fn two_lines(series: usize, right: f64, y: f64) -> Markup {
 /// The dearest cycles that something can be said of, with what it is: no name over another.
 fn peaks(agent: &AgentHistory, along: &Along, area: &Area, scale: &Scale) -> Markup {
     let caused = seen(agent, along).filter_map(|(time_ns, cycle)| {
-        let cause = agent.cause(*time_ns, cycle);
-        (cause != Cause::None).then_some((*time_ns, cycle, cause))
+        let text = match agent.cause(*time_ns, cycle) {
+            _ if cycle.cost_ns >= agent.latency_ns => "beyond the latency",
+            Cause::None => return None,
+            cause => cause.name(),
+        };
+        Some((*time_ns, cycle, text))
     });
-    let mut caused: Vec<(u64, &AgentCycle, Cause)> = caused.collect();
+    let mut caused: Vec<(u64, &AgentCycle, &str)> = caused.collect();
     caused.sort_by_key(|(time_ns, cycle, _)| (std::cmp::Reverse(cycle.cost_ns), *time_ns));
     let mut named: Vec<([f64; 2], Markup)> = Vec::new();
-    for (time_ns, cycle, cause) in caused {
+    for (time_ns, cycle, text) in caused {
         if named.len() == PEAKS {
             break;
         }
-        let (x, text) = (along.x(time_ns), cause.name());
+        let x = along.x(time_ns);
         let half = 0.5 * text_width(text, TEXT);
         let middle = x.clamp(area.left + half, area.x(1.0) - half);
         let span = [middle - half - 4.0, middle + half + 4.0];
@@ -227,7 +241,7 @@ fn peaks(agent: &AgentHistory, along: &Along, area: &Area, scale: &Scale) -> Mar
             continue;
         }
         let share = percent(cycle.cost_ns, agent.latency_ns);
-        let y = area.y(scale.place(share));
+        let y = area.y(scale.place(share.min(BEYOND)));
         let says = format!(
             "{text} at {}: {} operations, {} % of the latency",
             clock(time_ns),

@@ -2,6 +2,7 @@
 //! was an alarm or a fault; below, what its cycles cost.
 
 use farside_actors::figure::Figure;
+use farside_actors::figure::numbers::plain;
 use farside_actors::figure::scale::{Scale, Tick, text_width};
 use farside_actors::figure::svg::{Px, over_lines, path};
 use maud::{Markup, html};
@@ -113,11 +114,14 @@ fn says(agent: &AgentHistory, marks: &[&Mark], along: &Along) -> String {
         (count + 1, cost_ns + cycle.cost_ns)
     });
     let share = 100.0 * cost_ns as f64 / (count * agent.latency_ns).max(1) as f64;
-    let mut parts = vec![format!("{count} cycles, busy {share:.1} % of the time")];
+    let mut parts = vec![format!(
+        "{count} cycles, busy {} % of the time",
+        plain(share)
+    )];
     for kind in MarkKind::ALL {
         match marks.iter().filter(|mark| mark.kind == kind).count() {
             0 => {}
-            of => parts.push(format!("{}: {of}", kind.name())),
+            of => parts.push(format!("{}: {of}", kind.plural())),
         }
     }
     format!("{}.", parts.join("; "))

@@ -255,8 +255,8 @@ fn what_cannot_be_drawn_is_an_error_that_says_why() {
 }
 
 #[test]
-fn a_goal_that_is_given_up_and_an_agent_that_is_faulty_are_marked() {
-    // A processor so slow that the system agent is faulty while it drives, and no goal is reached.
+fn an_agent_that_is_faulty_and_the_stop_that_follows_are_marked() {
+    // A processor so slow that the system agent is faulty while the rover drives.
     let mut scenario: toml::Table = toml::from_str(K9).expect("it is TOML");
     scenario["until"] = "30min".into();
     let degrade = "processors = \"system/planner\"\nat = \"30s\"\nslowdown = 1000.0";
@@ -271,9 +271,37 @@ fn a_goal_that_is_given_up_and_an_agent_that_is_faulty_are_marked() {
     keep("timelines-faulty.svg", &svg);
     assert_eq!(count(&svg, "class=\"mark-line faulty\" d=\"M") - 1, 1);
     assert!(count(&svg, "class=\"mark-line stopped\" d=\"M") > 1);
+    assert!(svg.contains(">beyond the latency</text>"));
     let svg = drawn(&text, &tape, "map", &PictureRequest::default()).unwrap();
     keep("map-faulty.svg", &svg);
     assert_eq!(count(&svg, "class=\"goal done\""), 0);
+}
+
+#[test]
+fn goals_that_are_given_up_are_marked() {
+    // Two of the six goals need a camera that is out of order.
+    let broken =
+        "[[rover.fault]]\nat = \"1s\"\nkind = \"instrument-fails\"\npart = \"hawk_eye\"\n\n";
+    let text = K9
+        .replace(
+            "[mission]",
+            &format!("{broken}[deliberation]\nattempts = 1\n\n[mission]"),
+        )
+        .replace("name = \"wall\"", "name = \"w<a&ll\"");
+    let (tape, drawings, _) = taped(&text);
+    let svg = drawn(&text, &tape, "timelines", &PictureRequest::default()).unwrap();
+    keep("timelines-given-up.svg", &svg);
+    assert_eq!(count(&svg, "class=\"mark-line given-up\" d=\"M") - 1, 2);
+    let svg = drawn(&text, &tape, "map", &PictureRequest::default()).unwrap();
+    keep("map-given-up.svg", &svg);
+    assert_eq!(count(&svg, "class=\"goal done\""), 8);
+    assert_eq!(count(&svg, "class=\"goal given-up\""), 4);
+    assert!(svg.contains("w&lt;a&amp;ll: given up at") && !svg.contains("w<a"));
+    let told = |drawing: &Drawing| match drawing {
+        Drawing::Text { message, .. } => message == "w<a&ll is given up",
+        _ => false,
+    };
+    assert_eq!(drawings.iter().filter(|drawing| told(drawing)).count(), 1);
 }
 
 #[test]
