@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// Each member, the crates of this workspace it may depend on, and those of others that nobody but
 /// who lists them may depend on.
-const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
+const MAY_KNOW: [(&str, &[&str], &[&str]); 11] = [
     ("farside", &[], &["kameo", "tokio"]),
     ("farside-worlds", &["farside"], &[]),
     ("farside-logs", &["farside"], &["mcap"]),
@@ -21,6 +21,16 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
             "farside-worlds",
             "farside-logs",
             "farside-actors",
+        ],
+        &[],
+    ),
+    (
+        "farside-idea",
+        &[
+            "farside",
+            "farside-worlds",
+            "farside-actors",
+            "farside-planning",
         ],
         &[],
     ),
@@ -48,6 +58,7 @@ const MAY_KNOW: [(&str, &[&str], &[&str]); 10] = [
             "farside-worlds",
             "farside-logs",
             "farside-actors",
+            "farside-idea",
             "farside-misus",
             "farside-network",
             "farside-planning",
@@ -245,7 +256,7 @@ fn misplaced_names(path: &str, source: &str) -> Vec<String> {
         "mcap" => path.starts_with("logs/") || path.starts_with("fuzz/"),
         // Who reads scenarios, runs studies and writes reports knows no system; no system knows
         // another. Manifests say the latter; a system may name itself in its own docs.
-        "farside_misus" | "farside_network" | "farside_traffic" => {
+        "farside_idea" | "farside_misus" | "farside_network" | "farside_traffic" => {
             !path.starts_with("experiments/src/") || path == "experiments/src/registry.rs"
         }
         _ => true,
@@ -254,6 +265,7 @@ fn misplaced_names(path: &str, source: &str) -> Vec<String> {
         "kameo",
         "tokio",
         "mcap",
+        "farside_idea",
         "farside_misus",
         "farside_network",
         "farside_traffic",

@@ -12,11 +12,12 @@ use self::source::{Import, declares, imports_of, paths_of, test_modules, without
 use super::{code_of, root, sources};
 
 /// The folders of the crates whose files are checked.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 11] = [
     "src",
     "worlds/src",
     "logs/src",
     "actors/src",
+    "actors/idea/src",
     "actors/misus/src",
     "actors/network/src",
     "actors/planning/src",

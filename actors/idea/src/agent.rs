@@ -8,13 +8,13 @@
 
 mod saying;
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use farside::prelude::*;
 use farside_actors::processor::{Processor, ProcessorChange};
 use serde::{Deserialize, Serialize};
 
-use crate::deliberator::Deliberator;
+use crate::deliberator::SharedDeliberator;
 use crate::records::{AgentCycle, AgentFaulty, AgentRemark, GoalGivenUp};
 use crate::register::{AgentOffline, Controlled, RegisterAck, RegisterLoad, RegisterStatus};
 use crate::runner::{
@@ -27,8 +27,8 @@ use saying::Saying;
 pub struct Mind {
     /// What it plans with.
     pub service: Box<dyn PlanService>,
-    /// Who plans further ahead, if somebody does.
-    pub deliberator: Option<Box<dyn Deliberator>>,
+    /// Who plans further ahead, if somebody does. The one of the first life is that of all others.
+    pub deliberator: Option<SharedDeliberator>,
 }
 
 /// An agent that is to be.
@@ -86,6 +86,7 @@ struct Peer {
 struct Memory {
     lives: u32,
     registers: Vec<Controlled>,
+    deliberator: Option<SharedDeliberator>,
 }
 
 /// Timer: the clock ticks.
@@ -119,42 +120,38 @@ impl Agent {
         }
     }
 
-    /// A new plan runner.
-    fn runner(&mut self, epoch: u32, now: SimTime) -> Result<(), RunnerError> {
-        let Mind {
-            service,
-            deliberator,
-        } = (self.setup.mind)();
-        let (settings, registers) = (self.setup.runner, &self.setup.registers);
-        let runner = Runner::new(settings, service, registers, epoch, now)?;
-        self.saying = Saying::new(runner.model(), &self.setup.registers);
-        self.runner = Some(match deliberator {
-            Some(deliberator) => runner.with_deliberator(deliberator),
-            None => runner,
-        });
-        Ok(())
-    }
-
     /// Begins a life: the registers say their defaults from the next tick on.
     fn begin(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         let mut memory = std::mem::take(ctx.durable::<Memory>());
         memory.lives += 1;
         self.overdue = None;
         self.leaving.clear();
-        let begun = self.runner(memory.lives, ctx.now());
-        begun.map_err(|error| HandlerError::new(error.to_string()))?;
-        let Some(runner) = &self.runner else {
-            return Ok(());
-        };
+        let now = ctx.now();
+        let mind = (self.setup.mind)();
+        let (settings, registers) = (self.setup.runner, &self.setup.registers);
+        let runner = Runner::new(settings, mind.service, registers, memory.lives, now);
+        let mut runner = runner.map_err(|error| HandlerError::new(error.to_string()))?;
+        match &memory.deliberator {
+            Some(known) => known
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .restarted(),
+            None => memory.deliberator = mind.deliberator,
+        }
+        if let Some(deliberator) = &memory.deliberator {
+            runner = runner.with_deliberator(deliberator.clone());
+        }
         if memory.registers.is_empty() {
             memory.registers = runner.memory();
         } else {
-            let out = runner.restarted(&mut memory.registers, ctx.now());
+            let out = runner.restarted(&mut memory.registers, now);
             self.send(ctx, out);
         }
         *ctx.durable::<Memory>() = memory;
+        self.saying = Saying::new(runner.model(), registers);
+        self.runner = Some(runner);
         let latency_ns = self.setup.runner.latency.as_nanos();
-        let tick = ctx.now().as_nanos().div_ceil(latency_ns);
+        let tick = now.as_nanos().div_ceil(latency_ns);
         self.set_clock(ctx, tick);
         Ok(())
     }

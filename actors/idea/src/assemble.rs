@@ -8,12 +8,15 @@ use std::sync::{Arc, Mutex};
 
 use farside::{Address, HostId, SimDuration, Simulation};
 use farside_actors::field::Place;
+use farside_actors::link::LinkParams;
 use farside_actors::processor::Processor;
 use farside_actors::rover::{
     RoverConfig, RoverError, RoverSpec, RoverStart, add_hardware, hardware_name,
 };
 use farside_actors::system::SetupError;
-use farside_actors::wiring::{Wire, Wiring};
+use farside_actors::wiring::{Links, Wire, Wiring};
+use farside_planning::Ticks;
+use farside_planning::model::{Bound, Model, PredicateId, Timeline};
 use nalgebra::Point3;
 
 use crate::agent::{Agent, AgentSetup};
@@ -24,7 +27,7 @@ use crate::register::Backoff;
 use crate::relay::{RelayActor, RelaySetup, RelayTable};
 use crate::runner::{RegisterSetup, RunnerSettings, Side};
 pub(crate) use goals::{GoalPlace, Goals, goals};
-pub(crate) use minds::{Minds, Role};
+pub(crate) use minds::{Minds, Role, text_file};
 
 /// The name of the processor that agents plan on, on their hosts.
 const PROCESSOR: &str = "planner";
@@ -130,8 +133,8 @@ impl Parts<'_> {
 
     fn config(&self, role: Role) -> &AgentConfig {
         match role {
-            Role::System => &self.scenario.system,
-            Role::Mission | Role::Between => &self.scenario.mission,
+            Role::System => &self.scenario.system_agent,
+            Role::Mission | Role::Between => &self.scenario.mission_agent,
         }
     }
 
@@ -255,6 +258,7 @@ pub(crate) fn assemble(
     }
     wiring.terrain(Arc::new(parts.place.field.terrain().clone()));
     let links = wire(sim, &wiring)?;
+    check_polls(parts, &links, &all)?;
     let mut watched = Watched {
         agents: Vec::new(),
         rovers: Vec::new(),
@@ -305,10 +309,63 @@ pub(crate) fn assemble(
     Ok(Team { watched, tally })
 }
 
+/// Whether polls can be answered in time: the way to the relay and back, at its least, has to be shorter
+/// than the longest that a poll lasts.
+fn check_polls(parts: &Parts<'_>, links: &Links, names: &[Names]) -> Result<(), SetupError> {
+    let model = parts.minds.model(Role::System);
+    let latency = parts.scenario.system_agent.latency;
+    let is_polled = |timeline: &&Timeline| POLLED.contains(&timeline.name.as_str());
+    for timeline in model.timelines.iter().filter(is_polled) {
+        let predicates = timeline.predicates.iter();
+        let polls = predicates.filter(|at| has_outputs(model, **at));
+        let longest = polls.filter_map(|at| longest_ticks(model, *at)).min();
+        let Some(ticks) = longest.and_then(|ticks| u64::try_from(ticks).ok()) else {
+            continue;
+        };
+        let lasts = latency * ticks;
+        for names in names {
+            let agent = &names.agents[names.agents.len() - 1];
+            let ways = [(agent, &names.rover), (&names.rover, agent)];
+            let least = ways.map(|(from, to)| links.nominal(from, to).map(LinkParams::min_delay));
+            let least = least
+                .into_iter()
+                .flatten()
+                .fold(SimDuration::ZERO, |sum, one| sum + one);
+            if least >= lasts {
+                let message = format!(
+                    "{least} to {} and back, at least: no poll of {} could be answered, since it lasts \
+                     {lasts} at most",
+                    names.rover, timeline.name
+                );
+                return Err(SetupError::value("links", message));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn has_outputs(model: &Model, predicate: PredicateId) -> bool {
+    let predicate = &model.predicates[predicate];
+    predicate.inputs < predicate.parameters.len()
+}
+
+/// How long a token of a predicate lasts at most \[ticks\], as far as its rules say it as a number.
+fn longest_ticks(model: &Model, predicate: PredicateId) -> Option<Ticks> {
+    let rules = model
+        .rules
+        .iter()
+        .filter(|rule| rule.master.predicate == predicate);
+    let most = rules.filter_map(|rule| match rule.duration {
+        Some([_, Bound::Value(most)]) => Some(most),
+        _ => None,
+    });
+    most.min()
+}
+
 /// How long a bin of the series is: some hundreds of them in a run, and of whole seconds.
 fn bin(parts: &Parts<'_>) -> SimDuration {
     const BINS: u64 = 240;
-    let latency = parts.scenario.system.latency;
+    let latency = parts.scenario.system_agent.latency;
     let wanted_s = (parts.until.as_nanos() / BINS)
         .div_ceil(1_000_000_000)
         .max(1);
@@ -339,6 +396,8 @@ fn add_rover(
     let text = parts.table.as_deref().unwrap_or(TABLE);
     let table = RelayTable::new(text, model, &COMMANDED);
     let table = table.map_err(|error| SetupError::value("relay.table", error))?;
+    let fits = table.check_rover(&parts.scenario.rover);
+    fits.map_err(|error| SetupError::value("relay.table", error))?;
     let setup = Arc::new(RelaySetup {
         table: Arc::new(table),
         registers: COMMANDED.iter().map(|name| (*name).into()).collect(),

@@ -1,4 +1,4 @@
-//! What a scenario says of agents and goals: `[agents]`, `[mission]`, `[system]`, `[deliberation]`, `[relay]`,
+//! What a scenario says of agents and goals: `[agents]`, `[mission_agent]`, `[system_agent]`, `[deliberation]`, `[relay]`,
 //! `[goals]` and `[[goal]]`. The ground is `[world]`, as [`farside_actors::field`] declares it; the hardware is
 //! `[rover]`, as [`farside_actors::rover`] does.
 
@@ -49,7 +49,7 @@ pub enum Technology {
 }
 
 settings! {
-    /// An agent: `[mission]`, `[system]`.
+    /// An agent: `[mission_agent]`, `[system_agent]`.
     pub struct AgentConfig {
         /// Its model: one that is built in, or a file; the K9's of its place unless given.
         pub model: Option<String> [skip_serializing_if = "Option::is_none"];
@@ -160,8 +160,8 @@ pub(crate) struct IdeaScenario {
     pub(crate) world: FieldConfig,
     pub(crate) rover: RoverConfig,
     pub(crate) agents: AgentsConfig,
-    pub(crate) mission: AgentConfig,
-    pub(crate) system: AgentConfig,
+    pub(crate) mission_agent: AgentConfig,
+    pub(crate) system_agent: AgentConfig,
     pub(crate) deliberation: DeliberationConfig,
     pub(crate) relay: RelayConfig,
     pub(crate) goals: GoalsConfig,

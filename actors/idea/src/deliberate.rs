@@ -4,9 +4,10 @@
 //!
 //! Goals are ordered with the model `k9-ordering.ddl`: what is best has all goals that must be done, if
 //! the horizon and the battery allow that, else as many of them as can be; then the most weight; then
-//! the most goals; then the soonest end. For few goals that is proven: of each selection the shortest
-//! drives are known, and the complete planner plans the best one. Beyond, it is what the planner by
-//! repair finds. Both are bounded by operations and give the same for the same input.
+//! the most goals; then the soonest end. For few goals that is proven: the shortest drives through each
+//! selection are known. Beyond, goals are inserted one by one, and the order is repaired. The complete
+//! planner plans what was chosen, and says when each goal is done. All is bounded by operations and
+//! gives the same for the same input.
 //!
 //! After a goal that was done comes the next one; after one that was not, the best order of the others
 //! from where the rover was before it.
@@ -36,6 +37,9 @@ use farside_planning::search::schedule::LoadError;
 use thiserror::Error;
 
 pub use branches::{Deliberated, deliberate};
+
+/// For more goals than these no best order is looked for: it would take too much memory.
+const MOST_FEW: usize = 14;
 
 /// A goal and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +86,7 @@ pub struct Settings {
     pub reserve: Value,
     /// How long all may take \[ticks\].
     pub horizon: Ticks,
-    /// Up to so many goals the best order is proven.
+    /// Up to so many goals the best order is proven; at most 14.
     pub few: usize,
     /// How many operations deliberation may take.
     pub operations: u64,
@@ -97,8 +101,8 @@ impl Default for Settings {
             image_energy: 200,
             reserve: 20_000,
             horizon: 20_000,
-            few: 6,
-            operations: 20_000_000,
+            few: 10,
+            operations: 5_000_000,
         }
     }
 }
@@ -175,17 +179,30 @@ pub fn order(
             return Err(DeliberationError::Twice { number });
         }
     }
-    if targets.is_empty() {
-        let proven = true;
-        return Ok(Ordering {
-            proven,
-            ..Ordering::default()
-        });
-    }
-    if targets.len() <= settings.few {
+    let chosen = chosen(targets, begin, settings);
+    let (visits, operations) = selections::planned(&chosen, targets, begin, settings)?;
+    let missing = (0..targets.len()).filter(|target| !chosen.order.contains(target));
+    let left_out = missing.map(|target| {
+        let reason = match selections::fits(&[target], targets, begin, settings) {
+            false => "the horizon and the battery do not allow it, even alone",
+            true => "the horizon and the battery do not allow it with what is worth more",
+        };
+        let reason = reason.to_owned();
+        LeftOut { target, reason }
+    });
+    Ok(Ordering {
+        visits,
+        left_out: left_out.collect(),
+        proven: chosen.proven,
+        operations: chosen.operations + operations,
+    })
+}
+
+fn chosen(targets: &[Target], begin: &Begin, settings: &Settings) -> selections::Chosen {
+    if targets.len() <= settings.few.min(MOST_FEW) {
         selections::best(targets, begin, settings)
     } else {
-        selections::repaired(targets, begin, settings)
+        selections::good(targets, begin, settings)
     }
 }
 

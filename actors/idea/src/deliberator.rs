@@ -2,9 +2,14 @@
 //! timeline start and stop (section 2 of the IDEA paper: "controlled by the plan runner through goal
 //! registers").
 
+use std::sync::{Arc, Mutex};
+
 use farside_planning::model::{TimelineId, Value};
 
 use crate::service::{Ended, Plan, Snapshot, Started};
+
+/// A deliberative planner that outlives the lives of its agent: what it knows is durable.
+pub type SharedDeliberator = Arc<Mutex<dyn Deliberator>>;
 
 /// A deliberative planner.
 pub trait Deliberator: Send {
@@ -16,6 +21,13 @@ pub trait Deliberator: Send {
 
     /// A token of any timeline has ended.
     fn ended(&mut self, token: &Ended);
+
+    /// The agent has begun a new life: its timelines say nothing of the one before.
+    fn restarted(&mut self) {}
+
+    /// How a contract of a timeline ended that a former life had loaded: its first output, by name;
+    /// none if the other side could not go on with it.
+    fn late(&mut self, _timeline: TimelineId, _status: Option<&str>) {}
 
     /// The goals that it has given up since it was last asked.
     fn gives_up(&mut self) -> Vec<GivenUp> {

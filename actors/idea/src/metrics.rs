@@ -55,6 +55,9 @@ farside_actors::documented! {
         pub database_tokens: u32,
         /// The longest that a cycle took of its latency.
         pub max_cycle_lambda: f64,
+        /// The most that a cycle took \[operations\]: divided by a processor's operations a second it is
+        /// the least latency that would do.
+        pub max_cycle_operations: u64,
         /// What reactive cycles took, over all agents and cycles \[operations\].
         pub operations: u64,
         /// What deliberation took \[operations\].
@@ -128,6 +131,12 @@ fn figures(watched: &Watched, tally: &mut Tally, end: SimTime) -> IdeaMetrics {
         stale_statuses: sum(|one| one.stale),
         database_tokens: tally.agents.iter().map(|one| one.tokens).max().unwrap_or(0),
         max_cycle_lambda: most(&|one, latency| one.max_cost_ns as f64 / latency),
+        max_cycle_operations: tally
+            .agents
+            .iter()
+            .map(|one| one.max_operations)
+            .max()
+            .unwrap_or(0),
         operations: sum(|one| one.operations),
         deliberation_operations: sum(|one| one.deliberation),
         busy_share: most(&|one, latency| one.busy_ns as f64 / (latency * one.cycles.max(1) as f64)),
@@ -160,6 +169,7 @@ fn with_series(results: Results, load: &Load) -> Results {
             series(|bin| bin.busy_ns as f64 / bin.span_ns as f64),
         )
         .metric("cycle_by_time", series(|bin| bin.longest_ns as f64 / 1e9))
+        .metric("operations_by_time", series(|bin| bin.most as f64))
         .metric("tokens_by_time", series(|bin| f64::from(bin.tokens)))
 }
 

@@ -32,6 +32,11 @@ pub struct MissionPlanner {
     /// How many plans there were.
     plans: Value,
     given_up: Vec<GivenUp>,
+    /// The inputs of the goal that is being done.
+    doing: Option<Vec<Value>>,
+    /// Those of a goal that was being done when the agent's former life ended, until it is known what
+    /// came of it.
+    unresolved: Option<Vec<Value>>,
     /// Whether what is left of the plan is not wanted any more.
     drops: bool,
 }
@@ -50,6 +55,8 @@ impl MissionPlanner {
             at_dm,
             plans: 0,
             given_up: Vec::new(),
+            doing: None,
+            unresolved: None,
             drops: false,
         }
     }
@@ -139,7 +146,9 @@ impl Deliberator for MissionPlanner {
     fn begun(&mut self, token: &Started) {
         let predicates = &self.mission.predicates;
         let count = self.mission.model.predicates[token.predicate].inputs;
-        if token.predicate == predicates.request {
+        if token.predicate == predicates.image_at {
+            self.doing = Some(inputs(&token.parameters, count));
+        } else if token.predicate == predicates.request {
             self.asked(&inputs(&token.parameters, count));
         } else if token.predicate == predicates.recall {
             let number = token.parameters.first().copied().flatten();
@@ -155,7 +164,25 @@ impl Deliberator for MissionPlanner {
         if token.predicate == self.mission.predicates.image_at {
             let count = self.mission.model.predicates[token.predicate].inputs;
             let status = token.parameters.get(count).copied().flatten();
+            self.doing = None;
             self.goal_ended(&inputs(&token.parameters, count), status);
+        }
+    }
+
+    fn restarted(&mut self) {
+        self.unresolved = self.doing.take().or(self.unresolved.take());
+    }
+
+    fn late(&mut self, timeline: TimelineId, status: Option<&str>) {
+        if timeline != self.mission.timelines.goal {
+            return;
+        }
+        if let Some(inputs) = self.unresolved.take() {
+            let symbols = &self.mission.model.symbols;
+            let at = symbols
+                .iter()
+                .position(|name| Some(name.as_str()) == status);
+            self.goal_ended(&inputs, at.map(|at| at as Value));
         }
     }
 
@@ -172,6 +199,16 @@ impl Deliberator for MissionPlanner {
             return None;
         }
         let goal = self.mission.timelines.goal;
+        if self.unresolved.is_some() {
+            // What came of the last goal the other side will say: then all is planned anew.
+            return Some(Work {
+                operations: 1,
+                outputs: vec![Some(self.mission.planned.stale), None],
+                plan: None,
+                reads: Vec::new(),
+                remarks: Vec::new(),
+            });
+        }
         let [h0, ..] = inputs(&token.parameters, 2)[..] else {
             return None;
         };

@@ -24,8 +24,8 @@ use farside_planning::language::{Options, read_model};
 use farside_planning::model::Model;
 
 pub use handles::{
-    Mission, MissionPredicates, MissionTimelines, Planned, Statuses, System, SystemPredicates,
-    SystemTimelines,
+    Mission, MissionPredicates, MissionTimelines, PlannedStatuses, Statuses, System,
+    SystemPredicates, SystemTimelines,
 };
 
 /// The text of the system agent's model.

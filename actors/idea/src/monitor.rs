@@ -80,6 +80,7 @@ pub(crate) struct AgentTally {
     pub(crate) tokens: u32,
     pub(crate) max_response_ns: u64,
     pub(crate) max_cost_ns: u64,
+    pub(crate) max_operations: u64,
     pub(crate) busy_ns: u64,
     pub(crate) faulty: u32,
     pub(crate) alarms: u32,
@@ -223,6 +224,7 @@ impl AgentTally {
         self.deliberation += cycle.deliberation;
         self.tokens = self.tokens.max(cycle.tokens);
         self.max_response_ns = self.max_response_ns.max(cycle.response_ns);
+        self.max_operations = self.max_operations.max(cycle.operations);
         self.max_cost_ns = self.max_cost_ns.max(cycle.cost_ns);
         self.busy_ns += cycle.cost_ns.min(watched.latency.as_nanos());
         self.load.cycle(cycle, at, watched.latency);

@@ -154,8 +154,8 @@ fn cast(
             let role = Role::of(layer, layers);
             let is_system = role == Role::System;
             let config = match role {
-                Role::System => &scenario.system,
-                Role::Mission | Role::Between => &scenario.mission,
+                Role::System => &scenario.system_agent,
+                Role::Mission | Role::Between => &scenario.mission_agent,
             };
             let latency_ns = config.latency.as_nanos();
             let mut agent = AgentHistory::new(name, rover, latency_ns, is_system);

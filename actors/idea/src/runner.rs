@@ -23,7 +23,7 @@ use farside_planning::Ticks;
 use farside_planning::model::{Model, TimelineId};
 use thiserror::Error;
 
-use crate::deliberator::{Deliberator, GivenUp};
+use crate::deliberator::{GivenUp, SharedDeliberator};
 use crate::register::{
     AgentOffline, Backoff, Controlled, RegisterAck, RegisterLoad, RegisterStatus,
 };
@@ -245,7 +245,7 @@ impl Runner {
 
     /// With a deliberative planner beside the cycles.
     #[must_use]
-    pub fn with_deliberator(mut self, deliberator: Box<dyn Deliberator>) -> Self {
+    pub fn with_deliberator(mut self, deliberator: SharedDeliberator) -> Self {
         self.deliberation = Some(Deliberation::new(deliberator));
         self
     }
@@ -305,7 +305,7 @@ impl Runner {
             .advance(Ticks::try_from(tick).unwrap_or(Ticks::MAX));
         self.finish_deliberation(&mut cycle);
         for (at, peer, arrival) in self.read(now) {
-            if self.post(peer, arrival, memory, &mut cycle) {
+            if self.post(peer, arrival, memory, now, &mut cycle) {
                 news = news.or(Some(at));
             }
         }
@@ -355,6 +355,7 @@ impl Runner {
         peer: usize,
         arrival: Arrival,
         memory: &mut [Controlled],
+        now: SimTime,
         cycle: &mut Cycle,
     ) -> bool {
         match arrival {
@@ -370,7 +371,7 @@ impl Runner {
                 false
             }
             Arrival::Status(status) => self.post_status(peer, &status, cycle),
-            Arrival::Load(load) => self.take(peer, load, memory, cycle),
+            Arrival::Load(load) => self.take(peer, load, memory, now, cycle),
             Arrival::Offline(offline) => {
                 let why = format!("is off-line: {}", offline.reason);
                 self.fault_peer(peer, &why, cycle);
@@ -430,7 +431,7 @@ impl Runner {
             }
         }
         for (one, controlled) in self.incoming.iter().zip(memory) {
-            if let Some((status, before)) = controlled.repeat(now) {
+            while let Some((status, before)) = controlled.repeat(now) {
                 cycle.out.push(Out::Status(one.setup.peer, status, before));
             }
         }

@@ -10,6 +10,7 @@
 
 mod check;
 pub mod compiled;
+pub mod legal;
 pub mod propositional;
 pub mod temporal;
 #[cfg(test)]

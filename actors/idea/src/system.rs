@@ -1,4 +1,4 @@
-//! IDEA as scenarios see it: `[world]`, `[rover]`, `[agents]`, `[mission]`, `[system]`, `[deliberation]`,
+//! IDEA as scenarios see it: `[world]`, `[rover]`, `[agents]`, `[mission_agent]`, `[system_agent]`, `[deliberation]`,
 //! `[relay]`, `[goals]` and `[[goal]]`.
 
 use std::sync::PoisonError;
@@ -14,7 +14,7 @@ use farside_actors::system::{
 };
 use serde::Deserialize;
 
-use crate::assemble::{Minds, Parts, assemble, goals, names};
+use crate::assemble::{Minds, Parts, assemble, goals, names, text_file};
 use crate::config::{
     AgentConfig, AgentsConfig, DeliberationConfig, GoalConfig, GoalsConfig, IdeaScenario,
     RelayConfig,
@@ -40,8 +40,8 @@ impl System for IdeaSystem {
             FieldConfig::sections("world"),
             RoverConfig::sections("rover"),
             AgentsConfig::sections("agents"),
-            AgentConfig::sections("mission"),
-            AgentConfig::sections("system"),
+            AgentConfig::sections("mission_agent"),
+            AgentConfig::sections("system_agent"),
             DeliberationConfig::sections("deliberation"),
             RelayConfig::sections("relay"),
             GoalsConfig::sections("goals"),
@@ -87,8 +87,8 @@ impl Settings for IdeaScenario {
         let rovers: Vec<&str> = names.iter().map(|names| names.rover.as_str()).collect();
         self.rover.check_rovers("rover", &rovers)?;
         self.agents.check("agents")?;
-        self.mission.check("mission")?;
-        self.system.check("system")?;
+        self.mission_agent.check("mission_agent")?;
+        self.system_agent.check("system_agent")?;
         self.deliberation.check("deliberation")?;
         self.relay.check("relay")?;
         self.goals.check("goals")?;
@@ -107,11 +107,15 @@ impl Settings for IdeaScenario {
         let minds = Minds::read(self, setup)?;
         let goals = goals(self, &names(self), setup.problem_seed)?;
         let scene = IdeaScene::new(place.field.clone(), names(self), &goals);
+        let table = match &self.relay.table {
+            None => None,
+            Some(name) => Some(text_file(setup, name, "relay.table")?),
+        };
         let parts = Parts {
             scenario: self,
             place: &place,
             minds,
-            table: None,
+            table,
             goals,
             seed: setup.run_seed,
             until,
@@ -127,6 +131,7 @@ impl Settings for IdeaScenario {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)
         }))
     }
+
     fn draw(
         &self,
         picture: &str,

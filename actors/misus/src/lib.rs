@@ -4,10 +4,14 @@
 //! After T. Estlin, D. Gaines, F. Fisher and R. Castano, "Coordinating Multiple Rovers with
 //! Interdependent Science Objectives", AAMAS 2005. Built so far: its environment (section 2), as
 //! rock fields of [`farside_worlds`] and rover hardware of [`farside_actors::rover`], and its data
-//! [`analysis`], which runs distributed over the rovers. Tours are fixed; planners follow.
+//! [`analysis`], which runs distributed over the rovers. Tours are fixed; [`planner`] has the planners of
+//! sections 3 and 4, which no actor uses yet.
 //!
 //! On each rover there are two actors: the hardware, and the scientist, who sends the rover from rock
 //! to rock, exchanges what is read with the other scientists, and learns from all of it.
+//!
+//! How goals are shared over bad links ([`shac`], its section 3.2) is there by itself, with actors
+//! ([`sharing`]) that planners are to be put into.
 
 pub mod analysis;
 mod assemble;
@@ -18,9 +22,12 @@ mod messages;
 mod metrics;
 mod monitor;
 mod picture;
+pub mod planner;
 mod scenario;
 mod scene;
 mod scientist;
+pub mod shac;
+pub mod sharing;
 mod site;
 mod system;
 mod tools;

@@ -51,30 +51,47 @@ impl Objective {
     /// With no goal achieved. Mandatory goals are worth nothing of themselves; a goal that a
     /// combination names twice counts once.
     pub fn new(problem: &Problem) -> Self {
-        let mut of_goal = vec![Vec::new(); problem.goals.len()];
-        let mut combinations = Vec::with_capacity(problem.combinations.len());
-        for (place, combination) in (0..).zip(&problem.combinations) {
+        let weights = problem.goals.iter().map(|goal| goal.weight.unwrap_or(0.0));
+        let combinations = problem.combinations.iter();
+        Objective::of(
+            weights.collect(),
+            combinations.map(|combination| (combination.goals.as_slice(), combination.weight)),
+        )
+    }
+
+    /// With no goal achieved, of goals with these weights and of combinations of them, each with its
+    /// own weight: for whoever has no [`Problem`]. A goal that a combination names twice counts once.
+    ///
+    /// ```
+    /// use farside_planning::objective::Objective;
+    /// let mut objective = Objective::of(vec![12.0, 5.0], [([0, 1].as_slice(), -30.0)]);
+    /// objective.set(0, true);
+    /// assert_eq!(objective.gain(1), -25.0);
+    /// ```
+    ///
+    /// # Panics
+    /// When a combination names a goal that has no weight: a bug in the caller.
+    pub fn of<'a>(
+        weights: Vec<f64>,
+        combinations: impl IntoIterator<Item = (&'a [GoalId], f64)>,
+    ) -> Self {
+        let mut of_goal = vec![Vec::new(); weights.len()];
+        let mut together = Vec::new();
+        for (place, (goals, weight)) in (0..).zip(combinations) {
             let mut missing = 0;
-            for &goal in &combination.goals {
+            for &goal in goals {
                 let of_goal: &mut Vec<u32> = &mut of_goal[goal];
                 if of_goal.last() != Some(&place) {
                     of_goal.push(place);
                     missing += 1;
                 }
             }
-            combinations.push(Together {
-                weight: combination.weight,
-                missing,
-            });
+            together.push(Together { weight, missing });
         }
         Objective {
-            weights: problem
-                .goals
-                .iter()
-                .map(|goal| goal.weight.unwrap_or(0.0))
-                .collect(),
-            achieved: vec![false; problem.goals.len()],
-            combinations,
+            achieved: vec![false; weights.len()],
+            weights,
+            combinations: together,
             of_goal,
         }
     }
@@ -107,6 +124,19 @@ impl Objective {
             }
         }
         gain
+    }
+
+    /// What a goal that is not achieved would bring nearer without completing it: of each combination
+    /// that lacks other goals too, and is worth more than nothing, the weight over how many it lacks.
+    pub fn promise(&self, goal: GoalId) -> f64 {
+        let mut promise = 0.0;
+        for &combination in &self.of_goal[goal] {
+            let combination = &self.combinations[combination as usize];
+            if combination.missing > 1 && combination.weight > 0.0 {
+                promise += combination.weight / f64::from(combination.missing);
+            }
+        }
+        promise
     }
 
     /// What the plan is worth.
@@ -197,5 +227,16 @@ mod tests {
                 prop_assert_eq!(objective.score(), f64::from(sum) / 8.0);
             }
         }
+    }
+
+    #[test]
+    fn a_promise_is_a_part_of_what_is_not_complete_and_worth_something() {
+        let combinations = [([0, 1].as_slice(), 6.0), (&[0, 1, 2], 9.0), (&[0, 2], -4.0)];
+        let mut objective = Objective::of(vec![1.0; 3], combinations);
+        assert_eq!(objective.promise(0), 3.0 + 3.0);
+        objective.set(1, true);
+        assert_eq!((objective.gain(0), objective.promise(0)), (7.0, 4.5));
+        objective.set(2, true);
+        assert_eq!((objective.gain(0), objective.promise(0)), (12.0, 0.0));
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use farside::Pattern;
 use farside::random::RandomKey;
+use farside::suggest::{did_you_mean, nearest};
 use farside_actors::system::SetupError;
 
 use super::{Names, start};
@@ -55,6 +56,12 @@ pub(crate) fn goals(
                 &format!("goal.{index}.recalled"),
                 message,
             ));
+        }
+        if !CAMERAS.contains(&goal.camera.as_str()) {
+            let hint = did_you_mean(nearest(&goal.camera, CAMERAS.into_iter()).as_deref());
+            let known = CAMERAS.join(", ");
+            let message = format!("{:?}: expected one of {known}{hint}", goal.camera);
+            return Err(SetupError::value(&format!("goal.{index}.camera"), message));
         }
         let wrong = |message: String| SetupError::value(&format!("goal.{index}.rover"), message);
         let pattern = Pattern::over_names(&goal.rover).map_err(|error| wrong(error.to_string()))?;

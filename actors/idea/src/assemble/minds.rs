@@ -1,6 +1,6 @@
 //! What agents plan with: models, by their names or from files, and the technology over each.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use farside::SimDuration;
 use farside_actors::system::{Setup, SetupError};
@@ -11,7 +11,7 @@ use super::goals::Goals;
 use crate::agent::Mind;
 use crate::config::{AgentConfig, DeliberationConfig, IdeaScenario, Technology};
 use crate::deliberate::Settings;
-use crate::deliberator::Deliberator;
+use crate::deliberator::SharedDeliberator;
 use crate::mission::MissionPlanner;
 use crate::models::{self, Mission};
 use crate::service::PlanService;
@@ -19,8 +19,8 @@ use crate::service::compiled::Compiled;
 use crate::service::propositional::Propositional;
 use crate::service::temporal::{MergeScan, Propagation, Temporal, TemporalOptions};
 
-/// The longest file of a model \[byte\].
-const MAX_MODEL_BYTES: u64 = 1 << 20;
+/// The longest file of a model or a table \[byte\].
+const MAX_TEXT_BYTES: u64 = 1 << 20;
 
 /// Which agent of a row it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +46,8 @@ impl Role {
     /// The scenario's table.
     pub(crate) fn table(self) -> &'static str {
         match self {
-            Role::Mission | Role::Between => "mission",
-            Role::System => "system",
+            Role::Mission | Role::Between => "mission_agent",
+            Role::System => "system_agent",
         }
     }
 
@@ -74,14 +74,19 @@ impl Minds {
         scenario: &IdeaScenario,
         setup: &mut Setup<'_>,
     ) -> Result<Minds, SetupError> {
-        let mission = model(&scenario.mission, "mission", "k9-mission", setup)?;
-        let system = model(&scenario.system, "system", "k9-system", setup)?;
-        service(&mission, &scenario.mission, "mission")?;
-        service(&system, &scenario.system, "system")?;
+        let mission = model(
+            &scenario.mission_agent,
+            "mission_agent",
+            "k9-mission",
+            setup,
+        )?;
+        let system = model(&scenario.system_agent, "system_agent", "k9-system", setup)?;
+        service(&mission, &scenario.mission_agent, "mission_agent")?;
+        service(&system, &scenario.system_agent, "system_agent")?;
         Ok(Minds {
-            mission: (mission, scenario.mission.clone()),
-            between: (models::forward().clone(), scenario.mission.clone()),
-            system: (system, scenario.system.clone()),
+            mission: (mission, scenario.mission_agent.clone()),
+            between: (models::forward().clone(), scenario.mission_agent.clone()),
+            system: (system, scenario.system_agent.clone()),
             deliberation: scenario.deliberation.clone(),
         })
     }
@@ -106,10 +111,12 @@ impl Minds {
         let (latency, start_dm, table) = (config.latency, goals.start_dm, role.table());
         let mission = (role == Role::Mission).then(|| Mission::of(model.clone()));
         Arc::new(move || {
-            let planner = mission.clone().map(|mission| -> Box<dyn Deliberator> {
+            let planner = mission.clone().map(|mission| -> SharedDeliberator {
                 let settings = settings(&deliberation, latency);
                 let attempts = deliberation.attempts;
-                Box::new(MissionPlanner::new(mission, settings, attempts, start_dm))
+                Arc::new(Mutex::new(MissionPlanner::new(
+                    mission, settings, attempts, start_dm,
+                )))
             });
             Mind {
                 service: service(&model, &config, table).expect("it was checked"),
@@ -153,12 +160,22 @@ fn model(
         let message = format!("{name:?}: expected {known}, or a file called *.ddl{hint}");
         return Err(wrong(message));
     }
-    let bytes = setup.files.read(name, MAX_MODEL_BYTES).map_err(wrong)?;
-    let text = String::from_utf8(bytes.to_vec());
-    let text = text.map_err(|error| wrong(format!("{name}: {error}")))?;
+    let text = text_file(setup, name, &format!("{table}.model"))?;
     let read = read_model(name, &text, &Options::default()).ok();
     let model = read.map_err(|findings| wrong(findings.to_string()))?;
     Ok(Arc::new(model))
+}
+
+/// A text that a key of the scenario names.
+pub(crate) fn text_file(
+    setup: &mut Setup<'_>,
+    name: &str,
+    key: &str,
+) -> Result<String, SetupError> {
+    let wrong = |message: String| SetupError::value(key, message);
+    let bytes = setup.files.read(name, MAX_TEXT_BYTES).map_err(wrong)?;
+    let text = String::from_utf8(bytes);
+    text.map_err(|error| wrong(format!("{name}: {error}")))
 }
 
 /// The technology that a scenario names, over a model.

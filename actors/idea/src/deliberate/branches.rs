@@ -3,7 +3,9 @@
 use farside_planning::Ticks;
 use smallvec::smallvec;
 
-use super::{Begin, DeliberationError, Ordering, Settings, Target, Visit, drive_ticks, order};
+use super::{
+    Begin, DeliberationError, Ordering, Settings, Target, Visit, chosen, drive_ticks, order,
+};
 use crate::models::Mission;
 use crate::service::{Branch, Plan, Step};
 
@@ -37,11 +39,7 @@ pub fn deliberate(
     let count = ordering.visits.len();
     let mut steps: Vec<Step> = Vec::new();
     for visit in &ordering.visits {
-        steps.push(step(
-            mission,
-            &targets[visit.target],
-            if steps.is_empty() { h0 } else { 0 },
-        ));
+        steps.push(step(mission, &targets[visit.target], h0));
     }
     let ok = (image_inputs(mission), mission.statuses.ok);
     for at in 0..count {
@@ -66,13 +64,9 @@ pub fn deliberate(
                 battery: from.battery - spent,
                 ..from
             };
-            let found = order(&left, &begin, &rest)?;
+            let found = chosen(&left, &begin, &rest);
             operations += found.operations;
-            found
-                .visits
-                .iter()
-                .map(|visit| others[visit.target])
-                .collect()
+            found.order.iter().map(|&target| others[target]).collect()
         } else {
             ordering.visits[at + 1..]
                 .iter()
@@ -85,7 +79,7 @@ pub fn deliberate(
         let next = if same && at + 1 < count {
             Some(at + 1)
         } else {
-            chain(mission, targets, &other, &mut steps)
+            chain(mission, targets, &other, h0, &mut steps)
         };
         steps[at]
             .branches
@@ -134,11 +128,12 @@ fn chain(
     mission: &Mission,
     targets: &[Target],
     order: &[usize],
+    h0: Ticks,
     steps: &mut Vec<Step>,
 ) -> Option<usize> {
     let first = steps.len();
     for (place, &target) in order.iter().enumerate() {
-        let mut one = step(mission, &targets[target], 0);
+        let mut one = step(mission, &targets[target], h0);
         if place + 1 < order.len() {
             let next = first + place + 1;
             one.branches.push(Branch { when: None, next });

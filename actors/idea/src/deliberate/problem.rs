@@ -62,43 +62,22 @@ pub(super) fn in_order(
     begin: &Begin,
     settings: &Settings,
 ) -> Result<Arc<Problem>, DeliberationError> {
-    let goals: Vec<(usize, Option<f64>)> = order.iter().map(|&target| (target, None)).collect();
-    let mut text = text(&goals, begin, settings);
-    for pair in order.windows(2) {
-        let _ = writeln!(text, "(Order (before g{} g{}))", pair[0], pair[1]);
-    }
-    let read = read_problem("order.ddl", &text, model, &Options::default());
-    Ok(Arc::new(read.ok()?))
-}
-
-/// What is wanted: each goal with its weight, or as one that must be done.
-pub(super) fn problem(
-    model: &Model,
-    goals: &[(usize, Option<f64>)],
-    begin: &Begin,
-    settings: &Settings,
-) -> Result<Arc<Problem>, DeliberationError> {
-    let text = text(goals, begin, settings);
-    let read = read_problem("order.ddl", &text, model, &Options::default());
-    Ok(Arc::new(read.ok()?))
-}
-
-fn text(goals: &[(usize, Option<f64>)], begin: &Begin, settings: &Settings) -> String {
     let (horizon, battery) = (settings.horizon, begin.battery);
     let mut text = format!(
         "(Define_Problem order :horizon [0 {horizon}])\n\
          (Fact (SINGLE ((k9 Position_SV) ((At (p0))))) :start 0)\n\
          (Level (k9 battery) {battery})\n"
     );
-    for &(target, weight) in goals {
+    for &target in order {
         let place = target + 1;
-        let weight = weight.map_or(":mandatory".to_owned(), |weight| {
-            format!(":weight {weight}")
-        });
         let _ = writeln!(
             text,
-            "(Goal g{target} (SINGLE ((k9 Camera_SV) ((TakeImage (p{place}))))) {weight})"
+            "(Goal g{target} (SINGLE ((k9 Camera_SV) ((TakeImage (p{place}))))) :mandatory)"
         );
     }
-    text
+    for pair in order.windows(2) {
+        let _ = writeln!(text, "(Order (before g{} g{}))", pair[0], pair[1]);
+    }
+    let read = read_problem("order.ddl", &text, model, &Options::default());
+    Ok(Arc::new(read.ok()?))
 }

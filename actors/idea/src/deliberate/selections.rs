@@ -1,15 +1,12 @@
 //! Which goals are done, and in which order.
 
-use std::sync::Arc;
-
 use farside_planning::Ticks;
-use farside_planning::model::Model;
 use farside_planning::plan::Plan;
-use farside_planning::search::{self, Forward, Planner, Repair};
+use farside_planning::search::complete::Complete;
+use farside_planning::search::schedule::Schedule;
+use farside_planning::search::{Stack, Verdict, chronological, extract};
 
-use super::{
-    Begin, DeliberationError, LeftOut, Ordering, Settings, Target, Visit, drive_ticks, problem,
-};
+use super::{Begin, DeliberationError, Settings, Target, Visit, drive_ticks, problem};
 
 /// What a selection of goals is worth: how many of those that must be done are in it, what the others
 /// weigh, and how many goals it has.
@@ -107,122 +104,147 @@ fn is_allowed(bits: usize, drives: Ticks, begin: &Begin, settings: &Settings) ->
     ends <= settings.horizon && begin.battery - takes >= settings.reserve
 }
 
-/// The best order. Time and energy both follow the drives, so that of each selection only the shortest
-/// order counts; the complete planner then plans the best selection in that order.
-pub(super) fn best(
-    targets: &[Target],
-    begin: &Begin,
-    settings: &Settings,
-) -> Result<Ordering, DeliberationError> {
+/// A selection of goals in an order.
+pub(super) struct Chosen {
+    pub(super) order: Vec<usize>,
+    /// Whether nothing is better.
+    pub(super) proven: bool,
+    pub(super) operations: u64,
+}
+
+/// The best selection. Time and energy both follow the drives, so that of each selection only the
+/// shortest order counts.
+pub(super) fn best(targets: &[Target], begin: &Begin, settings: &Settings) -> Chosen {
     let shortest = Shortest::of(targets, begin, settings);
     let allowed = |bits: &usize| is_allowed(*bits, shortest.ticks(*bits), begin, settings);
     let selections = (0..1_usize << targets.len()).filter(allowed);
-    let best = selections.max_by_key(|&bits| {
-        (
-            worth(bits, targets),
-            std::cmp::Reverse(shortest.ticks(bits)),
-        )
-    });
-    let bits = best.unwrap_or(0);
-    let mut ordering = Ordering {
+    let bits = selections
+        .max_by_key(|&bits| {
+            (
+                worth(bits, targets),
+                std::cmp::Reverse(shortest.ticks(bits)),
+            )
+        })
+        .unwrap_or(0);
+    Chosen {
+        order: if bits == 0 {
+            Vec::new()
+        } else {
+            shortest.order(bits)
+        },
         proven: true,
         operations: shortest.operations,
-        ..Ordering::default()
-    };
-    let missing = (0..targets.len()).filter(|target| bits >> target & 1 == 0);
-    ordering.left_out.extend(missing.map(|target| {
-        let reason = match allowed(&(1 << target)) {
-            false => "the horizon and the battery do not allow it, even alone",
-            true => "the horizon and the battery do not allow it with what is worth more",
-        };
-        LeftOut {
-            target,
-            reason: reason.to_owned(),
-        }
-    }));
-    if bits == 0 {
-        return Ok(ordering);
     }
-    let order = shortest.order(bits);
-    let model = problem::model(targets, begin, settings)?;
-    let problem = problem::in_order(&model, &order, begin, settings)?;
-    let operations = settings.operations.saturating_sub(ordering.operations);
-    let of = search::Settings {
-        operations,
-        seed: 1,
-    };
-    let answer = Forward.solve(&model, &problem, of)?;
-    ordering.operations += answer.operations;
-    let plan = answer
-        .plan
-        .ok_or(DeliberationError::NoPlan { operations })?;
-    ordering.visits = visits(&plan);
-    Ok(ordering)
 }
 
-/// A good order of many goals, by repair.
-pub(super) fn repaired(
+/// A good selection of many goals: each, the one that is worth most first, goes where it makes the way
+/// least longer, if the horizon and the battery allow it; and parts of the order are turned around as
+/// long as that makes it shorter (G. A. Croes, *A Method for Solving Traveling-Salesman Problems*, 1958).
+pub(super) fn good(targets: &[Target], begin: &Begin, settings: &Settings) -> Chosen {
+    let mut chosen = Chosen {
+        order: Vec::new(),
+        proven: false,
+        operations: 0,
+    };
+    let mut by_worth: Vec<usize> = (0..targets.len()).collect();
+    by_worth.sort_by_key(|&at| std::cmp::Reverse(targets[at].weight.map_or(u64::MAX, u64::from)));
+    for target in by_worth {
+        if chosen.operations >= settings.operations {
+            break;
+        }
+        let slots = (0..=chosen.order.len()).map(|slot| {
+            let mut order = chosen.order.clone();
+            order.insert(slot, target);
+            (drives(&order, targets, begin, settings), order)
+        });
+        let Some((_, order)) = slots.min() else {
+            continue;
+        };
+        chosen.operations += (order.len() * order.len()) as u64;
+        let order = turned(order, targets, begin, settings, &mut chosen.operations);
+        if fits(&order, targets, begin, settings) {
+            chosen.order = order;
+        }
+    }
+    chosen
+}
+
+/// An order with parts turned around, as long as that makes it shorter.
+fn turned(
+    mut order: Vec<usize>,
     targets: &[Target],
     begin: &Begin,
     settings: &Settings,
-) -> Result<Ordering, DeliberationError> {
-    let model = problem::model(targets, begin, settings)?;
-    let weights = targets.iter().map(|target| target.weight.map(f64::from));
-    let goals: Vec<(usize, Option<f64>)> = weights.enumerate().collect();
-    let must = goals.iter().any(|goal| goal.1.is_none());
-    let half = if must {
-        settings.operations / 2
-    } else {
-        settings.operations
-    };
-    let (plan, mut operations) = repair(&model, &goals, half, begin, settings)?;
-    let mut plan = plan;
-    if plan.is_none() && must {
-        // Not all that must be done can be: as many of them as possible.
-        let all: f64 = goals.iter().filter_map(|goal| goal.1).sum();
-        let weighed = goals
-            .iter()
-            .map(|&(target, weight)| (target, weight.or(Some(all + 1.0))));
-        let weighed: Vec<(usize, Option<f64>)> = weighed.collect();
-        let left = settings.operations.saturating_sub(operations);
-        let (second, more) = repair(&model, &weighed, left, begin, settings)?;
-        (plan, operations) = (second, operations + more);
-    }
-    let plan = plan.unwrap_or_default();
-    let visits = visits(&plan);
-    let missing = |target: &usize| visits.iter().all(|visit| visit.target != *target);
-    let left_out = (0..targets.len()).filter(missing).map(|target| {
-        let name = format!("g{target}");
-        let said = plan.left_out.iter().find(|one| one.goal == name);
-        let reason = said.map_or("no order with it was found in time", |one| &one.reason);
-        LeftOut {
-            target,
-            reason: reason.to_owned(),
+    operations: &mut u64,
+) -> Vec<usize> {
+    let mut least = drives(&order, targets, begin, settings);
+    let mut shorter = true;
+    while shorter && *operations < settings.operations {
+        shorter = false;
+        for from in 0..order.len() {
+            for to in from + 2..=order.len() {
+                order[from..to].reverse();
+                let ticks = drives(&order, targets, begin, settings);
+                *operations += order.len() as u64;
+                if ticks < least {
+                    (least, shorter) = (ticks, true);
+                } else {
+                    order[from..to].reverse();
+                }
+            }
         }
-    });
-    let left_out = left_out.collect();
-    Ok(Ordering {
-        visits,
-        left_out,
-        proven: false,
-        operations,
-    })
+    }
+    order
 }
 
-fn repair(
-    model: &Arc<Model>,
-    goals: &[(usize, Option<f64>)],
-    operations: u64,
+/// How long the drives of an order take.
+fn drives(order: &[usize], targets: &[Target], begin: &Begin, settings: &Settings) -> Ticks {
+    let places = order.iter().map(|&at| [targets[at].x_dm, targets[at].y_dm]);
+    let mut at = [begin.x_dm, begin.y_dm];
+    let drives =
+        places.map(|there| drive_ticks(std::mem::replace(&mut at, there), there, settings));
+    drives.sum()
+}
+
+/// Whether the horizon and the battery allow an order.
+pub(super) fn fits(
+    order: &[usize],
+    targets: &[Target],
     begin: &Begin,
     settings: &Settings,
-) -> Result<(Option<Plan>, u64), DeliberationError> {
-    let problem = problem::problem(model, goals, begin, settings)?;
-    let of = search::Settings {
-        operations,
-        seed: 1,
-    };
-    let answer = Repair::default().solve(model, &problem, of)?;
-    Ok((answer.plan, answer.operations))
+) -> bool {
+    let bits = (1_usize << order.len().min(63)) - 1;
+    is_allowed(
+        bits,
+        drives(order, targets, begin, settings),
+        begin,
+        settings,
+    )
+}
+
+/// When each goal of an order is done, as the complete planner says that plans it.
+pub(super) fn planned(
+    chosen: &Chosen,
+    targets: &[Target],
+    begin: &Begin,
+    settings: &Settings,
+) -> Result<(Vec<Visit>, u64), DeliberationError> {
+    if chosen.order.is_empty() {
+        return Ok((Vec::new(), 0));
+    }
+    let model = problem::model(targets, begin, settings)?;
+    let problem = problem::in_order(&model, &chosen.order, begin, settings)?;
+    let mut schedule = Schedule::new(model, problem)?;
+    let mut complete = Complete::new(&schedule);
+    let (before, limit) = (schedule.database.operations(), settings.operations);
+    let mut stack = Stack::default();
+    let verdict = chronological(&mut schedule.database, &mut complete, &mut stack, limit);
+    let operations = schedule.database.operations() - before;
+    if !matches!(verdict, Verdict::Solved) {
+        return Err(DeliberationError::NoPlan { operations });
+    }
+    let plan = extract(&schedule, |_| String::new(), ("complete", 0, operations));
+    Ok((visits(&plan), operations))
 }
 
 /// The goals of a plan, in its order.

@@ -13,7 +13,7 @@ const TIME: SeriesIndex = SeriesIndex {
 };
 
 /// Sorted by name.
-pub(crate) const ALL: [Metric; 25] = [
+pub(crate) const ALL: [Metric; 27] = [
     Metric::new("aborted_cycles", "aborted cycles", "", Number, Lower),
     Metric::new("achieved_after_s", "time until the last goal is achieved", "s", Number, Lower),
     Metric::new("alarms", "alarms", "", Number, Neither),
@@ -37,9 +37,12 @@ pub(crate) const ALL: [Metric; 25] = [
     Metric::new("goals_repeated", "goals done more than once", "", Number, Lower),
     Metric::new("goals_total", "goals", "", Number, Neither),
     Metric::new("max_cycle_lambda", "longest cycle, in latencies", "", Number, Lower),
+    Metric::new("max_cycle_operations", "operations of the dearest cycle", "", Number, Lower),
     Metric::new("max_response_lambda", "longest response, in latencies", "", Number, Lower),
     Metric::new("mean_decisions", "decisions a cycle", "", Number, Neither),
     Metric::new("operations", "operations of cycles", "", Number, Lower),
+    Metric::new("operations_by_time", "operations of the dearest cycle by time", "", Series(TIME), Lower)
+        .about("The most operations that a cycle of the first system agent took in each bin of time."),
     Metric::new("recoveries", "recoveries", "", Number, Neither),
     Metric::new("stale_statuses", "stale statuses", "", Number, Lower),
     Metric::new("tokens_by_time", "tokens in the plan database by time", "", Series(TIME), Lower)

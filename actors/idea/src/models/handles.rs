@@ -46,6 +46,10 @@ places! {
         temperature = "Temperature_SV",
         /// Polls of the power.
         power = "Power_SV",
+        /// How steep the last alarming pitch was.
+        pitch_slope = "PitchSlope_SV",
+        /// How steep the last alarming roll was.
+        roll_slope = "RollSlope_SV",
         /// Which alarm there is.
         health = "MotionHealth_SV",
         /// Which step of a recovery is taken.
@@ -86,9 +90,9 @@ places! {
         fans_unchanged = "FansUnchanged",
         /// `DeviceSetFanState (on ->)`.
         set_fans = "DeviceSetFanState",
-        /// `PitchMeasure (missed -> alarm pitch received hard)` \[degrees\].
+        /// `PitchMeasure (missed -> alarm pitch received)` \[degrees\].
         pitch_measure = "PitchMeasure",
-        /// `RollMeasure (missed -> alarm roll received hard)` \[degrees\].
+        /// `RollMeasure (missed -> alarm roll received)` \[degrees\].
         roll_measure = "RollMeasure",
         /// `TempReadCompare (-> fan temperature received)` \[degrees Celsius\].
         temperature_measure = "TempReadCompare",
@@ -98,6 +102,8 @@ places! {
         power_measure = "PowerMeasure",
         /// `PowerPause ()`.
         power_pause = "PowerPause",
+        /// `Slope (size)` \[degrees\].
+        slope = "Slope",
         /// `Healthy ()`.
         healthy = "Healthy",
         /// `HardLimit ()`.
@@ -171,13 +177,17 @@ places! {
 
 places! {
     /// The symbols with which deliberation ends.
-    Planned: Value, symbol {
-        /// A plan was taken.
+    PlannedStatuses: Value, symbol {
+        /// There is a plan.
         planned = "planned",
-        /// There is nothing to plan, or nothing can be.
+        /// No goal is left that can be done.
         nothing_to_do = "nothing_to_do",
-        /// What the plan relied on had changed.
+        /// What it planned for is not the case any more.
         stale = "STALE",
+        /// Its time was over before it was done.
+        timeout = "TIMEOUT",
+        /// Something else took its place.
+        preempted = "PREEMPTED",
     }
 }
 
@@ -222,7 +232,7 @@ pub struct Mission {
     /// How goals end.
     pub statuses: Statuses,
     /// How deliberation ends.
-    pub planned: Planned,
+    pub planned: PlannedStatuses,
 }
 
 impl Mission {
@@ -236,7 +246,7 @@ impl Mission {
             timelines: MissionTimelines::of(&model),
             predicates: MissionPredicates::of(&model),
             statuses: Statuses::of(&model),
-            planned: Planned::of(&model),
+            planned: PlannedStatuses::of(&model),
             model,
         }
     }

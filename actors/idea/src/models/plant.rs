@@ -69,13 +69,22 @@ impl Chances {
     };
 }
 
+/// What something is answered.
+#[derive(Clone, Copy, Debug)]
+struct Reply {
+    outputs: [Option<Value>; 3],
+    /// How many outputs it has.
+    count: usize,
+    /// After how many ticks it comes.
+    delay: Ticks,
+}
+
 /// An answer that is on its way.
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     due: Ticks,
     contract: Contract,
-    outputs: [Option<Value>; 4],
-    count: usize,
+    reply: Reply,
 }
 
 /// A plant and the service that controls it.
@@ -122,7 +131,7 @@ impl<S: PlanService> Plant<S> {
         if tick > 0 {
             self.happen(tick);
             self.deliver(tick);
-            self.ask(tick);
+            self.ask();
         }
         let outcome = self.service.solve(1, 1_000_000);
         match outcome {
@@ -168,7 +177,7 @@ impl<S: PlanService> Plant<S> {
                 continue;
             }
             self.answers.remove(place);
-            let outputs = &answer.outputs[..answer.count];
+            let outputs = &answer.reply.outputs[..answer.reply.count];
             if self.service.bind(answer.contract, outputs, true).is_err() {
                 self.stale += 1;
             }
@@ -176,7 +185,7 @@ impl<S: PlanService> Plant<S> {
     }
 
     /// What the mission agent and the operator ask for.
-    fn ask(&mut self, _tick: Ticks) {
+    fn ask(&mut self) {
         let System {
             timelines,
             predicates,
@@ -224,31 +233,22 @@ impl<S: PlanService> Plant<S> {
     fn answer(&mut self, tick: Ticks) {
         let started: Vec<Started> = self.service.started().to_vec();
         for token in started {
-            let polled = self.poll(tick, token.predicate);
-            let (outputs, count, delay) = match polled {
-                Some(None) => continue,
-                Some(Some(poll)) => poll,
-                None => match self.command(token.predicate) {
-                    Some(command) => command,
-                    None => continue,
-                },
+            let reply = match self.kind_of_poll(token.predicate) {
+                Some(kind) => self.poll(tick, kind),
+                None => self.command(token.predicate),
             };
-            self.answers.push(Answer {
-                due: tick + delay,
-                contract: token.contract,
-                outputs,
-                count,
-            });
+            if let Some(reply) = reply {
+                self.answers.push(Answer {
+                    due: tick + reply.delay,
+                    contract: token.contract,
+                    reply,
+                });
+            }
         }
     }
 
-    /// What a poll is answered and when; nothing within, if the answer is lost.
-    #[allow(clippy::type_complexity)]
-    fn poll(
-        &mut self,
-        tick: Ticks,
-        predicate: PredicateId,
-    ) -> Option<Option<([Option<Value>; 4], usize, Ticks)>> {
+    /// Which poll a predicate is, if it is one.
+    fn kind_of_poll(&self, predicate: PredicateId) -> Option<usize> {
         let at = self.system.predicates;
         let kinds = [
             at.pitch_measure,
@@ -256,7 +256,11 @@ impl<S: PlanService> Plant<S> {
             at.temperature_measure,
             at.power_measure,
         ];
-        let kind = kinds.iter().position(|&one| one == predicate)?;
+        kinds.iter().position(|&one| one == predicate)
+    }
+
+    /// What a poll is answered; nothing, if the answer is lost.
+    fn poll(&mut self, tick: Ticks, kind: usize) -> Option<Reply> {
         let is_lost = self.random.chance(self.chances.lost_poll) || tick < self.silent;
         let is_late = self.random.chance(self.chances.late_poll);
         let late = 2 + self.random.below(3) as Ticks;
@@ -268,16 +272,15 @@ impl<S: PlanService> Plant<S> {
             _ if tick < self.low => 10,
             _ => 70 + small,
         };
-        if is_lost {
-            return Some(None);
-        }
-        let count = if kind < 2 { 4 } else { 3 };
-        let delay = if is_late { late } else { 1 };
-        Some(Some(([None, Some(value), Some(1), None], count, delay)))
+        (!is_lost).then_some(Reply {
+            outputs: [None, Some(value), Some(1)],
+            count: 3,
+            delay: if is_late { late } else { 1 },
+        })
     }
 
-    /// What a command is answered and when; nothing, if it needs no answer or that is lost.
-    fn command(&mut self, predicate: PredicateId) -> Option<([Option<Value>; 4], usize, Ticks)> {
+    /// What a command is answered; nothing, if it needs no answer or that is lost.
+    fn command(&mut self, predicate: PredicateId) -> Option<Reply> {
         let (at, statuses) = (self.system.predicates, self.system.statuses);
         let mean = match predicate {
             one if one == at.stop => 2,
@@ -294,6 +297,10 @@ impl<S: PlanService> Plant<S> {
         } else {
             statuses.ok
         };
-        (!is_lost).then_some(([Some(status), None, None, None], 1, delay))
+        (!is_lost).then_some(Reply {
+            outputs: [Some(status), None, None],
+            count: 1,
+            delay,
+        })
     }
 }

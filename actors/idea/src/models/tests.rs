@@ -23,7 +23,9 @@ macro_rules! cases {
 }
 
 mod alarms;
+mod figure_5;
 mod goals;
+mod mission;
 mod mutants;
 mod random;
 mod rover;

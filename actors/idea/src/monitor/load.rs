@@ -69,6 +69,8 @@ pub(crate) struct Bin {
     pub(crate) busy_ns: u64,
     pub(crate) deliberating_ns: u64,
     pub(crate) longest_ns: u64,
+    /// The most operations of a cycle.
+    pub(crate) most: u64,
     pub(crate) tokens: u32,
 }
 
@@ -115,6 +117,7 @@ impl Load {
         let rest_ns = latency_ns - busy_ns;
         bin.deliberating_ns += each.saturating_mul(cycle.deliberation).min(rest_ns);
         bin.longest_ns = bin.longest_ns.max(cycle.cost_ns);
+        bin.most = bin.most.max(cycle.operations);
         bin.tokens = bin.tokens.max(cycle.tokens);
         let cause = match cycle.goals {
             0 => Cause::None,

@@ -23,6 +23,9 @@ pub struct Controlled {
     said: Option<RegisterStatus>,
     /// Until it is acknowledged: how often it was said, and when it is to be said again.
     unheard: Option<(u32, SimTime)>,
+    /// How the last contract of an earlier life of the controlling side ended, until that is
+    /// acknowledged: that life may not have heard of it.
+    owed: Option<(RegisterStatus, u32, SimTime)>,
 }
 
 /// What a load is to the controlled side.
@@ -49,6 +52,7 @@ impl Controlled {
             is_open: false,
             said: None,
             unheard: None,
+            owed: None,
         }
     }
 
@@ -68,8 +72,9 @@ impl Controlled {
     }
 
     /// Takes a load, if it is the next one. What went on before it is over: its status is not owed any
-    /// more.
-    pub fn take(&mut self, load: &RegisterLoad) -> Taken {
+    /// more, unless the controlling side has begun a new life, which is told how the last contract of
+    /// its former life ended.
+    pub fn take(&mut self, load: &RegisterLoad, now: SimTime) -> Taken {
         if load.epoch < self.epoch || load.number == 0 {
             return Taken::Old;
         }
@@ -86,6 +91,13 @@ impl Controlled {
         }
         if load.number - last - 1 > load.superseded {
             return Taken::Early;
+        }
+        if load.epoch > self.epoch && self.number > 0 {
+            if self.is_open {
+                self.say(Vec::new(), ContractEnd::Fault, now);
+            }
+            let unheard = self.unheard.and(self.said.take());
+            self.owed = unheard.map(|status| (status, 0, now));
         }
         self.epoch = load.epoch;
         self.number = load.number;
@@ -143,11 +155,23 @@ impl Controlled {
 
     /// When something is to be said again.
     pub fn due(&self) -> Option<SimTime> {
-        self.unheard.map(|(_, again)| again)
+        let owed = self.owed.as_ref().map(|(_, _, again)| *again);
+        self.unheard
+            .map(|(_, again)| again)
+            .into_iter()
+            .chain(owed)
+            .min()
     }
 
-    /// What is said again now, and how often it was said before; nothing if it is not time.
+    /// What is said again now, and how often it was said before; nothing if it is not time. There may
+    /// be something else to say at the same time: it is to be asked until there is nothing.
     pub fn repeat(&mut self, now: SimTime) -> Option<(RegisterStatus, u32)> {
+        if let Some((status, times, again)) = self.owed.as_mut().filter(|owed| owed.2 <= now) {
+            let before = *times;
+            *times = before.saturating_add(1);
+            *again = now + self.backoff.after(*times);
+            return Some((status.clone(), before));
+        }
         let (times, _) = self.unheard.filter(|(_, again)| *again <= now)?;
         let status = self.said.clone()?;
         let next = times.saturating_add(1);

@@ -68,6 +68,11 @@ impl Controlling {
         &self.register
     }
 
+    /// Which of its agent's lives it is in, from 1.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
     /// The number of the present procedure; 0 before the first.
     pub fn number(&self) -> u32 {
         self.number

@@ -125,7 +125,7 @@ impl Pair {
     }
 
     fn receive(&mut self, load: &RegisterLoad, tick: u64) {
-        match self.controlled.take(load) {
+        match self.controlled.take(load, at(tick)) {
             Taken::Yes => {
                 self.begun.push(load.number);
                 self.running = Some((load.number, tick + 4));
@@ -240,7 +240,7 @@ fn a_goal_that_must_be_done_is_not_skipped() {
     let mut controlling = Controlling::new(name(), 1, BACKOFF);
     let mut controlled = Controlled::new(name(), BACKOFF);
     let first = controlling.load("A".into(), Vec::new(), at(0));
-    assert_eq!(controlled.take(&first), Taken::Yes);
+    assert_eq!(controlled.take(&first, at(0)), Taken::Yes);
     let said = controlled
         .say(Vec::new(), ContractEnd::Ended, at(1))
         .expect("it goes on");
@@ -253,11 +253,11 @@ fn a_goal_that_must_be_done_is_not_skipped() {
         superseded: 0,
         ..lost.clone()
     };
-    assert_eq!(controlled.take(&next), Taken::Early);
+    assert_eq!(controlled.take(&next, at(2)), Taken::Early);
     let given_up = controlling.load("C".into(), Vec::new(), at(3));
     assert_eq!((given_up.number, given_up.superseded), (3, 1));
-    assert_eq!(controlled.take(&given_up), Taken::Yes);
-    assert_eq!(controlled.take(&lost), Taken::Old);
+    assert_eq!(controlled.take(&given_up, at(3)), Taken::Yes);
+    assert_eq!(controlled.take(&lost, at(3)), Taken::Old);
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn the_first_status_that_ends_a_contract_counts() {
     let mut controlling = Controlling::new(name(), 1, BACKOFF);
     let load = controlling.load("A".into(), Vec::new(), at(0));
     let mut controlled = Controlled::new(name(), BACKOFF);
-    controlled.take(&load);
+    controlled.take(&load, at(0));
     let open = controlled
         .say(vec![None], ContractEnd::Open, at(1))
         .expect("it goes on");
@@ -284,9 +284,9 @@ fn the_first_status_that_ends_a_contract_counts() {
 fn a_new_life_begins_anew_and_the_old_one_is_not_heard() {
     let mut controlled = Controlled::new(name(), BACKOFF);
     let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
-    assert_eq!(controlled.take(&old), Taken::Yes);
+    assert_eq!(controlled.take(&old, at(0)), Taken::Yes);
     let new = Controlling::new(name(), 2, BACKOFF).load("B".into(), Vec::new(), at(9));
-    assert_eq!(controlled.take(&new), Taken::Yes);
+    assert_eq!(controlled.take(&new, at(9)), Taken::Yes);
     assert_eq!(controlled.contract(), (2, 1));
-    assert_eq!(controlled.take(&old), Taken::Old);
+    assert_eq!(controlled.take(&old, at(0)), Taken::Old);
 }

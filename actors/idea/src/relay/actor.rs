@@ -230,13 +230,13 @@ impl Handler<RegisterLoad> for RelayActor {
         let Some(register) = self.place(&load.register) else {
             return Ok(());
         };
+        let now = ctx.now();
         let controlled = &mut ctx.durable::<Memory>().0[register];
-        match controlled.take(&load) {
+        match controlled.take(&load, now) {
             Taken::Yes => {
                 let (contract, ack) = (controlled.contract(), controlled.ack());
                 let mut acts = Vec::new();
                 let (procedure, inputs) = (&load.procedure, &load.inputs);
-                let now = ctx.now();
                 self.relay
                     .load(now, register, contract, procedure, inputs, &mut acts);
                 // A poll's answer follows at once, and acknowledges its load.
@@ -311,10 +311,8 @@ impl Handler<RelayWakes> for RelayActor {
             let reason = format!("{} was not heard of for {lease}", self.setup.agent);
             self.abandon(&reason, ctx)?;
         }
-        let memory = ctx.durable::<Memory>().0.iter_mut();
-        let again: Vec<_> = memory.map(|register| register.repeat(now)).collect();
-        for (register, said) in again.into_iter().enumerate() {
-            if let Some((status, before)) = said {
+        for register in 0..self.setup.registers.len() {
+            while let Some((status, before)) = ctx.durable::<Memory>().0[register].repeat(now) {
                 self.say(register, status, before, ctx)?;
             }
         }

@@ -217,16 +217,8 @@ fn polls_of_one_instant_share_a_question() {
         bench.state(state(1)),
         [
             // To whole degrees; alarms are not the relay's to find.
-            ended(
-                PITCH,
-                1,
-                vec![None, Some(number(26)), received.clone(), None]
-            ),
-            ended(
-                ROLL,
-                2,
-                vec![None, Some(number(-6)), received.clone(), None]
-            ),
+            ended(PITCH, 1, vec![None, Some(number(26)), received.clone()]),
+            ended(ROLL, 2, vec![None, Some(number(-6)), received.clone()]),
             ended(
                 TEMPERATURE,
                 3,

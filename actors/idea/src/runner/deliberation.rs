@@ -1,14 +1,19 @@
 //! Deliberation beside the cycles: it works on a snapshot in the time that cycles leave, and its plan
 //! is taken between two cycles, if the snapshot still fits.
 
+use std::sync::{MutexGuard, PoisonError};
+
+use farside_planning::model::TimelineId;
+
 use super::{Cycle, Runner};
-use crate::deliberator::{Deliberator, Work};
+use crate::deliberator::{Deliberator, SharedDeliberator, Work};
+use crate::register::{RegisterStatus, RegisterValue};
 use crate::service::{Contract, Snapshot};
 use crate::wording;
 
 /// A deliberative planner and what it is at.
 pub(super) struct Deliberation {
-    planner: Box<dyn Deliberator>,
+    planner: SharedDeliberator,
     job: Option<Job>,
 }
 
@@ -23,7 +28,12 @@ struct Job {
 }
 
 impl Deliberation {
-    pub(super) fn new(planner: Box<dyn Deliberator>) -> Self {
+    /// The planner, to be told something. Nobody else has it while its agent lives.
+    fn planner(&self) -> MutexGuard<'_, dyn Deliberator + 'static> {
+        self.planner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn new(planner: SharedDeliberator) -> Self {
         Deliberation { planner, job: None }
     }
 }
@@ -35,33 +45,47 @@ impl Runner {
         let Some(deliberation) = &mut self.deliberation else {
             return;
         };
-        let timeline = deliberation.planner.timeline();
+        let mut planner = deliberation
+            .planner
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         for token in &cycle.ended {
-            deliberation.planner.ended(token);
-            if deliberation
+            planner.ended(token);
+            deliberation
                 .job
-                .as_ref()
-                .is_some_and(|job| job.contract == token.contract)
-            {
-                deliberation.job = None;
-            }
+                .take_if(|job| job.contract == token.contract);
         }
-        cycle
-            .begun
-            .iter()
-            .for_each(|token| deliberation.planner.begun(token));
+        cycle.begun.iter().for_each(|token| planner.begun(token));
+        cycle.given_up.extend(planner.gives_up());
+        if let Some(timeline) = planner.drops() {
+            self.service.drop_plan(timeline);
+            deliberation.job = None;
+        }
+        let timeline = planner.timeline();
         let mut asked = cycle.begun.iter().rev();
         let asked = asked.find(|token| usize::from(token.contract.timeline) == timeline);
         let Some(token) = asked else {
             return;
         };
         let snapshot = self.service.snapshot();
-        deliberation.job = deliberation.planner.work(token, &snapshot).map(|work| Job {
+        deliberation.job = planner.work(token, &snapshot).map(|work| Job {
             contract: token.contract,
             snapshot,
             left: work.operations,
             work,
         });
+    }
+
+    /// What has become of a contract that a former life of the agent had loaded.
+    pub(super) fn hear_late(&self, timeline: TimelineId, status: &RegisterStatus) {
+        let Some(deliberation) = self.deliberation.as_ref() else {
+            return;
+        };
+        let said = match status.outputs.first() {
+            Some(Some(RegisterValue::Symbol(name))) => Some(&**name),
+            _ => None,
+        };
+        deliberation.planner().late(timeline, said);
     }
 
     /// Lets deliberation go on for so many operations, any number with none; how many it took.

@@ -33,6 +33,7 @@ impl Runner {
         peer: usize,
         load: RegisterLoad,
         memory: &mut [Controlled],
+        now: SimTime,
         cycle: &mut Cycle,
     ) -> bool {
         let mine = |one: &Incoming| one.setup.peer == peer && one.setup.name == load.register;
@@ -44,7 +45,7 @@ impl Runner {
             return false;
         };
         let controlled = &mut memory[at];
-        match controlled.take(&load) {
+        match controlled.take(&load, now) {
             Taken::Yes => {
                 self.incoming[at].taken = Some(load);
                 cycle.goals += 1;

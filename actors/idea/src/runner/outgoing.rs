@@ -56,6 +56,10 @@ impl Runner {
         match heard {
             Heard::Stale => {
                 cycle.stale += 1;
+                if status.epoch < one.controlling.epoch() {
+                    let timeline = one.setup.timeline;
+                    self.hear_late(timeline, status);
+                }
                 false
             }
             Heard::Again => false,

@@ -107,34 +107,74 @@ enum Bound {
     Several(Box<[Far]>),
 }
 
-/// From where an end's earliest and latest ticks are.
-type EndSource = [Bound; 2];
-
 /// A token that begins or ends.
-#[derive(Clone, Debug)]
 struct Change {
     timeline: u16,
     predicate: PredicateId,
     parameters: SmallVec<[Source; 4]>,
 }
 
-/// What a cycle decides.
+/// What a cycle decides. All of it stands in one row of numbers, so that few lines of memory are
+/// read: how many cells, ends and tokens there are, from where each is filled, and tokens with what
+/// they say.
 #[derive(Clone, Debug)]
 struct Transition {
     next: u32,
-    cells: Box<[Source]>,
-    ends: Box<[EndSource]>,
-    started: Box<[Change]>,
-    ended: Box<[Change]>,
+    code: Box<[u32]>,
     decisions: u32,
     guards: u32,
     backtracks: u32,
 }
 
+/// The highest bits of a number say what it is.
+const KIND: u32 = 30;
+const REST: u32 = (1 << KIND) - 1;
+
+/// Values and times that transitions name by their places.
+#[derive(Clone, Debug, Default)]
+struct Names {
+    values: Vec<Option<Value>>,
+    value_places: BTreeMap<Option<Value>, u32>,
+    several: Vec<Box<[Far]>>,
+}
+
+impl Names {
+    fn source(&mut self, source: Source) -> u32 {
+        match source {
+            Source::Value(value) => {
+                let next = self.values.len() as u32;
+                let place = *self.value_places.entry(value).or_insert(next);
+                if place == next {
+                    self.values.push(value);
+                }
+                place
+            }
+            Source::Cell(cell) => 1 << KIND | u32::from(cell),
+            Source::Posted(which, place) => 2 << KIND | u32::from(which) << 8 | u32::from(place),
+        }
+    }
+
+    fn bound(&mut self, bound: Bound) -> u32 {
+        match bound {
+            Bound::Never => 2 << KIND,
+            Bound::Ahead(ticks) => ticks as u32,
+            Bound::End(end) => 1 << KIND | u32::from(end),
+            Bound::Several(all) => {
+                let known = self.several.iter().position(|at| *at == all);
+                let place = known.unwrap_or(self.several.len());
+                if place == self.several.len() {
+                    self.several.push(all);
+                }
+                3 << KIND | place as u32
+            }
+        }
+    }
+}
+
 /// What may be posted next.
 #[derive(Clone, Debug, Default)]
 struct Node {
-    children: Vec<(u64, u32)>,
+    children: SmallVec<[(u64, u32); 1]>,
     transition: Option<u32>,
 }
 
@@ -205,6 +245,7 @@ pub struct Compiled {
     by_key: BTreeMap<Vec<u32>, u32>,
     nodes: Vec<Node>,
     transitions: Vec<Transition>,
+    names: Names,
     /// The state; none, while the interpreter is asked.
     state: u32,
     /// Where what was posted leads; none, if there is no such node.
@@ -275,6 +316,7 @@ impl Compiled {
             by_key: BTreeMap::new(),
             nodes: Vec::new(),
             transitions: Vec::new(),
+            names: Names::default(),
             state: 0,
             node: None,
             posted: Vec::new(),
@@ -307,6 +349,7 @@ impl Compiled {
             by_key: self.by_key,
             nodes: self.nodes,
             transitions: self.transitions,
+            names: self.names,
             ..fresh
         })
     }
@@ -314,20 +357,17 @@ impl Compiled {
     /// How large the table is by now.
     pub fn size(&self) -> TableSize {
         let nodes: usize = { self.nodes.iter() }
-            .map(|at| size_of::<Node>() + at.children.capacity() * size_of::<(u64, u32)>())
-            .sum();
-        let change = |at: &Change| {
-            let spilled = at.parameters.len().saturating_sub(4) * size_of::<Source>();
-            size_of::<Change>() + spilled
-        };
-        let transitions: usize = { self.transitions.iter() }
             .map(|at| {
-                size_of::<Transition>() + size_of_val(&*at.cells) + size_of_val(&*at.ends) + {
-                    at.started.iter().chain(&*at.ended)
-                }
-                .map(change)
-                .sum::<usize>()
+                let spilled = if at.children.spilled() {
+                    at.children.capacity()
+                } else {
+                    0
+                };
+                size_of::<Node>() + spilled * size_of::<(u64, u32)>()
             })
+            .sum();
+        let transitions: usize = { self.transitions.iter() }
+            .map(|at| size_of::<Transition>() + size_of_val(&*at.code))
             .sum();
         let forms: usize = { self.forms.iter() }
             .map(|at| size_of::<Form>() + size_of_val(&*at.lanes) + size_of_val(&*at.ends))
@@ -367,6 +407,18 @@ impl Compiled {
             | predicate << 37
             | u64::from(ends) << CLASS_BITS
             | mixed
+    }
+
+    /// What the token of an active contract says, as far as the table knows.
+    fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
+        if self.node.is_none() {
+            return Ok(None);
+        }
+        let timeline = usize::from(contract.timeline);
+        if self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline] {
+            return Err(check::dead(&self.model, contract));
+        }
+        Ok(Some(self.forms[self.state as usize].lanes[timeline].0))
     }
 
     fn child(&self, number: u64) -> Option<u32> {
@@ -495,61 +547,68 @@ impl Compiled {
     /// What the table says is decided.
     fn follow(&mut self, transition: u32) {
         let at = &self.transitions[transition as usize];
-        let (now, from) = (self.now, &self.registers);
+        let (now, from, names) = (self.now, &self.registers, &self.names);
         let posted = &self.posted;
-        let value = |source: &Source| match *source {
-            Source::Value(value) => value,
-            Source::Cell(cell) => from.cells[usize::from(cell)],
-            Source::Posted(which, place) => posted[usize::from(which)].values()[usize::from(place)],
+        let value = |source: &u32| {
+            let rest = source & REST;
+            match source >> KIND {
+                0 => names.values[rest as usize],
+                1 => from.cells[rest as usize],
+                _ => posted[(rest >> 8) as usize].values()[(rest & 0xff) as usize],
+            }
         };
-        for change in &at.ended {
-            let timeline = usize::from(change.timeline);
-            self.ended.push(Ended {
-                contract: Contract {
-                    timeline: change.timeline,
-                    number: self.numbers[timeline],
-                },
-                predicate: change.predicate,
-                start: self.starts[timeline],
-                finish: now,
-                parameters: change.parameters.iter().map(value).collect(),
-            });
-        }
-        for change in &at.started {
-            let timeline = usize::from(change.timeline);
-            self.numbers[timeline] += 1;
-            self.starts[timeline] = now;
+        let end = |at: &Far, max: bool| match *at {
+            Far::Ahead(ticks) => now + ticks,
+            Far::End(end) if max => from.ends[usize::from(end)].1,
+            Far::End(end) => from.ends[usize::from(end)].0,
+        };
+        let bound = |bound: u32, max: bool| match bound >> KIND {
+            0 => now + Ticks::from(bound & REST),
+            1 => end(&Far::End((bound & REST) as u16), max),
+            2 => Ticks::MAX,
+            _ => {
+                let all = &names.several[(bound & REST) as usize];
+                let all = all.iter().map(|at| end(at, max));
+                { if max { all.min() } else { all.max() } }.unwrap_or(now)
+            }
+        };
+        let (counts, code) = at.code.split_at(4);
+        let (cells, code) = code.split_at(counts[0] as usize);
+        let (ends, mut code) = code.split_at(2 * counts[1] as usize);
+        for change in 0..counts[2] + counts[3] {
+            let (timeline, predicate) = ((code[0] >> 16) as u16, (code[0] & 0xffff) as usize);
+            let (parameters, rest) = code[2..].split_at(code[1] as usize);
+            code = rest;
+            let lane = usize::from(timeline);
+            let parameters = parameters.iter().map(value).collect();
+            if change < counts[2] {
+                let number = self.numbers[lane];
+                self.ended.push(Ended {
+                    contract: Contract { timeline, number },
+                    predicate,
+                    start: self.starts[lane],
+                    finish: now,
+                    parameters,
+                });
+                continue;
+            }
+            self.numbers[lane] += 1;
+            self.starts[lane] = now;
+            let number = self.numbers[lane];
             self.started.push(Started {
-                contract: Contract {
-                    timeline: change.timeline,
-                    number: self.numbers[timeline],
-                },
-                predicate: change.predicate,
-                parameters: change.parameters.iter().map(value).collect(),
+                contract: Contract { timeline, number },
+                predicate,
+                parameters,
             });
         }
         self.spare.cells.clear();
-        self.spare.cells.extend(at.cells.iter().map(value));
+        self.spare.cells.extend(cells.iter().map(value));
         self.spare.ends.clear();
         let mut near = Ticks::MAX;
-        for [min, max] in &at.ends {
-            let end = |at: &Far, max: bool| match *at {
-                Far::Ahead(ticks) => now + ticks,
-                Far::End(end) if max => from.ends[usize::from(end)].1,
-                Far::End(end) => from.ends[usize::from(end)].0,
-            };
-            let bound = |at: &Bound, max: bool| match at {
-                Bound::Never => Ticks::MAX,
-                Bound::Ahead(ticks) => now + ticks,
-                Bound::End(at) => end(&Far::End(*at), max),
-                Bound::Several(all) => {
-                    let all = all.iter().map(|at| end(at, max));
-                    { if max { all.min() } else { all.max() } }.unwrap_or(now)
-                }
-            };
-            let (min, max) = (bound(min, false), bound(max, true));
-            near = near.min(comes_near((min, max), now, self.exact));
-            self.spare.ends.push((min, max));
+        for pair in ends.chunks_exact(2) {
+            let bounds = (bound(pair[0], false), bound(pair[1], true));
+            near = near.min(comes_near(bounds, now, self.exact));
+            self.spare.ends.push(bounds);
         }
         self.near = near;
         self.counters.decisions += u64::from(at.decisions);
@@ -590,29 +649,18 @@ impl Compiled {
             None => self.add_form(key, &stripped),
         };
         let spent = interpreter.counters();
-        let transition = match (self.node, ended) {
-            (Some(node), Some(ended)) if !loose => {
-                let started = self.changes_of(&stripped, false);
-                let made = started.zip(self.sources(&stripped));
-                made.map(|(started, (cells, ends))| {
-                    let at = Transition {
-                        next,
-                        cells,
-                        ends,
-                        started,
-                        ended,
-                        decisions: (spent.decisions - before.decisions) as u32,
-                        guards: (spent.guards - before.guards) as u32,
-                        backtracks: (spent.backtracks - before.backtracks) as u32,
-                    };
-                    (node, at)
-                })
-            }
-            _ => None,
-        };
-        if let Some((node, at)) = transition {
+        if let (Some(node), Some(ended), false) = (self.node, ended, loose)
+            && let Some(started) = self.changes_of(&stripped, false)
+            && let Some(code) = self.encode(&stripped, (ended, started))
+        {
             self.nodes[node as usize].transition = Some(self.transitions.len() as u32);
-            self.transitions.push(at);
+            self.transitions.push(Transition {
+                next,
+                code,
+                decisions: (spent.decisions - before.decisions) as u32,
+                guards: (spent.guards - before.guards) as u32,
+                backtracks: (spent.backtracks - before.backtracks) as u32,
+            });
         }
         self.read(&stripped, next);
     }
@@ -681,7 +729,7 @@ impl Compiled {
     }
 
     /// What began or ended, with where its parameters are from; none, if that is not clear.
-    fn changes_of(&self, is: &Propositional, ended: bool) -> Option<Box<[Change]>> {
+    fn changes_of(&self, is: &Propositional, ended: bool) -> Option<Vec<Change>> {
         let known = &is.world.state;
         let mut changes = Vec::new();
         for (timeline, lane) in known.lanes.iter().enumerate() {
@@ -701,25 +749,52 @@ impl Compiled {
                 parameters: parameters.collect(),
             });
         }
-        Some(changes.into())
+        Some(changes)
     }
 
-    /// From where a state's registers are filled; none, if that is not clear.
-    fn sources(&self, is: &Propositional) -> Option<(Box<[Source]>, Box<[EndSource]>)> {
+    /// From where a state's registers are filled, and what began and ended, as a row of numbers;
+    /// none, if it is not clear.
+    fn encode(
+        &mut self,
+        is: &Propositional,
+        (ended, started): (Vec<Change>, Vec<Change>),
+    ) -> Option<Box<[u32]>> {
         let known = &is.world.state;
-        let cells = (0..known.cells.len()).map(|cell| source(is, cell as u16));
-        let bound = |time: Ticks, fars: &[Far]| match (time, fars) {
-            (Ticks::MAX, _) => Some(Bound::Never),
-            (time, _) if !known.is_far(time) => Some(Bound::Ahead((time - self.now).max(0))),
-            (_, []) => None,
-            (_, &[Far::Ahead(ticks)]) => Some(Bound::Ahead(ticks)),
-            (_, &[Far::End(end)]) => Some(Bound::End(end)),
-            (_, several) => Some(Bound::Several(several.into())),
-        };
-        let ends = known.finishes.iter();
-        let ends = ends.map(|at| Some([bound(at.min, &at.lows)?, bound(at.max, &at.highs)?]));
-        let ends: Option<Box<[_]>> = ends.collect();
-        Some((cells.collect(), ends?))
+        let counts = [
+            known.cells.len(),
+            known.finishes.len(),
+            ended.len(),
+            started.len(),
+        ];
+        let mut code: Vec<u32> = counts.iter().map(|&at| at as u32).collect();
+        for cell in 0..known.cells.len() {
+            code.push(self.names.source(source(is, cell as u16)));
+        }
+        for at in &known.finishes {
+            for (time, fars) in [(at.min, &at.lows), (at.max, &at.highs)] {
+                let bound = match (time, &fars[..]) {
+                    (Ticks::MAX, _) => Bound::Never,
+                    (time, _) if !known.is_far(time) => Bound::Ahead((time - self.now).max(0)),
+                    (_, []) => return None,
+                    (_, &[Far::Ahead(ticks)]) if ticks > Ticks::from(REST) => return None,
+                    (_, &[Far::Ahead(ticks)]) => Bound::Ahead(ticks),
+                    (_, &[Far::End(end)]) => Bound::End(end),
+                    (_, several) => Bound::Several(several.into()),
+                };
+                code.push(self.names.bound(bound));
+            }
+        }
+        for change in ended.into_iter().chain(started) {
+            code.push(u32::from(change.timeline) << 16 | change.predicate as u32);
+            code.push(change.parameters.len() as u32);
+            code.extend(
+                change
+                    .parameters
+                    .into_iter()
+                    .map(|at| self.names.source(at)),
+            );
+        }
+        Some(code.into())
     }
 
     /// The interpreter decides.
@@ -834,18 +909,15 @@ impl PlanService for Compiled {
         outputs: &[Option<Value>],
         ends: bool,
     ) -> Result<(), Refusal> {
-        let mut number = 0;
         let timeline = usize::from(contract.timeline);
-        if self.interpreter.is_none() {
-            let dead = self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline];
-            if dead {
-                return Err(check::dead(&self.model, contract));
+        let number = match self.on_table(contract)? {
+            Some(predicate) => {
+                check::values(&self.model, predicate, "outputs", outputs)?;
+                let inputs = self.model.predicates[predicate].inputs;
+                self.number(STATUS, timeline, predicate, ends, (inputs, outputs))
             }
-            let predicate = self.forms[self.state as usize].lanes[timeline].0;
-            check::values(&self.model, predicate, "outputs", outputs)?;
-            let inputs = self.model.predicates[predicate].inputs;
-            number = self.number(STATUS, timeline, predicate, ends, (inputs, outputs));
-        }
+            None => 0,
+        };
         let outputs = SmallVec::from_slice(outputs);
         self.post(number, Posted::Status(contract, outputs, ends))?;
         if let Some(at) = self.ends.get_mut(timeline) {
@@ -869,15 +941,10 @@ impl PlanService for Compiled {
 
     fn cancel(&mut self, contract: Contract) -> Result<(), Refusal> {
         let timeline = usize::from(contract.timeline);
-        let mut number = 0;
-        if self.interpreter.is_none() {
-            let dead = self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline];
-            if dead {
-                return Err(check::dead(&self.model, contract));
-            }
-            let predicate = self.forms[self.state as usize].lanes[timeline].0;
-            number = self.number(CANCEL, timeline, predicate, false, (0, &[]));
-        }
+        let number = match self.on_table(contract)? {
+            Some(predicate) => self.number(CANCEL, timeline, predicate, false, (0, &[])),
+            None => 0,
+        };
         self.post(number, Posted::Cancel(contract))
     }
 

@@ -3,6 +3,7 @@
 mod ahead;
 mod cycles;
 mod equal;
+mod legal;
 mod plans;
 mod random;
 mod refusals;

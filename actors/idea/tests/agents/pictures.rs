@@ -158,7 +158,7 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     let (tape, _, _) = taped(K9);
     let svg = drawn(K9, &tape, "timelines", &PictureRequest::default()).unwrap();
     keep("timelines-system.svg", &svg);
-    assert_eq!(count(&svg, "class=\"lane\""), 12);
+    assert_eq!(count(&svg, "class=\"lane\""), 14);
     assert_eq!(count(&svg, "class=\"mark-line alarm\" d=\"M") - 1, 2);
     assert_eq!(count(&svg, "class=\"mark-line broken\" d=\"M") - 1, 2);
     assert!(svg.contains("system of idea/k9 &lt;&amp;&gt;") && !svg.contains("<&"));
@@ -284,8 +284,8 @@ fn goals_that_are_given_up_are_marked() {
         "[[rover.fault]]\nat = \"1s\"\nkind = \"instrument-fails\"\npart = \"hawk_eye\"\n\n";
     let text = K9
         .replace(
-            "[mission]",
-            &format!("{broken}[deliberation]\nattempts = 1\n\n[mission]"),
+            "[mission_agent]",
+            &format!("{broken}[deliberation]\nattempts = 1\n\n[mission_agent]"),
         )
         .replace("name = \"wall\"", "name = \"w<a&ll\"");
     let (tape, drawings, _) = taped(&text);
@@ -307,8 +307,8 @@ fn goals_that_are_given_up_are_marked() {
 #[test]
 fn an_hour_of_three_rovers_can_be_read() {
     let text = K9.replace(
-        "[mission]",
-        "[agents]\nrovers = 3\nstop_when_done = false\n\n[mission]",
+        "[mission_agent]",
+        "[agents]\nrovers = 3\nstop_when_done = false\n\n[mission_agent]",
     );
     let (tape, _, _) = taped(&text);
     let svg = drawn(&text, &tape, "timelines", &PictureRequest::default()).unwrap();

@@ -77,8 +77,9 @@ impl Actor for Plant {
 
 impl Handler<RegisterLoad> for Plant {
     fn handle(&mut self, load: RegisterLoad, ctx: &mut Context<'_, Self>) -> Outcome {
+        let now = ctx.now();
         let controlled = self.register(ctx, &load.register);
-        let taken = controlled.take(&load);
+        let taken = controlled.take(&load, now);
         let ack = controlled.ack();
         match taken {
             Taken::Yes => {

@@ -11,7 +11,7 @@ use farside_actors::system::{Assembly, Files, Results, Seeds, Settings, Setup, S
 use farside_actors::units;
 use farside_actors::wiring::LinkBuilder;
 use farside_idea::IdeaSystem;
-use farside_idea::records::{AgentRemark, GoalEnded, TimelineSays};
+use farside_idea::records::{AgentFaulty, AgentRemark, GoalEnded, TimelineSays};
 
 /// A scenario that is read.
 pub(crate) struct Scenario {
@@ -93,6 +93,8 @@ pub(crate) enum What {
     Says(TimelineSays),
     Ended(GoalEnded),
     Remark(String),
+    /// The tick, and why.
+    Faulty(u64, String),
     /// Any other sample that is no cycle, by its type.
     Other(String),
 }
@@ -139,6 +141,10 @@ impl Observer for Listen {
                     CommandEnd::Done => return Ok(Flow::Continue),
                     end => What::Remark(format!("{:?}: {end:?}", report.part)),
                 }
+            }
+            "AgentFaulty" => {
+                let faulty: AgentFaulty = schema.decode(record.body).expect("it is one");
+                What::Faulty(faulty.tick, faulty.reason)
             }
             other => What::Other(other.to_owned()),
         };
@@ -206,5 +212,38 @@ impl Run {
             println!("{label}: {text}");
         }
         println!("{:?} {:?}", self.report.end, self.results.violations);
+    }
+}
+
+/// What is said of a scenario that cannot be.
+pub(crate) fn refused(text: &str) -> String {
+    let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
+    let links = table
+        .remove("links")
+        .unwrap_or_else(|| toml::Table::new().into());
+    let links: LinksConfig = links.try_into().expect("they are links");
+    for key in ["system", "description", "seed", "until"] {
+        table.remove(key);
+    }
+    let text = toml::to_string(&table).expect("it was TOML");
+    let sections = toml::Deserializer::parse(&text).expect("it was TOML");
+    let settings = match IdeaSystem.parse(sections) {
+        Ok(settings) => settings,
+        Err(error) => return error.message().to_owned(),
+    };
+    if let Err(error) = settings.check() {
+        return error.to_string();
+    }
+    let mut sim = Simulation::new(1);
+    let mut files = Files::on_disk(".".into());
+    let links = LinkBuilder::new(&links, &[]).expect("they are right");
+    let (seeds, until) = (
+        Seeds { run: 1, problem: 1 },
+        Some(SimDuration::from_secs(60)),
+    );
+    let mut setup = Setup::new(seeds, until, &mut sim, &mut files, links);
+    match settings.assemble(&mut setup) {
+        Ok(_) => "nothing".to_owned(),
+        Err(error) => error.to_string(),
     }
 }

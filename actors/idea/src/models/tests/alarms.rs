@@ -126,7 +126,7 @@ fn each_alarm_has_a_sequence_of_its_own(system: &System) {
         rover.ok();
         assert_eq!(rover.monitor(), "Resuming 0");
         assert_eq!(rover.says(system.timelines.location), "Still");
-        rover.cycles(7);
+        rover.cycles(11);
         assert_eq!(rover.monitor(), "Resuming 0");
         rover.cycle();
         assert_eq!(rover.monitor(), "Nominal");
@@ -167,11 +167,11 @@ fn a_rover_resumes_three_times_and_then_is_safe(system: &System) {
             assert_eq!(after(resuming(system, n), pitch, roll), expected);
             // In the last cycle of the resumption, too.
             let mut rover = resuming(system, n);
-            rover.cycles(7);
+            rover.cycles(11);
             assert_eq!(after(rover, pitch, roll), expected);
         }
         let mut rover = resuming(system, n);
-        rover.cycles(8);
+        rover.cycles(12);
         assert_eq!(rover.monitor(), "Nominal");
     }
 }
@@ -261,7 +261,7 @@ fn polls_without_answers_make_a_rover_blind_and_it_waits(system: &System) {
         assert_eq!(rover.monitor(), "Recovery stop blind 1 0");
         rover.ok();
         (rover.pitch, rover.roll) = (Some(0), Some(0));
-        rover.cycles(28);
+        rover.cycles(32);
         assert_eq!(rover.monitor(), "Nominal");
     }
 }

@@ -45,25 +45,24 @@ fn noticed(text: &str) -> Option<&'static str> {
         .map(|_| "a random run")
 }
 
+/// Takes each rule out of a model in turn.
+fn check(text: &str) {
+    let all = compatibilities(text);
+    assert!(all.len() > 30);
+    let unnoticed = all.into_iter().filter_map(|(start, end)| {
+        let mutant = text[..start].to_owned() + &text[end..];
+        noticed(&mutant).is_none().then(|| &text[start..end])
+    });
+    assert_eq!(unnoticed.collect::<Vec<&str>>(), [""; 0]);
+}
+
 #[test]
 fn a_model_without_one_of_its_rules_is_noticed() {
-    for text in [SYSTEM, LIGHT] {
-        let all = compatibilities(text);
-        assert!(all.len() > 30);
-        let mut unnoticed = Vec::new();
-        for (start, end) in all {
-            let mutant = text[..start].to_owned() + &text[end..];
-            let by = noticed(&mutant);
-            if std::env::var_os("FARSIDE_SHOW").is_some() {
-                println!(
-                    "{by:?}: {}",
-                    text[start..end].lines().nth(1).unwrap_or_default()
-                );
-            }
-            if by.is_none() {
-                unnoticed.push(&text[start..end]);
-            }
-        }
-        assert_eq!(unnoticed, [""; 0]);
-    }
+    check(SYSTEM);
+}
+
+#[test]
+#[ignore = "as long again as the thorough model"]
+fn a_light_model_without_one_of_its_rules_is_noticed() {
+    check(LIGHT);
 }

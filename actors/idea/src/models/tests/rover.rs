@@ -44,18 +44,18 @@ impl Rover {
         self.service.advance(self.tick);
         let at = self.system.timelines;
         let polls = [
-            (at.pitch, self.pitch, 4),
-            (at.roll, self.roll, 4),
-            (at.temperature, self.temperature, 3),
-            (at.power, self.power, 3),
+            (at.pitch, self.pitch),
+            (at.roll, self.roll),
+            (at.temperature, self.temperature),
+            (at.power, self.power),
         ];
-        for (timeline, value, count) in polls {
+        for (timeline, value) in polls {
             let poll = self.service.present(timeline);
             let poll = poll.filter(|at| at.start < self.tick && at.parameters.len() >= 3);
             if let (Some(poll), Some(value)) = (poll, value) {
-                let outputs = [None, Some(value), Some(1), None];
+                let outputs = [None, Some(value), Some(1)];
                 // It may have been posted already.
-                let _ = self.service.bind(poll.contract, &outputs[..count], true);
+                let _ = self.service.bind(poll.contract, &outputs, true);
             }
         }
         let outcome = self.service.solve(1, 100_000);

@@ -354,11 +354,13 @@ impl State {
     ) -> Result<(), Clash> {
         let finish = usize::from(self.end(finish));
         let far = (self.is_far(min), self.is_far(max));
-        if (far.0 && lows.is_empty()) || (far.1 && highs.is_empty()) {
-            self.loose.set(true);
-        }
         let is = &self.finishes[finish];
         let was_far = (self.is_far(is.min), self.is_far(is.max));
+        // What is far does not matter to what is near already.
+        let matters = was_far.1 || is.max == Ticks::MAX;
+        if (far.0 && lows.is_empty()) || (far.1 && highs.is_empty() && matters) {
+            self.loose.set(true);
+        }
         let known = (is.lows.len(), is.highs.len());
         let bounds = &mut self.finishes[finish];
         let before = (bounds.min, bounds.max);
@@ -484,8 +486,11 @@ impl State {
             (End::Finish, End::Start) => {
                 to == self.tick || (min == -Ticks::MAX && max >= 0) || min >= 0
             }
-            // What is near is told apart.
-            (End::Finish, End::Finish) => min <= 0 && max >= 0,
+            // What is near is told apart; two far ends are another question.
+            (End::Finish, End::Finish) => {
+                (min == -Ticks::MAX || min == 0 || min == 1)
+                    && (max == Ticks::MAX || max == 0 || max == -1)
+            }
         };
         if !clear {
             self.loose.set(true);

@@ -9,7 +9,7 @@ use super::*;
 pub(super) const ROVER: &str = include_str!("../../../../planning/models/executive.ddl");
 
 /// Without the goals that come while a rover recovers, or may begin to: nobody lets it drive then.
-fn calm(service: &dyn PlanService, mut events: Vec<Event>) -> Vec<Event> {
+pub(super) fn calm(service: &dyn PlanService, mut events: Vec<Event>) -> Vec<Event> {
     let timelines = &service.model().timelines;
     let monitor = timelines
         .iter()

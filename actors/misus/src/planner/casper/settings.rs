@@ -1,0 +1,39 @@
+//! How rovers plan: the keys.
+
+use farside_actors::settings;
+use farside_actors::system::settings::one_of;
+use serde::{Deserialize, Serialize};
+
+/// How the next goal is chosen: all in which the paper's three planners differ (section 5.1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Choice {
+    /// The goal with which the team's score would be highest by Equation 1 (CASPER+IDGS); none if every
+    /// goal would make it less.
+    #[default]
+    Idgs,
+    /// The goal that is worth most by itself (CASPER+SimpleReward).
+    SimpleReward,
+    /// Any goal (CASPER+Random).
+    Random,
+}
+
+settings! {
+    /// The `[planner]` table: how rovers plan (the paper's section 4.2).
+    pub struct PlannerConfig {
+        /// How the next goal is chosen.
+        pub choice: Choice, one_of(&["idgs", "simple-reward", "random"]);
+        /// How many iterations an optimisation step of a rover has at the most.
+        pub iterations: u32 = 50, 1..=100_000;
+        /// How many optimisation steps there are.
+        pub steps: u32 = 20, 1..=100_000;
+        /// How often any goal is chosen instead of the best.
+        pub epsilon: f64 = 0.1, 0.0..=1.0;
+        /// After how many deletions a rover sheds a goal that its plan does not have.
+        pub deletions: u32 = 3, 1..=1_000_000;
+        /// How often the centre offers a goal to all rovers before it gives the goal up.
+        pub offers: u32 = 10, 1..=1_000_000;
+        /// By how much a rover's share of the work may exceed an even one when the centre assigns goals.
+        pub imbalance: f64 = 0.1, 0.0..=10.0;
+    }
+}
