@@ -95,6 +95,13 @@ fn pieces<'a>(lane: &'a Lane, along: &Along) -> Vec<Piece<'a>> {
         let (from, to) = (along.x(said.from_ns), along.x(to_ns));
         let is_quiet = lane.quiet.iter().any(|quiet| quiet == said.predicate());
         if is_quiet && to - from < THIN {
+            // Nothing is asked of it all the same.
+            let before = pieces
+                .last_mut()
+                .filter(|last| last.is_quiet && last.to >= from);
+            if let Some(before) = before {
+                before.to = to;
+            }
             continue;
         }
         let last = busy.filter(|_| !is_quiet).map(|at| &mut pieces[at]);

@@ -208,8 +208,8 @@ fn two_lines(series: usize, right: f64, y: f64) -> Markup {
         }
     };
     html! {
-        (entry(right - 230.0, "cost", "dearest cycle"))
-        (entry(right - 106.0, "cost mean", "mean of cycles"))
+        (entry(right - 250.0, "cost", "dearest cycle"))
+        (entry(right - 116.0, "cost mean", "mean of cycles"))
     }
 }
 

@@ -111,7 +111,7 @@ fn says(agent: &AgentHistory, marks: &[&Mark], along: &Along) -> String {
     let cycles = agent.cycles.iter();
     let cycles = cycles.filter(|(time_ns, _)| along.has(*time_ns));
     let (count, cost_ns) = cycles.fold((0u64, 0u64), |(count, cost_ns), (_, cycle)| {
-        (count + 1, cost_ns + cycle.cost_ns)
+        (count + 1, cost_ns + cycle.cost_ns.min(agent.latency_ns))
     });
     let share = 100.0 * cost_ns as f64 / (count * agent.latency_ns).max(1) as f64;
     let mut parts = vec![format!(

@@ -162,8 +162,16 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     assert_eq!(count(&svg, "class=\"mark-line alarm\" d=\"M") - 1, 2);
     assert_eq!(count(&svg, "class=\"mark-line broken\" d=\"M") - 1, 2);
     assert!(svg.contains("system of idea/k9 &lt;&amp;&gt;") && !svg.contains("<&"));
-    // The goal that both alarms interrupt goes on; what came of it is told.
-    assert!(svg.contains("ImageAt(30 -60 0 -30 wide_eye) from 0:05 to 2:48, then ok"));
+    // What came of each goal is told, of those that an alarm interrupted too.
+    let goals = svg.split("<title>ImageAt(").skip(1);
+    let goals: Vec<&str> = goals
+        .filter_map(|rest| rest.split("</title>").next())
+        .collect();
+    assert_eq!(goals.len(), 6);
+    assert!(
+        goals.iter().all(|goal| goal.ends_with(", then ok")),
+        "{goals:?}"
+    );
     for cause in ["goal expanded", "next command", "alarm"] {
         assert!(svg.contains(&format!(">{cause}</text>")), "{cause}");
     }
