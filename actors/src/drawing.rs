@@ -5,6 +5,8 @@
 use farside::scene::{Drawing, Form, Level, Pose, Shape};
 use farside_worlds::HeightField;
 
+use crate::rover::RoverPose;
+
 /// The frame of the world: x east, y north, z up \[m\].
 pub const MAP: &str = "map";
 
@@ -13,6 +15,9 @@ pub const GROUND: [f64; 4] = [0.6, 0.5, 0.4, 0.35];
 
 /// The colour of rovers.
 pub const ROVERS: [f64; 4] = [0.95, 0.55, 0.1, 1.0];
+
+/// The colour of where rovers believe to be.
+pub const BELIEVED: [f64; 4] = [0.95, 0.75, 0.4, 0.35];
 
 /// The colour of names.
 pub const NAMES: [f64; 4] = [1.0, 1.0, 1.0, 1.0];
@@ -86,6 +91,58 @@ pub fn rover(name: &str, scale_m: f64) -> Drawing {
     }
 }
 
+/// Where a rover is and how it stands, in truth.
+///
+/// ```
+/// use farside::scene::Facing;
+/// use farside_actors::drawing::rover_pose;
+/// use farside_actors::rover::RoverPose;
+/// // Nose up by 90 degrees: a turn about what is left of it, against the right hand.
+/// let up = RoverPose { pitch_rad: std::f64::consts::FRAC_PI_2, ..RoverPose::default() };
+/// let Facing::Orientation([x, y, z, w]) = rover_pose(&up).facing else { panic!() };
+/// let half = 0.5f64.sqrt();
+/// assert!((y + half).abs() < 1e-12 && (w - half).abs() < 1e-12 && x == 0.0 && z == 0.0);
+/// ```
+pub fn rover_pose(pose: &RoverPose) -> Pose {
+    let place_m = [pose.east_m, pose.north_m, pose.height_m];
+    // Heading first, then nose up, then right side down, each in what the turns before left.
+    Pose::oriented(place_m, turned(pose.yaw_rad, pose.pitch_rad, pose.roll_rad))
+}
+
+/// A turn by angles \[rad\] as a unit quaternion, x, y, z, w: to the left, then nose up, then right side
+/// down.
+pub fn turned(left_rad: f64, up_rad: f64, down_right_rad: f64) -> [f64; 4] {
+    let half = |angle_rad: f64| (libm::sin(0.5 * angle_rad), libm::cos(0.5 * angle_rad));
+    let ((sz, cz), (sy, cy), (sx, cx)) = (half(left_rad), half(-up_rad), half(down_right_rad));
+    [
+        sx * cy * cz - cx * sy * sz,
+        cx * sy * cz + sx * cy * sz,
+        cx * cy * sz - sx * sy * cz,
+        cx * cy * cz + sx * sy * sz,
+    ]
+}
+
+/// A rover where it is, with roll and pitch, and a faint box where it believes to be; it is half as long
+/// as `scale_m`.
+pub fn follow(name: &str, pose: &RoverPose, scale_m: f64) -> [Drawing; 3] {
+    let here = rover_pose(pose);
+    let believed_m = [pose.estimated_east_m, pose.estimated_north_m, pose.height_m];
+    let size_m = [0.5, 0.35, 0.25].map(|part| part * scale_m);
+    [
+        Drawing::Transform {
+            parent: MAP.to_owned(),
+            child: base_link(name),
+            pose: here,
+        },
+        poses(name, vec![here]),
+        Drawing::Entity {
+            id: layered("believed", name),
+            frame: MAP.to_owned(),
+            shapes: vec![shape(Form::Cube { size_m }, believed_m, BELIEVED)],
+        },
+    ]
+}
+
 /// The ground as a net on the layer `map`; for viewers that draw no entities, its knots as poses. Both
 /// are called `name`.
 ///
@@ -134,4 +191,34 @@ pub fn net(terrain: &HeightField, name: &str, thickness_m: f64) -> [Drawing; 2] 
         shapes: vec![shape(lines, [0.0; 3], GROUND)],
     };
     [net, poses(name, knots)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a turn makes of a vector.
+    fn apply([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+        let turn = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        (turn * nalgebra::Vector3::from(v)).into()
+    }
+
+    fn is_near(a: [f64; 3], b: [f64; 3]) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
+    }
+
+    #[test]
+    fn a_rover_turns_left_then_nose_up_then_right_side_down() {
+        let (left, up, down) = (0.7f64, 0.3f64, 0.2f64);
+        let turn = turned(left, up, down);
+        // What is ahead rises with the pitch, whatever the roll.
+        let ahead = [up.cos() * left.cos(), up.cos() * left.sin(), up.sin()];
+        assert!(is_near(apply(turn, [1.0, 0.0, 0.0]), ahead));
+        // Its left side rises with the roll: by its sine, as far as it does not pitch.
+        let [_, _, rises] = apply(turn, [0.0, 1.0, 0.0]);
+        assert!((rises - down.sin() * up.cos()).abs() < 1e-12, "{rises}");
+        let level = turned(left, 0.0, 0.0);
+        let beside = [-left.sin(), left.cos(), 0.0];
+        assert!(is_near(apply(level, [0.0, 1.0, 0.0]), beside));
+    }
 }

@@ -4,6 +4,7 @@
 //! axes, scales, legends, colours and numbers.
 
 pub mod colours;
+pub mod ground;
 pub mod numbers;
 pub mod relief;
 pub mod scale;

@@ -26,7 +26,7 @@ use crate::monitor::{Monitor, Tally, Watched, WatchedAgent, WatchedRover};
 use crate::register::Backoff;
 use crate::relay::{RelayActor, RelaySetup, RelayTable};
 use crate::runner::{RegisterSetup, RunnerSettings, Side};
-pub(crate) use goals::{Goals, goals};
+pub(crate) use goals::{GoalPlace, Goals, goals};
 pub(crate) use minds::{Minds, Role, text_file};
 
 /// The name of the processor that agents plan on, on their hosts.
@@ -48,7 +48,7 @@ pub(crate) const COMMANDED: [&str; 8] = [
 ];
 
 /// Those of them that say polls.
-const POLLED: [&str; 4] = ["Pitch_SV", "Roll_SV", "Temperature_SV", "Power_SV"];
+pub(crate) const POLLED: [&str; 4] = ["Pitch_SV", "Roll_SV", "Temperature_SV", "Power_SV"];
 
 /// Between rovers at the start \[m\].
 const APART_M: f64 = 6.0;
@@ -153,11 +153,7 @@ impl Parts<'_> {
 
     /// What an agent of a row is.
     fn role(&self, layer: usize) -> Role {
-        match layer {
-            last if last + 1 == self.scenario.agents.layers as usize => Role::System,
-            0 => Role::Mission,
-            _ => Role::Between,
-        }
+        Role::of(layer, self.scenario.agents.layers as usize)
     }
 
     /// The registers of an agent, and the actors on their other sides.

@@ -232,20 +232,13 @@ impl AgentTally {
 
     /// What a timeline of the K9's models says.
     fn hear(&mut self, says: &TimelineSays, at: SimTime) {
-        match says.timeline.as_str() {
-            "MotionHealth_SV" if says.says.ends_with("Alarm") || says.says == "HardLimit" => {
-                self.alarms += 1;
-                self.load.cause(Cause::Alarm, at);
-            }
-            // A rover is nominal at the start, and again when it has resumed.
-            "MotionMonitor_SV" if says.says == "Nominal" && at > SimTime::ZERO => {
-                self.recoveries += 1;
-            }
-            "MotionMonitor_SV" => self.load.cause(Cause::Alarm, at),
-            "Location_SV" if says.says.starts_with("DriveTo") => {
-                self.load.cause(Cause::Expanded, at);
-            }
-            _ => {}
+        self.alarms += u32::from(says.is_alarm());
+        // A rover is nominal at the start, and again when it has resumed.
+        let is_nominal = says.timeline == "MotionMonitor_SV" && says.says == "Nominal";
+        self.recoveries += u32::from(is_nominal && at > SimTime::ZERO);
+        match Cause::of(says) {
+            Cause::None => {}
+            cause => self.load.cause(cause, at),
         }
     }
 }

@@ -41,6 +41,14 @@ pub struct TimelineSays {
     pub before: Vec<String>,
 }
 
+impl TimelineSays {
+    /// Whether the timeline of the motion's health in the K9's models says that something is wrong.
+    pub fn is_alarm(&self) -> bool {
+        let is_one = self.says.ends_with("Alarm") || self.says == "HardLimit";
+        self.timeline == "MotionHealth_SV" && is_one
+    }
+}
+
 /// A contract that somebody else had asked for has ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GoalEnded {

@@ -5,10 +5,12 @@ use std::sync::PoisonError;
 
 use farside::Report;
 use farside_actors::field::{FieldConfig, Place, story};
+use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
+    Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -17,7 +19,8 @@ use crate::config::{
     AgentConfig, AgentsConfig, DeliberationConfig, GoalConfig, GoalsConfig, IdeaScenario,
     RelayConfig,
 };
-use crate::{builtin, metrics};
+use crate::scene::IdeaScene;
+use crate::{builtin, metrics, picture};
 
 /// Plan-based executives that control K9 rovers.
 pub struct IdeaSystem;
@@ -59,6 +62,10 @@ impl System for IdeaSystem {
         &builtin::STUDIES
     }
 
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
+    }
+
     fn parse(
         &self,
         sections: toml::Deserializer<'_>,
@@ -98,6 +105,8 @@ impl Settings for IdeaScenario {
         };
         let place = Place::of(&self.world, setup)?;
         let minds = Minds::read(self, setup)?;
+        let goals = goals(self, &names(self), setup.problem_seed)?;
+        let scene = IdeaScene::new(place.field.clone(), names(self), &goals);
         let table = match &self.relay.table {
             None => None,
             Some(name) => Some(text_file(setup, name, "relay.table")?),
@@ -107,7 +116,7 @@ impl Settings for IdeaScenario {
             place: &place,
             minds,
             table,
-            goals: goals(self, &names(self), setup.problem_seed)?,
+            goals,
             seed: setup.run_seed,
             until,
         };
@@ -116,9 +125,20 @@ impl Settings for IdeaScenario {
             let mut tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
             metrics::results(&team.watched, &mut tally, report.end_time)
         });
+        let assembly = assembly.with_scene(scene);
         let faults = self.rover.faults.iter().enumerate();
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)
         }))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        setup: &mut Setup<'_>,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, setup)
     }
 }

@@ -6,10 +6,12 @@ mod field;
 mod history;
 mod profiles;
 
+use std::sync::LazyLock;
+
 use farside::SimDuration;
 use farside::suggest::{did_you_mean, nearest};
-use farside_actors::figure::Figure;
 use farside_actors::figure::numbers::plain;
+use farside_actors::figure::{Figure, ground};
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
 };
@@ -22,7 +24,8 @@ use farside_actors::field::Place;
 use history::History;
 
 /// The style of pictures, beside that of all figures.
-const STYLE: &str = include_str!("picture/picture.css");
+static STYLE: LazyLock<String> =
+    LazyLock::new(|| [ground::STYLE, include_str!("picture/picture.css")].concat());
 
 /// The pictures that there are.
 pub(crate) const ALL: [PictureInfo; 2] = [

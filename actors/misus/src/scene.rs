@@ -8,8 +8,8 @@ use std::sync::Arc;
 use farside::RunInfo;
 use farside::record::{Record, RecordClass};
 use farside::scene::{Drawing, Form, Level, Pose, Scene};
-use farside_actors::drawing::{self, MAP, base_link, layered, poses, shape, text};
-use farside_actors::rover::{FaultBegins, RoverPose, hardware_name};
+use farside_actors::drawing::{self, MAP, layered, poses, shape, text};
+use farside_actors::rover::{FaultBegins, hardware_name};
 use farside_worlds::RockField;
 
 use crate::messages::FieldModel;
@@ -31,9 +31,6 @@ const CLASSES: [[f64; 4]; 8] = [
 
 /// The colour of rocks of which nothing is known.
 const UNKNOWN: [f64; 4] = [0.6, 0.6, 0.6, 0.6];
-
-/// The colour of where rovers believe to be.
-const BELIEVED: [f64; 4] = [0.95, 0.75, 0.4, 0.35];
 
 /// Draws a run.
 pub(crate) struct MisusScene {
@@ -92,28 +89,6 @@ impl MisusScene {
             out.push(self.rock(rock, colour));
         }
     }
-
-    fn follow(&self, rover: usize, pose: &RoverPose, out: &mut Vec<Drawing>) {
-        let name = &self.rovers[rover];
-        let place_m = [pose.east_m, pose.north_m, pose.height_m];
-        let facing = [libm::cos(pose.yaw_rad), libm::sin(pose.yaw_rad)];
-        let here = Pose::heading(place_m, facing);
-        out.push(Drawing::Transform {
-            parent: MAP.to_owned(),
-            child: base_link(name),
-            pose: here,
-        });
-        out.push(poses(name, vec![here]));
-        let believed_m = [pose.estimated_east_m, pose.estimated_north_m, pose.height_m];
-        let form = Form::Cube {
-            size_m: [0.5, 0.35, 0.25].map(|part| part * SCALE_M),
-        };
-        out.push(Drawing::Entity {
-            id: layered("believed", name),
-            frame: MAP.to_owned(),
-            shapes: vec![shape(form, believed_m, BELIEVED)],
-        });
-    }
 }
 
 impl Scene for MisusScene {
@@ -151,7 +126,7 @@ impl Scene for MisusScene {
         match (record.class, rover, kind.name()) {
             (RecordClass::Sample, Some(rover), "RoverPose") => {
                 if let Ok(pose) = kind.schema().decode(record.body) {
-                    self.follow(rover, &pose, out);
+                    out.extend(drawing::follow(&self.rovers[rover], &pose, SCALE_M));
                 }
             }
             (RecordClass::Told, Some(_), "FaultBegins") => {

@@ -22,6 +22,20 @@ pub(crate) struct Goals {
     pub(crate) nothing: Arc<str>,
     /// Where the rover starts \[dm\].
     pub(crate) start_dm: [i64; 2],
+    /// What and where they are, for who shows them.
+    pub(crate) places: Vec<GoalPlace>,
+}
+
+/// A goal, for who shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct GoalPlace {
+    /// Its number among those of its rover, from 1.
+    pub(crate) number: i64,
+    pub(crate) name: String,
+    /// East, north \[m\].
+    pub(crate) place_m: [f64; 2],
+    /// What the system agent calls it.
+    pub(crate) words: String,
 }
 
 /// The goals of all rovers.
@@ -103,7 +117,7 @@ fn in_words(scenario: &IdeaScenario, rover: u32, goals: Vec<GoalConfig>) -> Goal
     let is_ordered = scenario.agents.layers > 1;
     let from = start(rover, scenario.agents.rovers);
     let number = |value: f64| RegisterValue::Number(libm::round(value) as i64);
-    let mut orders = Vec::new();
+    let (mut orders, mut places) = (Vec::new(), Vec::new());
     for (index, goal) in (1..).zip(&goals) {
         let mut image = vec![
             number(10.0 * (from.east_m + goal.east_m)),
@@ -112,6 +126,15 @@ fn in_words(scenario: &IdeaScenario, rover: u32, goals: Vec<GoalConfig>) -> Goal
             number(goal.tilt_rad.to_degrees()),
             RegisterValue::Symbol(goal.camera.as_str().into()),
         ];
+        places.push(GoalPlace {
+            number: index,
+            name: match goal.name.as_str() {
+                "" => format!("goal {index}"),
+                name => name.to_owned(),
+            },
+            place_m: [from.east_m + goal.east_m, from.north_m + goal.north_m],
+            words: in_one("ImageAt", &image),
+        });
         if is_ordered {
             image.insert(0, RegisterValue::Number(index));
         }
@@ -137,5 +160,19 @@ fn in_words(scenario: &IdeaScenario, rover: u32, goals: Vec<GoalConfig>) -> Goal
         orders,
         nothing: if is_ordered { "Quiet" } else { "NoGoal" }.into(),
         start_dm: [from.east_m, from.north_m].map(|m| libm::round(10.0 * m) as i64),
+        places,
     }
+}
+
+/// A procedure with its inputs as [`crate::wording::words`] has them.
+fn in_one(procedure: &str, inputs: &[RegisterValue]) -> String {
+    let inputs: Vec<String> = inputs
+        .iter()
+        .map(|value| match value {
+            RegisterValue::Truth(truth) => truth.to_string(),
+            RegisterValue::Number(number) => number.to_string(),
+            RegisterValue::Symbol(name) => name.to_string(),
+        })
+        .collect();
+    format!("{procedure}({})", inputs.join(" "))
 }

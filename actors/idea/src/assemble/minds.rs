@@ -34,6 +34,15 @@ pub(crate) enum Role {
 }
 
 impl Role {
+    /// What an agent is by its place in a row of so many.
+    pub(crate) fn of(layer: usize, layers: usize) -> Role {
+        match layer {
+            last if last + 1 == layers => Role::System,
+            0 => Role::Mission,
+            _ => Role::Between,
+        }
+    }
+
     /// The scenario's table.
     pub(crate) fn table(self) -> &'static str {
         match self {

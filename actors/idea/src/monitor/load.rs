@@ -3,7 +3,7 @@
 
 use farside::{SimDuration, SimTime};
 
-use crate::records::AgentCycle;
+use crate::records::{AgentCycle, TimelineSays};
 
 /// The most peaks that are kept.
 const PEAKS: usize = 12;
@@ -13,6 +13,8 @@ const PEAKS: usize = 12;
 pub(crate) enum Cause {
     /// Nothing in particular.
     None,
+    /// The next command of a goal, or the next goal of a plan, was given.
+    Command,
     /// A goal was received.
     Goal,
     /// A goal was expanded into commands.
@@ -22,10 +24,27 @@ pub(crate) enum Cause {
 }
 
 impl Cause {
+    /// Why the cycle was dear in which a timeline of the K9's models began to say something.
+    pub(crate) fn of(says: &TimelineSays) -> Cause {
+        match says.timeline.as_str() {
+            "MotionHealth_SV" if says.is_alarm() => Cause::Alarm,
+            "MotionMonitor_SV" => match says.says.as_str() {
+                "Nominal" => Cause::None,
+                _ => Cause::Alarm,
+            },
+            "Location_SV" if says.says.starts_with("DriveTo") => Cause::Expanded,
+            "Goal_SV" if says.says.starts_with("ImageAt") => Cause::Command,
+            "PanTilt_SV" if says.says.starts_with("Point") => Cause::Command,
+            "Camera_SV" if says.says.starts_with("TakeImage") => Cause::Command,
+            _ => Cause::None,
+        }
+    }
+
     /// What it is called.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Cause::None => "nothing in particular",
+            Cause::Command => "next command",
             Cause::Goal => "goal received",
             Cause::Expanded => "goal expanded",
             Cause::Alarm => "alarm",

@@ -7,6 +7,7 @@ mod graph;
 mod ground;
 mod mission;
 mod mistakes;
+mod pictures;
 mod plant;
 mod remote;
 mod response;

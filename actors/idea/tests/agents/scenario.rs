@@ -7,11 +7,71 @@ use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants}
 use farside::{End, Report, RunInfo};
 use farside_actors::link::{Degrade, LinksConfig};
 use farside_actors::rover::{CommandEnd, CommandReport};
-use farside_actors::system::{Files, Results, Seeds, Setup, System};
+use farside_actors::system::{Assembly, Files, Results, Seeds, Settings, Setup, System};
 use farside_actors::units;
 use farside_actors::wiring::LinkBuilder;
 use farside_idea::IdeaSystem;
 use farside_idea::records::{AgentFaulty, AgentRemark, GoalEnded, TimelineSays};
+
+/// A scenario that is read.
+pub(crate) struct Scenario {
+    pub(crate) settings: Box<dyn Settings>,
+    pub(crate) until: SimDuration,
+    links: LinksConfig,
+    degrades: Vec<Degrade>,
+}
+
+impl Scenario {
+    /// Reads a scenario's text as the command does.
+    pub(crate) fn read(text: &str) -> Scenario {
+        let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
+        let take = |table: &mut toml::Table, key: &str| table.remove(key);
+        let links = take(&mut table, "links").unwrap_or_else(|| toml::Table::new().into());
+        let degrades =
+            take(&mut table, "degrade").unwrap_or_else(|| Vec::<toml::Value>::new().into());
+        let until = take(&mut table, "until").expect("it ends");
+        for key in ["system", "description", "seed"] {
+            take(&mut table, key);
+        }
+        let text = toml::to_string(&table).expect("it was TOML");
+        let sections = toml::Deserializer::parse(&text).expect("it was TOML");
+        let settings = IdeaSystem.parse(sections).expect("these are its keys");
+        settings.check().expect("they are in their ranges");
+        Scenario {
+            settings,
+            until: units::duration::deserialize(until).expect("it is a duration"),
+            links: links.try_into().expect("they are links"),
+            degrades: degrades.try_into().expect("they are degradations"),
+        }
+    }
+
+    /// Hands out what the system is built from, for a run or for a picture.
+    pub(crate) fn set_up<T>(
+        &self,
+        seed: u64,
+        sim: &mut Simulation,
+        build: impl FnOnce(&dyn Settings, Setup<'_>) -> T,
+    ) -> T {
+        let mut files = Files::on_disk(".".into());
+        let links = LinkBuilder::new(&self.links, &self.degrades).expect("they are right");
+        let seeds = Seeds {
+            run: seed,
+            problem: seed,
+        };
+        let setup = Setup::new(seeds, Some(self.until), sim, &mut files, links);
+        build(&*self.settings, setup)
+    }
+
+    /// Puts the system together.
+    pub(crate) fn assemble(&self, seed: u64, sim: &mut Simulation) -> Assembly {
+        self.set_up(seed, sim, |settings, mut setup| {
+            let assembly = settings.assemble(&mut setup).expect("it can be");
+            let remarks = setup.close().expect("all keys match");
+            assert!(remarks.is_empty(), "{remarks:?}");
+            assembly
+        })
+    }
+}
 
 /// What came of a run.
 pub(crate) struct Run {
@@ -102,33 +162,10 @@ impl Observer for Listen {
 impl Run {
     /// A scenario with a seed; `plan` adds to it what no key says.
     pub(crate) fn of(text: &str, seed: u64, plan: impl FnOnce(&mut Simulation)) -> Run {
-        let mut table: toml::Table = toml::from_str(text).expect("it is TOML");
-        let take = |table: &mut toml::Table, key: &str| table.remove(key);
-        let links = take(&mut table, "links").unwrap_or_else(|| toml::Table::new().into());
-        let links: LinksConfig = links.try_into().expect("they are links");
-        let degrades =
-            take(&mut table, "degrade").unwrap_or_else(|| Vec::<toml::Value>::new().into());
-        let degrades: Vec<Degrade> = degrades.try_into().expect("they are degradations");
-        let until = take(&mut table, "until").expect("it ends");
-        let until = units::duration::deserialize(until).expect("it is a duration");
-        for key in ["system", "description", "seed"] {
-            take(&mut table, key);
-        }
-        let text = toml::to_string(&table).expect("it was TOML");
-        let sections = toml::Deserializer::parse(&text).expect("it was TOML");
-        let settings = IdeaSystem.parse(sections).expect("these are its keys");
-        settings.check().expect("they are in their ranges");
+        let scenario = Scenario::read(text);
         let mut sim = Simulation::new(seed);
-        let mut files = Files::on_disk(".".into());
-        let links = LinkBuilder::new(&links, &degrades).expect("they are right");
-        let seeds = Seeds {
-            run: seed,
-            problem: seed,
-        };
-        let mut setup = Setup::new(seeds, Some(until), &mut sim, &mut files, links);
-        let assembly = settings.assemble(&mut setup).expect("it can be");
-        let remarks = setup.close().expect("all keys match");
-        assert!(remarks.is_empty(), "{remarks:?}");
+        let assembly = scenario.assemble(seed, &mut sim);
+        let until = scenario.until;
         sim.stop_at(SimTime::ZERO + until, "until");
         plan(&mut sim);
         let said = Arc::new(Mutex::new(Vec::new()));

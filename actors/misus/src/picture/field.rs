@@ -3,8 +3,8 @@
 
 use farside::SimDuration;
 use farside_actors::figure::Figure;
-use farside_actors::figure::relief;
-use farside_actors::figure::svg::{Px, over_lines, path, shortened};
+use farside_actors::figure::ground::{Ground, LegendRow, legend, legend_rows};
+use farside_actors::figure::svg::{Px, shortened};
 use farside_worlds::RockField;
 use maud::{Markup, html};
 
@@ -22,8 +22,6 @@ const SIDE: f64 = 16.0;
 const GAP: f64 = 24.0;
 /// Right of the panels: the legend.
 const LEGEND: f64 = 250.0;
-/// From row to row of the legend.
-const ROW: f64 = 22.0;
 /// The least radius of a rock, in pixels: smaller ones would have no shape.
 const LEAST: f64 = 4.0;
 
@@ -31,20 +29,25 @@ const LEAST: f64 = 4.0;
 struct Panel<'a> {
     field: &'a RockField,
     history: &'a History,
-    left: f64,
-    px_per_m: f64,
+    ground: Ground<'a>,
 }
 
 /// The picture of a field at a time, as the rover of this number thinks it is.
 pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: u64) -> Figure {
     let model = history.model(rover, at_ns);
     let name = &history.names[rover];
-    let px_per_m = PANEL / field.settings().side_m;
+    let side_m = field.settings().side_m;
     let panel = |left| Panel {
         field,
         history,
-        left,
-        px_per_m,
+        ground: Ground {
+            terrain: field.terrain(),
+            corner_m: [-0.5 * side_m; 2],
+            side_m,
+            left,
+            top: TOP,
+            side: PANEL,
+        },
     };
     let (truth, thought) = (panel(SIDE), panel(SIDE + PANEL + GAP));
     let at = in_sols(SimDuration::from_nanos(at_ns));
@@ -55,16 +58,16 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
     let body = html! {
         text class="title" x=(Px(SIDE)) y="28" { (title) }
         text class="tick" x=(Px(SIDE)) y="50" { (says) }
-        text class="facet" x=(Px(truth.left)) y=(Px(TOP - 12.0)) { "What the rocks are" }
-        text class="facet" x=(Px(thought.left)) y=(Px(TOP - 12.0)) { "What " (name) " thinks they are" }
-        (truth.ground())
+        text class="facet" x=(Px(truth.ground.left)) y=(Px(TOP - 12.0)) { "What the rocks are" }
+        text class="facet" x=(Px(thought.ground.left)) y=(Px(TOP - 12.0)) { "What " (name) " thinks they are" }
+        (truth.ground.draw())
         (truth.true_rocks())
         (truth.tracks(at_ns))
-        (thought.ground())
+        (thought.ground.draw())
         (thought.learned_rocks(model, colours.as_deref()))
         (thought.readings(model))
         (thought.tracks(at_ns))
-        (legend(field, (right, TOP + 10.0)))
+        (legend(&explained(field, right), (right, TOP + 10.0)))
     };
     Figure {
         file: "field.svg".to_owned(),
@@ -74,7 +77,7 @@ pub(super) fn figure(history: &History, field: &RockField, rover: usize, at_ns: 
         height: TOP + PANEL + SIDE,
         body,
         facet: String::new(),
-        style: super::STYLE,
+        style: &super::STYLE,
     }
 }
 
@@ -108,32 +111,11 @@ fn says(
 }
 
 impl Panel<'_> {
-    fn px(&self, [x_m, y_m]: [f64; 2]) -> (f64, f64) {
-        let half_m = 0.5 * self.field.settings().side_m;
-        (
-            self.left + (x_m + half_m) * self.px_per_m,
-            TOP + (half_m - y_m) * self.px_per_m,
-        )
-    }
-
-    fn is_inside(&self, (x, y): (f64, f64)) -> bool {
-        (self.left..=self.left + PANEL).contains(&x) && (TOP..=TOP + PANEL).contains(&y)
-    }
-
-    /// Contours and the edge of the field.
-    fn ground(&self) -> Markup {
-        let inside = |at: &(f64, f64)| self.is_inside(*at);
-        html! {
-            (relief::draw(self.field.terrain(), self.px_per_m, |at_m| self.px(at_m), inside))
-            rect class="frame" x=(Px(self.left)) y=(Px(TOP)) width=(Px(PANEL)) height=(Px(PANEL)) {}
-        }
-    }
-
     /// Where a rock is in the figure, and how large.
     fn rock(&self, rock: usize) -> ((f64, f64), f64) {
         let one = self.field.rocks()[rock];
-        let radius = 0.5 * one.diameter_m * self.px_per_m;
-        (self.px(one.position_m.into()), radius.max(LEAST))
+        let radius = 0.5 * one.diameter_m * self.ground.px_per_m();
+        (self.ground.px(one.position_m.into()), radius.max(LEAST))
     }
 
     fn true_rocks(&self) -> Markup {
@@ -192,39 +174,17 @@ impl Panel<'_> {
 
     /// Where rovers were, in truth and as they believed, and where they are.
     fn tracks(&self, at_ns: u64) -> Markup {
-        let line = |points: Vec<[f64; 2]>| path(points.into_iter().map(|at_m| self.px(at_m)));
         html! {
             @for (rover, name) in self.history.names.iter().enumerate() {
-                @let moments = self.history.until(rover, at_ns);
-                path class="track" d=(line(moments.iter().map(|m| m.true_m).collect())) {
-                    title { (name) ", in truth" }
-                }
-                path class="track believed" d=(line(moments.iter().map(|m| m.believed_m).collect())) {
-                    title { (name) ", as it believes" }
-                }
-                @if let Some(last) = moments.last() {
-                    @let (x, y) = self.px(last.true_m);
-                    path class="rover" d=(arrow((x, y), last.yaw_rad)) { title { (name) } }
-                    (over_lines("who", (x, y - 12.0), "middle", &shortened(name, 12)))
-                }
+                (self.ground.track(name, self.history.until(rover, at_ns)))
             }
         }
     }
 }
 
-/// A rover, pointed where it heads.
-fn arrow((x, y): (f64, f64), yaw_rad: f64) -> String {
-    let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
-    let corner = |(ahead, left): (f64, f64)| {
-        // Pixels count downwards.
-        (x + ahead * cos - left * sin, y - ahead * sin - left * cos)
-    };
-    let corners = [(9.0, 0.0), (-6.0, 5.5), (-3.0, 0.0), (-6.0, -5.5)];
-    format!("{}Z", path(corners.map(corner)))
-}
-
-fn legend(field: &RockField, (x, y): (f64, f64)) -> Markup {
-    let mut rows: Vec<(Markup, String)> = Vec::new();
+/// The rows of the legend, for a legend at this x.
+fn explained(field: &RockField, x: f64) -> Vec<LegendRow> {
+    let mut rows: Vec<LegendRow> = Vec::new();
     for (class, one) in field.classes().iter().enumerate() {
         let rock = html! {
             g class={ "n" (class % COLOURS) } {
@@ -237,10 +197,6 @@ fn legend(field: &RockField, (x, y): (f64, f64)) -> Markup {
     let faint = html! {
         g class="n0" { path class="rock" d=(shape(0, (x + 12.0, 0.0), 7.0)) fill-opacity="0.4" {} }
     };
-    let line = |class: &str| {
-        let data = path([(x, 0.0), (x + 26.0, 0.0)]);
-        html! { path class=(class) d=(data) {} }
-    };
     rows.extend([
         (faint, "less sure".to_owned()),
         (hollow, "not read: by its place alone".to_owned()),
@@ -252,26 +208,7 @@ fn legend(field: &RockField, (x, y): (f64, f64)) -> Markup {
             html! { circle class="image" cx=(Px(x + 12.0)) cy="0" r="7" {} },
             "image known".to_owned(),
         ),
-        (
-            html! { path class="rover" d=(arrow((x + 12.0, 0.0), 0.0)) {} },
-            "rover".to_owned(),
-        ),
-        (line("track"), "where it was".to_owned()),
-        (line("track believed"), "where it believed to be".to_owned()),
-        (
-            line("relief key"),
-            format!(
-                "contours every {} m",
-                relief::contour_step_m(field.terrain())
-            ),
-        ),
     ]);
-    html! {
-        @for (row, (sample, says)) in rows.iter().enumerate() {
-            g transform={ "translate(0 " (Px(y + ROW * row as f64)) ")" } {
-                (sample)
-                text x=(Px(x + 36.0)) y="4.5" { (says) }
-            }
-        }
-    }
+    rows.extend(legend_rows(field.terrain(), x));
+    rows
 }

@@ -3,21 +3,11 @@
 
 use farside::encoding::{DecodeError, Schema};
 use farside::record::RecordClass;
+use farside_actors::figure::ground::Moment;
 use farside_actors::rover::{FaultBegins, RoverPose, RoverResources, hardware_name};
 use farside_actors::system::{PictureError, Recorded, Recording};
 
 use crate::messages::FieldModel;
-
-/// A rover at an instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Moment {
-    pub(super) time_ns: u64,
-    /// Where it is.
-    pub(super) true_m: [f64; 2],
-    /// Where it believes to be.
-    pub(super) believed_m: [f64; 2],
-    pub(super) yaw_rad: f64,
-}
 
 /// What a rover has at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,12 +122,7 @@ impl History {
         match (record.class, record.kind) {
             (RecordClass::Sample, "RoverPose") => {
                 let pose: RoverPose = schemas.pose.decode(record.body)?;
-                self.moments[rover].push(Moment {
-                    time_ns,
-                    true_m: [pose.east_m, pose.north_m],
-                    believed_m: [pose.estimated_east_m, pose.estimated_north_m],
-                    yaw_rad: pose.yaw_rad,
-                });
+                self.moments[rover].push(Moment::new(time_ns, &pose));
             }
             (RecordClass::Sample, "RoverResources") => {
                 let resources: RoverResources = schemas.resources.decode(record.body)?;
@@ -165,8 +150,7 @@ impl History {
 
     /// A rover's moments up to a time.
     pub(super) fn until(&self, rover: usize, at_ns: u64) -> &[Moment] {
-        let all = &self.moments[rover];
-        &all[..all.partition_point(|moment| moment.time_ns <= at_ns)]
+        Moment::until(&self.moments[rover], at_ns)
     }
 
     /// What a rover had in a time span.

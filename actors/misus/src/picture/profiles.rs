@@ -86,7 +86,7 @@ pub(super) fn figure(
         height: bottom,
         body,
         facet: String::new(),
-        style: super::STYLE,
+        style: &super::STYLE,
     }
 }
 
