@@ -138,9 +138,9 @@ settings! {
         /// To the north of where the rover starts; rounded to decimetres.
         pub north_m as "north": f64 [with = "units::signed_length_m"], in_unit("m", -10_000.0..=10_000.0);
         /// Where the mast points, from straight ahead to the left; rounded to degrees.
-        pub pan_rad as "pan": f64 [with = "units::angle_rad"], in_unit("rad", -3.142..=3.142);
+        pub pan_rad as "pan": f64 [with = "units::angle_rad"], in_unit("rad", -6.3..=6.3);
         /// Where the mast points, from level upwards; rounded to degrees.
-        pub tilt_rad as "tilt": f64 [with = "units::angle_rad"], in_unit("rad", -1.571..=1.571);
+        pub tilt_rad as "tilt": f64 [with = "units::angle_rad"], in_unit("rad", -1.6..=1.6);
         /// With which camera.
         pub camera: String = "wide_eye".to_owned(), one_of(&CAMERAS);
         /// When the ground sends it.

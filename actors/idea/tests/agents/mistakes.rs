@@ -28,10 +28,7 @@ fn mistakes_are_named_by_their_keys() {
         agent("model = 'k9-sistem'"),
         &["system_agent.model", "did you mean \"k9-system\"?"],
     );
-    says(
-        agent("model = 'k9-mission'"),
-        &["system_agent", "Goal_SV", "Location_SV"][..1].as_ref(),
-    );
+    says(agent("model = 'k9-mission'"), &["system_agent"]);
     says(
         agent("latency = '0s'"),
         &["system_agent.latency", "more than 0s"],
@@ -61,8 +58,5 @@ fn mistakes_are_named_by_their_keys() {
         ),
         &["goal.4.recalled", "agents.layers"],
     );
-    says(
-        with("model = \"k9\"", "model = \"mer\""),
-        &["relay.table", "hawk_eye"][..1].as_ref(),
-    );
+    says(with("model = \"k9\"", "model = \"mer\""), &["relay.table"]);
 }
