@@ -212,13 +212,20 @@ mod tests {
         let (left, up, down) = (0.7f64, 0.3f64, 0.2f64);
         let turn = turned(left, up, down);
         // What is ahead rises with the pitch, whatever the roll.
-        let ahead = [up.cos() * left.cos(), up.cos() * left.sin(), up.sin()];
+        let ahead = [
+            libm::cos(up) * libm::cos(left),
+            libm::cos(up) * libm::sin(left),
+            libm::sin(up),
+        ];
         assert!(is_near(apply(turn, [1.0, 0.0, 0.0]), ahead));
         // Its left side rises with the roll: by its sine, as far as it does not pitch.
         let [_, _, rises] = apply(turn, [0.0, 1.0, 0.0]);
-        assert!((rises - down.sin() * up.cos()).abs() < 1e-12, "{rises}");
+        assert!(
+            (rises - libm::sin(down) * libm::cos(up)).abs() < 1e-12,
+            "{rises}"
+        );
         let level = turned(left, 0.0, 0.0);
-        let beside = [-left.sin(), left.cos(), 0.0];
+        let beside = [-libm::sin(left), libm::cos(left), 0.0];
         assert!(is_near(apply(level, [0.0, 1.0, 0.0]), beside));
     }
 }
