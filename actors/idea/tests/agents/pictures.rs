@@ -313,6 +313,19 @@ fn goals_that_are_given_up_are_marked() {
 }
 
 #[test]
+fn every_alarm_is_on_the_map_and_over_the_timelines() {
+    let text = include_str!("../../scenarios/k9-alarms.toml");
+    let (tape, _, _) = taped(text);
+    let svg = drawn(text, &tape, "timelines", &PictureRequest::default()).unwrap();
+    keep("timelines-alarms.svg", &svg);
+    let alarms = count(&svg, "class=\"mark-line alarm\" d=\"M") - 1;
+    let svg = drawn(text, &tape, "map", &PictureRequest::default()).unwrap();
+    keep("map-alarms.svg", &svg);
+    assert!(alarms >= 4, "{alarms}");
+    assert_eq!(count(&svg, "class=\"alarm-place\"") - 1, alarms);
+}
+
+#[test]
 fn an_hour_of_three_rovers_can_be_read() {
     let text = K9.replace(
         "[mission_agent]",
