@@ -192,7 +192,7 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     let svg = drawn(K9, &tape, "timelines", &mission).unwrap();
     keep("timelines-mission.svg", &svg);
     assert_eq!(count(&svg, "class=\"lane\""), 3);
-    assert!(svg.contains(">goal received</text>"));
+    assert!(svg.contains(">goal received</text>") && svg.contains(" x Planning from 0:00 to"));
 }
 
 #[test]
