@@ -209,23 +209,17 @@ mod tests {
 
     #[test]
     fn a_rover_turns_left_then_nose_up_then_right_side_down() {
-        let (left, up, down) = (0.7f64, 0.3f64, 0.2f64);
+        use libm::{cos, sin};
+        let (left, up, down) = (0.7, 0.3, 0.2);
         let turn = turned(left, up, down);
         // What is ahead rises with the pitch, whatever the roll.
-        let ahead = [
-            libm::cos(up) * libm::cos(left),
-            libm::cos(up) * libm::sin(left),
-            libm::sin(up),
-        ];
+        let ahead = [cos(up) * cos(left), cos(up) * sin(left), sin(up)];
         assert!(is_near(apply(turn, [1.0, 0.0, 0.0]), ahead));
         // Its left side rises with the roll: by its sine, as far as it does not pitch.
         let [_, _, rises] = apply(turn, [0.0, 1.0, 0.0]);
-        assert!(
-            (rises - libm::sin(down) * libm::cos(up)).abs() < 1e-12,
-            "{rises}"
-        );
+        assert!(f64::abs(rises - sin(down) * cos(up)) < 1e-12, "{rises}");
         let level = turned(left, 0.0, 0.0);
-        let beside = [-libm::sin(left), libm::cos(left), 0.0];
+        let beside = [-sin(left), cos(left), 0.0];
         assert!(is_near(apply(level, [0.0, 1.0, 0.0]), beside));
     }
 }

@@ -175,12 +175,9 @@ fn cast(
 
 /// A timeline of a model, of which nothing is known yet.
 fn lane(timeline: &Timeline, is_system: bool, predicate: impl Fn(&usize) -> String) -> Lane {
-    let fillers = [&timeline.default, &timeline.initial];
-    let quiet: Vec<usize> = fillers
-        .into_iter()
-        .flatten()
-        .map(|one| one.predicate)
-        .collect();
+    // What a timeline without a default says first goes on until something is asked of it.
+    let quiet = timeline.default.as_ref().or(timeline.initial.as_ref());
+    let quiet: Vec<usize> = quiet.map(|filler| filler.predicate).into_iter().collect();
     let others = timeline.predicates.iter().filter(|at| !quiet.contains(at));
     Lane {
         name: timeline.name.clone(),

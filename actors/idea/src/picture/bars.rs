@@ -295,12 +295,12 @@ mod tests {
         }
     }
 
-    fn along(to_s: u64) -> Along {
+    fn along(to_s: u64, right: f64) -> Along {
         Along {
             from_ns: 0,
             to_ns: to_s * SECOND,
             left: 0.0,
-            right: 100.0,
+            right,
         }
     }
 
@@ -316,17 +316,17 @@ mod tests {
             .collect();
         let lane = lane(&all);
         // A pixel is five seconds: turns of less than one, two apart.
-        let found = pieces(&lane, &along(500));
+        let found = pieces(&lane, &along(500, 100.0));
         let many: Vec<usize> = found.iter().map(|piece| piece.said.len()).collect();
         assert_eq!(many, [50]);
-        assert!(has_many(&lane, &along(500)));
-        let (bars, _) = draw(&lane, &along(500), 0.0);
+        assert!(has_many(&lane, &along(500, 100.0)));
+        let (bars, _) = draw(&lane, &along(500, 100.0), 0.0);
         let drawn = bars.into_string();
         assert!(drawn.contains("50 x Turn from 0:00 to 8:12"), "{drawn}");
         // A pixel is a second: each apart.
-        let found = pieces(&lane, &along(100));
+        let found = pieces(&lane, &along(100, 100.0));
         assert!(found.iter().all(|piece| piece.said.len() == 1));
-        assert_eq!(found.iter().filter(|piece| !piece.is_quiet).count(), 11);
+        assert_eq!(found.iter().filter(|piece| !piece.is_quiet).count(), 10);
     }
 
     #[test]
@@ -336,16 +336,16 @@ mod tests {
             (60, 64, "Turn(30)"),
             (64, 100, "Still"),
         ]);
-        let (_, texts) = draw(&lane, &along(100), 0.0);
+        let (_, texts) = draw(&lane, &along(100, 200.0), 0.0);
         let drawn = texts.into_string();
         // Inside of a wide bar, behind a thin one.
         assert!(
-            drawn.contains(">Drive(1 2)</text>") && drawn.contains(">Turn</text>"),
+            drawn.contains(">Drive(1 2)</text>") && drawn.contains(">Turn(30)</text>"),
             "{drawn}"
         );
         assert!(!drawn.contains(">Still</text>"), "{drawn}");
         let escaped = self::lane(&[(0, 100, "Say(<&)")]);
-        let (bars, texts) = draw(&escaped, &along(100), 0.0);
+        let (bars, texts) = draw(&escaped, &along(100, 200.0), 0.0);
         let drawn = bars.into_string() + &texts.into_string();
         assert!(
             drawn.contains("Say(&lt;&amp;)") && !drawn.contains("(<&"),

@@ -232,8 +232,9 @@ impl Map<'_> {
         let mut room = Room::new([LEFT, TOP, LEFT + SIDE, TOP + SIDE]);
         for (_, rover) in self.each() {
             let moments = Moment::until(&rover.moments, self.at_ns);
-            for moment in moments {
-                room.avoid(self.ground.px(moment.true_m));
+            for pair in moments.windows(2) {
+                let [from, to] = [pair[0].true_m, pair[1].true_m].map(|m| self.ground.px(m));
+                room.avoid_line(from, to);
             }
             if let Some(last) = moments.last() {
                 let (x, y) = self.ground.px(last.true_m);

@@ -47,12 +47,8 @@ pub(super) fn figure(history: &History, agent: usize, (from_ns, to_ns): (u64, u6
     let first_strip = bottom + 48.0;
     let end = first_strip + strips::APART * strips.len() as f64;
     let (x_label, x_ticks) = times(from_ns, to_ns);
-    let lane_top = |row: usize| top + LANE * row as f64;
     let strip_top = |number: usize| first_strip + strips::APART * number as f64;
-    let lanes = agent.lanes.iter().enumerate();
-    let drawn: Vec<(Markup, Markup)> = lanes
-        .map(|(row, lane)| bars::draw(lane, &along, lane_top(row)))
-        .collect();
+    let (lanes, on_lanes) = lanes(agent, &along, top);
     let title = format!(
         "{} of {}, seed {}, from {} to {}",
         agent.name,
@@ -68,27 +64,14 @@ pub(super) fn figure(history: &History, agent: usize, (from_ns, to_ns): (u64, u6
         text class="tick" x="16" y="50" { (says) }
         (legend(agent, &marks, &along))
         (grid(&along, &x_ticks, top, [bottom, end - strips::APART + strips::HEIGHT]))
-        @for (row, lane) in agent.lanes.iter().enumerate() {
-            @let name = lane.name.strip_suffix("_SV").unwrap_or(&lane.name);
-            text class="lane" x=(Px(LEFT - 10.0)) y=(Px(lane_top(row) + 15.5)) text-anchor="end" {
-                (name)
-                title { (lane.name) }
-            }
-            (drawn[row].0)
-        }
+        (lanes)
         @for (number, strip) in strips.iter().enumerate() {
             @let is_last = number + 1 == strips.len();
             @let x = if is_last { (x_label, x_ticks.as_slice()) } else { ("", &[][..]) };
             (strip.draw(agent, &along, strip_top(number), x))
         }
         (lines(&marks, &along, top, end - strips::APART + strips::HEIGHT))
-        @for (row, lane) in agent.lanes.iter().enumerate() {
-            (drawn[row].1)
-            @if lane.is_polled && lane.said.is_empty() {
-                @let at = (LEFT + 5.0, lane_top(row) + 15.2);
-                (over_lines("on-bar soft", at, "start", "polls: the answers are messages"))
-            }
-        }
+        (on_lanes)
         @for (number, strip) in strips.iter().enumerate() {
             (strip.written(agent, &along, strip_top(number)))
         }
@@ -104,6 +87,35 @@ pub(super) fn figure(history: &History, agent: usize, (from_ns, to_ns): (u64, u6
         facet: String::new(),
         style: &super::STYLE,
     }
+}
+
+/// The lanes, the first one's upper edge at `top`, and what is written on them.
+fn lanes(agent: &AgentHistory, along: &Along, top: f64) -> (Markup, Markup) {
+    let lane_top = |row: usize| top + LANE * row as f64;
+    let lanes = agent.lanes.iter().enumerate();
+    let drawn: Vec<(Markup, Markup)> = lanes
+        .map(|(row, lane)| bars::draw(lane, along, lane_top(row)))
+        .collect();
+    let below = html! {
+        @for (row, lane) in agent.lanes.iter().enumerate() {
+            @let name = lane.name.strip_suffix("_SV").unwrap_or(&lane.name);
+            text class="lane" x=(Px(LEFT - 10.0)) y=(Px(lane_top(row) + 15.5)) text-anchor="end" {
+                (name)
+                title { (lane.name) }
+            }
+            (drawn[row].0)
+        }
+    };
+    let above = html! {
+        @for (row, lane) in agent.lanes.iter().enumerate() {
+            (drawn[row].1)
+            @if lane.is_polled && lane.said.is_empty() {
+                @let at = (LEFT + 5.0, lane_top(row) + 15.2);
+                (over_lines("on-bar soft", at, "start", "polls: the answers are messages"))
+            }
+        }
+    };
+    (below, above)
 }
 
 /// The figure in a sentence or two.

@@ -192,7 +192,7 @@ fn the_timelines_of_an_agent_have_a_lane_each_and_a_line_for_each_alarm() {
     let svg = drawn(K9, &tape, "timelines", &mission).unwrap();
     keep("timelines-mission.svg", &svg);
     assert_eq!(count(&svg, "class=\"lane\""), 3);
-    assert!(svg.contains(">goal received</text>"));
+    assert!(svg.contains(">goal received</text>") && svg.contains(" x Planning from 0:00 to"));
 }
 
 #[test]
@@ -310,6 +310,19 @@ fn goals_that_are_given_up_are_marked() {
         _ => false,
     };
     assert_eq!(drawings.iter().filter(|drawing| told(drawing)).count(), 1);
+}
+
+#[test]
+fn every_alarm_is_on_the_map_and_over_the_timelines() {
+    let text = include_str!("../../scenarios/k9-alarms.toml");
+    let (tape, _, _) = taped(text);
+    let svg = drawn(text, &tape, "timelines", &PictureRequest::default()).unwrap();
+    keep("timelines-alarms.svg", &svg);
+    let alarms = count(&svg, "class=\"mark-line alarm\" d=\"M") - 1;
+    let svg = drawn(text, &tape, "map", &PictureRequest::default()).unwrap();
+    keep("map-alarms.svg", &svg);
+    assert!(alarms >= 4, "{alarms}");
+    assert_eq!(count(&svg, "class=\"alarm-place\"") - 1, alarms);
 }
 
 #[test]

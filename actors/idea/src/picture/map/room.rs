@@ -5,6 +5,8 @@ type Span = [f64; 4];
 
 /// How far the middle of a text's edge is from its place, nearest first.
 const FAR: [f64; 5] = [12.0, 22.0, 36.0, 54.0, 80.0];
+/// From point to point of a line that is avoided.
+const STEP: f64 = 6.0;
 /// In how many directions one looks.
 const DIRECTIONS: u32 = 12;
 
@@ -31,9 +33,15 @@ impl Room {
         self.taken.push(span);
     }
 
-    /// A place that is better not covered.
-    pub(super) fn avoid(&mut self, at: (f64, f64)) {
-        self.avoided.push(at);
+    /// A line that is better not covered: points of it, near to each other.
+    pub(super) fn avoid_line(&mut self, (x, y): (f64, f64), (x2, y2): (f64, f64)) {
+        let length = libm::hypot(x2 - x, y2 - y);
+        let parts = libm::ceil(length / STEP).clamp(1.0, 1e4);
+        for part in 0..=parts as u32 {
+            let share = f64::from(part) / parts;
+            self.avoided
+                .push((x + share * (x2 - x), y + share * (y2 - y)));
+        }
     }
 
     /// Takes room for a box of half a width and half a height beside a place; returns its middle. None if
@@ -124,9 +132,7 @@ mod tests {
     fn tracks_are_not_covered_where_there_is_room() {
         let mut room = Room::new([0.0, 0.0, 300.0, 300.0]);
         // A track to the right of the place.
-        for x in 150..300 {
-            room.avoid((f64::from(x), 150.0));
-        }
+        room.avoid_line((150.0, 150.0), (300.0, 150.0));
         let (x, y) = room.beside((150.0, 150.0), [20.0, 8.0]).unwrap();
         assert!((y - 150.0).abs() > 8.0 || x < 130.0, "{x} {y}");
     }
