@@ -83,8 +83,9 @@ fn blame(problem: &Problem, unmet: &Unmet) -> SetupError {
         ("communication", format!("{missing_s} s of time"))
     };
     let rover = &problem.rovers[unmet.rover].name;
-    let message =
-        format!("{rover} cannot make its daily communication: it lacks {lacks}, so there is no plan");
+    let message = format!(
+        "{rover} cannot make its daily communication: it lacks {lacks}, so there is no plan"
+    );
     SetupError::value(&format!("problem.{key}"), message)
 }
 
@@ -96,7 +97,9 @@ pub(super) fn assemble(
 ) -> Result<Team, SetupError> {
     let shared = Arc::new(shared);
     let names = [CENTRE].into_iter();
-    let names: Vec<&str> = names.chain(shared.rovers.iter().map(String::as_str)).collect();
+    let names: Vec<&str> = names
+        .chain(shared.rovers.iter().map(String::as_str))
+        .collect();
     let hosts: Vec<HostId> = names.iter().map(|name| sim.host(name)).collect();
     let places_m = [[0.0; 2]].into_iter();
     let places_m = places_m.chain(shared.problem.rovers.iter().map(|rover| rover.position_m));

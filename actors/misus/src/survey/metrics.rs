@@ -34,7 +34,13 @@ const fn curve(
 /// Sorted by name.
 const ALL: [Metric; 15] = [
     Metric::new("complete", "all goals achieved", "", Rate, Higher),
-    Metric::new("goals_achieved", "goals in the plan", "goals", Number, Higher),
+    Metric::new(
+        "goals_achieved",
+        "goals in the plan",
+        "goals",
+        Number,
+        Higher,
+    ),
     curve(
         "goals_by_step",
         "goals in the plan",
@@ -43,7 +49,13 @@ const ALL: [Metric; 15] = [
         "How many goals the team's plan achieves after each optimisation step. Source: the MISUS paper, Figure 4.",
     ),
     Metric::new("goals_deleted", "goals given up", "goals", Number, Lower),
-    Metric::new("goals_total", "goals of the problem", "goals", Number, Neither),
+    Metric::new(
+        "goals_total",
+        "goals of the problem",
+        "goals",
+        Number,
+        Neither,
+    ),
     curve(
         "operations_by_step",
         "operations of a step",
@@ -52,10 +64,34 @@ const ALL: [Metric; 15] = [
         "What all rovers' planners look at in each optimisation step: the time that it takes on a processor. \
          Source: the MISUS paper, Figure 5.",
     ),
-    Metric::new("plan_operations", "operations of planning", "operations", Number, Lower),
-    Metric::new("plan_violations", "what is wrong with the plan", "", Number, Lower),
-    Metric::new("planner_steps", "optimisation steps made", "steps", Number, Neither),
-    Metric::new("reassigned", "goals assigned again", "goals", Number, Neither),
+    Metric::new(
+        "plan_operations",
+        "operations of planning",
+        "operations",
+        Number,
+        Lower,
+    ),
+    Metric::new(
+        "plan_violations",
+        "what is wrong with the plan",
+        "",
+        Number,
+        Lower,
+    ),
+    Metric::new(
+        "planner_steps",
+        "optimisation steps made",
+        "steps",
+        Number,
+        Neither,
+    ),
+    Metric::new(
+        "reassigned",
+        "goals assigned again",
+        "goals",
+        Number,
+        Neither,
+    ),
     Metric::new("score", "score of the plan", "", Number, Higher),
     curve(
         "score_by_step",
@@ -213,8 +249,14 @@ pub(super) fn results(team: &Team) -> Results {
         .metric("operations_by_step", by_step(curves.operations))
         .metric("traverse_by_step", by_step(curves.traverse_m));
     results.line("score of the plan", format!("{:.2}", metrics.score));
-    results.line("goals in the plan", format!("{goals_achieved} of {goals_total}"));
-    results.line("length of all drives", format!("{:.0} m", metrics.traverse_m));
+    results.line(
+        "goals in the plan",
+        format!("{goals_achieved} of {goals_total}"),
+    );
+    results.line(
+        "length of all drives",
+        format!("{:.0} m", metrics.traverse_m),
+    );
     let (shed, again) = (metrics.shed, metrics.reassigned);
     results.line("goals shed", format!("{shed}, {again} assigned again"));
     results.line("operations", metrics.plan_operations.to_string());

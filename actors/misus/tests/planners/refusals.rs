@@ -26,9 +26,15 @@ fn what_has_to_be_done_and_cannot_be_is_explained() {
 #[test]
 fn bad_values_are_refused() {
     check("planner.choice = \"best\"", "unknown variant `best`");
-    check("planner.epsilon = 1.5", "planner.epsilon: 1.5: expected 0 to 1");
+    check(
+        "planner.epsilon = 1.5",
+        "planner.epsilon: 1.5: expected 0 to 1",
+    );
     check("planner.epsilon = nan", "planner.epsilon: NaN");
-    check("planner.steps = 0", "planner.steps: 0: expected 1 to 100000");
+    check(
+        "planner.steps = 0",
+        "planner.steps: 0: expected 1 to 100000",
+    );
     check("rounds.every = \"0s\"", "rounds.every");
     check("rounds.processor = \"fast\"", "fast");
     check("lns.operations = 0", "lns.operations: 0");

@@ -56,7 +56,11 @@ impl Observer for Listen {
     }
 
     fn begin(&mut self, run: &Arc<farside::RunInfo>) -> Result<(), ObserverError> {
-        self.1 = run.entities.iter().map(|one| one.name.to_string()).collect();
+        self.1 = run
+            .entities
+            .iter()
+            .map(|one| one.name.to_string())
+            .collect();
         Ok(())
     }
 
@@ -110,7 +114,8 @@ impl Run<'_> {
         for &(name, crash, restart) in self.crashes {
             let at = SimTime::from_secs;
             sim.crash_named_at(at(crash), name).expect("it is there");
-            sim.restart_named_at(at(restart), name).expect("it is there");
+            sim.restart_named_at(at(restart), name)
+                .expect("it is there");
         }
         if let Some(until) = until {
             sim.stop_at(SimTime::ZERO + until, "until");
