@@ -43,6 +43,8 @@ pub(super) struct CentralPlanner {
     memory: Option<Memory>,
     /// What the processor has in hand.
     in_hand: Option<Work>,
+    /// How often goals had been assigned when it last looked around.
+    looked: u32,
 }
 
 /// What is kept through crashes.
@@ -140,6 +142,7 @@ impl CentralPlanner {
             processor,
             memory: None,
             in_hand: None,
+            looked: 0,
         }
     }
 
@@ -156,13 +159,27 @@ impl CentralPlanner {
         }
     }
 
-    /// Looks around again after `delay`, unless planners wait for each other.
+    /// Looks around again after `delay`, unless all have made all steps.
     fn look_later(&self, delay: SimDuration, ctx: &mut Context<'_, Self>) {
         let Some(memory) = &self.memory else { return };
         let done = |said: &PlanHeld| said.steps >= self.shared.planner.steps;
-        if !self.shared.rounds.synchronised && !memory.said.iter().all(done) {
+        if !memory.said.iter().all(done) {
             ctx.timer(delay, LooksAround);
         }
+    }
+
+    /// Assigns again what rovers may not have heard of, if nothing has come of it since the last look.
+    fn repeat(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        let Some(memory) = &self.memory else {
+            return Ok(());
+        };
+        if std::mem::replace(&mut self.looked, memory.round) < memory.round {
+            return Ok(());
+        }
+        let behind = |rover: &usize| memory.said[*rover].steps < memory.round;
+        let behind: Vec<usize> = (0..memory.said.len()).filter(behind).collect();
+        let mut behind = behind.into_iter();
+        behind.try_for_each(|rover| self.assign_to(rover, ctx))
     }
 
     fn assign_to(&self, rover: usize, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -235,7 +252,10 @@ impl Handler<PlanHeld> for CentralPlanner {
 
 impl Handler<LooksAround> for CentralPlanner {
     fn handle(&mut self, _: LooksAround, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.revise(ctx);
+        match self.shared.rounds.synchronised {
+            true => self.repeat(ctx)?,
+            false => self.revise(ctx),
+        }
         self.look_later(self.shared.rounds.every, ctx);
         Ok(())
     }

@@ -101,7 +101,7 @@ impl RoverPlanner {
         }
     }
 
-    /// Asks for what is still lacking.
+    /// Asks for what is still lacking, and says again what others may lack.
     fn ask(&self, ctx: &mut Context<'_, Self>) -> Outcome {
         let Some(memory) = &self.memory else {
             return Ok(());
@@ -111,13 +111,21 @@ impl RoverPlanner {
             return Ok(());
         }
         let mut said = memory.said[(memory.steps % 2) as usize].clone();
-        (said.rover, said.asks) = (self.rover as u32, true);
-        for other in &lacking.rovers {
-            self.tell(ctx, &self.shared.rovers[*other], said.clone())?;
+        said.rover = self.rover as u32;
+        for other in self.others() {
+            let name = &self.shared.rovers[other];
+            said.asks = lacking.rovers.contains(&other);
+            if said.asks && memory.steps > 1 {
+                // Who is a step behind waits for that.
+                let before = memory.said[((memory.steps + 1) % 2) as usize].clone();
+                self.tell(ctx, name, before)?;
+            }
+            if memory.steps > 0 {
+                self.tell(ctx, name, said.clone())?;
+            }
         }
-        if lacking.centre {
-            self.tell(ctx, CENTRE, said)?;
-        }
+        said.asks = lacking.centre;
+        self.tell(ctx, CENTRE, said)?;
         self.wait(ctx);
         Ok(())
     }
