@@ -9,7 +9,7 @@ use super::assemble::Shared;
 use super::messages::{
     Assigned, AssignmentsLeave, CentralRound, GoalsAssigned, LooksAround, PlanHeld, Reserved,
 };
-use crate::planner::casper::Choice;
+use crate::planner::casper::{Choice, PlannerConfig};
 use crate::planner::central::{Assignment, Central, State};
 use crate::planner::instance::Instance;
 use crate::planner::lns;
@@ -52,6 +52,18 @@ pub(super) struct CentralPlanner {
 struct Kept(Option<Memory>);
 
 impl Memory {
+    /// Nothing is assigned yet.
+    fn new(instance: &Instance, planner: &PlannerConfig) -> Memory {
+        let rovers = instance.vehicles().len();
+        Memory {
+            central: Central::new(instance, planner),
+            round: 0,
+            assignments: vec![0; instance.goals()],
+            said: vec![PlanHeld::default(); rovers],
+            plans: vec![Vec::new(); rovers],
+        }
+    }
+
     /// Assigns all goals for the first time. Returns what was looked at.
     fn begin(&mut self, shared: &Shared) -> Result<u64, HandlerError> {
         let instance = &shared.instance;
@@ -201,14 +213,7 @@ impl Actor for CentralPlanner {
             self.look_later(every, ctx);
             return Ok(());
         }
-        let (instance, rovers) = (&self.shared.instance, self.shared.rovers.len());
-        let mut memory = Memory {
-            central: Central::new(instance, &self.shared.planner),
-            round: 0,
-            assignments: vec![0; instance.goals()],
-            said: vec![PlanHeld::default(); rovers],
-            plans: vec![Vec::new(); rovers],
-        };
+        let mut memory = Memory::new(&self.shared.instance, &self.shared.planner);
         let operations = memory.begin(&self.shared)?;
         self.memory = Some(memory);
         let reassigned = 0;
@@ -286,5 +291,40 @@ impl Handler<AssignmentsLeave> for CentralPlanner {
 impl Handler<ProcessorChange> for CentralPlanner {
     fn handle(&mut self, _: ProcessorChange, _: &mut Context<'_, Self>) -> Outcome {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::problem::{ProblemConfig, generate};
+
+    /// A goal that all rovers shed comes back to one of them, whose old word is the last that the centre
+    /// has heard: that is no news of the goal.
+    #[test]
+    fn what_was_shed_before_a_goal_came_back_is_no_news() {
+        let instance = Instance::new(&generate(&ProblemConfig::default(), 1).unwrap()).unwrap();
+        let mut memory = Memory::new(&instance, &PlannerConfig::default());
+        for assignment in memory.central.assign_all(&instance) {
+            memory.count(&assignment);
+        }
+        let owner = |memory: &Memory| match memory.central.state(0) {
+            State::Assigned(assignment) => Some(assignment.rovers[0]),
+            _ => None,
+        };
+        for time in 1..=3 {
+            let rover = owner(&memory).unwrap();
+            memory.said[rover].shed = vec![Assigned {
+                goal: 0,
+                assignment: time,
+            }];
+            memory.revise(&instance);
+        }
+        assert_eq!(owner(&memory), None);
+        assert_eq!(memory.revise(&instance).reassigned, 1);
+        let back = owner(&memory);
+        assert!(back.is_some());
+        assert_eq!(memory.revise(&instance).reassigned, 0);
+        assert_eq!((owner(&memory), memory.assignments[0]), (back, 4));
     }
 }
