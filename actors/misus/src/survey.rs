@@ -22,6 +22,7 @@ mod messages;
 mod metrics;
 mod monitor;
 mod rover;
+mod shared;
 mod system;
 
 pub use config::RoundsConfig;

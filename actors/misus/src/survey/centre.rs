@@ -5,10 +5,10 @@ use std::sync::Arc;
 use farside::prelude::*;
 use farside_actors::processor::{Processor, ProcessorChange};
 
-use super::assemble::Shared;
 use super::messages::{
     Assigned, AssignmentsLeave, CentralRound, GoalsAssigned, LooksAround, PlanHeld, Reserved,
 };
+use super::shared::Shared;
 use crate::planner::casper::{Choice, PlannerConfig};
 use crate::planner::central::{Assignment, Central, State};
 use crate::planner::instance::Instance;

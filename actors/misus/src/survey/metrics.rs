@@ -7,9 +7,10 @@ use farside_actors::system::MetricKind::{Number, Rate, Series as Curve};
 use farside_actors::system::{Metric, Results, Series, SeriesIndex, with_about};
 use serde::Serialize;
 
-use super::assemble::{Shared, Team};
+use super::assemble::Team;
 use super::messages::{PlannedStop, PlannerStep};
 use super::monitor::Tally;
+use super::shared::Shared;
 use crate::planner::chain::Chain;
 use crate::planner::plan::{Stop, TeamPlan, violations};
 use crate::planner::score::Score;

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use farside::RunInfo;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 
-use super::assemble::{CENTRE, Shared};
 use super::messages::{CentralRound, PlannerStep};
+use super::shared::{CENTRE, Shared};
 
 /// What is known of all planners.
 #[derive(Default)]

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use farside::prelude::*;
 use farside_actors::processor::{Processor, ProcessorChange};
 
-use super::assemble::{CENTRE, Shared};
 use super::messages::{
     Assigned, GoalsAssigned, PlanHeld, PlannedStop, PlannerStep, StepBegins, StepEnds, StillWaits,
 };
+use super::shared::{CENTRE, Shared};
 use crate::planner::casper::{Casper, Step};
 use crate::planner::chain::Visit;
 

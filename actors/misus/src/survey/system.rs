@@ -7,8 +7,9 @@ use farside_actors::system::{
 };
 use serde::Deserialize;
 
-use super::assemble::{assemble, shared};
+use super::assemble::assemble;
 use super::config::{PlanningScenario, RoundsConfig};
+use super::shared::shared;
 use super::{builtin, metrics};
 use crate::planner::casper::PlannerConfig;
 use crate::planner::lns::LnsConfig;

@@ -17,7 +17,7 @@ pub enum Choice {
     /// Any goal (CASPER+Random).
     Random,
     /// None: rovers keep to what they are given. The centre plans for the whole team at once, by
-    /// large-neighbourhood search ([`lns`](crate::planner::lns)).
+    /// large-neighbourhood search.
     Lns,
 }
 
