@@ -158,3 +158,32 @@ impl Ran {
         values.map(|value| value.expect("it is there")).collect()
     }
 }
+
+#[test]
+fn the_built_in_scenario_runs() {
+    let builtin = PlanningSystem.scenarios();
+    let mut table: toml::Table = toml::from_str(builtin[0].text).expect("it is TOML");
+    assert_eq!(table["system"].as_str(), Some(PlanningSystem.name()));
+    let links = table["links"].to_string();
+    for key in ["system", "description", "seed", "until", "links"] {
+        table.remove(key);
+    }
+    let links = format!("default = {}", toml::Value::from(links_of(&links)));
+    let text = table.to_string();
+    let run = Run {
+        text: &text,
+        links: &links,
+        ..Run::default()
+    };
+    let ran = run.run();
+    assert!(ran.results.violations.is_empty());
+    assert_eq!(ran.curve("score_by_step").len(), 20);
+    assert!(ran.report.end_time < SimTime::from_secs(3600));
+}
+
+/// The `default` table of links.
+fn links_of(text: &str) -> toml::Table {
+    let links: toml::Table = toml::from_str(&format!("links = {text}")).expect("they are links");
+    let default = links["links"]["default"].as_table();
+    default.expect("there is one").clone()
+}
