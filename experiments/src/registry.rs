@@ -14,7 +14,7 @@
 use farside::suggest::nearest;
 use farside_actors::system::{Builtin, Metric, System};
 use farside_idea::IdeaSystem;
-use farside_misus::MisusSystem;
+use farside_misus::{MisusSystem, PlanningSystem};
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;
 use thiserror::Error;
@@ -105,6 +105,7 @@ impl Registry {
             .with(NetworkSystem)
             .with(IdeaSystem)
             .with(MisusSystem)
+            .with(PlanningSystem)
             .with(TrafficSystem)
     }
 

@@ -317,6 +317,9 @@ impl Casper {
     /// The goal to add next, by its number among those assigned; None if there is none, or none that the
     /// planner wants.
     fn next(&mut self, instance: &Instance, step: &mut Step) -> Option<usize> {
+        if self.config.choice == Choice::Lns {
+            return None;
+        }
         let open = |&(_, visit): &(usize, &Visit)| {
             let requires = instance.requires(visit.task);
             !self.score.holds(visit.task) && requires.iter().all(|&other| self.score.holds(other))

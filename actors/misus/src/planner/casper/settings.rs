@@ -16,13 +16,16 @@ pub enum Choice {
     SimpleReward,
     /// Any goal (CASPER+Random).
     Random,
+    /// None: rovers keep to what they are given. The centre plans for the whole team at once, by
+    /// large-neighbourhood search.
+    Lns,
 }
 
 settings! {
     /// The `[planner]` table: how rovers plan (the paper's section 4.2).
     pub struct PlannerConfig {
         /// How the next goal is chosen.
-        pub choice: Choice, one_of(&["idgs", "simple-reward", "random"]);
+        pub choice: Choice, one_of(&["idgs", "simple-reward", "random", "lns"]);
         /// How many iterations an optimisation step of a rover has at the most.
         pub iterations: u32 = 50, 1..=100_000;
         /// How many optimisation steps there are.

@@ -1,0 +1,89 @@
+//! Planners over links as scenarios see them: `[problem]`, `[planner]`, `[lns]`, `[rounds]`.
+
+use farside::Report;
+use farside_actors::system::settings::Table;
+use farside_actors::system::{
+    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+};
+use serde::Deserialize;
+
+use super::assemble::assemble;
+use super::config::{PlanningScenario, RoundsConfig};
+use super::shared::shared;
+use super::{builtin, metrics};
+use crate::planner::casper::PlannerConfig;
+use crate::planner::lns::LnsConfig;
+use crate::planner::problem::ProblemConfig;
+
+/// The planners of MISUS over links: the paper's evaluation, and what becomes of it on bad links.
+///
+/// ```
+/// use farside_actors::system::System;
+/// use farside_misus::PlanningSystem;
+/// assert_eq!(PlanningSystem.name(), "misus-planning");
+/// let tables: Vec<String> = PlanningSystem.sections().into_iter().map(|one| one.name).collect();
+/// assert_eq!(tables, ["problem", "planner", "lns", "rounds"]);
+/// ```
+pub struct PlanningSystem;
+
+impl System for PlanningSystem {
+    fn name(&self) -> &str {
+        "misus-planning"
+    }
+
+    fn about(&self) -> &str {
+        "planners of a team of rovers share out observations, and exchange their plans over links"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        [
+            ProblemConfig::sections("problem"),
+            PlannerConfig::sections("planner"),
+            LnsConfig::sections("lns"),
+            RoundsConfig::sections("rounds"),
+        ]
+        .concat()
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        metrics::all()
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &builtin::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        &builtin::STUDIES
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(PlanningScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for PlanningScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        self.check_all()
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        if setup.until.is_none() {
+            let message = "missing: planners that wait for each other need an end";
+            return Err(SetupError::value("until", message));
+        }
+        let shared = shared(self, setup.problem_seed, setup.run_seed)?;
+        let team = setup.wired(|sim, wire| assemble(sim, shared, wire))?;
+        let name = team.shared.problem.name.clone();
+        let goals = team.shared.instance.goals();
+        let assembly = Assembly::new(move |_: &Report| metrics::results(&team));
+        Ok(assembly.with_notes(vec![format!("problem: {name}, {goals} goals")]))
+    }
+}
