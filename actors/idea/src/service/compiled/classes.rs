@@ -47,6 +47,20 @@ impl Classes {
         }
     }
 
+    /// As [`of`](Self::of); none for what is no value of the type.
+    #[inline]
+    pub(super) fn of_type(&self, values: &Values, value: Value) -> Option<u32> {
+        match (self, values) {
+            (Classes::Numbers(least, classes), _) => {
+                let place = usize::try_from(value.wrapping_sub(*least)).ok()?;
+                classes.get(place).map(|&class| u32::from(class))
+            }
+            (_, Values::Truth) => (value == 0 || value == 1).then_some(value as u32),
+            (_, Values::Symbols(all)) => all.binary_search(&value).is_ok().then_some(value as u32),
+            (_, Values::Numbers(span)) => span.contains(value).then(|| self.of(value)),
+        }
+    }
+
     /// How many there are at most.
     pub(super) fn count(&self, model: &Model) -> u64 {
         match self {

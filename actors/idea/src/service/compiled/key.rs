@@ -5,7 +5,7 @@ use farside_planning::Ticks;
 use farside_planning::model::End;
 
 use super::NotCompiled;
-use super::classes::Classes;
+use super::Sort;
 use crate::service::propositional::rules::{Part, constant};
 use crate::service::propositional::state::{Guard, Open, span};
 use crate::service::propositional::{Propositional, Tables};
@@ -87,7 +87,7 @@ pub(super) fn longest(is: &Propositional, timeline: usize) -> Option<Ticks> {
 
 /// What is known, in numbers, but for what makes no difference; none, if it holds numbers that
 /// functions gave.
-pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Option<Vec<u32>> {
+pub(super) fn key(is: &Propositional, sorts: &[Sort], exact: Ticks) -> Option<Vec<u32>> {
     let (state, tick) = (&is.world.state, is.now);
     let mut key: Vec<u32> = Vec::with_capacity(256);
     for (timeline, lane) in state.lanes.iter().enumerate() {
@@ -124,7 +124,7 @@ pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Opti
         }
         let class = known
             .value
-            .map_or(0, |value| 1 + classes[known.of].of(value));
+            .map_or(0, |value| 1 + sorts[known.of].classes.of(value));
         key.extend([
             known.of as u32,
             known.also.map_or(u32::MAX, |of| of as u32),
