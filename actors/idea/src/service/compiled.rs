@@ -309,6 +309,7 @@ impl Compiled {
         );
         state.exact = self.exact;
         state.loose.set(false);
+        state.formulas.clear();
         for (place, (known, &held)) in (0..).zip(state.cells.iter_mut().zip(&form.cells)) {
             (known.value, known.origin) = (self.cell(held), Origin::Cell(place));
         }

@@ -78,11 +78,29 @@ impl Classes {
 ///
 /// If a rule asks of more numbers than can be sorted, or of several measured ones at once.
 pub(super) fn classes(tables: &Tables) -> Result<Vec<Classes>, NotCompiled> {
-    let types = 0..tables.model.types.len();
-    types.map(|of| classes_of(tables, of)).collect()
+    let types = &tables.model.types;
+    let mut known: Vec<Classes> = { types.iter() }
+        .map(|of| match of.values {
+            Values::Numbers(_) => Classes::One,
+            _ => Classes::Each,
+        })
+        .collect();
+    // What a function makes of a number is told apart by its own class: classes are split until
+    // those of one class lead to one class.
+    loop {
+        let types = 0..tables.model.types.len();
+        let finer: Result<Vec<Classes>, NotCompiled> =
+            types.map(|of| classes_of(tables, of, &known)).collect();
+        let finer = finer?;
+        let count = |all: &[Classes]| -> u64 { all.iter().map(|at| at.count(&tables.model)).sum() };
+        if count(&finer) == count(&known) {
+            return Ok(finer);
+        }
+        known = finer;
+    }
 }
 
-fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
+fn classes_of(tables: &Tables, of: TypeId, coarse: &[Classes]) -> Result<Classes, NotCompiled> {
     let model = &tables.model;
     let Values::Numbers(span) = model.types[of].values else {
         return Ok(Classes::Each);
@@ -142,7 +160,7 @@ fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
         let mut answers: Vec<Option<Value>> = Vec::new();
         answers.extend(literals.iter().map(|&at| Some(Value::from(at == value))));
         for &(rule, variable) in &questions {
-            ask(tables, (rule, variable), value, &mut answers);
+            ask(tables, coarse, (rule, variable), value, &mut answers);
         }
         let next = u16::try_from(known.len()).map_err(|_| NotCompiled::Numbers {
             of: model.types[of].name.clone(),
@@ -223,6 +241,7 @@ fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCo
 /// What a rule makes of a number, if nothing else is known.
 fn ask(
     tables: &Tables,
+    coarse: &[Classes],
     (rule, of): (usize, VariableId),
     value: Value,
     answers: &mut Vec<Option<Value>>,
@@ -252,17 +271,11 @@ fn ask(
             }
         }
     }
-    let named = |variable: VariableId| {
-        let is = |argument: &Argument| *argument == Argument::Variable(variable);
-        let mut told = said.master.arguments.iter().any(is);
-        patterns(said, &tables.flats[rule].relations, |pattern| {
-            told |= pattern.arguments.iter().any(is);
-        });
-        told
-    };
     for (variable, known) in known.iter().enumerate() {
-        if variable != of && named(variable) {
-            answers.push(*known);
+        if variable != of {
+            let of = said.variables[variable].of;
+            let class = |value| coarse[of].of_type(&tables.model.types[of].values, value);
+            answers.push(known.map(|value| class(value).map_or(-1, Value::from)));
         }
     }
     for relationship in relationships(said) {

@@ -117,11 +117,6 @@ pub(super) fn key(is: &Propositional, sorts: &[Sort], exact: Ticks) -> Option<Ve
         key.push(u32::MAX - 1);
     }
     for known in &state.cells {
-        if is.tables.is_measured(known.of)
-            && known.origin == crate::service::propositional::state::Origin::Computed
-        {
-            return None;
-        }
         let class = known
             .value
             .map_or(0, |value| 1 + sorts[known.of].classes.of(value));

@@ -1,6 +1,7 @@
 //! How a table grows: from what the interpreter decided.
 
 use farside_planning::Ticks;
+use farside_planning::model::{RelationshipKind, Value};
 
 use super::Compiled;
 use super::key::{key, longest};
@@ -13,7 +14,7 @@ use crate::service::propositional::state::{Far, Origin};
 
 impl Compiled {
     /// What the interpreter decided becomes a state, and, if it may, a transition to it.
-    pub(super) fn learn(&mut self, interpreter: Box<Propositional>, before: ServiceCounters) {
+    pub(super) fn learn(&mut self, mut interpreter: Box<Propositional>, before: ServiceCounters) {
         let loose = interpreter.world.state.loose.get();
         let ended = self.node.and_then(|_| self.changes_of(&interpreter, true));
         let asks = interpreter.world.state.open.len();
@@ -24,6 +25,7 @@ impl Compiled {
         let (Some(key), false) = (key, planned || asks != stripped.world.state.open.len()) else {
             // It goes on alone.
             interpreter.world.state.loose.set(false);
+            interpreter.world.state.formulas.clear();
             (self.node, self.interpreter) = (None, Some(interpreter));
             self.posted.clear();
             self.solved = Some(self.now);
@@ -217,14 +219,20 @@ impl Compiled {
     /// From where a cell has its value.
     fn source(&self, is: &Propositional, cell: u16) -> Source {
         let known = &is.world.state.cells[usize::from(is.world.state.root(cell))];
-        let form = self.forms.get(self.state as usize);
-        match (known.value, known.origin) {
-            (None, _) | (_, Origin::Model | Origin::Computed) => Source::Value(known.value),
-            (_, Origin::Cell(cell)) => match form.map(|form| form.cells[usize::from(cell)]) {
-                Some(Held::Register(place)) => Source::Register(u32::from(place)),
-                _ => Source::Value(known.value),
+        match known.value {
+            Some(value) => self.source_of(is, value, known.origin),
+            None => Source::Value(None),
+        }
+    }
+
+    fn source_of(&self, is: &Propositional, value: Value, origin: Origin) -> Source {
+        match origin {
+            Origin::Model => Source::Value(Some(value)),
+            Origin::Cell(cell) => match self.forms[self.state as usize].cells[usize::from(cell)] {
+                Held::Register(place) => Source::Register(u32::from(place)),
+                Held::Same(_) => Source::Value(Some(value)),
             },
-            (_, Origin::Posted(which, place)) => {
+            Origin::Posted(which, place) => {
                 let at = &self.posted[usize::from(which)];
                 let said = &self.model.predicates[at.predicate];
                 let first = match at.what {
@@ -235,8 +243,24 @@ impl Compiled {
                 if is.tables.is_measured(of) {
                     Source::Register(at.first + u32::from(place))
                 } else {
-                    Source::Value(known.value)
+                    Source::Value(Some(value))
                 }
+            }
+            Origin::Computed(formula) => {
+                let formula = &is.world.state.formulas[usize::from(formula)];
+                let inputs = formula.inputs.iter();
+                let inputs: Vec<Source> = inputs
+                    .map(|&(value, origin)| self.source_of(is, value, origin))
+                    .collect();
+                let same = |at: &Source| matches!(at, Source::Value(_));
+                if inputs.iter().all(same) {
+                    return Source::Value(Some(value));
+                }
+                let call = match formula.kind {
+                    RelationshipKind::Function(at) => Some(self.model.functions[at].call),
+                    _ => None,
+                };
+                Source::Computed((formula.kind, call), inputs)
             }
         }
     }

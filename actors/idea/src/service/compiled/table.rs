@@ -3,21 +3,26 @@
 use std::collections::BTreeMap;
 
 use farside_planning::Ticks;
-use farside_planning::model::{PredicateId, TimelineId, Value};
+use farside_planning::model::{PredicateId, RelationshipKind, TimelineId, Value};
 use smallvec::SmallVec;
 
 use crate::service::Contract;
 use crate::service::propositional::Propositional;
-use crate::service::propositional::state::Far;
+use crate::service::propositional::state::{Far, reckon};
 
 /// From where a register is filled, or a parameter of a token that began or ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub(super) enum Source {
     /// It is the same whenever this is decided.
     Value(Option<Value>),
     /// A register of before, or a value that was posted: these stand behind the registers.
     Register(u32),
+    /// A number that is made from others.
+    Computed(Computation, Vec<Source>),
 }
+
+/// How a number is made from others, with the model's function, if it is one.
+pub(super) type Computation = (RelationshipKind, Option<fn(&[Value]) -> Option<Value>>);
 
 /// From where a bound of an end is that is far.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,6 +73,8 @@ pub(super) struct Names {
     pub(super) values: Vec<Option<Value>>,
     pub(super) value_places: BTreeMap<Option<Value>, u32>,
     pub(super) several: Vec<Box<[Far]>>,
+    /// Numbers that are made from others.
+    pub(super) computed: Vec<(Computation, Box<[u32]>)>,
 }
 
 /// What may be posted next.
@@ -146,7 +153,18 @@ impl Names {
         let place = (source & REST) as usize;
         match source >> KIND {
             0 => self.values[place],
-            _ => registers[place],
+            1 => registers[place],
+            _ => self.compute(place, registers),
+        }
+    }
+
+    fn compute(&self, place: usize, registers: &[Option<Value>]) -> Option<Value> {
+        let ((kind, call), inputs) = &self.computed[place];
+        let inputs = inputs.iter().map(|&at| self.value(at, registers));
+        let inputs: Option<SmallVec<[Value; 4]>> = inputs.collect();
+        match call {
+            Some(call) => call(&inputs?),
+            None => reckon(*kind, &inputs?),
         }
     }
 
@@ -161,6 +179,16 @@ impl Names {
                 place
             }
             Source::Register(place) => 1 << KIND | place,
+            Source::Computed(how, inputs) => {
+                let inputs: Box<[u32]> = inputs.into_iter().map(|at| self.source(at)).collect();
+                let is = |at: &(Computation, Box<[u32]>)| at.0.0 == how.0 && at.1 == inputs;
+                let known = self.computed.iter().position(is);
+                let place = known.unwrap_or(self.computed.len());
+                if place == self.computed.len() {
+                    self.computed.push((how, inputs));
+                }
+                2 << KIND | place as u32
+            }
         }
     }
 
