@@ -8,7 +8,8 @@
 //! technology then decides the same ticks. What is measured is the planner alone: statuses and goals
 //! that are posted, and the cycle. "Through the service" is as the plan runner asks any technology,
 //! which copies out what began and ended; "direct" is the table's own interface, which has it read in
-//! place. `-- --ticks N technology` runs one alone, for a profiler.
+//! place. `-- --ticks N technology` runs one alone, for a profiler; a
+//! table is walked `--again M` times once it is made.
 
 // A benchmark measures real time.
 #![allow(clippy::disallowed_types)]
@@ -27,14 +28,15 @@ use farside_idea::service::{
 };
 use farside_planning::Ticks;
 use farside_planning::model::{Model, PredicateId, TimelineId, Value};
+use smallvec::SmallVec;
 
 const TICKS: Ticks = 172_800;
 const BUDGET: u64 = 100_000;
 
 /// What is posted to a service.
 enum Call {
-    Bind(Contract, Vec<Option<Value>>, bool),
-    Goal(TimelineId, PredicateId, Vec<Value>),
+    Bind(Contract, SmallVec<[Option<Value>; 3]>, bool),
+    Goal(TimelineId, PredicateId, SmallVec<[Value; 6]>),
     Cancel(Contract),
     Cycle(Ticks),
 }
@@ -62,7 +64,7 @@ impl PlanService for Recorder {
     ) -> Result<(), Refusal> {
         self.service.bind(contract, outputs, ends)?;
         self.calls
-            .push(Call::Bind(contract, outputs.to_vec(), ends));
+            .push(Call::Bind(contract, SmallVec::from_slice(outputs), ends));
         Ok(())
     }
 
@@ -73,7 +75,7 @@ impl PlanService for Recorder {
         inputs: &[Value],
     ) -> Result<(), Refusal> {
         self.service.insert_goal(timeline, predicate, inputs)?;
-        let call = Call::Goal(timeline, predicate, inputs.to_vec());
+        let call = Call::Goal(timeline, predicate, SmallVec::from_slice(inputs));
         self.calls.push(call);
         Ok(())
     }
@@ -281,6 +283,8 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let ticks = arguments.iter().skip_while(|at| *at != "--ticks").nth(1);
     if let Some(ticks) = ticks.and_then(|ticks| ticks.parse().ok()) {
+        let again = arguments.iter().skip_while(|at| *at != "--again").nth(1);
+        let again = again.and_then(|at| at.parse().ok()).unwrap_or(9);
         let calls = record(Chances::CALM, ticks);
         let is = |name: &str| arguments.iter().any(|at| at == name);
         let model = &system().model;
@@ -288,7 +292,7 @@ fn main() {
             let mut service = Compiled::new(model.clone()).expect("the model fits");
             replay(&mut service, &calls, cycle_served);
             let mut best = f64::INFINITY;
-            for _ in 0..9 {
+            for _ in 0..again {
                 service = service.restarted().expect("the model fits");
                 let (seconds, _) = if is("direct") {
                     replay(&mut service, &calls, cycle_direct)

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use farside_planning::Ticks;
-use farside_planning::model::{Model, PredicateId, Problem, TimelineId, Value, Values};
+use farside_planning::model::{Model, PredicateId, Problem, TimelineId, Value};
 use smallvec::SmallVec;
 use thiserror::Error;
 
@@ -35,7 +35,7 @@ use super::{
 };
 use changes::Recent;
 pub use changes::{Began, Row};
-use classes::{Classes, classes};
+use classes::{Sorts, classes};
 use key::{check_present, exact_ticks, is_far};
 use table::{Codes, Form, Lane, Names, Node, Posted, Registers, Transition, What};
 
@@ -117,8 +117,7 @@ pub struct TableSize {
 /// ```
 pub struct Compiled {
     model: Arc<Model>,
-    /// By type.
-    sorts: Vec<Sort>,
+    sorts: Sorts,
     exact: Ticks,
     forms: Vec<Form>,
     by_key: BTreeMap<Vec<u32>, u32>,
@@ -148,15 +147,6 @@ pub struct Compiled {
     /// What the interpreter had spent when it was woken.
     base: ServiceCounters,
     interpreted: u64,
-}
-
-/// The values of a type, and which of them are told apart.
-#[derive(Clone, Debug)]
-struct Sort {
-    values: Values,
-    classes: Classes,
-    /// How many classes there are, with one for what is not known.
-    count: u64,
 }
 
 /// The most nodes of a table: then it grows no more.
@@ -191,13 +181,7 @@ impl Compiled {
         check_present(&interpreter.tables)?;
         let exact = exact_ticks(&interpreter.tables);
         interpreter.world.state.exact = exact;
-        let classes = classes(&interpreter.tables)?;
-        let sorts = model.types.iter().zip(classes).map(|(of, classes)| Sort {
-            values: of.values.clone(),
-            count: classes.count(&model) + 1,
-            classes,
-        });
-        let sorts: Vec<Sort> = sorts.collect();
+        let sorts = classes(&interpreter.tables)?;
         check_counts(&model, &sorts)?;
         let timelines = model.timelines.len();
         Ok(Compiled {
@@ -401,7 +385,7 @@ impl Compiled {
 }
 
 /// Whether what may be posted can be numbered.
-fn check_counts(model: &Model, sorts: &[Sort]) -> Result<(), NotCompiled> {
+fn check_counts(model: &Model, sorts: &Sorts) -> Result<(), NotCompiled> {
     let check = |what: &str, expected: u64, actual: u64| {
         if actual <= expected {
             return Ok(());
@@ -415,14 +399,12 @@ fn check_counts(model: &Model, sorts: &[Sort]) -> Result<(), NotCompiled> {
     };
     check("timelines", 1 << 12, model.timelines.len() as u64)?;
     check("predicates", 1 << 12, model.predicates.len() as u64)?;
-    for predicate in &model.predicates {
+    for (predicate, counts) in model.predicates.iter().zip(&sorts.counts) {
         for places in [
             0..predicate.inputs,
             predicate.inputs..predicate.parameters.len(),
         ] {
-            let parameters = predicate.parameters[places].iter();
-            let all = parameters.map(|at| sorts[at.of].count);
-            let all = all.fold(1, u64::saturating_mul);
+            let all = counts[places].iter().copied().fold(1, u64::saturating_mul);
             let what = format!("classes of what {} says", predicate.name);
             check(&what, 1 << CLASS_BITS, all)?;
         }

@@ -1,14 +1,15 @@
 //! Which values of a parameter a model tells apart.
 //!
-//! Truth values and symbols are told apart always. Numbers are told apart by what functions, tables,
-//! guards and literals of the rules make of them: two numbers that all of these answer alike are of
-//! one class. A number that nothing asks of is of one class with all others.
+//! Truth values and symbols are told apart always. Numbers of a parameter are told apart by what
+//! functions, tables, guards and literals of the rules make of them, and where they go from there: two
+//! numbers that all of these answer alike are of one class. A number that nothing asks of is of one
+//! class with all others.
 
 use std::collections::BTreeMap;
 
 use farside_planning::model::{
-    Argument, Model, Operand, Pattern, Relationship, RelationshipKind, Rule, Target, TypeId, Value,
-    Values, VariableId,
+    Argument, Model, Operand, Pattern, PredicateId, Relationship, RelationshipKind, Rule, Target,
+    TypeId, Value, Values, VariableId,
 };
 use smallvec::SmallVec;
 
@@ -20,7 +21,7 @@ use crate::service::words;
 /// The most numbers of a type that are sorted into classes.
 const MOST_NUMBERS: i64 = 1 << 20;
 
-/// The classes of a type's values.
+/// The classes of values.
 #[derive(Clone, Debug)]
 pub(super) enum Classes {
     /// All are alike.
@@ -31,13 +32,15 @@ pub(super) enum Classes {
     Literals(Vec<Value>),
     /// By the value itself: a truth value or a symbol.
     Each,
+    /// Too many to be sorted: of variables that no state may hold a value of.
+    Unsorted,
 }
 
 impl Classes {
     #[inline]
     pub(super) fn of(&self, value: Value) -> u32 {
         match self {
-            Classes::One => 0,
+            Classes::One | Classes::Unsorted => 0,
             Classes::Numbers(least, classes) => u32::from(classes[(value - least) as usize]),
             Classes::Literals(all) => match all.binary_search(&value) {
                 Ok(place) => place as u32 + 1,
@@ -64,7 +67,7 @@ impl Classes {
     /// How many there are at most.
     pub(super) fn count(&self, model: &Model) -> u64 {
         match self {
-            Classes::One => 1,
+            Classes::One | Classes::Unsorted => 1,
             Classes::Numbers(_, classes) => u64::from(classes.iter().max().map_or(0, |&at| at)) + 1,
             Classes::Literals(all) => all.len() as u64 + 1,
             Classes::Each => model.symbols.len().max(2) as u64,
@@ -72,84 +75,188 @@ impl Classes {
     }
 }
 
-/// By type: its classes.
+/// The classes of all that values may be of: parameters of predicates, and variables of rules.
+#[derive(Clone, Debug)]
+pub(super) struct Sorts {
+    /// By predicate, by place.
+    pub(super) parameters: Vec<Vec<Classes>>,
+    /// By rule, by variable.
+    pub(super) variables: Vec<Vec<Classes>>,
+    /// By predicate, by place: how many classes there are, with one for what is not known.
+    pub(super) counts: Vec<Vec<u64>>,
+}
+
+/// What is asked of the values of a parameter or a variable.
+#[derive(Debug, Default)]
+struct Asked {
+    literals: Vec<Value>,
+    /// What rules make of a variable.
+    questions: Vec<(usize, VariableId)>,
+}
+
+impl Sorts {
+    /// As coarse as can be: what is not measured is told apart always, numbers are not.
+    fn coarsest(tables: &Tables) -> Sorts {
+        let model = &tables.model;
+        let of = |of: TypeId| match &model.types[of].values {
+            Values::Numbers(_) if tables.is_measured(of) => Classes::One,
+            Values::Numbers(span) => {
+                let classes = 0..(span.max - span.min + 1) as u16;
+                Classes::Numbers(span.min, classes.collect())
+            }
+            _ => Classes::Each,
+        };
+        let predicates = model.predicates.iter();
+        let parameters = predicates.map(|at| at.parameters.iter().map(|at| of(at.of)).collect());
+        let rules = model.rules.iter();
+        let variables = rules.map(|at| at.variables.iter().map(|at| of(at.of)).collect());
+        Sorts {
+            parameters: parameters.collect(),
+            variables: variables.collect(),
+            counts: Vec::new(),
+        }
+    }
+
+    fn count(&self, model: &Model) -> u64 {
+        let all = self.parameters.iter().chain(&self.variables).flatten();
+        all.map(|at| at.count(model)).sum()
+    }
+}
+
+/// What is told apart.
 ///
 /// # Errors
 ///
 /// If a rule asks of more numbers than can be sorted, or of several measured ones at once.
-pub(super) fn classes(tables: &Tables) -> Result<Vec<Classes>, NotCompiled> {
-    let types = &tables.model.types;
-    let mut known: Vec<Classes> = { types.iter() }
-        .map(|of| match of.values {
-            Values::Numbers(_) => Classes::One,
-            _ => Classes::Each,
-        })
-        .collect();
-    // What a function makes of a number is told apart by its own class: classes are split until
-    // those of one class lead to one class.
+pub(super) fn classes(tables: &Tables) -> Result<Sorts, NotCompiled> {
+    let mut sorts = Sorts::coarsest(tables);
+    // Where a value goes it is told apart by the classes of there, and so is what a function makes of
+    // it: classes are split until those of one class lead to one class.
     loop {
-        let types = 0..tables.model.types.len();
-        let finer: Result<Vec<Classes>, NotCompiled> =
-            types.map(|of| classes_of(tables, of, &known)).collect();
-        let finer = finer?;
-        let count = |all: &[Classes]| -> u64 { all.iter().map(|at| at.count(&tables.model)).sum() };
-        if count(&finer) == count(&known) {
+        let mut finer = split(tables, &sorts)?;
+        if finer.count(&tables.model) == sorts.count(&tables.model) {
+            let count = |at: &Classes| at.count(&tables.model) + 1;
+            let all = finer.parameters.iter();
+            finer.counts = all.map(|all| all.iter().map(count).collect()).collect();
             return Ok(finer);
         }
-        known = finer;
+        sorts = finer;
     }
 }
 
-fn classes_of(tables: &Tables, of: TypeId, coarse: &[Classes]) -> Result<Classes, NotCompiled> {
+fn split(tables: &Tables, coarse: &Sorts) -> Result<Sorts, NotCompiled> {
     let model = &tables.model;
-    let Values::Numbers(span) = model.types[of].values else {
-        return Ok(Classes::Each);
-    };
-    if !tables.is_measured(of) {
-        let classes = 0..(span.max - span.min + 1) as u16;
-        return Ok(Classes::Numbers(span.min, classes.collect()));
+    let mut finer = coarse.clone();
+    for (predicate, said) in model.predicates.iter().enumerate() {
+        for (place, parameter) in said.parameters.iter().enumerate() {
+            if tables.is_measured(parameter.of) {
+                let mut asked = Asked::default();
+                for rule in 0..model.rules.len() {
+                    asked.add_parameter(tables, coarse, rule, (predicate, place));
+                }
+                let sorted = sort_out(tables, coarse, parameter.of, asked)?;
+                finer.parameters[predicate][place] = sorted;
+            }
+        }
     }
-    let mut questions: Vec<(usize, VariableId)> = Vec::new();
-    let mut literals: Vec<Value> = Vec::new();
     for (rule, said) in model.rules.iter().enumerate() {
+        for (variable, at) in said.variables.iter().enumerate() {
+            if tables.is_measured(at.of) {
+                let mut asked = Asked::default();
+                asked.add_variable(tables, coarse, rule, variable, None);
+                let sorted = match sort_out(tables, coarse, at.of, asked) {
+                    Err(NotCompiled::Numbers { .. }) => Classes::Unsorted,
+                    sorted => sorted?,
+                };
+                finer.variables[rule][variable] = sorted;
+            }
+        }
+    }
+    Ok(finer)
+}
+
+impl Asked {
+    /// What a rule asks of a parameter, wherever it names it.
+    fn add_parameter(
+        &mut self,
+        tables: &Tables,
+        coarse: &Sorts,
+        rule: usize,
+        (predicate, place): (PredicateId, usize),
+    ) {
+        let mut variables: SmallVec<[VariableId; 4]> = SmallVec::new();
+        let said = &tables.model.rules[rule];
         patterns(said, &tables.flats[rule].relations, |pattern| {
-            let parameters = &model.predicates[pattern.predicate].parameters;
-            for (argument, parameter) in pattern.arguments.iter().zip(parameters) {
-                if let Argument::Value(value) = *argument
-                    && parameter.of == of
-                {
-                    literals.push(value);
+            if pattern.predicate == predicate {
+                match pattern.arguments[place] {
+                    Argument::Value(value) => self.literals.push(value),
+                    Argument::Variable(variable) => variables.push(variable),
+                    Argument::Any => {}
                 }
             }
         });
+        for variable in variables {
+            self.add_variable(tables, coarse, rule, variable, Some((predicate, place)));
+        }
+    }
+
+    /// What a rule asks of a variable, and of the parameters that have its value, but for one.
+    fn add_variable(
+        &mut self,
+        tables: &Tables,
+        coarse: &Sorts,
+        rule: usize,
+        variable: VariableId,
+        but: Option<(PredicateId, usize)>,
+    ) {
+        let said = &tables.model.rules[rule];
+        let mut asks = asks_of(said, variable);
         patterns(said, &tables.flats[rule].relations, |pattern| {
-            let parameters = &model.predicates[pattern.predicate].parameters;
-            for (argument, parameter) in pattern.arguments.iter().zip(parameters) {
-                if let Argument::Variable(variable) = *argument
-                    && parameter.of == of
-                    && asks_of(said, variable)
-                    && !questions.contains(&(rule, variable))
+            for (place, argument) in pattern.arguments.iter().enumerate() {
+                if *argument == Argument::Variable(variable)
+                    && but != Some((pattern.predicate, place))
                 {
-                    questions.push((rule, variable));
+                    match &coarse.parameters[pattern.predicate][place] {
+                        Classes::One | Classes::Each | Classes::Unsorted => {}
+                        Classes::Literals(all) => self.literals.extend(all),
+                        Classes::Numbers(..) => asks = true,
+                    }
                 }
             }
         });
+        if asks && !self.questions.contains(&(rule, variable)) {
+            self.questions.push((rule, variable));
+        }
     }
-    if questions.is_empty() && literals.is_empty() {
-        return Ok(Classes::One);
-    }
-    if questions.is_empty() {
-        literals.sort_unstable();
-        literals.dedup();
-        return Ok(Classes::Literals(literals));
-    }
+}
+
+fn sort_out(
+    tables: &Tables,
+    coarse: &Sorts,
+    of: TypeId,
+    asked: Asked,
+) -> Result<Classes, NotCompiled> {
+    let model = &tables.model;
+    let Asked {
+        mut literals,
+        questions,
+    } = asked;
+    literals.sort_unstable();
+    literals.dedup();
+    let (Values::Numbers(span), Some(&(first, _))) = (&model.types[of].values, questions.first())
+    else {
+        return Ok(match literals[..] {
+            [] => Classes::One,
+            _ => Classes::Literals(literals),
+        });
+    };
+    let too_many = || NotCompiled::Numbers {
+        of: model.types[of].name.clone(),
+        rule: words::rule(model, first),
+    };
     let count = span.max.saturating_sub(span.min).saturating_add(1);
     if count > MOST_NUMBERS {
-        let rule = questions
-            .first()
-            .map_or(String::new(), |at| words::rule(model, at.0));
-        let of = model.types[of].name.clone();
-        return Err(NotCompiled::Numbers { of, rule });
+        return Err(too_many());
     }
     for &(rule, variable) in &questions {
         check_alone(tables, rule, variable)?;
@@ -159,15 +266,10 @@ fn classes_of(tables: &Tables, of: TypeId, coarse: &[Classes]) -> Result<Classes
     for value in span.min..=span.max {
         let mut answers: Vec<Option<Value>> = Vec::new();
         answers.extend(literals.iter().map(|&at| Some(Value::from(at == value))));
-        for &(rule, variable) in &questions {
-            ask(tables, coarse, (rule, variable), value, &mut answers);
+        for &question in &questions {
+            ask(tables, coarse, question, value, &mut answers);
         }
-        let next = u16::try_from(known.len()).map_err(|_| NotCompiled::Numbers {
-            of: model.types[of].name.clone(),
-            rule: questions
-                .first()
-                .map_or(String::new(), |at| words::rule(model, at.0)),
-        })?;
+        let next = u16::try_from(known.len()).map_err(|_| too_many())?;
         classes.push(*known.entry(answers).or_insert(next));
     }
     Ok(Classes::Numbers(span.min, classes))
@@ -241,7 +343,7 @@ fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCo
 /// What a rule makes of a number, if nothing else is known.
 fn ask(
     tables: &Tables,
-    coarse: &[Classes],
+    coarse: &Sorts,
     (rule, of): (usize, VariableId),
     value: Value,
     answers: &mut Vec<Option<Value>>,
@@ -271,13 +373,26 @@ fn ask(
             }
         }
     }
-    for (variable, known) in known.iter().enumerate() {
+    let model = &tables.model;
+    let class = |classes: &Classes, of: TypeId, value: Option<Value>| {
+        let class = |value| classes.of_type(&model.types[of].values, value);
+        value.map(|value| class(value).map_or(-1, Value::from))
+    };
+    for (variable, &value) in known.iter().enumerate() {
         if variable != of {
-            let of = said.variables[variable].of;
-            let class = |value| coarse[of].of_type(&tables.model.types[of].values, value);
-            answers.push(known.map(|value| class(value).map_or(-1, Value::from)));
+            let classes = &coarse.variables[rule][variable];
+            answers.push(class(classes, said.variables[variable].of, value));
         }
     }
+    patterns(said, &tables.flats[rule].relations, |pattern| {
+        let places = coarse.parameters[pattern.predicate].iter();
+        let parameters = &model.predicates[pattern.predicate].parameters;
+        for ((argument, classes), at) in pattern.arguments.iter().zip(places).zip(parameters) {
+            if let Argument::Variable(variable) = *argument {
+                answers.push(class(classes, at.of, known[variable]));
+            }
+        }
+    });
     for relationship in relationships(said) {
         // With symbols that are not known it may hold or not: all of them are tried.
         let operands: SmallVec<[Option<Value>; 4]> = relationship
@@ -301,10 +416,21 @@ fn ask(
                     answers.push(Some(Value::from(tables.holds(relationship.kind, &values))));
                 }
             }
+            // A function of others: whether it gives what is known is not told apart.
+            _ if gives(relationship.kind) && !has_input(relationship, &known) => {}
             // A function of symbols, too: each number is a class of its own.
             _ => answers.push(Some(value)),
         }
     }
+}
+
+/// Whether one of the variables that a function is of is known.
+fn has_input(said: &Relationship, known: &[Option<Value>]) -> bool {
+    let inputs = &said.operands[..said.operands.len() - 1];
+    inputs.iter().any(|operand| match *operand {
+        Operand::Variable(variable) => known[variable].is_some(),
+        _ => false,
+    })
 }
 
 /// Whether the last operand follows from the others.

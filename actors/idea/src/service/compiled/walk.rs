@@ -24,16 +24,19 @@ impl Compiled {
         values: &[Option<Value>],
     ) -> Result<u64, Refusal> {
         let said = &self.model.predicates[predicate];
-        let (what, parameters) = match kind {
-            GOAL => ("inputs", &said.parameters[..said.inputs]),
-            _ => ("outputs", &said.parameters[said.inputs..]),
+        let (what, places) = match kind {
+            GOAL => ("inputs", 0..said.inputs),
+            _ => ("outputs", said.inputs..said.parameters.len()),
         };
+        let parameters = &said.parameters[places.clone()];
+        let sorts = self.sorts.parameters[predicate][places.clone()].iter();
+        let sorts = sorts.zip(&self.sorts.counts[predicate][places]);
         let mut right = values.len() == parameters.len();
         let mut mixed = 0;
-        for (value, parameter) in values.iter().zip(parameters) {
-            let sort = &self.sorts[parameter.of];
+        for ((value, parameter), (classes, count)) in values.iter().zip(parameters).zip(sorts) {
+            let known = &self.model.types[parameter.of].values;
             let class = match *value {
-                Some(value) => match sort.classes.of_type(&sort.values, value) {
+                Some(value) => match classes.of_type(known, value) {
                     Some(class) => 1 + u64::from(class),
                     None => {
                         right = false;
@@ -42,7 +45,7 @@ impl Compiled {
                 },
                 None => 0,
             };
-            mixed = mixed * sort.count + class;
+            mixed = mixed * count + class;
         }
         if !right {
             check::values(&self.model, predicate, what, values)?;
