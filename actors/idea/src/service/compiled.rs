@@ -35,7 +35,7 @@ use super::{
 };
 use changes::Recent;
 pub use changes::{Began, Row};
-use classes::{Sorts, classes};
+use classes::{Slot, Sorts, classes, slots};
 use key::{check_present, exact_ticks, is_far};
 use table::{Codes, Form, Lane, Names, Node, Posted, Registers, Transition, What};
 
@@ -118,6 +118,10 @@ pub struct TableSize {
 pub struct Compiled {
     model: Arc<Model>,
     sorts: Sorts,
+    /// By predicate, by place.
+    slots: Vec<Box<[Slot]>>,
+    /// By predicate.
+    inputs: Vec<usize>,
     exact: Ticks,
     forms: Vec<Form>,
     by_key: BTreeMap<Vec<u32>, u32>,
@@ -182,11 +186,14 @@ impl Compiled {
         let exact = exact_ticks(&interpreter.tables);
         interpreter.world.state.exact = exact;
         let sorts = classes(&interpreter.tables)?;
-        check_counts(&model, &sorts)?;
+        let slots = slots(&model, &sorts);
+        check_counts(&model, &slots)?;
         let timelines = model.timelines.len();
         Ok(Compiled {
-            model,
             sorts,
+            slots,
+            inputs: model.predicates.iter().map(|at| at.inputs).collect(),
+            model,
             exact,
             forms: Vec::new(),
             by_key: BTreeMap::new(),
@@ -247,7 +254,7 @@ impl Compiled {
         let forms: usize = { self.forms.iter() }
             .map(|at| {
                 let held = size_of_val(&*at.cells) + size_of_val(&*at.ends);
-                let lanes = size_of_val(&*at.lanes) + size_of_val(&*at.lasts);
+                let lanes = size_of_val(&*at.lanes) + size_of_val(&*at.times);
                 size_of::<Form>() + held + lanes + size_of_val(&*at.over)
             })
             .sum();
@@ -385,7 +392,7 @@ impl Compiled {
 }
 
 /// Whether what may be posted can be numbered.
-fn check_counts(model: &Model, sorts: &Sorts) -> Result<(), NotCompiled> {
+fn check_counts(model: &Model, slots: &[Box<[Slot]>]) -> Result<(), NotCompiled> {
     let check = |what: &str, expected: u64, actual: u64| {
         if actual <= expected {
             return Ok(());
@@ -399,12 +406,15 @@ fn check_counts(model: &Model, sorts: &Sorts) -> Result<(), NotCompiled> {
     };
     check("timelines", 1 << 12, model.timelines.len() as u64)?;
     check("predicates", 1 << 12, model.predicates.len() as u64)?;
-    for (predicate, counts) in model.predicates.iter().zip(&sorts.counts) {
+    for (predicate, slots) in model.predicates.iter().zip(slots) {
         for places in [
             0..predicate.inputs,
             predicate.inputs..predicate.parameters.len(),
         ] {
-            let all = counts[places].iter().copied().fold(1, u64::saturating_mul);
+            let all = slots[places]
+                .iter()
+                .map(|at| at.count)
+                .fold(1, u64::saturating_mul);
             let what = format!("classes of what {} says", predicate.name);
             check(&what, 1 << CLASS_BITS, all)?;
         }

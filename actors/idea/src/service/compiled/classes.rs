@@ -82,8 +82,72 @@ pub(super) struct Sorts {
     pub(super) parameters: Vec<Vec<Classes>>,
     /// By rule, by variable.
     pub(super) variables: Vec<Vec<Classes>>,
-    /// By predicate, by place: how many classes there are, with one for what is not known.
-    pub(super) counts: Vec<Vec<u64>>,
+}
+
+/// A parameter, for what is posted: its values by class, from 1 on, with 0 for what is not known.
+#[derive(Clone, Debug)]
+pub(super) struct Slot {
+    /// How many classes there are, with one for what is not known.
+    pub(super) count: u64,
+    least: Value,
+    /// By value from the least one on: its class; 0 for what is no value of the type.
+    classes: Box<[u16]>,
+    /// What is too wide for that.
+    wide: Option<(Values, Classes)>,
+}
+
+/// The most values of which a slot knows each.
+const MOST_KNOWN: usize = 1 << 10;
+
+impl Slot {
+    fn of(model: &Model, of: TypeId, classes: &Classes) -> Slot {
+        let values = &model.types[of].values;
+        let (least, most) = match values {
+            Values::Truth => (0, 1),
+            Values::Symbols(all) => {
+                let (first, last) = (all.first(), all.last());
+                (first.map_or(0, |&at| at), last.map_or(0, |&at| at))
+            }
+            Values::Numbers(span) => (span.min, span.max),
+        };
+        let count = classes.count(model) + 1;
+        let known = most.saturating_sub(least).saturating_add(1);
+        let narrow = known <= MOST_KNOWN as Value && count < u64::from(u16::MAX);
+        let class = |value| { classes.of_type(values, value) }.map_or(0, |at| at as u16 + 1);
+        Slot {
+            count,
+            least,
+            classes: match narrow {
+                true => (least..=most).map(class).collect(),
+                false => Box::default(),
+            },
+            wide: (!narrow).then(|| (values.clone(), classes.clone())),
+        }
+    }
+
+    /// The class of a value, if it is one of the type.
+    #[inline]
+    pub(super) fn class(&self, value: Value) -> Option<u32> {
+        let place = value.wrapping_sub(self.least) as usize;
+        match self.classes.get(place) {
+            Some(&class) => (class > 0).then_some(u32::from(class)),
+            None => {
+                let (values, classes) = self.wide.as_ref()?;
+                Some(classes.of_type(values, value)? + 1)
+            }
+        }
+    }
+}
+
+/// By predicate, by place: its classes, for what is posted.
+pub(super) fn slots(model: &Model, sorts: &Sorts) -> Vec<Box<[Slot]>> {
+    let predicates = model.predicates.iter().zip(&sorts.parameters);
+    let slots = predicates.map(|(said, sorts)| {
+        let parameters = said.parameters.iter().zip(sorts);
+        let slots = parameters.map(|(at, classes)| Slot::of(model, at.of, classes));
+        slots.collect()
+    });
+    slots.collect()
 }
 
 /// What is asked of the values of a parameter or a variable.
@@ -113,7 +177,6 @@ impl Sorts {
         Sorts {
             parameters: parameters.collect(),
             variables: variables.collect(),
-            counts: Vec::new(),
         }
     }
 
@@ -133,11 +196,8 @@ pub(super) fn classes(tables: &Tables) -> Result<Sorts, NotCompiled> {
     // Where a value goes it is told apart by the classes of there, and so is what a function makes of
     // it: classes are split until those of one class lead to one class.
     loop {
-        let mut finer = split(tables, &sorts)?;
+        let finer = split(tables, &sorts)?;
         if finer.count(&tables.model) == sorts.count(&tables.model) {
-            let count = |at: &Classes| at.count(&tables.model) + 1;
-            let all = finer.parameters.iter();
-            finer.counts = all.map(|all| all.iter().map(count).collect()).collect();
             return Ok(finer);
         }
         sorts = finer;

@@ -5,7 +5,7 @@ use farside_planning::model::{RelationshipKind, Value};
 
 use super::Compiled;
 use super::key::{key, longest};
-use super::table::{Bound, Change, Form, Held, Node, REST, Source, Transition, What};
+use super::table::{Bound, Change, Form, Held, Node, REST, Source, Time, Transition, What};
 use super::walk::comes_near;
 use crate::service::PlanService;
 use crate::service::ServiceCounters;
@@ -102,12 +102,23 @@ impl Compiled {
                 time => Held::Same((time - self.now).max(0)),
             })
         });
-        let ends = ends.collect();
-        let lasts = known.lanes.iter().enumerate().map(|(timeline, lane)| {
+        let ends: Box<[[Held<Ticks>; 2]]> = ends.collect();
+        let mut asked: Vec<Time> = Vec::new();
+        let registers = |held: &Held<Ticks>| match *held {
+            Held::Register(end) => Some(end),
+            Held::Same(_) => None,
+        };
+        let all = ends.iter().flatten().filter_map(registers);
+        asked.extend(all.map(|end| Time { end, whose: None }));
+        for (timeline, lane) in (0..).zip(&known.lanes) {
             let token = lane.tokens.last().expect("each timeline says something");
-            let longest = longest(is, timeline).unwrap_or(Ticks::MAX);
-            (known.end(known.at(*token).finish), longest)
-        });
+            let end = usize::from(known.end(known.at(*token).finish));
+            let longest = longest(is, usize::from(timeline));
+            if let (Some(end), Some(longest)) = (registers(&ends[end][1]), longest) {
+                let whose = Some((timeline, longest));
+                asked.push(Time { end, whose });
+            }
+        }
         let mut interpreter = Box::new(is.clone());
         interpreter.shrink();
         self.forms.push(Form {
@@ -116,7 +127,7 @@ impl Compiled {
             over: is.ends.clone().into(),
             cells,
             ends,
-            lasts: lasts.collect(),
+            times: asked.into(),
             interpreter,
         });
         let state = (self.forms.len() - 1) as u32;

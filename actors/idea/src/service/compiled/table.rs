@@ -102,10 +102,20 @@ pub(super) struct Form {
     /// The earliest and the latest tick of each end: from when the state is entered, or far and in a
     /// register of times.
     pub(super) ends: Box<[[Held<Ticks>; 2]]>,
-    /// By timeline: its token's end, and how long its own rules let it last at most.
-    pub(super) lasts: Box<[(u16, Ticks)]>,
+    /// What is asked of ends that come near.
+    pub(super) times: Box<[Time]>,
     /// To be filled from the registers, and run.
     pub(super) interpreter: Box<Propositional>,
+}
+
+/// What is asked of an end that was far when the state was entered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Time {
+    /// Its register.
+    pub(super) end: u16,
+    /// Whether it is the time of a timeline's token, which its own rules let last so long at most;
+    /// else whether it is near.
+    pub(super) whose: Option<(u16, Ticks)>,
 }
 
 /// What was posted in this cycle. Its values stand behind the registers.

@@ -23,29 +23,21 @@ impl Compiled {
         ends: bool,
         values: &[Option<Value>],
     ) -> Result<u64, Refusal> {
-        let said = &self.model.predicates[predicate];
-        let (what, places) = match kind {
-            GOAL => ("inputs", 0..said.inputs),
-            _ => ("outputs", said.inputs..said.parameters.len()),
+        let inputs = self.inputs[predicate];
+        let slots = &self.slots[predicate];
+        let (what, slots) = match kind {
+            GOAL => ("inputs", &slots[..inputs]),
+            _ => ("outputs", &slots[inputs..]),
         };
-        let parameters = &said.parameters[places.clone()];
-        let sorts = self.sorts.parameters[predicate][places.clone()].iter();
-        let sorts = sorts.zip(&self.sorts.counts[predicate][places]);
-        let mut right = values.len() == parameters.len();
+        let mut right = values.len() == slots.len();
         let mut mixed = 0;
-        for ((value, parameter), (classes, count)) in values.iter().zip(parameters).zip(sorts) {
-            let known = &self.model.types[parameter.of].values;
+        for (value, slot) in values.iter().zip(slots) {
             let class = match *value {
-                Some(value) => match classes.of_type(known, value) {
-                    Some(class) => 1 + u64::from(class),
-                    None => {
-                        right = false;
-                        0
-                    }
-                },
-                None => 0,
+                Some(value) => slot.class(value),
+                None => Some(0),
             };
-            mixed = mixed * count + class;
+            right &= class.is_some();
+            mixed = mixed * slot.count + u64::from(class.unwrap_or(0));
         }
         if !right {
             check::values(&self.model, predicate, what, values)?;
@@ -87,29 +79,32 @@ impl Compiled {
 
     /// Far ends that are near now are the first that is posted.
     pub(super) fn come_near(&mut self) {
-        if self.registers.ends.len() + self.lanes.len() > 60 {
+        let form = &self.forms[self.state as usize];
+        if form.times.len() > 60 {
             // More than a number can say.
             (self.node, self.near) = (None, Ticks::MAX);
             return;
         }
-        let (mut which, mut bit) = (0_u64, 0);
+        let (mut which, mut bit) = (0_u64, 1);
         let mut near = Ticks::MAX;
-        for &end in &self.registers.ends {
-            let was = is_far(end, self.now - 1, self.exact);
-            if was && !is_far(end, self.now, self.exact) {
-                which |= 1 << bit;
+        for time in &form.times {
+            let end = self.registers.ends[usize::from(time.end)];
+            let is = match time.whose {
+                // It was far when the state was entered.
+                None => {
+                    near = near.min(comes_near(end, self.now, self.exact));
+                    !is_far(end, self.now, self.exact)
+                }
+                // How a token ends whose time is nearly over depends on whose time it is.
+                Some((timeline, longest)) => {
+                    let start = self.lanes[usize::from(timeline)].start;
+                    start.saturating_add(longest) == end && !is_far(end, self.now, self.exact)
+                }
+            };
+            if is {
+                which |= bit;
             }
-            bit += 1;
-            near = near.min(comes_near(end, self.now, self.exact));
-        }
-        // How a token ends whose time is nearly over depends on whose time it is.
-        let form = &self.forms[self.state as usize];
-        for (lane, &(end, longest)) in self.lanes.iter().zip(&form.lasts) {
-            let max = self.bound(form.ends[usize::from(end)][1]);
-            if lane.start.saturating_add(longest) == max {
-                which |= 1 << bit;
-            }
-            bit += 1;
+            bit <<= 1;
         }
         self.near = near;
         let number = NEAR << 61 | which;
@@ -146,8 +141,9 @@ impl Compiled {
         let timelines = &code[..usize::from(at.started)];
         let names = &self.names;
         self.spare.cells.clear();
-        let values = cells.iter().map(|&at| names.value(at, &from.cells));
-        self.spare.cells.extend(values);
+        for &at in cells {
+            self.spare.cells.push(names.value(at, &from.cells));
+        }
         self.spare.ends.clear();
         let mut near = Ticks::MAX;
         let end = |at: &Far| match *at {
