@@ -148,8 +148,7 @@ fn temporal() -> Temporal {
 fn cycle_served<S: PlanService>(service: &mut S) -> (Outcome, u64) {
     let outcome = service.solve(1, BUDGET);
     let started = service.started().iter();
-    let decided =
-        started.map(|at| sum_of(at.predicate, at.contract, at.parameters.iter().copied()));
+    let decided = started.map(|at| at.predicate as u64 + at.contract.number);
     (outcome, decided.sum::<u64>() + service.ended().len() as u64)
 }
 
@@ -157,20 +156,11 @@ fn cycle_served<S: PlanService>(service: &mut S) -> (Outcome, u64) {
 fn cycle_direct(table: &mut Compiled) -> (Outcome, u64) {
     let outcome = table.decide(1, BUDGET);
     let started = table.each_started();
-    let decided = started.map(|at| sum_of(at.predicate, at.contract, at.parameters.iter()));
+    let decided = started.map(|at| at.predicate as u64 + at.contract.number);
     (
         outcome,
         decided.sum::<u64>() + table.each_ended().count() as u64,
     )
-}
-
-fn sum_of(
-    predicate: PredicateId,
-    contract: Contract,
-    parameters: impl Iterator<Item = Option<Value>>,
-) -> u64 {
-    let values = parameters.map(|at| at.unwrap_or(0) as u64);
-    values.fold(predicate as u64 + contract.number, u64::wrapping_add)
 }
 
 /// Seconds that a service takes for what was recorded, and a sum over what it decided.

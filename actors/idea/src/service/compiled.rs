@@ -339,7 +339,7 @@ impl Compiled {
         {
             self.node = Some(child);
             self.posted.push(posted);
-            self.registers.cells.extend_from_slice(values);
+            self.registers.cells.extend(values.iter().copied());
             return Ok(());
         }
         let interpreter = self.wake();

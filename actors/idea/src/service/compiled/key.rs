@@ -14,7 +14,8 @@ use crate::service::words;
 /// The most ticks that are counted exactly: the longest distance that a relation asks for. What lies
 /// further ahead is far.
 pub(super) fn exact_ticks(tables: &Tables) -> Ticks {
-    let mut most = 1;
+    // What lasts two ticks at most, as polls do, need not be watched.
+    let mut most = 2;
     for flat in &tables.flats {
         for distance in flat.relations.iter().flat_map(|at| &at.distances) {
             for bound in [distance.min, distance.max] {

@@ -6,7 +6,6 @@ use farside_planning::model::{RelationshipKind, Value};
 use super::Compiled;
 use super::key::{key, longest};
 use super::table::{Bound, Change, Form, Held, Node, REST, Source, Time, Transition, What};
-use super::walk::comes_near;
 use crate::service::PlanService;
 use crate::service::ServiceCounters;
 use crate::service::propositional::Propositional;
@@ -73,7 +72,7 @@ impl Compiled {
             }
         }
         let ends = self.registers.ends.iter();
-        let near = ends.map(|&at| comes_near(at, self.now, self.exact)).min();
+        let near = ends.map(|&at| at.saturating_sub(self.exact)).min();
         self.near = near.unwrap_or(Ticks::MAX);
         self.enter(state);
     }

@@ -168,6 +168,7 @@ impl Names {
         }
     }
 
+    #[inline(never)]
     fn compute(&self, place: usize, registers: &[Option<Value>]) -> Option<Value> {
         let ((kind, call), inputs) = &self.computed[place];
         let inputs = inputs.iter().map(|&at| self.value(at, registers));

@@ -3,7 +3,6 @@
 use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, Value};
 
-use super::key::is_far;
 use super::table::{Held, KIND, REST, Transition, What};
 use super::{CLASS_BITS, Compiled, GOAL, NEAR};
 use crate::service::propositional::state::Far;
@@ -15,6 +14,7 @@ impl Compiled {
     /// # Errors
     ///
     /// If there is another number of values, or one is not of its type.
+    #[inline]
     pub(super) fn number(
         &self,
         kind: u64,
@@ -51,6 +51,7 @@ impl Compiled {
     }
 
     /// What the token of an active contract says, as far as the table knows.
+    #[inline]
     pub(super) fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
         if self.node.is_none() {
             return Ok(None);
@@ -71,6 +72,7 @@ impl Compiled {
         Ok(Some(form.lanes[timeline].0))
     }
 
+    #[inline]
     pub(super) fn child(&self, number: u64) -> Option<u32> {
         let node = &self.nodes[self.node? as usize];
         let child = node.children.iter().find(|child| child.0 == number);
@@ -89,19 +91,14 @@ impl Compiled {
         let mut near = Ticks::MAX;
         for time in &form.times {
             let end = self.registers.ends[usize::from(time.end)];
-            let is = match time.whose {
-                // It was far when the state was entered.
-                None => {
-                    near = near.min(comes_near(end, self.now, self.exact));
-                    !is_far(end, self.now, self.exact)
-                }
+            let due = end.saturating_sub(self.exact);
+            if due > self.now {
+                near = near.min(due);
+            } else if time.whose.is_none_or(|(timeline, longest)| {
                 // How a token ends whose time is nearly over depends on whose time it is.
-                Some((timeline, longest)) => {
-                    let start = self.lanes[usize::from(timeline)].start;
-                    start.saturating_add(longest) == end && !is_far(end, self.now, self.exact)
-                }
-            };
-            if is {
+                let start = self.lanes[usize::from(timeline)].start;
+                start.saturating_add(longest) == end
+            }) {
                 which |= bit;
             }
             bit <<= 1;
@@ -146,20 +143,21 @@ impl Compiled {
         }
         self.spare.ends.clear();
         let mut near = Ticks::MAX;
-        let end = |at: &Far| match *at {
+        let far = |at: &Far| match *at {
             Far::Ahead(ticks) => now + ticks,
             Far::End(end) => from.ends[usize::from(end)],
         };
         for &bound in ends {
             let rest = (bound & REST) as usize;
-            let bound = match bound >> KIND {
+            let end = match bound >> KIND {
                 0 => now + rest as Ticks,
                 1 => from.ends[rest],
-                2 => names.several[rest].iter().map(end).min().unwrap_or(now),
-                _ => names.several[rest].iter().map(end).max().unwrap_or(now),
+                2 => names.several[rest].iter().map(far).min().unwrap_or(now),
+                _ => names.several[rest].iter().map(far).max().unwrap_or(now),
             };
-            near = near.min(comes_near(bound, now, self.exact));
-            self.spare.ends.push(bound);
+            // A far end of the next state is far now.
+            near = near.min(end.saturating_sub(self.exact));
+            self.spare.ends.push(end);
         }
         for &timeline in timelines {
             let lane = &mut self.lanes[timeline as usize];
@@ -181,15 +179,5 @@ impl Compiled {
         self.node = Some(self.forms[state as usize].node);
         self.posted.clear();
         self.solved = Some(self.now);
-    }
-}
-
-/// From which tick on an end is near that is far now; never, if it is not.
-#[inline]
-pub(super) fn comes_near(end: Ticks, now: Ticks, exact: Ticks) -> Ticks {
-    if is_far(end, now, exact) {
-        end - exact
-    } else {
-        Ticks::MAX
     }
 }
