@@ -2,8 +2,8 @@
 //! then.
 //!
 //! A state is what the [propositional](super::propositional) technology knows between two cycles, but
-//! for what makes no difference: numbers of one class are alike, and of a token's latest end it only
-//! counts whether it is near. What differs is kept in registers. In a state, statuses, goals, cancels
+//! for what makes no difference: numbers of one class are alike, and of a far end it only counts that
+//! it is far. What differs is kept in registers. In a state, statuses, goals, cancels
 //! and ends that come near lead from node to node; at the last one stands what the cycle decides: the
 //! next state, what began and ended, and from where its registers are filled. A node or a decision
 //! that is not there yet is made by running the interpreter, once. Where the interpreter decided by
@@ -274,7 +274,8 @@ impl Compiled {
     fn wake(&mut self) -> &mut Propositional {
         if self.interpreter.is_none() {
             let mut interpreter = self.forms[self.state as usize].interpreter.clone();
-            interpreter.advance(self.now);
+            // The form may be of a later tick, of before a restart.
+            (interpreter.now, interpreter.world.state.tick) = (self.now, self.now);
             interpreter.posted = 0;
             self.base = interpreter.counters();
             self.fill(&mut interpreter);
