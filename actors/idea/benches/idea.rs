@@ -6,7 +6,10 @@
 //!
 //! A plant answers polls and commands and gives goals, once, and what was posted is kept; each
 //! technology then decides the same ticks. What is measured is the planner alone: statuses and goals
-//! that are posted, and the cycle. `-- --ticks N technology` runs one alone, for a profiler.
+//! that are posted, and the cycle. "Through the service" is as the plan runner asks any technology,
+//! which copies out what began and ended; "direct" is the table's own interface, which has it read in
+//! place. `-- --ticks N technology` runs one alone, for a profiler; a
+//! table is walked `--again M` times once it is made.
 
 // A benchmark measures real time.
 #![allow(clippy::disallowed_types)]
@@ -25,14 +28,15 @@ use farside_idea::service::{
 };
 use farside_planning::Ticks;
 use farside_planning::model::{Model, PredicateId, TimelineId, Value};
+use smallvec::SmallVec;
 
 const TICKS: Ticks = 172_800;
 const BUDGET: u64 = 100_000;
 
 /// What is posted to a service.
 enum Call {
-    Bind(Contract, Vec<Option<Value>>, bool),
-    Goal(TimelineId, PredicateId, Vec<Value>),
+    Bind(Contract, SmallVec<[Option<Value>; 3]>, bool),
+    Goal(TimelineId, PredicateId, SmallVec<[Value; 6]>),
     Cancel(Contract),
     Cycle(Ticks),
 }
@@ -60,7 +64,7 @@ impl PlanService for Recorder {
     ) -> Result<(), Refusal> {
         self.service.bind(contract, outputs, ends)?;
         self.calls
-            .push(Call::Bind(contract, outputs.to_vec(), ends));
+            .push(Call::Bind(contract, SmallVec::from_slice(outputs), ends));
         Ok(())
     }
 
@@ -71,7 +75,7 @@ impl PlanService for Recorder {
         inputs: &[Value],
     ) -> Result<(), Refusal> {
         self.service.insert_goal(timeline, predicate, inputs)?;
-        let call = Call::Goal(timeline, predicate, inputs.to_vec());
+        let call = Call::Goal(timeline, predicate, SmallVec::from_slice(inputs));
         self.calls.push(call);
         Ok(())
     }
@@ -139,10 +143,34 @@ fn temporal() -> Temporal {
     service.expect("the model fits")
 }
 
+/// A cycle as the plan runner asks for it. A sum over what is decided tells whether all technologies
+/// decide alike.
+fn cycle_served<S: PlanService>(service: &mut S) -> (Outcome, u64) {
+    let outcome = service.solve(1, BUDGET);
+    let started = service.started().iter();
+    let decided = started.map(|at| at.predicate as u64 + at.contract.number);
+    (outcome, decided.sum::<u64>() + service.ended().len() as u64)
+}
+
+/// A cycle by the table's own interface.
+fn cycle_direct(table: &mut Compiled) -> (Outcome, u64) {
+    let outcome = table.decide(1, BUDGET);
+    let started = table.each_started();
+    let decided = started.map(|at| at.predicate as u64 + at.contract.number);
+    (
+        outcome,
+        decided.sum::<u64>() + table.each_ended().count() as u64,
+    )
+}
+
 /// Seconds that a service takes for what was recorded, and a sum over what it decided.
-fn replay<S: PlanService>(service: &mut S, calls: &[Call]) -> (f64, u64) {
+fn replay<S: PlanService>(
+    service: &mut S,
+    calls: &[Call],
+    cycle: impl Fn(&mut S) -> (Outcome, u64),
+) -> (f64, u64) {
     let start = Instant::now();
-    let mut decided = 0;
+    let mut decided = 0_u64;
     service.advance(0);
     for call in calls {
         let posted = match call {
@@ -152,13 +180,10 @@ fn replay<S: PlanService>(service: &mut S, calls: &[Call]) -> (f64, u64) {
             }
             Call::Cancel(contract) => service.cancel(*contract),
             Call::Cycle(tick) => {
-                let outcome = service.solve(1, BUDGET);
+                let (outcome, sum) = cycle(service);
                 assert_eq!(outcome, Outcome::Decided, "tick {tick}");
                 service.forget(*tick);
-                for started in service.started() {
-                    decided += started.predicate as u64 + started.contract.number;
-                }
-                decided += service.ended().len() as u64;
+                decided = decided.wrapping_add(sum);
                 service.advance(tick + 1);
                 Ok(())
             }
@@ -175,8 +200,13 @@ struct Row {
     counters: ServiceCounters,
 }
 
-fn row<S: PlanService>(name: &'static str, service: &mut S, calls: &[Call]) -> Row {
-    let (seconds, decided) = replay(service, calls);
+fn row<S: PlanService>(
+    name: &'static str,
+    service: &mut S,
+    calls: &[Call],
+    cycle: impl Fn(&mut S) -> (Outcome, u64),
+) -> Row {
+    let (seconds, decided) = replay(service, calls, cycle);
     let counters = service.counters();
     Row {
         name,
@@ -191,25 +221,39 @@ fn compare(name: &str, chances: Chances, ticks: Ticks) {
     let model = &system().model;
     let propositional = || Propositional::new(model.clone()).expect("the model fits");
     let mut compiled = Compiled::new(model.clone()).expect("the model fits");
-    let mut rows = vec![row("interpreted (temporal)", &mut temporal(), &calls)];
-    rows.push(row("propositional", &mut propositional(), &calls));
-    rows.push(row("compiled, from nothing", &mut compiled, &calls));
+    let mut rows = vec![row(
+        "interpreted (temporal)",
+        &mut temporal(),
+        &calls,
+        cycle_served,
+    )];
+    rows.push(row(
+        "propositional",
+        &mut propositional(),
+        &calls,
+        cycle_served,
+    ));
+    let name_of = "compiled, from nothing";
+    rows.push(row(name_of, &mut compiled, &calls, cycle_served));
     let size = compiled.size();
     let mut warm = compiled.restarted().expect("the model fits");
-    rows.push(row("compiled, with its table", &mut warm, &calls));
+    let name_of = "compiled, through the service";
+    rows.push(row(name_of, &mut warm, &calls, cycle_served));
     let again = warm.size().interpreted;
+    let mut warm = warm.restarted().expect("the model fits");
+    rows.push(row("compiled, direct", &mut warm, &calls, cycle_direct));
     println!(
         "{name}: {ticks} ticks, {} posted",
         calls.len() as Ticks - ticks
     );
     println!(
-        "{:<26} {:>12} {:>9} {:>7} {:>11} {:>7}",
+        "{:<30} {:>12} {:>9} {:>7} {:>11} {:>7}",
         "", "cycles a s", "ns each", "ratio", "operations", "tokens"
     );
     for at in &rows {
         assert_eq!(at.decided, rows[0].decided, "{}", at.name);
         println!(
-            "{:<26} {:>12.0} {:>9.0} {:>7.1} {:>11.1} {:>7}",
+            "{:<30} {:>12.0} {:>9.0} {:>7.1} {:>11.1} {:>7}",
             at.name,
             ticks as f64 / at.seconds,
             at.seconds * 1e9 / ticks as f64,
@@ -229,23 +273,30 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let ticks = arguments.iter().skip_while(|at| *at != "--ticks").nth(1);
     if let Some(ticks) = ticks.and_then(|ticks| ticks.parse().ok()) {
+        let again = arguments.iter().skip_while(|at| *at != "--again").nth(1);
+        let again = again.and_then(|at| at.parse().ok()).unwrap_or(9);
         let calls = record(Chances::CALM, ticks);
         let is = |name: &str| arguments.iter().any(|at| at == name);
         let model = &system().model;
-        let (seconds, _) = if is("compiled") {
+        let (seconds, _) = if is("compiled") || is("direct") {
             let mut service = Compiled::new(model.clone()).expect("the model fits");
-            replay(&mut service, &calls);
+            replay(&mut service, &calls, cycle_served);
             let mut best = f64::INFINITY;
-            for _ in 0..9 {
+            for _ in 0..again {
                 service = service.restarted().expect("the model fits");
-                best = best.min(replay(&mut service, &calls).0);
+                let (seconds, _) = if is("direct") {
+                    replay(&mut service, &calls, cycle_direct)
+                } else {
+                    replay(&mut service, &calls, cycle_served)
+                };
+                best = best.min(seconds);
             }
             (best, 0)
         } else if is("propositional") {
             let mut service = Propositional::new(model.clone()).expect("the model fits");
-            replay(&mut service, &calls)
+            replay(&mut service, &calls, cycle_served)
         } else {
-            replay(&mut temporal(), &calls)
+            replay(&mut temporal(), &calls, cycle_served)
         };
         println!("{:.0} cycles a second", ticks as f64 / seconds);
         return;

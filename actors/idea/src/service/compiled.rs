@@ -2,8 +2,8 @@
 //! then.
 //!
 //! A state is what the [propositional](super::propositional) technology knows between two cycles, but
-//! for what makes no difference: numbers of one class are alike, and of a token's latest end it only
-//! counts whether it is near. What differs is kept in registers. In a state, statuses, goals, cancels
+//! for what makes no difference: numbers of one class are alike, and of a far end it only counts that
+//! it is far. What differs is kept in registers. In a state, statuses, goals, cancels
 //! and ends that come near lead from node to node; at the last one stands what the cycle decides: the
 //! next state, what began and ended, and from where its registers are filled. A node or a decision
 //! that is not there yet is made by running the interpreter, once. Where the interpreter decided by
@@ -12,6 +12,7 @@
 //! Plans that deliberative planners commit are not of the table: while there is one, the interpreter
 //! decides.
 
+mod changes;
 mod classes;
 mod key;
 mod learn;
@@ -32,9 +33,11 @@ use super::{
     Contract, Ended, Outcome, Plan, PlanService, Present, Refusal, ServiceCounters, Snapshot,
     Stale, Started, check,
 };
-use classes::{Classes, classes};
+use changes::Recent;
+pub use changes::{Began, Row};
+use classes::{Slot, Sorts, classes, slots};
 use key::{check_present, exact_ticks, is_far};
-use table::{Form, Names, Node, Posted, Registers, Transition};
+use table::{Codes, Form, Lane, Names, Node, Posted, Registers, Transition, What};
 
 /// Why a model does not become a table.
 #[derive(Debug, Error)]
@@ -114,14 +117,17 @@ pub struct TableSize {
 /// ```
 pub struct Compiled {
     model: Arc<Model>,
-    classes: Vec<Classes>,
-    /// By type: how many classes there are.
-    counts: Vec<u64>,
+    sorts: Sorts,
+    /// By predicate, by place.
+    slots: Vec<Box<[Slot]>>,
+    /// By predicate.
+    inputs: Vec<usize>,
     exact: Ticks,
     forms: Vec<Form>,
     by_key: BTreeMap<Vec<u32>, u32>,
     nodes: Vec<Node>,
     transitions: Vec<Transition>,
+    codes: Codes,
     names: Names,
     /// The state; none, while the interpreter is asked.
     state: u32,
@@ -130,16 +136,15 @@ pub struct Compiled {
     posted: Vec<Posted>,
     registers: Registers,
     spare: Registers,
-    starts: Vec<Ticks>,
-    numbers: Vec<u64>,
-    /// By timeline: whether a status of this cycle ended its token.
-    ends: Vec<bool>,
+    /// By timeline.
+    lanes: Vec<Lane>,
     /// From when on a far end is near.
     near: Ticks,
     now: Ticks,
     solved: Option<Ticks>,
     /// Who decides, if not the table.
     interpreter: Option<Box<Propositional>>,
+    recent: Recent,
     started: Vec<Started>,
     ended: Vec<Ended>,
     counters: ServiceCounters,
@@ -180,32 +185,33 @@ impl Compiled {
         check_present(&interpreter.tables)?;
         let exact = exact_ticks(&interpreter.tables);
         interpreter.world.state.exact = exact;
-        let classes = classes(&interpreter.tables)?;
-        let counts: Vec<u64> = classes.iter().map(|at| at.count(&model)).collect();
-        check_counts(&model, &counts)?;
+        let sorts = classes(&interpreter.tables)?;
+        let slots = slots(&model, &sorts);
+        check_counts(&model, &slots)?;
         let timelines = model.timelines.len();
         Ok(Compiled {
+            sorts,
+            slots,
+            inputs: model.predicates.iter().map(|at| at.inputs).collect(),
             model,
-            classes,
-            counts,
             exact,
             forms: Vec::new(),
             by_key: BTreeMap::new(),
             nodes: Vec::new(),
             transitions: Vec::new(),
+            codes: Codes::new(),
             names: Names::default(),
             state: 0,
             node: None,
             posted: Vec::new(),
             registers: Registers::default(),
             spare: Registers::default(),
-            starts: vec![0; timelines],
-            numbers: vec![0; timelines],
-            ends: vec![false; timelines],
+            lanes: vec![Lane::default(); timelines],
             near: Ticks::MAX,
             now: 0,
             solved: None,
             interpreter: Some(Box::new(interpreter)),
+            recent: Recent::Listed,
             started: Vec::new(),
             ended: Vec::new(),
             counters: ServiceCounters::default(),
@@ -226,6 +232,7 @@ impl Compiled {
             by_key: self.by_key,
             nodes: self.nodes,
             transitions: self.transitions,
+            codes: self.codes,
             names: self.names,
             ..fresh
         })
@@ -243,11 +250,13 @@ impl Compiled {
                 size_of::<Node>() + spilled * size_of::<(u64, u32)>()
             })
             .sum();
-        let transitions: usize = { self.transitions.iter() }
-            .map(|at| size_of::<Transition>() + size_of_val(&*at.code))
-            .sum();
+        let transitions = size_of_val(&*self.transitions) + size_of_val(&*self.codes);
         let forms: usize = { self.forms.iter() }
-            .map(|at| size_of::<Form>() + size_of_val(&*at.lanes) + size_of_val(&*at.ends))
+            .map(|at| {
+                let held = size_of_val(&*at.cells) + size_of_val(&*at.ends);
+                let lanes = size_of_val(&*at.lanes) + size_of_val(&*at.times);
+                size_of::<Form>() + held + lanes + size_of_val(&*at.over)
+            })
             .sum();
         let keys: usize = self.by_key.keys().map(|key| 24 + 4 * key.len()).sum();
         let copies: usize = { self.forms.iter() }.map(|at| at.interpreter.bytes()).sum();
@@ -265,12 +274,13 @@ impl Compiled {
     fn wake(&mut self) -> &mut Propositional {
         if self.interpreter.is_none() {
             let mut interpreter = self.forms[self.state as usize].interpreter.clone();
-            interpreter.advance(self.now);
+            // The form may be of a later tick, of before a restart.
+            (interpreter.now, interpreter.world.state.tick) = (self.now, self.now);
             interpreter.posted = 0;
             self.base = interpreter.counters();
             self.fill(&mut interpreter);
             for posted in &self.posted {
-                let again = post(&mut interpreter, posted);
+                let again = post(&mut interpreter, posted, self.values(posted));
                 debug_assert!(again.is_ok(), "it was taken before: {again:?}");
             }
             self.interpreter = Some(interpreter);
@@ -278,58 +288,73 @@ impl Compiled {
         self.interpreter.as_mut().expect("it was made")
     }
 
+    /// The values of something that was posted in this cycle.
+    fn values(&self, posted: &Posted) -> &[Option<Value>] {
+        &self.registers.cells[posted.first as usize..][..posted.count as usize]
+    }
+
     /// Fills a state's form from its registers.
     fn fill(&self, interpreter: &mut Propositional) {
-        let state = &mut interpreter.world.state;
+        let (state, form) = (
+            &mut interpreter.world.state,
+            &self.forms[self.state as usize],
+        );
         state.exact = self.exact;
         state.loose.set(false);
-        for (place, (known, value)) in { state.cells.iter_mut() }
-            .zip(&self.registers.cells)
-            .enumerate()
-        {
-            (known.value, known.origin) = (*value, Origin::Cell(place as u16));
+        state.formulas.clear();
+        for (place, (known, &held)) in (0..).zip(state.cells.iter_mut().zip(&form.cells)) {
+            (known.value, known.origin) = (self.cell(held), Origin::Cell(place));
         }
-        let ends = state.finishes.iter_mut().zip(&self.registers.ends);
-        for (place, (bounds, &(min, max))) in ends.enumerate() {
+        for (place, (bounds, &held)) in (0..).zip(state.finishes.iter_mut().zip(&form.ends)) {
             let from = |time: Ticks| -> Fars {
                 let far = is_far(time, self.now, self.exact);
-                { far.then_some(Far::End(place as u16)) }
-                    .into_iter()
-                    .collect()
+                far.then_some(Far::End(place)).into_iter().collect()
             };
+            let [min, max] = held.map(|held| self.bound(held));
             (bounds.min, bounds.max) = (min, max);
             (bounds.lows, bounds.highs) = (from(min), from(max));
         }
-        for (timeline, lane) in state.lanes.iter_mut().enumerate() {
-            lane.number = self.numbers[timeline];
+        for (is, lane) in self.lanes.iter().zip(&mut state.lanes) {
+            lane.number = is.number;
             if let Some(&token) = lane.tokens.last() {
-                state.tokens[usize::from(token)].start = self.starts[timeline];
+                state.tokens[usize::from(token)].start = is.start;
             }
         }
     }
 
     /// Something is posted: along the table, or to the interpreter, which makes a new node.
-    fn post(&mut self, number: u64, posted: Posted) -> Result<(), Refusal> {
+    fn post(
+        &mut self,
+        number: u64,
+        (what, predicate): (What, PredicateId),
+        values: &[Option<Value>],
+    ) -> Result<(), Refusal> {
+        let posted = Posted {
+            what,
+            predicate,
+            first: self.registers.cells.len() as u32,
+            count: values.len() as u32,
+        };
         if self.interpreter.is_none()
             && let Some(child) = self.child(number)
         {
             self.node = Some(child);
             self.posted.push(posted);
+            self.registers.cells.extend(values.iter().copied());
             return Ok(());
         }
         let interpreter = self.wake();
-        let outcome = post(interpreter, &posted);
-        let loose = interpreter.world.state.loose.get();
         // What is refused leaves no trace, and is refused by the interpreter again.
-        if outcome.is_ok() {
-            self.posted.push(posted);
-            self.node = match self.node {
-                Some(_) if loose => None,
-                Some(node) => self.child(number).or_else(|| self.add_node(node, number)),
-                None => None,
-            };
-        }
-        outcome
+        post(interpreter, &posted, values)?;
+        let loose = interpreter.world.state.loose.get();
+        self.posted.push(posted);
+        self.registers.cells.extend_from_slice(values);
+        self.node = match self.node {
+            Some(_) if loose => None,
+            Some(node) => self.child(number).or_else(|| self.add_node(node, number)),
+            None => None,
+        };
+        Ok(())
     }
 
     fn add_node(&mut self, parent: u32, number: u64) -> Option<u32> {
@@ -368,7 +393,7 @@ impl Compiled {
 }
 
 /// Whether what may be posted can be numbered.
-fn check_counts(model: &Model, counts: &[u64]) -> Result<(), NotCompiled> {
+fn check_counts(model: &Model, slots: &[Box<[Slot]>]) -> Result<(), NotCompiled> {
     let check = |what: &str, expected: u64, actual: u64| {
         if actual <= expected {
             return Ok(());
@@ -382,14 +407,15 @@ fn check_counts(model: &Model, counts: &[u64]) -> Result<(), NotCompiled> {
     };
     check("timelines", 1 << 12, model.timelines.len() as u64)?;
     check("predicates", 1 << 12, model.predicates.len() as u64)?;
-    for predicate in &model.predicates {
+    for (predicate, slots) in model.predicates.iter().zip(slots) {
         for places in [
             0..predicate.inputs,
             predicate.inputs..predicate.parameters.len(),
         ] {
-            let parameters = predicate.parameters[places].iter();
-            let all = parameters.map(|at| counts[at.of] + 1);
-            let all = all.fold(1, u64::saturating_mul);
+            let all = slots[places]
+                .iter()
+                .map(|at| at.count)
+                .fold(1, u64::saturating_mul);
             let what = format!("classes of what {} says", predicate.name);
             check(&what, 1 << CLASS_BITS, all)?;
         }
@@ -398,14 +424,18 @@ fn check_counts(model: &Model, counts: &[u64]) -> Result<(), NotCompiled> {
 }
 
 /// Posts something to the interpreter.
-fn post(interpreter: &mut Propositional, posted: &Posted) -> Result<(), Refusal> {
-    match posted {
-        Posted::Status(contract, values, ends) => interpreter.bind(*contract, values, *ends),
-        Posted::Goal(timeline, predicate, values) => {
+fn post(
+    interpreter: &mut Propositional,
+    posted: &Posted,
+    values: &[Option<Value>],
+) -> Result<(), Refusal> {
+    match posted.what {
+        What::Status(contract, ends) => interpreter.bind(contract, values, ends),
+        What::Goal(timeline) => {
             let inputs: SmallVec<[Value; 4]> = values.iter().copied().flatten().collect();
-            interpreter.insert_goal(*timeline, *predicate, &inputs)
+            interpreter.insert_goal(timeline, posted.predicate, &inputs)
         }
-        Posted::Cancel(contract) => interpreter.cancel(*contract),
+        What::Cancel(contract) => interpreter.cancel(contract),
     }
 }
 
@@ -439,20 +469,13 @@ impl PlanService for Compiled {
         ends: bool,
     ) -> Result<(), Refusal> {
         let timeline = usize::from(contract.timeline);
-        let number = match self.on_table(contract)? {
-            Some(predicate) => {
-                check::values(&self.model, predicate, "outputs", outputs)?;
-                let inputs = self.model.predicates[predicate].inputs;
-                self.number(STATUS, timeline, predicate, ends, (inputs, outputs))
-            }
+        let known = self.on_table(contract)?;
+        let number = match known {
+            Some(predicate) => self.number(STATUS, timeline, predicate, ends, outputs)?,
             None => 0,
         };
-        let outputs = SmallVec::from_slice(outputs);
-        self.post(number, Posted::Status(contract, outputs, ends))?;
-        if let Some(at) = self.ends.get_mut(timeline) {
-            *at |= ends;
-        }
-        Ok(())
+        let what = What::Status(contract, ends);
+        self.post(number, (what, known.unwrap_or(0)), outputs)
     }
 
     fn insert_goal(
@@ -463,40 +486,24 @@ impl PlanService for Compiled {
     ) -> Result<(), Refusal> {
         check::predicate(&self.model, timeline, predicate)?;
         let values: SmallVec<[Option<Value>; 4]> = inputs.iter().copied().map(Some).collect();
-        check::values(&self.model, predicate, "inputs", &values)?;
-        let number = self.number(GOAL, timeline, predicate, false, (0, &values));
-        self.post(number, Posted::Goal(timeline, predicate, values))
+        let number = self.number(GOAL, timeline, predicate, false, &values)?;
+        self.post(number, (What::Goal(timeline), predicate), &values)
     }
 
     fn cancel(&mut self, contract: Contract) -> Result<(), Refusal> {
-        let timeline = usize::from(contract.timeline);
-        let number = match self.on_table(contract)? {
-            Some(predicate) => self.number(CANCEL, timeline, predicate, false, (0, &[])),
-            None => 0,
-        };
-        self.post(number, Posted::Cancel(contract))
+        // It is the same whatever the token says.
+        let timeline = u64::from(contract.timeline);
+        self.on_table(contract)?;
+        let number = CANCEL << 61 | timeline << 49;
+        self.post(number, (What::Cancel(contract), 0), &[])
     }
 
     fn solve(&mut self, horizon: Ticks, budget: u64) -> Outcome {
-        self.started.clear();
-        self.ended.clear();
-        let spent = 1 + self.posted.len() as u64;
-        let known = { self.node.filter(|_| self.interpreter.is_none()) }
-            .and_then(|node| self.nodes[node as usize].transition);
-        match known {
-            Some(_) if spent > budget => {
-                // What was posted stands, and the interpreter keeps it.
-                self.wake();
-                self.node = None;
-                Outcome::OverBudget
-            }
-            Some(transition) => {
-                self.counters.operations += spent;
-                self.follow(transition);
-                Outcome::Decided
-            }
-            None => self.interpret(horizon, budget),
+        let outcome = self.decide(horizon, budget);
+        if let Recent::Row(_) = self.recent {
+            self.list();
         }
+        outcome
     }
 
     fn started(&self) -> &[Started] {
@@ -511,17 +518,17 @@ impl PlanService for Compiled {
         if let Some(interpreter) = &self.interpreter {
             return interpreter.present(timeline);
         }
-        let (predicate, cells) = self.forms[self.state as usize].lanes.get(timeline)?;
-        let parameters = cells
-            .iter()
-            .map(|&cell| self.registers.cells[usize::from(cell)]);
+        let form = &self.forms[self.state as usize];
+        let (predicate, cells) = form.lanes.get(timeline)?;
+        let held = cells.iter().map(|&cell| form.cells[usize::from(cell)]);
+        let parameters = held.map(|held| self.cell(held));
         Some(Present {
             contract: Contract {
                 timeline: timeline as u16,
-                number: self.numbers[timeline],
+                number: self.lanes[timeline].number,
             },
             predicate: *predicate,
-            start: self.starts[timeline],
+            start: self.lanes[timeline].start,
             parameters: parameters.collect(),
         })
     }
@@ -531,7 +538,7 @@ impl PlanService for Compiled {
 
     fn counters(&self) -> ServiceCounters {
         ServiceCounters {
-            tokens: self.numbers.len() as u64,
+            tokens: self.lanes.len() as u64,
             ..self.counters
         }
     }

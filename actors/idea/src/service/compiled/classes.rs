@@ -1,14 +1,15 @@
 //! Which values of a parameter a model tells apart.
 //!
-//! Truth values and symbols are told apart always. Numbers are told apart by what functions, tables,
-//! guards and literals of the rules make of them: two numbers that all of these answer alike are of
-//! one class. A number that nothing asks of is of one class with all others.
+//! Truth values and symbols are told apart always. Numbers of a parameter are told apart by what
+//! functions, tables, guards and literals of the rules make of them, and where they go from there: two
+//! numbers that all of these answer alike are of one class. A number that nothing asks of is of one
+//! class with all others.
 
 use std::collections::BTreeMap;
 
 use farside_planning::model::{
-    Argument, Model, Operand, Pattern, Relationship, RelationshipKind, Rule, Target, TypeId, Value,
-    Values, VariableId,
+    Argument, Model, Operand, Pattern, PredicateId, Relationship, RelationshipKind, Rule, Target,
+    TypeId, Value, Values, VariableId,
 };
 use smallvec::SmallVec;
 
@@ -20,7 +21,7 @@ use crate::service::words;
 /// The most numbers of a type that are sorted into classes.
 const MOST_NUMBERS: i64 = 1 << 20;
 
-/// The classes of a type's values.
+/// The classes of values.
 #[derive(Clone, Debug)]
 pub(super) enum Classes {
     /// All are alike.
@@ -31,13 +32,15 @@ pub(super) enum Classes {
     Literals(Vec<Value>),
     /// By the value itself: a truth value or a symbol.
     Each,
+    /// Too many to be sorted: of variables that no state may hold a value of.
+    Unsorted,
 }
 
 impl Classes {
     #[inline]
     pub(super) fn of(&self, value: Value) -> u32 {
         match self {
-            Classes::One => 0,
+            Classes::One | Classes::Unsorted => 0,
             Classes::Numbers(least, classes) => u32::from(classes[(value - least) as usize]),
             Classes::Literals(all) => match all.binary_search(&value) {
                 Ok(place) => place as u32 + 1,
@@ -47,10 +50,24 @@ impl Classes {
         }
     }
 
+    /// As [`of`](Self::of); none for what is no value of the type.
+    #[inline]
+    pub(super) fn of_type(&self, values: &Values, value: Value) -> Option<u32> {
+        match (self, values) {
+            (Classes::Numbers(least, classes), _) => {
+                let place = usize::try_from(value.wrapping_sub(*least)).ok()?;
+                classes.get(place).map(|&class| u32::from(class))
+            }
+            (_, Values::Truth) => (value == 0 || value == 1).then_some(value as u32),
+            (_, Values::Symbols(all)) => all.binary_search(&value).is_ok().then_some(value as u32),
+            (_, Values::Numbers(span)) => span.contains(value).then(|| self.of(value)),
+        }
+    }
+
     /// How many there are at most.
     pub(super) fn count(&self, model: &Model) -> u64 {
         match self {
-            Classes::One => 1,
+            Classes::One | Classes::Unsorted => 1,
             Classes::Numbers(_, classes) => u64::from(classes.iter().max().map_or(0, |&at| at)) + 1,
             Classes::Literals(all) => all.len() as u64 + 1,
             Classes::Each => model.symbols.len().max(2) as u64,
@@ -58,66 +75,248 @@ impl Classes {
     }
 }
 
-/// By type: its classes.
+/// The classes of all that values may be of: parameters of predicates, and variables of rules.
+#[derive(Clone, Debug)]
+pub(super) struct Sorts {
+    /// By predicate, by place.
+    pub(super) parameters: Vec<Vec<Classes>>,
+    /// By rule, by variable.
+    pub(super) variables: Vec<Vec<Classes>>,
+}
+
+/// A parameter, for what is posted: its values by class, from 1 on, with 0 for what is not known.
+#[derive(Clone, Debug)]
+pub(super) struct Slot {
+    /// How many classes there are, with one for what is not known.
+    pub(super) count: u64,
+    least: Value,
+    /// By value from the least one on: its class; 0 for what is no value of the type.
+    classes: Box<[u16]>,
+    /// What is too wide for that.
+    wide: Option<(Values, Classes)>,
+}
+
+/// The most values of which a slot knows each.
+const MOST_KNOWN: usize = 1 << 10;
+
+impl Slot {
+    fn of(model: &Model, of: TypeId, classes: &Classes) -> Slot {
+        let values = &model.types[of].values;
+        let (least, most) = match values {
+            Values::Truth => (0, 1),
+            Values::Symbols(all) => {
+                let (first, last) = (all.first(), all.last());
+                (first.map_or(0, |&at| at), last.map_or(0, |&at| at))
+            }
+            Values::Numbers(span) => (span.min, span.max),
+        };
+        let count = classes.count(model) + 1;
+        let known = most.saturating_sub(least).saturating_add(1);
+        let narrow = known <= MOST_KNOWN as Value && count < u64::from(u16::MAX);
+        let class = |value| { classes.of_type(values, value) }.map_or(0, |at| at as u16 + 1);
+        Slot {
+            count,
+            least,
+            classes: match narrow {
+                true => (least..=most).map(class).collect(),
+                false => Box::default(),
+            },
+            wide: (!narrow).then(|| (values.clone(), classes.clone())),
+        }
+    }
+
+    /// The class of a value, if it is one of the type.
+    #[inline]
+    pub(super) fn class(&self, value: Value) -> Option<u32> {
+        let place = value.wrapping_sub(self.least) as usize;
+        match self.classes.get(place) {
+            Some(&class) => (class > 0).then_some(u32::from(class)),
+            None => {
+                let (values, classes) = self.wide.as_ref()?;
+                Some(classes.of_type(values, value)? + 1)
+            }
+        }
+    }
+}
+
+/// By predicate, by place: its classes, for what is posted.
+pub(super) fn slots(model: &Model, sorts: &Sorts) -> Vec<Box<[Slot]>> {
+    let predicates = model.predicates.iter().zip(&sorts.parameters);
+    let slots = predicates.map(|(said, sorts)| {
+        let parameters = said.parameters.iter().zip(sorts);
+        let slots = parameters.map(|(at, classes)| Slot::of(model, at.of, classes));
+        slots.collect()
+    });
+    slots.collect()
+}
+
+/// What is asked of the values of a parameter or a variable.
+#[derive(Debug, Default)]
+struct Asked {
+    literals: Vec<Value>,
+    /// What rules make of a variable.
+    questions: Vec<(usize, VariableId)>,
+}
+
+impl Sorts {
+    /// As coarse as can be: what is not measured is told apart always, numbers are not.
+    fn coarsest(tables: &Tables) -> Sorts {
+        let model = &tables.model;
+        let of = |of: TypeId| match &model.types[of].values {
+            Values::Numbers(_) if tables.is_measured(of) => Classes::One,
+            Values::Numbers(span) => {
+                let classes = 0..(span.max - span.min + 1) as u16;
+                Classes::Numbers(span.min, classes.collect())
+            }
+            _ => Classes::Each,
+        };
+        let predicates = model.predicates.iter();
+        let parameters = predicates.map(|at| at.parameters.iter().map(|at| of(at.of)).collect());
+        let rules = model.rules.iter();
+        let variables = rules.map(|at| at.variables.iter().map(|at| of(at.of)).collect());
+        Sorts {
+            parameters: parameters.collect(),
+            variables: variables.collect(),
+        }
+    }
+
+    fn count(&self, model: &Model) -> u64 {
+        let all = self.parameters.iter().chain(&self.variables).flatten();
+        all.map(|at| at.count(model)).sum()
+    }
+}
+
+/// What is told apart.
 ///
 /// # Errors
 ///
 /// If a rule asks of more numbers than can be sorted, or of several measured ones at once.
-pub(super) fn classes(tables: &Tables) -> Result<Vec<Classes>, NotCompiled> {
-    let types = 0..tables.model.types.len();
-    types.map(|of| classes_of(tables, of)).collect()
+pub(super) fn classes(tables: &Tables) -> Result<Sorts, NotCompiled> {
+    let mut sorts = Sorts::coarsest(tables);
+    // Where a value goes it is told apart by the classes of there, and so is what a function makes of
+    // it: classes are split until those of one class lead to one class.
+    loop {
+        let finer = split(tables, &sorts)?;
+        if finer.count(&tables.model) == sorts.count(&tables.model) {
+            return Ok(finer);
+        }
+        sorts = finer;
+    }
 }
 
-fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
+fn split(tables: &Tables, coarse: &Sorts) -> Result<Sorts, NotCompiled> {
     let model = &tables.model;
-    let Values::Numbers(span) = model.types[of].values else {
-        return Ok(Classes::Each);
-    };
-    if !tables.is_measured(of) {
-        let classes = 0..(span.max - span.min + 1) as u16;
-        return Ok(Classes::Numbers(span.min, classes.collect()));
+    let mut finer = coarse.clone();
+    for (predicate, said) in model.predicates.iter().enumerate() {
+        for (place, parameter) in said.parameters.iter().enumerate() {
+            if tables.is_measured(parameter.of) {
+                let mut asked = Asked::default();
+                for rule in 0..model.rules.len() {
+                    asked.add_parameter(tables, coarse, rule, (predicate, place));
+                }
+                let sorted = sort_out(tables, coarse, parameter.of, asked)?;
+                finer.parameters[predicate][place] = sorted;
+            }
+        }
     }
-    let mut questions: Vec<(usize, VariableId)> = Vec::new();
-    let mut literals: Vec<Value> = Vec::new();
     for (rule, said) in model.rules.iter().enumerate() {
+        for (variable, at) in said.variables.iter().enumerate() {
+            if tables.is_measured(at.of) {
+                let mut asked = Asked::default();
+                asked.add_variable(tables, coarse, rule, variable, None);
+                let sorted = match sort_out(tables, coarse, at.of, asked) {
+                    Err(NotCompiled::Numbers { .. }) => Classes::Unsorted,
+                    sorted => sorted?,
+                };
+                finer.variables[rule][variable] = sorted;
+            }
+        }
+    }
+    Ok(finer)
+}
+
+impl Asked {
+    /// What a rule asks of a parameter, wherever it names it.
+    fn add_parameter(
+        &mut self,
+        tables: &Tables,
+        coarse: &Sorts,
+        rule: usize,
+        (predicate, place): (PredicateId, usize),
+    ) {
+        let mut variables: SmallVec<[VariableId; 4]> = SmallVec::new();
+        let said = &tables.model.rules[rule];
         patterns(said, &tables.flats[rule].relations, |pattern| {
-            let parameters = &model.predicates[pattern.predicate].parameters;
-            for (argument, parameter) in pattern.arguments.iter().zip(parameters) {
-                if let Argument::Value(value) = *argument
-                    && parameter.of == of
-                {
-                    literals.push(value);
+            if pattern.predicate == predicate {
+                match pattern.arguments[place] {
+                    Argument::Value(value) => self.literals.push(value),
+                    Argument::Variable(variable) => variables.push(variable),
+                    Argument::Any => {}
                 }
             }
         });
+        for variable in variables {
+            self.add_variable(tables, coarse, rule, variable, Some((predicate, place)));
+        }
+    }
+
+    /// What a rule asks of a variable, and of the parameters that have its value, but for one.
+    fn add_variable(
+        &mut self,
+        tables: &Tables,
+        coarse: &Sorts,
+        rule: usize,
+        variable: VariableId,
+        but: Option<(PredicateId, usize)>,
+    ) {
+        let said = &tables.model.rules[rule];
+        let mut asks = asks_of(said, variable);
         patterns(said, &tables.flats[rule].relations, |pattern| {
-            let parameters = &model.predicates[pattern.predicate].parameters;
-            for (argument, parameter) in pattern.arguments.iter().zip(parameters) {
-                if let Argument::Variable(variable) = *argument
-                    && parameter.of == of
-                    && asks_of(said, variable)
-                    && !questions.contains(&(rule, variable))
+            for (place, argument) in pattern.arguments.iter().enumerate() {
+                if *argument == Argument::Variable(variable)
+                    && but != Some((pattern.predicate, place))
                 {
-                    questions.push((rule, variable));
+                    match &coarse.parameters[pattern.predicate][place] {
+                        Classes::One | Classes::Each | Classes::Unsorted => {}
+                        Classes::Literals(all) => self.literals.extend(all),
+                        Classes::Numbers(..) => asks = true,
+                    }
                 }
             }
         });
+        if asks && !self.questions.contains(&(rule, variable)) {
+            self.questions.push((rule, variable));
+        }
     }
-    if questions.is_empty() && literals.is_empty() {
-        return Ok(Classes::One);
-    }
-    if questions.is_empty() {
-        literals.sort_unstable();
-        literals.dedup();
-        return Ok(Classes::Literals(literals));
-    }
+}
+
+fn sort_out(
+    tables: &Tables,
+    coarse: &Sorts,
+    of: TypeId,
+    asked: Asked,
+) -> Result<Classes, NotCompiled> {
+    let model = &tables.model;
+    let Asked {
+        mut literals,
+        questions,
+    } = asked;
+    literals.sort_unstable();
+    literals.dedup();
+    let (Values::Numbers(span), Some(&(first, _))) = (&model.types[of].values, questions.first())
+    else {
+        return Ok(match literals[..] {
+            [] => Classes::One,
+            _ => Classes::Literals(literals),
+        });
+    };
+    let too_many = || NotCompiled::Numbers {
+        of: model.types[of].name.clone(),
+        rule: words::rule(model, first),
+    };
     let count = span.max.saturating_sub(span.min).saturating_add(1);
     if count > MOST_NUMBERS {
-        let rule = questions
-            .first()
-            .map_or(String::new(), |at| words::rule(model, at.0));
-        let of = model.types[of].name.clone();
-        return Err(NotCompiled::Numbers { of, rule });
+        return Err(too_many());
     }
     for &(rule, variable) in &questions {
         check_alone(tables, rule, variable)?;
@@ -127,15 +326,10 @@ fn classes_of(tables: &Tables, of: TypeId) -> Result<Classes, NotCompiled> {
     for value in span.min..=span.max {
         let mut answers: Vec<Option<Value>> = Vec::new();
         answers.extend(literals.iter().map(|&at| Some(Value::from(at == value))));
-        for &(rule, variable) in &questions {
-            ask(tables, (rule, variable), value, &mut answers);
+        for &question in &questions {
+            ask(tables, coarse, question, value, &mut answers);
         }
-        let next = u16::try_from(known.len()).map_err(|_| NotCompiled::Numbers {
-            of: model.types[of].name.clone(),
-            rule: questions
-                .first()
-                .map_or(String::new(), |at| words::rule(model, at.0)),
-        })?;
+        let next = u16::try_from(known.len()).map_err(|_| too_many())?;
         classes.push(*known.entry(answers).or_insert(next));
     }
     Ok(Classes::Numbers(span.min, classes))
@@ -209,6 +403,7 @@ fn check_alone(tables: &Tables, rule: usize, of: VariableId) -> Result<(), NotCo
 /// What a rule makes of a number, if nothing else is known.
 fn ask(
     tables: &Tables,
+    coarse: &Sorts,
     (rule, of): (usize, VariableId),
     value: Value,
     answers: &mut Vec<Option<Value>>,
@@ -238,19 +433,26 @@ fn ask(
             }
         }
     }
-    let named = |variable: VariableId| {
-        let is = |argument: &Argument| *argument == Argument::Variable(variable);
-        let mut told = said.master.arguments.iter().any(is);
-        patterns(said, &tables.flats[rule].relations, |pattern| {
-            told |= pattern.arguments.iter().any(is);
-        });
-        told
+    let model = &tables.model;
+    let class = |classes: &Classes, of: TypeId, value: Option<Value>| {
+        let class = |value| classes.of_type(&model.types[of].values, value);
+        value.map(|value| class(value).map_or(-1, Value::from))
     };
-    for (variable, known) in known.iter().enumerate() {
-        if variable != of && named(variable) {
-            answers.push(*known);
+    for (variable, &value) in known.iter().enumerate() {
+        if variable != of {
+            let classes = &coarse.variables[rule][variable];
+            answers.push(class(classes, said.variables[variable].of, value));
         }
     }
+    patterns(said, &tables.flats[rule].relations, |pattern| {
+        let places = coarse.parameters[pattern.predicate].iter();
+        let parameters = &model.predicates[pattern.predicate].parameters;
+        for ((argument, classes), at) in pattern.arguments.iter().zip(places).zip(parameters) {
+            if let Argument::Variable(variable) = *argument {
+                answers.push(class(classes, at.of, known[variable]));
+            }
+        }
+    });
     for relationship in relationships(said) {
         // With symbols that are not known it may hold or not: all of them are tried.
         let operands: SmallVec<[Option<Value>; 4]> = relationship
@@ -274,10 +476,21 @@ fn ask(
                     answers.push(Some(Value::from(tables.holds(relationship.kind, &values))));
                 }
             }
+            // A function of others: whether it gives what is known is not told apart.
+            _ if gives(relationship.kind) && !has_input(relationship, &known) => {}
             // A function of symbols, too: each number is a class of its own.
             _ => answers.push(Some(value)),
         }
     }
+}
+
+/// Whether one of the variables that a function is of is known.
+fn has_input(said: &Relationship, known: &[Option<Value>]) -> bool {
+    let inputs = &said.operands[..said.operands.len() - 1];
+    inputs.iter().any(|operand| match *operand {
+        Operand::Variable(variable) => known[variable].is_some(),
+        _ => false,
+    })
 }
 
 /// Whether the last operand follows from the others.

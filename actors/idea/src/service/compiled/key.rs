@@ -5,16 +5,17 @@ use farside_planning::Ticks;
 use farside_planning::model::End;
 
 use super::NotCompiled;
-use super::classes::Classes;
+use super::classes::{Classes, Sorts};
 use crate::service::propositional::rules::{Part, constant};
-use crate::service::propositional::state::{Guard, Open, span};
+use crate::service::propositional::state::{Cell, Guard, Open, span};
 use crate::service::propositional::{Propositional, Tables};
 use crate::service::words;
 
 /// The most ticks that are counted exactly: the longest distance that a relation asks for. What lies
 /// further ahead is far.
 pub(super) fn exact_ticks(tables: &Tables) -> Ticks {
-    let mut most = 1;
+    // What lasts two ticks at most, as polls do, need not be watched.
+    let mut most = 2;
     for flat in &tables.flats {
         for distance in flat.relations.iter().flat_map(|at| &at.distances) {
             for bound in [distance.min, distance.max] {
@@ -85,9 +86,9 @@ pub(super) fn longest(is: &Propositional, timeline: usize) -> Option<Ticks> {
     bounds.map(|[_, most]| most).min()
 }
 
-/// What is known, in numbers, but for what makes no difference; none, if it holds numbers that
-/// functions gave.
-pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Option<Vec<u32>> {
+/// What is known, in numbers, but for what makes no difference; none, if a rule holds a
+/// number that is not sorted.
+pub(super) fn key(is: &Propositional, sorts: &Sorts, exact: Ticks) -> Option<Vec<u32>> {
     let (state, tick) = (&is.world.state, is.now);
     let mut key: Vec<u32> = Vec::with_capacity(256);
     for (timeline, lane) in state.lanes.iter().enumerate() {
@@ -103,28 +104,35 @@ pub(super) fn key(is: &Propositional, classes: &[Classes], exact: Ticks) -> Opti
             u32::from(at.fills) | u32::from(is.ends[timeline]) << 1 | u32::from(own) << 2,
             u32::from(at.finish),
         ]);
-        key.extend(at.parameters.iter().map(|&at| u32::from(at)));
+        let class = |cell: Cell, classes: &Classes| {
+            let known = &state.cells[usize::from(cell)];
+            known.value.map_or(0, |value| 1 + classes.of(value))
+        };
+        for (&cell, classes) in at.parameters.iter().zip(&sorts.parameters[at.predicate]) {
+            key.extend([u32::from(cell), class(cell, classes)]);
+        }
         for said in &at.instances {
             key.extend([u32::MAX, said.rule as u32, said.guard as u32]);
-            key.extend(
-                said.variables
-                    .iter()
-                    .map(|at| at.map_or(u32::MAX, u32::from)),
-            );
+            for (&cell, classes) in said.variables.iter().zip(&sorts.variables[said.rule]) {
+                let is_known = |cell: Cell| state.cells[usize::from(cell)].value.is_some();
+                if matches!(classes, Classes::Unsorted) && cell.is_some_and(is_known) {
+                    return None;
+                }
+                key.push(cell.map_or(u32::MAX, u32::from));
+                key.extend(cell.map(|cell| class(cell, classes)));
+            }
             key.push(u32::MAX);
             key.extend(said.labels.iter().map(|at| at.map_or(u32::MAX, u32::from)));
         }
         key.push(u32::MAX - 1);
     }
     for known in &state.cells {
-        if is.tables.is_measured(known.of)
-            && known.origin == crate::service::propositional::state::Origin::Computed
-        {
-            return None;
-        }
-        let class = known
-            .value
-            .map_or(0, |value| 1 + classes[known.of].of(value));
+        // Numbers are told apart where they are parameters or variables.
+        let class = match known.value {
+            None => 0,
+            Some(_) if is.tables.is_measured(known.of) => 1,
+            Some(value) => 1 + value as u32,
+        };
         key.extend([
             known.of as u32,
             known.also.map_or(u32::MAX, |of| of as u32),

@@ -3,50 +3,76 @@
 use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, Value};
 
-use super::key::is_far;
-use super::table::{KIND, REST};
+use super::table::{Held, KIND, REST, Transition, What};
 use super::{CLASS_BITS, Compiled, GOAL, NEAR};
 use crate::service::propositional::state::Far;
-use crate::service::{Contract, Ended, Refusal, Started, check};
+use crate::service::{Contract, Refusal, check};
 
 impl Compiled {
     /// The number of what is posted, for its node.
+    ///
+    /// # Errors
+    ///
+    /// If there is another number of values, or one is not of its type.
+    #[inline]
     pub(super) fn number(
         &self,
         kind: u64,
         timeline: usize,
         predicate: PredicateId,
         ends: bool,
-        (first, values): (usize, &[Option<Value>]),
-    ) -> u64 {
-        let parameters = &self.model.predicates[predicate].parameters[first..];
+        values: &[Option<Value>],
+    ) -> Result<u64, Refusal> {
+        let inputs = self.inputs[predicate];
+        let slots = &self.slots[predicate];
+        let (what, slots) = match kind {
+            GOAL => ("inputs", &slots[..inputs]),
+            _ => ("outputs", &slots[inputs..]),
+        };
+        let mut right = values.len() == slots.len();
         let mut mixed = 0;
-        for (value, parameter) in values.iter().zip(parameters) {
-            let classes = &self.classes[parameter.of];
-            let count = self.counts[parameter.of] + 1;
-            let class = value.map_or(0, |value| 1 + u64::from(classes.of(value)));
-            mixed = mixed * count + class;
+        for (value, slot) in values.iter().zip(slots) {
+            let class = match *value {
+                Some(value) => slot.class(value),
+                None => Some(0),
+            };
+            right &= class.is_some();
+            mixed = mixed * slot.count + u64::from(class.unwrap_or(0));
+        }
+        if !right {
+            check::values(&self.model, predicate, what, values)?;
         }
         let predicate = if kind == GOAL { predicate as u64 } else { 0 };
-        kind << 61
+        Ok(kind << 61
             | (timeline as u64) << 49
             | predicate << 37
             | u64::from(ends) << CLASS_BITS
-            | mixed
+            | mixed)
     }
 
     /// What the token of an active contract says, as far as the table knows.
+    #[inline]
     pub(super) fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
         if self.node.is_none() {
             return Ok(None);
         }
         let timeline = usize::from(contract.timeline);
-        if self.numbers.get(timeline) != Some(&contract.number) || self.ends[timeline] {
+        let lane = self.lanes.get(timeline);
+        let form = &self.forms[self.state as usize];
+        let ended = |at: &super::Posted| match at.what {
+            What::Status(of, ends) => ends && of == contract,
+            _ => false,
+        };
+        if lane.is_none_or(|lane| lane.number != contract.number)
+            || form.over[timeline]
+            || self.posted.iter().any(ended)
+        {
             return Err(check::dead(&self.model, contract));
         }
-        Ok(Some(self.forms[self.state as usize].lanes[timeline].0))
+        Ok(Some(form.lanes[timeline].0))
     }
 
+    #[inline]
     pub(super) fn child(&self, number: u64) -> Option<u32> {
         let node = &self.nodes[self.node? as usize];
         let child = node.children.iter().find(|child| child.0 == number);
@@ -55,30 +81,27 @@ impl Compiled {
 
     /// Far ends that are near now are the first that is posted.
     pub(super) fn come_near(&mut self) {
-        let far = &self.forms[self.state as usize].far;
-        let (mut which, mut near, mut bit) = (0_u64, Ticks::MAX, 0);
-        for &end in far {
-            let bounds = self.registers.ends[usize::from(end)];
-            for bound in [bounds.0, bounds.1] {
-                let was = is_far(bound, self.now - 1, self.exact);
-                if was && !is_far(bound, self.now, self.exact) {
-                    which |= 1 << bit;
-                }
-                bit += 1;
-            }
-            near = near.min(comes_near(bounds, self.now, self.exact));
+        let form = &self.forms[self.state as usize];
+        if form.times.len() > 60 {
+            // More than a number can say.
+            (self.node, self.near) = (None, Ticks::MAX);
+            return;
         }
-        // How a token ends whose time is nearly over depends on whose time it is.
-        for (timeline, &(end, longest)) in self.forms[self.state as usize].lasts.iter().enumerate()
-        {
-            let (_, max) = self.registers.ends[usize::from(end)];
-            if self.starts[timeline].saturating_add(longest) == max {
-                which |= 1 << bit;
+        let (mut which, mut bit) = (0_u64, 1);
+        let mut near = Ticks::MAX;
+        for time in &form.times {
+            let end = self.registers.ends[usize::from(time.end)];
+            let due = end.saturating_sub(self.exact);
+            if due > self.now {
+                near = near.min(due);
+            } else if time.whose.is_none_or(|(timeline, longest)| {
+                // How a token ends whose time is nearly over depends on whose time it is.
+                let start = self.lanes[usize::from(timeline)].start;
+                start.saturating_add(longest) == end
+            }) {
+                which |= bit;
             }
-            bit += 1;
-        }
-        if bit > 60 {
-            self.node = None;
+            bit <<= 1;
         }
         self.near = near;
         let number = NEAR << 61 | which;
@@ -89,93 +112,72 @@ impl Compiled {
         };
     }
 
-    /// What the table says is decided.
-    pub(super) fn follow(&mut self, transition: u32) {
-        let at = &self.transitions[transition as usize];
-        let (now, from, names) = (self.now, &self.registers, &self.names);
-        let posted = &self.posted;
-        let value = |source: &u32| {
-            let rest = source & REST;
-            match source >> KIND {
-                0 => names.values[rest as usize],
-                1 => from.cells[rest as usize],
-                _ => posted[(rest >> 8) as usize].values()[(rest & 0xff) as usize],
-            }
-        };
-        let end = |at: &Far, max: bool| match *at {
-            Far::Ahead(ticks) => now + ticks,
-            Far::End(end) if max => from.ends[usize::from(end)].1,
-            Far::End(end) => from.ends[usize::from(end)].0,
-        };
-        let bound = |bound: u32, max: bool| match bound >> KIND {
-            0 => now + Ticks::from(bound & REST),
-            1 => end(&Far::End((bound & REST) as u16), max),
-            2 => Ticks::MAX,
-            _ => {
-                let all = &names.several[(bound & REST) as usize];
-                let all = all.iter().map(|at| end(at, max));
-                { if max { all.min() } else { all.max() } }.unwrap_or(now)
-            }
-        };
-        let (counts, code) = at.code.split_at(4);
-        let (cells, code) = code.split_at(counts[0] as usize);
-        let (ends, mut code) = code.split_at(2 * counts[1] as usize);
-        for change in 0..counts[2] + counts[3] {
-            let (timeline, predicate) = ((code[0] >> 16) as u16, (code[0] & 0xffff) as usize);
-            let (parameters, rest) = code[2..].split_at(code[1] as usize);
-            code = rest;
-            let lane = usize::from(timeline);
-            let parameters = parameters.iter().map(value).collect();
-            if change < counts[2] {
-                let number = self.numbers[lane];
-                self.ended.push(Ended {
-                    contract: Contract { timeline, number },
-                    predicate,
-                    start: self.starts[lane],
-                    finish: now,
-                    parameters,
-                });
-                continue;
-            }
-            self.numbers[lane] += 1;
-            self.starts[lane] = now;
-            let number = self.numbers[lane];
-            self.started.push(Started {
-                contract: Contract { timeline, number },
-                predicate,
-                parameters,
-            });
+    /// The value of a cell of the state.
+    pub(super) fn cell(&self, held: Held<Option<Value>>) -> Option<Value> {
+        match held {
+            Held::Same(value) => value,
+            Held::Register(place) => self.registers.cells[usize::from(place)],
         }
+    }
+
+    /// A bound of an end of the state.
+    pub(super) fn bound(&self, held: Held<Ticks>) -> Ticks {
+        match held {
+            Held::Same(Ticks::MAX) => Ticks::MAX,
+            Held::Same(ahead) => self.solved.unwrap_or(self.now) + ahead,
+            Held::Register(place) => self.registers.ends[usize::from(place)],
+        }
+    }
+
+    /// What the table says is decided. The registers of before are spare then, until the next cycle.
+    pub(super) fn follow(&mut self, at: Transition) {
+        let (now, from) = (self.now, &self.registers);
+        let code = &self.codes[at.code as usize..];
+        let (cells, code) = code.split_at(usize::from(at.cells));
+        let (ends, code) = code.split_at(usize::from(at.ends));
+        let timelines = &code[..usize::from(at.started)];
+        let names = &self.names;
         self.spare.cells.clear();
-        self.spare.cells.extend(cells.iter().map(value));
+        for &at in cells {
+            self.spare.cells.push(names.value(at, &from.cells));
+        }
         self.spare.ends.clear();
         let mut near = Ticks::MAX;
-        for pair in ends.chunks_exact(2) {
-            let bounds = (bound(pair[0], false), bound(pair[1], true));
-            near = near.min(comes_near(bounds, now, self.exact));
-            self.spare.ends.push(bounds);
+        let far = |at: &Far| match *at {
+            Far::Ahead(ticks) => now + ticks,
+            Far::End(end) => from.ends[usize::from(end)],
+        };
+        for &bound in ends {
+            let rest = (bound & REST) as usize;
+            let end = match bound >> KIND {
+                0 => now + rest as Ticks,
+                1 => from.ends[rest],
+                2 => names.several[rest].iter().map(far).min().unwrap_or(now),
+                _ => names.several[rest].iter().map(far).max().unwrap_or(now),
+            };
+            // A far end of the next state is far now.
+            near = near.min(end.saturating_sub(self.exact));
+            self.spare.ends.push(end);
+        }
+        for &timeline in timelines {
+            let lane = &mut self.lanes[timeline as usize];
+            lane.number += 1;
+            lane.before = lane.start;
+            lane.start = now;
         }
         self.near = near;
         self.counters.decisions += u64::from(at.decisions);
         self.counters.guards += u64::from(at.guards);
         self.counters.backtracks += u64::from(at.backtracks);
-        self.state = at.next;
         std::mem::swap(&mut self.registers, &mut self.spare);
-        self.settle_state();
+        self.enter(at.next);
     }
 
     /// A state is entered: nothing is posted in it yet.
-    pub(super) fn settle_state(&mut self) {
-        let form = &self.forms[self.state as usize];
-        self.node = Some(form.node);
-        self.ends.copy_from_slice(&form.ends);
+    pub(super) fn enter(&mut self, state: u32) {
+        self.state = state;
+        self.node = Some(self.forms[state as usize].node);
         self.posted.clear();
         self.solved = Some(self.now);
     }
-}
-
-/// From which tick on a bound of an end is near that is far now.
-pub(super) fn comes_near((min, max): (Ticks, Ticks), now: Ticks, exact: Ticks) -> Ticks {
-    let far = [min, max].into_iter().filter(|&at| is_far(at, now, exact));
-    far.map(|at| at - exact).min().unwrap_or(Ticks::MAX)
 }

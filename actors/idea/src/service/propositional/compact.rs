@@ -17,12 +17,13 @@ impl World {
     /// Drops what does not count any more, and gives the rest new places: of each timeline the last
     /// tokens, as many as count.
     pub(in crate::service) fn compact(&mut self, known: usize) {
-        let old = std::mem::take(&mut self.state);
+        let mut old = std::mem::take(&mut self.state);
         let mut new = State {
             operations: old.operations,
             tick: old.tick,
             exact: old.exact,
             loose: old.loose.clone(),
+            formulas: std::mem::take(&mut old.formulas),
             ..State::default()
         };
         let mut places = Places {

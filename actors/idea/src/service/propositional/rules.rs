@@ -24,8 +24,6 @@ pub(in crate::service) struct Flat {
     pub(in crate::service) top: Vec<Part>,
     /// The variables among the master's arguments, each with the first place that it has.
     pub(in crate::service) named: Vec<(VariableId, usize)>,
-    /// By variable: whether a token has it as a parameter.
-    pub(in crate::service) told: Vec<bool>,
     /// Least and most ticks that the master lasts.
     pub(in crate::service) duration: Option<[Ticks; 2]>,
 }
@@ -97,16 +95,6 @@ impl Flat {
             return Err(coupled(said.position, what));
         }
         flat.name(said);
-        let patterns = flat.relations.iter().filter_map(|at| match &at.target {
-            Target::New(pattern, _) => Some(pattern),
-            Target::Label(_) => None,
-        });
-        flat.told = vec![false; said.variables.len()];
-        for argument in patterns.chain([&said.master]).flat_map(|at| &at.arguments) {
-            if let Argument::Variable(variable) = *argument {
-                flat.told[variable] = true;
-            }
-        }
         Ok(flat)
     }
 

@@ -10,7 +10,7 @@ mod times;
 
 use farside_planning::Ticks;
 use farside_planning::model::{
-    End, Model, PredicateId, RuleId, TimelineId, TypeId, Value, VariableId,
+    End, Model, PredicateId, RelationshipKind, RuleId, TimelineId, TypeId, Value, VariableId,
 };
 use smallvec::SmallVec;
 
@@ -44,12 +44,19 @@ pub(in crate::service) enum Origin {
     /// The model, or what values of the same classes give.
     #[default]
     Model,
-    /// A function's number: it is of no class.
-    Computed,
+    /// A function, by its place in [`State::formulas`].
+    Computed(u16),
     /// What a cell had when the cycle began.
     Cell(u16),
     /// What was posted in this cycle: which, and in which place.
     Posted(u16, u16),
+}
+
+/// A function's number, and what it was made from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::service) struct Formula {
+    pub(in crate::service) kind: RelationshipKind,
+    pub(in crate::service) inputs: SmallVec<[(Value, Origin); 4]>,
 }
 
 /// Where an end is from that lies further ahead than what is counted exactly.
@@ -162,6 +169,8 @@ pub(in crate::service) struct State {
     pub(in crate::service) exact: Ticks,
     /// Whether something was decided by numbers that such a one does not tell apart.
     pub(in crate::service) loose: std::cell::Cell<bool>,
+    /// What numbers were made from, for whoever tells states apart.
+    pub(in crate::service) formulas: Vec<Formula>,
 }
 
 impl State {
@@ -261,6 +270,13 @@ impl State {
         let what = What::Values;
         let cell = self.root(cell);
         let known = &self.cells[usize::from(cell)];
+        let computed = |at: Origin| matches!(at, Origin::Computed(_));
+        if known.value.is_some()
+            && known.origin != origin
+            && (computed(origin) || computed(known.origin))
+        {
+            self.compare(tables, cell, cell);
+        }
         match known.value {
             Some(is) if is == value => return Ok(()),
             Some(_) => return Err(Clash { what, rule }),

@@ -145,3 +145,53 @@ fn a_table_decides_as_the_database_does_whatever_happens() {
         assert!(other.service.size().transitions > 100);
     }
 }
+
+/// What is read in place is what the database decides, whatever is posted.
+#[test]
+fn what_is_read_from_a_table_in_place_is_what_the_database_decides() {
+    let model = read(K9);
+    let mut table = Compiled::new(model.clone()).expect("the model fits");
+    for seed in 0..12 {
+        let temporal = Temporal::new(model.clone(), TemporalOptions::default());
+        let mut temporal = temporal.expect("the model fits");
+        table = table.restarted().expect("the model fits");
+        let mut stimuli = Stimuli::new(&model, seed % 4);
+        for tick in 0..300 {
+            let events = match tick {
+                0 => Vec::new(),
+                _ => calm(&temporal, stimuli.next(&temporal)),
+            };
+            temporal.advance(tick);
+            table.advance(tick);
+            for event in &events {
+                assert_eq!(event.post(&mut temporal), event.post(&mut table));
+            }
+            let outcome = temporal.solve(1, 1_000_000);
+            let same = table.decide(1, 1_000_000);
+            assert_eq!(
+                std::mem::discriminant(&outcome),
+                std::mem::discriminant(&same)
+            );
+            let started = table.each_started().map(|at| Started {
+                contract: at.contract,
+                predicate: at.predicate,
+                parameters: at.parameters.iter().collect(),
+            });
+            assert_eq!(started.collect::<Vec<_>>(), temporal.started(), "at {tick}");
+            let ended = table.each_ended().map(|at| Ended {
+                contract: at.contract,
+                predicate: at.predicate,
+                start: at.start,
+                finish: tick,
+                parameters: at.parameters.iter().collect(),
+            });
+            assert_eq!(ended.collect::<Vec<_>>(), temporal.ended(), "at {tick}");
+            temporal.forget(tick);
+            if outcome != Outcome::Decided {
+                break;
+            }
+        }
+    }
+    // The later runs meet what the first ones met, and are decided by the table.
+    assert!(table.size().interpreted < 10);
+}

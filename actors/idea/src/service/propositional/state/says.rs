@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::super::Tables;
 use super::super::rules::is_of;
 use super::times::later;
-use super::{Cell, Clash, Far, Fars, Guard, Open, Origin, State, Token, What};
+use super::{Cell, Clash, Far, Fars, Formula, Guard, Open, Origin, State, Token, What};
 
 impl State {
     /// What follows from what is known anew, until nothing does.
@@ -162,11 +162,7 @@ impl State {
                     _ => None,
                 });
             }
-            let told = match said.operands.last() {
-                Some(&Operand::Variable(variable)) => tables.flats[rule].told[variable],
-                _ => false,
-            };
-            self.say_one(tables, (said.kind, told), (&cells, &known), rule)?;
+            self.say_one(tables, said.kind, (&cells, &known), rule)?;
         }
         Ok(())
     }
@@ -175,7 +171,7 @@ impl State {
     pub(super) fn say_one(
         &mut self,
         tables: &Tables,
-        (kind, told): (RelationshipKind, bool),
+        kind: RelationshipKind,
         (cells, known): (&[Option<Cell>], &[Option<Value>]),
         rule: RuleId,
     ) -> Result<(), Clash> {
@@ -201,11 +197,7 @@ impl State {
                 if let Some(output) = inputs.and_then(|inputs| call(&inputs))
                     && let Some(cell) = cells[cells.len() - 1]
                 {
-                    let of = self.cells[usize::from(self.root(cell))].of;
-                    let origin = match tables.is_measured(of) && !told {
-                        true => Origin::Computed,
-                        false => Origin::Model,
-                    };
+                    let origin = self.computed(tables, kind, cells, known);
                     self.bind_from(tables, cell, (output, origin), Some(rule))?;
                 }
                 // An output that is known and another than the function's was refused.
@@ -217,8 +209,11 @@ impl State {
             RelationshipKind::Sum | RelationshipKind::Product => {
                 let (_, others) = known.split_last().expect("it has operands");
                 let others: Option<SmallVec<[Value; 4]>> = others.iter().copied().collect();
-                if let Some(value) = others.and_then(|others| reckon(kind, &others)) {
-                    is(self, known.len() - 1, value)?;
+                if let Some(value) = others.and_then(|others| reckon(kind, &others))
+                    && let Some(cell) = cells[cells.len() - 1]
+                {
+                    let origin = self.computed(tables, kind, cells, known);
+                    self.bind_from(tables, cell, (value, origin), Some(rule))?;
                 }
                 return Ok(());
             }
@@ -235,6 +230,36 @@ impl State {
             return Err(Clash { what, rule });
         }
         Ok(())
+    }
+
+    /// What the last of some cells is made from, if that is a number and somebody tells states apart.
+    fn computed(
+        &mut self,
+        tables: &Tables,
+        kind: RelationshipKind,
+        cells: &[Option<Cell>],
+        known: &[Option<Value>],
+    ) -> Origin {
+        let output = cells.last().copied().flatten();
+        let is_number = |cell| tables.is_measured(self.cells[usize::from(self.root(cell))].of);
+        if self.exact == 0 || !output.is_some_and(is_number) {
+            return Origin::Model;
+        }
+        let origin = |cell: &Option<Cell>| {
+            cell.map_or(Origin::Model, |cell| {
+                self.cells[usize::from(self.root(cell))].origin
+            })
+        };
+        let inputs = cells[..cells.len() - 1].iter().zip(known);
+        let inputs = inputs.map(|(cell, value)| (value.unwrap_or(0), origin(cell)));
+        let inputs = inputs.collect();
+        let formula = Formula { kind, inputs };
+        let place = self.formulas.iter().position(|at| *at == formula);
+        let place = place.unwrap_or(self.formulas.len());
+        if place == self.formulas.len() {
+            self.formulas.push(formula);
+        }
+        Origin::Computed(place as u16)
     }
 
     pub(super) fn check_output(
