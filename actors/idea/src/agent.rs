@@ -89,11 +89,13 @@ struct Memory {
     deliberator: Option<SharedDeliberator>,
 }
 
-/// Timer: the clock ticks.
+/// Timer: the clock ticks. It carries what the cycle before took, so that two runs whose cycles take
+/// other numbers of operations differ in their digest, whether or not that takes time.
 #[derive(Serialize, Deserialize)]
 #[doc(hidden)]
 pub struct AgentTick {
     tick: u64,
+    spent_operations: u64,
 }
 
 /// Timer: what was decided leaves.
@@ -152,13 +154,17 @@ impl Agent {
         self.runner = Some(runner);
         let latency_ns = self.setup.runner.latency.as_nanos();
         let tick = now.as_nanos().div_ceil(latency_ns);
-        self.set_clock(ctx, tick);
+        self.set_clock(ctx, tick, 0);
         Ok(())
     }
 
-    fn set_clock(&self, ctx: &mut Context<'_, Self>, tick: u64) {
+    fn set_clock(&self, ctx: &mut Context<'_, Self>, tick: u64, spent_operations: u64) {
         let at = SimTime::ZERO + self.setup.runner.latency * tick;
-        ctx.timer(at.since(ctx.now()), AgentTick { tick });
+        let clock = AgentTick {
+            tick,
+            spent_operations,
+        };
+        ctx.timer(at.since(ctx.now()), clock);
     }
 
     /// Keeps what was delivered for the next cycle that begins later.
@@ -246,7 +252,7 @@ impl Agent {
             });
             self.saying.record(&cycle, ctx);
         }
-        let tick = cycle.tick;
+        let (tick, spent) = (cycle.tick, cycle.operations);
         for text in cycle.faults.drain(..).chain(cycle.remarks.drain(..)) {
             ctx.sample(&AgentRemark { tick, text });
         }
@@ -273,7 +279,7 @@ impl Agent {
             self.leaving = cycle.out;
             ctx.timer(cost, DecisionsLeave);
         }
-        self.set_clock(ctx, tick + 1);
+        self.set_clock(ctx, tick + 1, spent);
     }
 }
 

@@ -29,6 +29,9 @@ const TEXT: &str = "
  (OR
   (ends :condition (SINGLE ((Agent Up_SV) ((Go (?x -> ?status))))))
   (ends_during :condition (SINGLE ((Agent Up_SV) ((Idle ())))))))
+(Define_Compatibility
+ (SINGLE ((Agent Down_SV) ((Go (9 -> ?status)))))
+ :compatibility_spec (starts :condition (SINGLE ((Agent Up_SV) ((Idle ()))))))
 ";
 
 const ABOVE: usize = 0;
@@ -319,4 +322,23 @@ fn an_agent_that_is_off_line_loses_its_contracts() {
             [symbol(if is_above { "PREEMPTED" } else { "FAULT" })]
         );
     }
+}
+
+#[test]
+fn where_the_model_allows_nothing_the_compatibility_is_named() {
+    let mut bench = Bench::new(10_000, FOR_EVER);
+    bench.cycle();
+    let load = bench
+        .above
+        .load("Go".into(), vec![RegisterValue::Number(9)], bench.now());
+    bench.arrive(ABOVE, Arrival::Load(load));
+    let cycle = bench.cycle();
+    let Verdict::NoPlan(why) = &cycle.verdict else {
+        panic!("{:?}", cycle.verdict);
+    };
+    assert!(
+        why.compatibility.contains("agent.ddl:") && why.compatibility.contains("Go"),
+        "{why}"
+    );
+    assert!(cycle.begun.is_empty() && answers(&cycle).is_empty());
 }
