@@ -55,7 +55,8 @@ impl Schedule {
     }
 
     /// Takes a request made in the event `key`: it takes effect one look-ahead later, so that
-    /// hosts that run ahead in parallel have not passed it.
+    /// hosts that run ahead in parallel have not passed it. Where that would be past the clock, it is
+    /// after all that happens on it: whoever asks for a stop is heard.
     pub(crate) fn ask_stop(&mut self, key: EventKey, by: EntityId, reason: String) {
         let at = if self.look_ahead.is_zero() {
             Bound {
@@ -63,7 +64,10 @@ impl Schedule {
                 step: key.step + 1,
             }
         } else {
-            Bound::at(key.time + self.look_ahead)
+            Bound::at(key.time + self.look_ahead).min(Bound {
+                time: SimTime::from_nanos(SimTime::MAX.as_nanos() - 1),
+                step: u32::MAX,
+            })
         };
         if self
             .stop

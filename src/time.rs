@@ -44,9 +44,9 @@ impl SimTime {
         SimTime(nanos)
     }
 
-    /// The instant `secs` seconds after the start.
+    /// The instant `secs` seconds after the start, or [`SimTime::MAX`] if that is later.
     pub const fn from_secs(secs: u64) -> Self {
-        SimTime(secs * 1_000_000_000)
+        SimTime(secs.saturating_mul(1_000_000_000))
     }
 
     /// Nanoseconds since the start.
@@ -82,19 +82,19 @@ impl SimDuration {
         SimDuration(nanos)
     }
 
-    /// `micros` microseconds.
+    /// `micros` microseconds, at most [`SimDuration::MAX`].
     pub const fn from_micros(micros: u64) -> Self {
-        SimDuration(micros * 1_000)
+        SimDuration(micros.saturating_mul(1_000))
     }
 
-    /// `millis` milliseconds.
+    /// `millis` milliseconds, at most [`SimDuration::MAX`].
     pub const fn from_millis(millis: u64) -> Self {
-        SimDuration(millis * 1_000_000)
+        SimDuration(millis.saturating_mul(1_000_000))
     }
 
-    /// `secs` seconds.
+    /// `secs` seconds, at most [`SimDuration::MAX`].
     pub const fn from_secs(secs: u64) -> Self {
-        SimDuration(secs * 1_000_000_000)
+        SimDuration(secs.saturating_mul(1_000_000_000))
     }
 
     /// `secs` seconds, rounded to the nearest nanosecond; negative and NaN give zero, too long
@@ -210,5 +210,14 @@ mod tests {
         assert_eq!(SimDuration::from_secs_f64(f64::NAN), SimDuration::ZERO);
         assert_eq!(SimDuration::from_secs_f64(1e30), SimDuration::MAX);
         assert_eq!(SimTime::ZERO.since(SimTime::MAX), SimDuration::ZERO);
+        // The greatest whole number of each unit that fits, and one more.
+        let fits = u64::MAX / 1_000_000_000;
+        assert_eq!(SimTime::from_secs(fits).as_nanos(), fits * 1_000_000_000);
+        assert_eq!(SimTime::from_secs(fits + 1), SimTime::MAX);
+        assert_eq!(SimTime::from_secs(u64::MAX), SimTime::MAX);
+        assert_eq!(SimDuration::from_secs(fits + 1), SimDuration::MAX);
+        assert_eq!(SimDuration::from_millis(u64::MAX / 7), SimDuration::MAX);
+        assert_eq!(SimDuration::from_micros(u64::MAX / 3), SimDuration::MAX);
+        assert_eq!(SimDuration::from_secs(3) * u64::MAX, SimDuration::MAX);
     }
 }

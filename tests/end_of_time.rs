@@ -3,6 +3,7 @@
 
 use farside::prelude::*;
 use farside::{Carrier, Parcel, Verdicts};
+use farside_tests::executors::agreed;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -136,6 +137,64 @@ proptest! {
             prop_assert_eq!(u128::from(report.counts.delivered), heard.min(sent));
             prop_assert_eq!(u128::from(report.counts.in_flight), sent - heard.min(sent));
         }
+    }
+}
+
+/// Asks for a stop at the last instant at which anything happens, or shortly before.
+struct Stopper {
+    at: SimDuration,
+}
+
+impl Actor for Stopper {
+    type Accepts = (Call,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.timer(self.at, Call);
+        Ok(())
+    }
+}
+
+impl Handler<Call> for Stopper {
+    fn handle(&mut self, _call: Call, ctx: &mut Context<'_, Self>) -> Outcome {
+        ctx.stop("it is late");
+        ctx.timer(self.at, Call);
+        Ok(())
+    }
+}
+
+#[test]
+fn who_asks_for_a_stop_is_heard_at_the_end_of_the_clock_too() {
+    for before in [1, 2, 4, 5, 6] {
+        let at = SimDuration::from_nanos(u64::MAX - before);
+        let report = agreed(|heavy| {
+            let mut sim = Simulation::new(1);
+            let hosts = ["a", "b"].map(|name| sim.host(name));
+            for host in hosts.into_iter().filter(|_| heavy) {
+                sim.heavy(host);
+            }
+            sim.actor(hosts[0], "a", move |_| Stopper { at });
+            sim.actor(hosts[1], "b", |_| Hearer);
+            sim.link(
+                hosts[0],
+                hosts[1],
+                "a-b",
+                UntilThen {
+                    delay: SimDuration::from_nanos(5),
+                },
+            );
+            sim.link(
+                hosts[1],
+                hosts[0],
+                "b-a",
+                UntilThen {
+                    delay: SimDuration::from_nanos(5),
+                },
+            );
+            sim
+        });
+        let report = report.expect("it can start");
+        assert_eq!(report.end.name(), "stopped", "{:?}", report.end);
+        assert!(report.end_time < SimTime::MAX);
     }
 }
 

@@ -41,7 +41,9 @@ impl Rung {
         let wanted = (entries.len() / PER_BUCKET).clamp(1, MOST_BUCKETS) as u64;
         self.start_ns = first_ns;
         self.next = 0;
-        self.shift = (span_ns / wanted).checked_ilog2().map_or(0, |log| log + 1);
+        // A bucket as wide as all of time could not be counted in 64 bits: two then do.
+        let log = (span_ns / wanted).checked_ilog2();
+        self.shift = log.map_or(0, |log| (log + 1).min(u64::BITS - 1));
         self.used = (span_ns >> self.shift) as usize + 1;
         if self.buckets.len() < self.used {
             self.buckets.resize_with(self.used, Vec::new);
@@ -192,9 +194,11 @@ impl Far {
     fn divide_bucket(&mut self) {
         let mut finer = self.spare.pop().unwrap_or_default();
         if let Some(rung) = self.rungs.last_mut() {
-            let (end_ns, width_ns) = (rung.next_ns(), 1u64 << rung.shift);
-            let bucket = &mut rung.buckets[rung.next - 1];
-            finer.fill(bucket, end_ns - width_ns, end_ns - 1);
+            let at = rung.next - 1;
+            let begin_ns = rung.start_ns + ((at as u64) << rung.shift);
+            // The last bucket ends where time does.
+            let last_ns = begin_ns.saturating_add((1u64 << rung.shift) - 1);
+            finer.fill(&mut rung.buckets[at], begin_ns, last_ns);
         }
         self.rungs.push(finer);
     }

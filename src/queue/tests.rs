@@ -110,6 +110,52 @@ proptest! {
     }
 }
 
+proptest! {
+    /// Near the end of the clock too, where delays that would pass it stop at its last instant, which
+    /// is never reached: what is there is left.
+    #[test]
+    fn the_last_of_all_times_pop_in_key_order(
+        start in prop::collection::vec(late(), 1..400),
+        pushes in prop::collection::vec(late(), 0..800),
+        crowd in 0usize..300,
+    ) {
+        let end = Bound::at(SimTime::MAX);
+        let mut queue = Queue::default();
+        let mut count = 0;
+        let crowded = std::iter::repeat_n(u64::MAX, crowd);
+        for time in start.into_iter().chain(crowded) {
+            count += 1;
+            queue.push(entry(time, 0, 0, count));
+        }
+        let mut last: Option<EventKey> = None;
+        let mut taken = 0;
+        let mut pushes = pushes.into_iter();
+        while let Some(popped) = queue.pop_before(end) {
+            prop_assert!(last.is_none_or(|last| last < popped.key()));
+            last = Some(popped.key());
+            taken += 1;
+            if let Some(delay) = pushes.next() {
+                count += 1;
+                let time = popped.key().time.as_nanos().saturating_add(delay.max(1));
+                queue.push(entry(time, 0, 0, count));
+            }
+        }
+        let left = queue.drain_sorted();
+        prop_assert!(left.iter().all(|entry| entry.key().time == SimTime::MAX));
+        prop_assert_eq!(taken + left.len() as u64, count);
+    }
+}
+
+/// Any time, mostly a short one, the last, or the last but one.
+fn late() -> impl Strategy<Value = u64> {
+    prop_oneof![
+        0u64..1_000,
+        any::<u64>(),
+        u64::MAX - 1_000..=u64::MAX,
+        u64::MAX - 1..=u64::MAX,
+    ]
+}
+
 /// What is left at the end is everything, in key order, wherever it waited.
 #[test]
 fn everything_left_is_drained_in_key_order() {

@@ -2,3 +2,4 @@
 //! a description that proptest can shrink. Nothing depends on this crate.
 
 pub mod chatter;
+pub mod executors;
