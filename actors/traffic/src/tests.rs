@@ -355,7 +355,7 @@ fn each_mistake_names_its_key() {
         ),
         (
             "groups = [{ prefix = 'x', count = 0 }]",
-            "traffic.groups.0.count: 0: expected at least 1",
+            "traffic.groups.0.count: 0: expected 1 to 1000000",
         ),
         (
             "groups = [{ prefix = 'x', count = 99999 }]",

@@ -30,9 +30,9 @@ settings! {
         /// the start and stay at their goals. A built-in map of cells has its own.
         pub tasks: Option<String>
             [skip_serializing_if = "Option::is_none"];
-        /// How many sensor nodes; at least 1.
+        /// How many sensor nodes.
         pub nodes: u32 = 28,
-            1..;
+            1..=10_000;
         /// The radio radius of each, in metres; by default one that nearly every placement can do
         /// with.
         pub radius_m as "radius": Option<f64>
