@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::encoding::Schema;
+use crate::encoding::{EncodeError, Schema};
 use crate::ids::{EntityId, HostId, MatchKey};
 use crate::payload::{Encode, Message};
 use crate::random::RandomKey;
@@ -34,8 +34,8 @@ pub trait Carrier: Send + 'static {
     }
 
     /// Decides the fate of `parcel`: at least one verdict, one for each copy. A copy that was held
-    /// ([`Verdicts::hold`], [`Verdicts::park`]) is shown again, with its token, and gets at least one
-    /// verdict more.
+    /// ([`Verdicts::hold`], [`Verdicts::park`]) is shown again, with its token, and gets one verdict
+    /// more, besides those about copies that [`Verdicts::park_another`] makes.
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
 
     /// Takes a change from a control event.
@@ -89,7 +89,7 @@ impl Parcel<'_> {
 
     /// The sender's host and the receiver's.
     pub fn hosts(&self) -> (HostId, HostId) {
-        let host = |entity| HostId(self.topology.place(entity).host);
+        let host = |entity| HostId::new(self.topology.owner, self.topology.place(entity).host);
         (host(self.sender), host(self.receiver))
     }
 
@@ -299,7 +299,7 @@ impl Verdicts {
         });
     }
 
-    /// One copy arrives `delay` from now, carried so. Unless the copy was held, `delay` is
+    /// One copy arrives `delay` from now, carried so: from the sending to then, it takes
     /// [`Carriage::total`].
     pub fn deliver_as(&mut self, delay: SimDuration, carriage: Carriage) {
         self.list.push(Verdict::Deliver {
@@ -461,21 +461,11 @@ impl Verdicts {
 
 /// A carrier whose type the engine does not know.
 pub(crate) trait AnyCarrier: Send {
-    fn min_delay(&self) -> SimDuration;
-    fn rate_bit_per_s(&self) -> Option<u64>;
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts);
     fn change(&mut self, change: Box<dyn Any + Send>, now: SimTime);
 }
 
 impl<C: Carrier> AnyCarrier for C {
-    fn min_delay(&self) -> SimDuration {
-        Carrier::min_delay(self)
-    }
-
-    fn rate_bit_per_s(&self) -> Option<u64> {
-        Carrier::rate_bit_per_s(self)
-    }
-
     fn carry(&mut self, parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
         Carrier::carry(self, parcel, verdicts);
     }
@@ -486,10 +476,12 @@ impl<C: Carrier> AnyCarrier for C {
     }
 }
 
+type EncodeChange = fn(&(dyn Any + Send), &Schema, &mut Vec<u8>) -> Result<(), EncodeError>;
+
 /// A change on its way to its link: the value, and how to write it down.
 pub(crate) struct SealedChange {
     pub(crate) value: Box<dyn Any + Send>,
-    pub(crate) encode: fn(&(dyn Any + Send), &Schema, &mut Vec<u8>),
+    pub(crate) encode: EncodeChange,
 }
 
 impl SealedChange {
@@ -498,9 +490,7 @@ impl SealedChange {
             value: Box::new(change),
             encode: |value, schema, out| {
                 let value = value.downcast_ref::<M>().expect("encoded as it was sealed");
-                // The schema was traced from this very type; what it cannot hold is left out of
-                // the record, and the change still happens.
-                let _ = schema.encode(value, out);
+                schema.encode(value, out)
             },
         }
     }

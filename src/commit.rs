@@ -7,10 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::digest::Digest;
 use crate::engine::{FirstSample, Happened, Head, InFlight, Side, Sink};
 use crate::fault::ObserverError;
-use crate::guard::{dropped, guarded};
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::record::{Checkpoint, Flow, Observer, RecordClass, Wants};
+use crate::record::{Checkpoint, Flow, NamedObserver, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
 use crate::time::SimTime;
 use crate::topology::{Kind, Topology};
@@ -18,18 +17,10 @@ use crate::topology::{Kind, Topology};
 /// Hashed records from one checkpoint to the next.
 const CHECKPOINT_RECORDS: usize = 8192;
 
-/// Runs an observer. Whether it returns an error or panics, it can watch no longer.
-fn watched<T>(observe: impl FnOnce() -> Result<T, ObserverError>) -> Result<T, String> {
-    match guarded(observe) {
-        Ok(observed) => observed.map_err(|error| error.to_string()),
-        Err(cause) => Err(format!("an observer {cause}")),
-    }
-}
-
 /// Takes records in key order, and is told nothing else.
 pub(crate) struct Committer {
     topology: Arc<Topology>,
-    observers: Vec<(Wants, Box<dyn Observer>)>,
+    observers: Vec<(NamedObserver, Wants)>,
     digest: Digest,
     /// Some observer wants checkpoints.
     checkpoints: bool,
@@ -42,22 +33,28 @@ pub(crate) struct Committer {
     last: EventKey,
     pub(crate) stop: Option<(EventKey, EntityId, String)>,
     failure: Option<String>,
-    interrupt: Arc<AtomicBool>,
+    pub(crate) interrupt: Arc<AtomicBool>,
 }
 
 impl Committer {
     pub(crate) fn new(
         topology: Arc<Topology>,
-        observers: Vec<Box<dyn Observer>>,
+        mut observers: Vec<(NamedObserver, Wants)>,
         interrupt: Arc<AtomicBool>,
     ) -> Result<Self, ObserverError> {
-        let mut observers: Vec<_> = observers.into_iter().map(|o| (o.wants(), o)).collect();
-        for (_, observer) in &mut observers {
-            watched(|| observer.begin(&topology.info)).map_err(ObserverError)?;
+        let begun = observers
+            .iter_mut()
+            .try_for_each(|(observer, _)| observer.watch(|o| o.begin(&topology.info)));
+        if let Err(error) = begun {
+            for (observer, _) in observers {
+                // Why the run cannot start is known already.
+                let _ = observer.dismiss();
+            }
+            return Err(error);
         }
         Ok(Committer {
             last: topology.key(SimTime::ZERO, 0, EntityId::CONTROL, 0),
-            checkpoints: observers.iter().any(|(wants, _)| wants.checkpoints),
+            checkpoints: observers.iter().any(|(_, wants)| wants.checkpoints),
             topology,
             observers,
             digest: Digest::EMPTY,
@@ -69,6 +66,14 @@ impl Committer {
             failure: None,
             interrupt,
         })
+    }
+
+    /// Drops the observers of a run that cannot start after all.
+    pub(crate) fn dismiss(self) {
+        for (observer, _) in self.observers {
+            // Why it cannot start is known already.
+            let _ = observer.dismiss();
+        }
     }
 
     /// The key of the last record committed.
@@ -84,6 +89,11 @@ impl Committer {
         self.interrupt
             .load(Ordering::Relaxed)
             .then_some(End::Interrupted)
+    }
+
+    /// True if there is a [`Committer::verdict`].
+    pub(crate) fn verdict_is_due(&self) -> bool {
+        self.failure.is_some() || self.interrupt.load(Ordering::Relaxed)
     }
 
     /// Records what is still on its way, tells the observers that the run is over, and reports.
@@ -123,14 +133,14 @@ impl Committer {
         if let Some(failure) = self.failure {
             report.end = End::ObserverFailed(failure);
         }
-        for (_, observer) in &mut self.observers {
-            if let Err(failure) = watched(|| observer.end(&report)) {
-                report.end = End::ObserverFailed(failure);
+        for (observer, _) in &mut self.observers {
+            if let Err(failure) = observer.watch(|o| o.end(&report)) {
+                report.end = End::ObserverFailed(failure.0);
             }
         }
-        for (_, observer) in self.observers {
-            if let Err(cause) = dropped(observer) {
-                report.end = End::ObserverFailed(format!("an observer {cause}"));
+        for (observer, _) in self.observers {
+            if let Err(failure) = observer.dismiss() {
+                report.end = End::ObserverFailed(failure.0);
             }
         }
         report
@@ -182,11 +192,11 @@ impl Committer {
             digest: self.digest,
             hashes: &self.hashes,
         };
-        for (wants, observer) in &mut self.observers {
+        for (observer, wants) in &mut self.observers {
             if wants.checkpoints
-                && let Err(failure) = watched(|| observer.checkpoint(&checkpoint))
+                && let Err(failure) = observer.watch(|o| o.checkpoint(&checkpoint))
             {
-                self.failure.get_or_insert(failure);
+                self.failure.get_or_insert(failure.0);
             }
         }
         self.hashes.clear();
@@ -198,21 +208,18 @@ impl Committer {
     #[inline(never)]
     fn show(&mut self, happened: &Happened<'_>) {
         let record = happened.record(&self.topology);
-        for (wants, observer) in &mut self.observers {
+        for (observer, wants) in &mut self.observers {
             if record.class == RecordClass::Sample && !wants.samples {
                 continue;
             }
-            match guarded(|| observer.record(&record)) {
-                Ok(Ok(Flow::Continue)) => {}
-                Ok(Ok(Flow::Stop(reason))) => {
+            match observer.watch(|o| o.record(&record)) {
+                Ok(Flow::Continue) => {}
+                Ok(Flow::Stop(reason)) => {
                     self.stop
                         .get_or_insert((record.key, EntityId::CONTROL, reason));
                 }
-                Ok(Err(error)) => {
-                    self.failure.get_or_insert(error.to_string());
-                }
-                Err(cause) => {
-                    self.failure.get_or_insert(format!("an observer {cause}"));
+                Err(failure) => {
+                    self.failure.get_or_insert(failure.0);
                 }
             }
         }
@@ -242,7 +249,7 @@ impl Sink for Committer {
     fn first_sample(&mut self, _sample: FirstSample) {}
 
     fn paused(&self) -> bool {
-        self.stop.is_some() || self.failure.is_some() || self.interrupt.load(Ordering::Relaxed)
+        self.stop.is_some() || self.verdict_is_due()
     }
 }
 
@@ -259,23 +266,58 @@ struct Kept {
     hash: u128,
 }
 
-/// What one engine did in one window, in key order.
-#[derive(Default)]
+/// So many records an engine may be ahead of what is committed, and so many bytes of messages: then it
+/// waits for the others, however long the window is.
+const AHEAD_RECORDS: usize = 1 << 12;
+const AHEAD_BYTES: usize = 1 << 20;
+
+/// What one engine did in a window and is not committed yet, in key order.
 pub(crate) struct Batch {
     kept: Vec<Kept>,
     sides: Vec<Side>,
     bytes: Vec<u8>,
+    /// So many of the first are committed.
+    committed: usize,
+    /// At so many records, or bytes, the engine pauses.
+    pause_at: (usize, usize),
     pub(crate) first_samples: Vec<FirstSample>,
+    interrupt: Arc<AtomicBool>,
 }
 
 impl Batch {
-    /// The key of what happened at `at`.
-    pub(crate) fn key(&self, at: usize) -> Option<EventKey> {
-        self.kept.get(at).map(|kept| kept.key)
+    pub(crate) fn new(interrupt: Arc<AtomicBool>) -> Self {
+        Batch {
+            kept: Vec::new(),
+            sides: Vec::new(),
+            bytes: Vec::new(),
+            committed: 0,
+            pause_at: (AHEAD_RECORDS, AHEAD_BYTES),
+            first_samples: Vec::new(),
+            interrupt,
+        }
     }
 
-    /// Commits what happened at `at`.
-    pub(crate) fn commit(&self, at: usize, sink: &mut impl Sink) {
+    /// Takes as much again as an engine may be ahead: one that all others wait for goes on.
+    pub(crate) fn open(&mut self) {
+        self.pause_at = (
+            self.kept.len() + AHEAD_RECORDS,
+            self.bytes.len() + AHEAD_BYTES,
+        );
+    }
+
+    /// True if the engine is as far ahead as it may be.
+    pub(crate) fn is_full(&self) -> bool {
+        self.kept.len() >= AHEAD_RECORDS || self.bytes.len() >= AHEAD_BYTES
+    }
+
+    /// The keys of what is not committed, and its places.
+    pub(crate) fn uncommitted(&self) -> impl Iterator<Item = (EventKey, usize)> {
+        let rest = self.kept.iter().enumerate().skip(self.committed);
+        rest.map(|(at, kept)| (kept.key, at))
+    }
+
+    /// Commits what happened at `at`, the first that is not committed.
+    pub(crate) fn commit(&mut self, at: usize, sink: &mut impl Sink) {
         let kept = &self.kept[at];
         sink.commit(&Happened {
             class: kept.class,
@@ -287,20 +329,36 @@ impl Batch {
             sends: kept.sends,
             hash: kept.hash,
         });
+        self.committed = at + 1;
     }
 
-    pub(crate) fn clear(&mut self) {
-        self.kept.clear();
-        self.sides.clear();
-        self.bytes.clear();
+    /// Forgets what is committed.
+    pub(crate) fn shed(&mut self) {
+        let committed = std::mem::take(&mut self.committed);
+        if committed == self.kept.len() {
+            self.kept.clear();
+            self.sides.clear();
+            self.bytes.clear();
+            return;
+        }
+        self.kept.drain(..committed);
+        let bytes = self.kept.first().map_or(0, |kept| kept.body.start);
+        let sides = self.kept.iter().find_map(|kept| kept.side);
+        let sides = sides.unwrap_or(self.sides.len());
+        self.bytes.drain(..bytes);
+        self.sides.drain(..sides);
+        for kept in &mut self.kept {
+            kept.body = kept.body.start - bytes..kept.body.end - bytes;
+            kept.side = kept.side.map(|at| at - sides);
+        }
     }
 
-    /// The messages that the uncommitted records from `at` on had taken from their way, though
-    /// committed events before `fault` sent them.
-    pub(crate) fn undone(&self, at: usize, fault: EventKey, topology: &Topology) -> Vec<InFlight> {
+    /// The messages that the uncommitted records had taken from their way, though events before
+    /// `from`, which are committed, had sent them.
+    pub(crate) fn undone(&self, from: EventKey, topology: &Topology) -> Vec<InFlight> {
         let mut found = Vec::new();
         let mut unit: Option<EventKey> = None;
-        for kept in &self.kept[at..] {
+        for kept in &self.kept[self.committed..] {
             let first = unit != Some(kept.key);
             unit = Some(kept.key);
             // A loss that a hand-over decided is undone with the hand-over, which is counted.
@@ -311,9 +369,9 @@ impl Batch {
             };
             let side = kept.side.map(|at| &self.sides[at]);
             let by = kept.head.scheduled_by(topology, side);
-            if message && by.is_some_and(|by| by < fault) {
+            if message && by.is_some_and(|by| by < from) {
                 found.push((
-                    kept.key,
+                    kept.head.key_in_flight(topology, kept.key, side),
                     kept.head.left_over(),
                     self.bytes[kept.body.clone()].to_vec(),
                 ));
@@ -347,7 +405,11 @@ impl Sink for Batch {
         self.first_samples.push(sample);
     }
 
+    #[inline]
     fn paused(&self) -> bool {
-        false
+        let (records, bytes) = self.pause_at;
+        self.kept.len() >= records
+            || self.bytes.len() >= bytes
+            || self.interrupt.load(Ordering::Relaxed)
     }
 }

@@ -8,6 +8,7 @@ mod erased;
 mod event;
 mod flows;
 mod hash;
+mod hops;
 mod parts;
 mod remains;
 mod store;
@@ -29,6 +30,7 @@ pub(crate) use cell::{ActorCell, CellState};
 pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
 pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
+pub(crate) use hops::{Hop, Hops};
 pub(crate) use parts::{FirstSample, Parts, SampleNames};
 pub(crate) use remains::Remains;
 
@@ -167,12 +169,11 @@ impl Engine {
             }
             _ => return self.handle_other(key, head, letter, entry.slot, sink),
         };
-        if self.actors[local].actor.is_none() || key.step > self.parts.topology.step_limit {
+        if self.actors[local].actor.is_none() || self.parts.topology.is_late_step(key.step) {
             return self.handle_other(key, head, letter, entry.slot, sink);
         }
         if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
-            self.parts.note_unfinished(key, head);
-            return Err(fault);
+            return Err(self.unfinished(key, head, letter, fault));
         }
         self.run_handler_of(local, record, key, &head, &mut letter, sink)
     }
@@ -196,11 +197,14 @@ impl Engine {
             return self.discard(key, head, letter);
         }
         if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
-            self.parts.note_unfinished(key, head);
-            return Err(fault);
+            return Err(self.unfinished(key, head, letter, fault));
         }
-        if key.step > self.parts.topology.step_limit {
-            return Err(self.step_limit_fault(key, &head));
+        if self.parts.topology.is_late_step(key.step) {
+            self.parts.hops.keep(Hop { key, head, side });
+            if key.step > self.parts.topology.step_limit {
+                let fault = self.step_limit_fault(key, &head);
+                return Err(self.unfinished(key, head, letter, fault));
+            }
         }
         if head.class == Class::Message && head.has_side {
             self.charge_receiver(head.receiver, side);
@@ -237,6 +241,21 @@ impl Engine {
             }
         };
         self.run_handler(record, key, &head, letter, sink)
+    }
+
+    /// Keeps what is known of an event that failed before anybody had its message. That dropping the
+    /// message may fail as well changes nothing: the first fault stands.
+    #[cold]
+    fn unfinished(
+        &mut self,
+        key: EventKey,
+        head: Head,
+        letter: Option<Sealed>,
+        fault: Box<Fault>,
+    ) -> Box<Fault> {
+        self.parts.note_unfinished(key, head);
+        let _ = dropped(letter);
+        fault
     }
 
     /// Drops a message or timer that nobody handles.
@@ -411,6 +430,7 @@ impl Engine {
                 head = head.of_kind(links.get(entity).map(|link| link.change_kind));
                 let parts = &mut self.parts;
                 guarded(|| parts.apply_change(local, key, head.kind(), change))
+                    .and_then(|applied| applied)
                     .map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
                 self.commit(RecordClass::Change, key, &head, sink);
                 Ok(())
@@ -434,7 +454,11 @@ impl Engine {
         let (ordinal, _) = state.next_in_flow(EntityId::CONTROL, kind, None);
         let mut head = head.of_kind(Some(kind));
         head.ordinal = ordinal;
-        self.parts.begin(key, Some(&letter), &head)?;
+        if let Err(fault) = self.parts.begin(key, Some(&letter), &head) {
+            // Nobody sent it: it has no fate.
+            let _ = dropped(letter);
+            return Err(fault);
+        }
         if self.is_crashed(head.receiver) {
             self.discard(key, head, Some(letter))?;
             self.commit(RecordClass::Told, key, &head, sink);
@@ -481,34 +505,14 @@ impl Engine {
         self.parts.drop_carriers(remains);
     }
 
-    fn step_limit_fault(&mut self, key: EventKey, head: &Head) -> Box<Fault> {
-        // The hops that follow would show the same loop: name the ones still waiting here.
-        let topology = self.parts.topology.clone();
-        let hop = |head: &Head| {
-            let kind = head
-                .kind()
-                .map_or("start", |kind| topology.kind(kind).name());
-            format!(
-                "{} -> {} ({kind})",
-                topology.name(head.sender),
-                topology.name(head.receiver)
-            )
-        };
-        let mut chain = vec![hop(head)];
-        for entry in self.parts.queue.drain_sorted() {
-            let (waiting, at) = (self.parts.take(entry.slot), entry.key());
-            let void = waiting.head.class == Class::Void;
-            if at.time == key.time && !void && chain.len() < 8 {
-                chain.push(hop(&waiting.head));
-            }
-            self.parts.insert_pending(at, waiting);
-        }
-        self.parts.note_unfinished(key, *head);
+    /// The fault of one hop too many, of which the executor tells what led to it.
+    #[cold]
+    fn step_limit_fault(&self, key: EventKey, head: &Head) -> Box<Fault> {
         let cause = FaultCause::StepLimit {
-            limit: topology.step_limit,
-            chain,
+            limit: self.parts.topology.step_limit,
+            chain: Vec::new(),
         };
-        self.parts.fault_at(key, head.receiver, None, cause)
+        self.parts.fault_at(key, head.handled_by(), None, cause)
     }
 }
 

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::commit::Committer;
-use crate::engine::{Class, Engine, Happened, Head, Remains, Sink};
-use crate::fault::{BuildError, Fault};
+use crate::engine::{Class, Engine, Happened, Head, Hop, Remains, Sink};
+use crate::fault::{BuildError, Fault, FaultCause};
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::record::{Observer, RecordClass};
+use crate::record::{NamedObserver, RecordClass, Wants};
 use crate::report::{End, Report};
 use crate::schedule::Schedule;
 use crate::time::SimTime;
@@ -47,9 +47,9 @@ pub(crate) struct Ready {
     pub(crate) topology: Arc<Topology>,
     pub(crate) engines: Vec<Engine>,
     pub(crate) schedule: Schedule,
-    pub(crate) observers: Vec<Box<dyn Observer>>,
+    pub(crate) observers: Vec<(NamedObserver, Wants)>,
     pub(crate) interrupt: Arc<AtomicBool>,
-    /// A constructor panicked before the first event.
+    /// A constructor, or a link that was asked about itself, panicked before the first event.
     pub(crate) fault: Option<Box<Fault>>,
 }
 
@@ -62,36 +62,86 @@ pub(crate) fn run(ready: Ready, executor: Executor) -> Result<Report, BuildError
         interrupt,
         fault,
     } = ready;
-    let committer = Committer::new(topology.clone(), observers, interrupt)?;
+    let committer = Committer::new(topology.clone(), observers, interrupt);
+    let threads = match executor {
+        Executor::Inline => Ok(None),
+        Executor::Kameo { threads } => self::kameo::threads(threads).map(Some),
+    };
+    let ready = match (committer, threads) {
+        (Ok(committer), Ok(threads)) => Ok((committer, threads)),
+        (Ok(committer), Err(error)) => {
+            committer.dismiss();
+            Err(error)
+        }
+        (Err(error), _) => Err(error.into()),
+    };
+    let (committer, threads) = match ready {
+        Ok(ready) => ready,
+        Err(error) => {
+            // Why the run cannot start is known; what panics now is of no interest any more.
+            let mut remains = dissolved(engines, None);
+            schedule.dissolve(&topology, &mut remains);
+            return Err(error);
+        }
+    };
     if let Some(fault) = fault {
         let ending = Ending::fault(fault);
-        let mut remains = Remains::default();
-        for mut engine in engines {
-            engine.dissolve(ending.fault, &mut remains);
-        }
+        let remains = dissolved(engines, ending.undone_from);
         return Ok(ending.finish(&topology, schedule, committer, remains));
     }
-    match executor {
-        Executor::Inline => Ok(inline::run(topology, engines, schedule, committer)),
-        Executor::Kameo { threads } => {
-            self::kameo::run(topology, engines, schedule, committer, threads)
-        }
+    match threads {
+        None => Ok(inline::run(topology, engines, schedule, committer)),
+        Some(threads) => Ok(self::kameo::run(
+            topology, engines, schedule, committer, threads,
+        )),
     }
+}
+
+/// Takes engines apart that will not run, or not again.
+fn dissolved(engines: Vec<Engine>, undone_from: Option<EventKey>) -> Remains {
+    let mut remains = Remains::default();
+    for mut engine in engines {
+        engine.dissolve(undone_from, &mut remains);
+    }
+    remains
+}
+
+/// The fault, with what led to it if it is one of too many hops at an instant: the hops before it, each
+/// the cause of the next, whichever engines they were in. `hop` finds one by its event's key.
+fn explained(
+    mut fault: Box<Fault>,
+    topology: &Topology,
+    hop: impl Fn(EventKey) -> Option<Hop>,
+) -> Box<Fault> {
+    /// So many hops show a loop of any length that people write.
+    const SHOWN: usize = Topology::TRACED_STEPS as usize;
+    if let FaultCause::StepLimit { chain, .. } = &mut fault.cause {
+        let mut at = Some(fault.key);
+        while let Some(hop) = at.and_then(&hop)
+            && chain.len() < SHOWN
+        {
+            chain.push(hop.told(topology));
+            at = hop.scheduled_by(topology);
+        }
+        chain.reverse();
+    }
+    fault
 }
 
 /// How a run ended, before what is still on its way is counted.
 pub(crate) struct Ending {
     end: End,
     time: SimTime,
-    /// The key of the fault, if there was one: what happened at or after it is undone.
-    fault: Option<EventKey>,
+    /// What happened at or after this key is undone: that of the fault, if there was one, or where
+    /// engines that had run further ahead were cut off.
+    undone_from: Option<EventKey>,
 }
 
 impl Ending {
     fn fault(fault: Box<Fault>) -> Self {
         Ending {
             time: fault.time,
-            fault: Some(fault.key),
+            undone_from: Some(fault.key),
             end: End::Fault(fault),
         }
     }
@@ -100,7 +150,7 @@ impl Ending {
         Ending {
             end,
             time,
-            fault: None,
+            undone_from: None,
         }
     }
 
@@ -147,7 +197,7 @@ impl Ending {
         Ending {
             end: End::Stopped { by, reason },
             time: key.time,
-            fault: None,
+            undone_from: None,
         }
     }
 }

@@ -98,6 +98,39 @@ pub enum FaultCause {
         /// Who sent it.
         sender: String,
     },
+    /// A link gave one copy of a message two fates: a copy that it held has one, unless it makes
+    /// another that has a number of its own.
+    #[error("link {link} gave copy {copy} of {kind} from {sender} two fates")]
+    TwoFates {
+        /// The link.
+        link: String,
+        /// The copy's number.
+        copy: u32,
+        /// The message's kind.
+        kind: String,
+        /// Who sent it.
+        sender: String,
+    },
+    /// A link lost a message and did not say why.
+    #[error("link {link} lost {kind} from {sender} for no reason: say why, as in `queue_full`")]
+    NoReason {
+        /// The link.
+        link: String,
+        /// The message's kind.
+        kind: String,
+        /// Who sent it.
+        sender: String,
+    },
+    /// A link delivers a message after another delay than it says that the parts of it are.
+    #[error("link {link} delivers {delay} after the sending, but the parts of that are {parts}")]
+    PartsOfDelay {
+        /// The link.
+        link: String,
+        /// From the sending to the delivery.
+        delay: SimDuration,
+        /// The sum of the parts: [`Carriage::total`](crate::Carriage::total).
+        parts: SimDuration,
+    },
     /// No link joins the two hosts.
     #[error("no link from host {from} to host {to}, to send {kind} to {receiver}")]
     NoRoute {
@@ -118,6 +151,14 @@ pub enum FaultCause {
         /// The Rust type of the message.
         kind: String,
     },
+    /// A handler used an id that another simulation of the same program gave out.
+    #[error("{what} number {number} is of another simulation")]
+    OtherSimulation {
+        /// What the id is of: `actor`, `link` or `timer`.
+        what: &'static str,
+        /// Its number there, in order of declaration.
+        number: u32,
+    },
     /// A delayed send to another host: only a link delays what leaves a host.
     #[error("send_after reaches {receiver} on another host; only its link may delay it")]
     DelayedAcrossHosts {
@@ -129,7 +170,8 @@ pub enum FaultCause {
     StepLimit {
         /// The limit.
         limit: u32,
-        /// The last hops, as `sender -> receiver (kind)`.
+        /// The last hops, as `sender -> receiver (kind)`, each the cause of the next, up to the one
+        /// that was too many.
         chain: Vec<String>,
     },
     /// Two types of state samples share a name, which a log could not tell apart.
@@ -166,6 +208,14 @@ pub enum BuildError {
         /// The name.
         name: String,
     },
+    /// The name of an actor begins with a word that logs use; see [`crate::record::RESERVED`].
+    #[error("name {name:?} begins with {first}, which names of actors may not: logs use it")]
+    ReservedName {
+        /// The name.
+        name: String,
+        /// Its first part.
+        first: String,
+    },
     /// Two entities have one name.
     #[error("the name {name:?} is declared twice")]
     DuplicateName {
@@ -201,6 +251,24 @@ pub enum BuildError {
         first: String,
         /// The other.
         second: String,
+    },
+    /// A link that is not shared was to carry what a host sends.
+    #[error("link {link} is not shared: it cannot carry what host {from} sends to host {to}")]
+    NotShared {
+        /// The link.
+        link: String,
+        /// The sending host.
+        from: String,
+        /// The receiving host.
+        to: String,
+    },
+    /// An id that another simulation of the same program gave out was used to assemble this one.
+    #[error("{what} number {number} is of another simulation")]
+    OtherSimulation {
+        /// What the id is of: `host`, `actor` or `link`.
+        what: &'static str,
+        /// Its number there, in order of declaration.
+        number: u32,
     },
     /// An actor was to be told something, and there is no such actor, or it does not accept that.
     #[error(transparent)]

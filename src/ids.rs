@@ -2,30 +2,69 @@
 //! what their protocol calls them.
 
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde::{Deserialize, Serialize};
 
+/// Which simulation of this process an id is of. A run's results do not depend on it: it is only ever
+/// compared with that of the simulation that is given the id.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Owner(u32);
+
+impl Owner {
+    /// One that no other simulation of this process has.
+    pub(crate) fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        Owner(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
 /// A host: the actors on it form one logical process and reach each other without a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct HostId(pub(crate) u32);
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct HostId {
+    pub(crate) owner: Owner,
+    pub(crate) index: u32,
+}
 
 impl HostId {
+    pub(crate) fn new(owner: Owner, index: u32) -> Self {
+        HostId { owner, index }
+    }
+
     /// The host's number in order of declaration, from 0.
     pub fn index(self) -> usize {
-        self.0 as usize
+        self.index as usize
+    }
+}
+
+// What a program prints, and the order in which it finds things by hash, must not depend on how many
+// simulations it had before.
+impl fmt::Debug for HostId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "HostId({})", self.index)
+    }
+}
+
+impl Hash for HostId {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.index.hash(state);
     }
 }
 
 /// A link of a simulation that takes changes of type `C`.
 pub struct LinkId<C> {
+    pub(crate) owner: Owner,
     pub(crate) declared: u32,
     change: PhantomData<fn(C)>,
 }
 
 impl<C> LinkId<C> {
-    pub(crate) fn new(declared: u32) -> Self {
+    pub(crate) fn new(owner: Owner, declared: u32) -> Self {
         LinkId {
+            owner,
             declared,
             change: PhantomData,
         }
@@ -115,6 +154,7 @@ impl fmt::Display for MatchKey {
 /// A timer that is set, for [`Context::cancel`](crate::Context::cancel).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimerId {
+    pub(crate) owner: Owner,
     pub(crate) slot: u32,
     pub(crate) kind: KindIndex,
     /// Tells this timer from a later one in the same slot.

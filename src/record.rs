@@ -7,12 +7,40 @@ use std::sync::Arc;
 
 use crate::carrier::Carriage;
 use crate::digest::Digest;
+use crate::fault::FaultCause;
 pub use crate::fault::ObserverError;
+use crate::guard::{dropped, guarded};
 use crate::ids::{EntityId, MatchKey};
 use crate::key::EventKey;
 use crate::report::Report;
 use crate::time::SimTime;
 use crate::topology::{Kind, RunInfo};
+
+/// First parts of names that no actor may have: logs put on topics that begin with them what is no
+/// delivery of an actor's message, `/lost/rover_01/pose` beside `/rover_01/pose`.
+///
+/// ```
+/// use farside::prelude::*;
+/// # struct Idle;
+/// # impl Actor for Idle { type Accepts = (); }
+/// let mut sim = Simulation::new(1);
+/// let host = sim.host("rover_01");
+/// sim.actor(host, "lost/rover_01", |_| Idle);
+/// let error = sim.run(Executor::Inline).unwrap_err();
+/// assert_eq!(
+///     error.to_string(),
+///     "name \"lost/rover_01\" begins with lost, which names of actors may not: logs use it"
+/// );
+/// ```
+pub const RESERVED: [&str; 7] = [
+    "event",
+    "hand_over",
+    "in_flight",
+    "lost",
+    "scene",
+    "state",
+    "timer",
+];
 
 /// What a [`Record`] is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -177,6 +205,44 @@ pub trait Observer: Send {
     fn end(&mut self, _report: &Report) -> Result<(), ObserverError> {
         Ok(())
     }
+}
+
+/// An observer, and what its type is called: who is to blame if it cannot go on.
+pub(crate) struct NamedObserver {
+    pub(crate) name: &'static str,
+    pub(crate) observer: Box<dyn Observer>,
+}
+
+impl NamedObserver {
+    /// Runs the observer. Whether it returns an error or panics, it can watch no longer.
+    pub(crate) fn watch<T>(
+        &mut self,
+        observe: impl FnOnce(&mut dyn Observer) -> Result<T, ObserverError>,
+    ) -> Result<T, ObserverError> {
+        match guarded(|| observe(&mut *self.observer)) {
+            Ok(observed) => observed,
+            Err(cause) => Err(self.panicked(&cause)),
+        }
+    }
+
+    pub(crate) fn wants(&self) -> Result<Wants, ObserverError> {
+        guarded(|| self.observer.wants()).map_err(|cause| self.panicked(&cause))
+    }
+
+    /// Drops the observer.
+    pub(crate) fn dismiss(self) -> Result<(), ObserverError> {
+        let NamedObserver { name, observer } = self;
+        dropped(observer).map_err(|cause| panicked(name, &cause))
+    }
+
+    #[cold]
+    fn panicked(&self, cause: &FaultCause) -> ObserverError {
+        panicked(self.name, cause)
+    }
+}
+
+fn panicked(name: &str, cause: &FaultCause) -> ObserverError {
+    ObserverError(format!("an observer {cause} ({name})"))
 }
 
 /// A closure that looks at each record and never stops the run.

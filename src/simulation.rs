@@ -11,10 +11,11 @@ use crate::actor::{self, Accepts, Actor, Address, Recipient};
 use crate::carrier::{AnyCarrier, Carrier, SealedChange};
 use crate::engine::{Factory, Sealed};
 use crate::executor::{self, Executor};
-use crate::fault::{BuildError, LookupError};
-use crate::ids::{HostId, LinkId};
+use crate::fault::{BuildError, FaultCause, LookupError};
+use crate::guard::{dropped, guarded};
+use crate::ids::{HostId, LinkId, Owner};
 use crate::payload::Message;
-use crate::record::Observer;
+use crate::record::{NamedObserver, Observer};
 use crate::report::Report;
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{ActorType, FixedMap, KindEntry};
@@ -22,6 +23,8 @@ use crate::topology::{ActorType, FixedMap, KindEntry};
 struct HostDecl {
     name: String,
     heavy: bool,
+    /// The numbers of its actors.
+    actors: Vec<u32>,
 }
 
 struct ActorDecl {
@@ -37,6 +40,11 @@ struct LinkDecl {
     /// `None` for a shared link, which is a process of its own.
     host: Option<HostId>,
     change: KindEntry,
+    /// What it says of itself, read once.
+    min_delay: SimDuration,
+    rate_bit_per_s: Option<u64>,
+    /// It panicked when it was asked.
+    trouble: Option<Box<FaultCause>>,
     carrier: Box<dyn AnyCarrier>,
 }
 
@@ -70,32 +78,40 @@ struct ControlDecl {
 ///
 /// See the crate's front page for a tutorial.
 pub struct Simulation {
+    /// What all ids that it gives out say.
+    owner: Owner,
     seed: u64,
     tie_seed: Option<u64>,
     hosts: Vec<HostDecl>,
     /// The number of each host, by name.
     host_numbers: FixedMap<String, u32>,
     actors: Vec<ActorDecl>,
+    /// The number of each actor, by name; of the first, if several have it by mistake.
+    actor_numbers: FixedMap<String, u32>,
     links: Vec<LinkDecl>,
     routes: Vec<RouteDecl>,
     controls: Vec<ControlDecl>,
     types: Vec<ActorType>,
-    observers: Vec<Box<dyn Observer>>,
+    observers: Vec<NamedObserver>,
     interrupt: Arc<AtomicBool>,
     step_limit: u32,
     digest: bool,
     check_min_delay: bool,
+    /// The first mistake that was noticed as it was made.
+    mistake: Option<BuildError>,
 }
 
 impl Simulation {
     /// An empty simulation with this seed, from which every random stream is derived.
     pub fn new(seed: u64) -> Self {
         Simulation {
+            owner: Owner::new(),
             seed,
             tie_seed: None,
             hosts: Vec::new(),
             host_numbers: FixedMap::default(),
             actors: Vec::new(),
+            actor_numbers: FixedMap::default(),
             links: Vec::new(),
             routes: Vec::new(),
             controls: Vec::new(),
@@ -105,27 +121,49 @@ impl Simulation {
             step_limit: 10_000,
             digest: true,
             check_min_delay: true,
+            mistake: None,
         }
     }
 
     /// The host called `name`, declared if it is new.
     pub fn host(&mut self, name: &str) -> HostId {
         if let Some(at) = self.host_numbers.get(name) {
-            return HostId(*at);
+            return HostId::new(self.owner, *at);
         }
         let at = self.hosts.len() as u32;
         self.hosts.push(HostDecl {
             name: name.to_owned(),
             heavy: false,
+            actors: Vec::new(),
         });
         self.host_numbers.insert(name.to_owned(), at);
-        HostId(at)
+        HostId::new(self.owner, at)
+    }
+
+    /// Keeps the first mistake.
+    fn mistaken(&mut self, mistake: BuildError) {
+        self.mistake.get_or_insert(mistake);
+    }
+
+    /// True if an id is one of this simulation's; else that is a mistake.
+    fn owns(&mut self, owner: Owner, what: &'static str, number: u32) -> bool {
+        let own = owner == self.owner;
+        if !own {
+            self.mistaken(BuildError::OtherSimulation { what, number });
+        }
+        own
+    }
+
+    fn owns_host(&mut self, host: HostId) -> bool {
+        self.owns(host.owner, "host", host.index)
     }
 
     /// Declares that handlers on this host take long enough (tens of microseconds) to be worth a
     /// thread. Changes no result.
     pub fn heavy(&mut self, host: HostId) {
-        self.hosts[host.0 as usize].heavy = true;
+        if self.owns_host(host) {
+            self.hosts[host.index()].heavy = true;
+        }
     }
 
     /// Declares an actor on `host`, and what it accepts. `build` is called with the actor's name
@@ -136,6 +174,13 @@ impl Simulation {
         name: &str,
         build: impl Fn(&str) -> A + Send + 'static,
     ) -> Address<A> {
+        let declared = self.actors.len() as u32;
+        if self.owns_host(host) {
+            self.hosts[host.index()].actors.push(declared);
+        }
+        self.actor_numbers
+            .entry(name.to_owned())
+            .or_insert(declared);
         let actor_type = self.actor_type::<A>();
         self.actors.push(ActorDecl {
             name: name.to_owned(),
@@ -143,7 +188,7 @@ impl Simulation {
             actor_type,
             factory: Box::new(move |name| Boxed::boxed(build(name))),
         });
-        Address::new(self.actors.len() as u32 - 1)
+        Address::new(self.owner, declared)
     }
 
     /// The place of an actor's type in the list of types, at its end if the type is new.
@@ -171,6 +216,7 @@ impl Simulation {
         name: &str,
         carrier: C,
     ) -> LinkId<C::Change> {
+        self.owns_host(to);
         let link = self.declare_link(name, Some(from), carrier);
         self.routes.push(RouteDecl {
             from,
@@ -202,8 +248,36 @@ impl Simulation {
         self.declare_link(name, None, carrier)
     }
 
-    /// Lets `link`, a shared one, carry what `from` sends to `to`.
+    /// Lets `link`, a shared one, carry what `from` sends to `to`. That it is not shared is reported
+    /// by [`Simulation::run`]: a link that is a host's own decides in that host's events.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b, c) = (sim.host("a"), sim.host("b"), sim.host("c"));
+    /// let wire = sim.link(a, b, "a-b", FixedDelay::new(SimDuration::from_millis(5)));
+    /// sim.route(c, b, wire);
+    /// let error = sim.run(Executor::Inline).unwrap_err();
+    /// assert_eq!(
+    ///     error.to_string(),
+    ///     "link a-b is not shared: it cannot carry what host c sends to host b"
+    /// );
+    /// ```
     pub fn route<C>(&mut self, from: HostId, to: HostId, link: LinkId<C>) {
+        let own = [
+            self.owns_host(from),
+            self.owns_host(to),
+            self.owns(link.owner, "link", link.declared),
+        ];
+        if own.contains(&false) {
+            return;
+        }
+        let decl = &self.links[link.declared as usize];
+        if decl.host.is_some() {
+            let name = |host: HostId| self.hosts[host.index()].name.clone();
+            let (link, from, to) = (decl.name.clone(), name(from), name(to));
+            return self.mistaken(BuildError::NotShared { link, from, to });
+        }
         self.routes.push(RouteDecl {
             from,
             to: Some(to),
@@ -217,24 +291,41 @@ impl Simulation {
         host: Option<HostId>,
         carrier: C,
     ) -> LinkId<C::Change> {
+        if let Some(host) = host {
+            self.owns_host(host);
+        }
+        let asked = guarded(|| (carrier.min_delay(), carrier.rate_bit_per_s()));
+        let (trouble, (min_delay, rate_bit_per_s)) = match asked {
+            Ok(said) => (None, said),
+            Err(cause) => (Some(cause), (SimDuration::ZERO, None)),
+        };
         self.links.push(LinkDecl {
             name: name.to_owned(),
             host,
             change: KindEntry::of::<C::Change>(),
+            min_delay,
+            rate_bit_per_s,
+            trouble,
             carrier: Box::new(carrier),
         });
-        LinkId::new(self.links.len() as u32 - 1)
+        LinkId::new(self.owner, self.links.len() as u32 - 1)
     }
 
     /// Crashes an actor at `time`: its state is gone, its timers are void, and what reaches it is
     /// lost as `crashed` until it is restarted. Durable memory stays.
     pub fn crash_at<A>(&mut self, time: SimTime, actor: Address<A>) {
-        self.control(time, Some(Target::Actor(actor.declared)), Planned::Crash);
+        self.control_actor(time, actor, Planned::Crash);
     }
 
     /// Restarts an actor at `time`, crashed or not: a new one is built, in a new incarnation.
     pub fn restart_at<A>(&mut self, time: SimTime, actor: Address<A>) {
-        self.control(time, Some(Target::Actor(actor.declared)), Planned::Restart);
+        self.control_actor(time, actor, Planned::Restart);
+    }
+
+    fn control_actor<A>(&mut self, time: SimTime, actor: Address<A>, what: Planned) {
+        if self.owns(actor.owner, "actor", actor.declared) {
+            self.control(time, Some(Target::Actor(actor.declared)), what);
+        }
     }
 
     /// Crashes all actors declared so far on `host`, at one instant, in order of declaration. What
@@ -267,10 +358,11 @@ impl Simulation {
         }
     }
 
-    fn actors_on(&self, host: HostId) -> Vec<u32> {
-        let actors = (0..).zip(&self.actors);
-        let here = actors.filter(|(_, actor)| actor.host == host);
-        here.map(|(declared, _)| declared).collect()
+    fn actors_on(&mut self, host: HostId) -> Vec<u32> {
+        match self.owns_host(host) {
+            true => self.hosts[host.index()].actors.clone(),
+            false => Vec::new(),
+        }
     }
 
     /// The names of all actors declared so far, in order of declaration.
@@ -300,7 +392,7 @@ impl Simulation {
     /// assert_eq!(sim.slowest_link(), SimDuration::from_millis(700));
     /// ```
     pub fn slowest_link(&self) -> SimDuration {
-        let delays = self.links.iter().map(|link| link.carrier.min_delay());
+        let delays = self.links.iter().map(|link| link.min_delay);
         delays.max().unwrap_or(SimDuration::ZERO)
     }
 
@@ -315,7 +407,7 @@ impl Simulation {
     /// assert_eq!(sim.slowest_rate_bit_per_s(), None);
     /// ```
     pub fn slowest_rate_bit_per_s(&self) -> Option<u64> {
-        let rates = self.links.iter().map(|link| link.carrier.rate_bit_per_s());
+        let rates = self.links.iter().map(|link| link.rate_bit_per_s);
         rates.flatten().min()
     }
 
@@ -367,6 +459,9 @@ impl Simulation {
     /// assert_eq!(report.end.detail(), "rover_01: crater 7 at 43200s");
     /// ```
     pub fn tell_at<M: Message>(&mut self, time: SimTime, actor: impl actor::Target<M>, message: M) {
+        if !self.owns(actor.owner(), "actor", actor.declared()) {
+            return;
+        }
         let target = Some(Target::Actor(actor.declared()));
         let what = Planned::Tell(KindEntry::of::<M>(), actor.seal(message));
         self.control(time, target, what);
@@ -446,7 +541,7 @@ impl Simulation {
     pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
         let declared = self.declared_named(name)?;
         let actor_type = self.actors[declared as usize].actor_type as usize;
-        Recipient::of(declared, &self.types[actor_type], name)
+        Recipient::of(self.owner, declared, &self.types[actor_type], name)
     }
 
     fn target_named(&self, name: &str) -> Result<Target, LookupError> {
@@ -454,15 +549,16 @@ impl Simulation {
     }
 
     fn declared_named(&self, name: &str) -> Result<u32, LookupError> {
-        let at = self.actor_names().position(|known| known == name);
-        let at = at.ok_or_else(|| LookupError::unknown(name, self.actor_names()))?;
-        Ok(at as u32)
+        let at = self.actor_numbers.get(name).copied();
+        at.ok_or_else(|| LookupError::unknown(name, self.actor_names()))
     }
 
     /// Changes a link at `time`.
     pub fn change_at<C: Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
         let what = Planned::Change(SealedChange::new(change));
-        self.control(time, Some(Target::Link(link.declared)), what);
+        if self.owns(link.owner, "link", link.declared) {
+            self.control(time, Some(Target::Link(link.declared)), what);
+        }
     }
 
     /// Stops the run at `time`, before anything that would happen then.
@@ -475,8 +571,11 @@ impl Simulation {
     }
 
     /// Adds an observer. Observers are told the same things in the same order, first added first.
-    pub fn observe(&mut self, observer: impl Observer + 'static) {
-        self.observers.push(Box::new(observer));
+    pub fn observe<O: Observer + 'static>(&mut self, observer: O) {
+        self.observers.push(NamedObserver {
+            name: std::any::type_name::<O>(),
+            observer: Box::new(observer),
+        });
     }
 
     /// Shuffles the order of sources at equal (time, step), to show whether a result hangs on it.
@@ -533,15 +632,35 @@ impl Simulation {
     ///
     /// # Errors
     /// When the simulation cannot start. What goes wrong later is in [`Report::end`].
-    pub fn run(self, executor: Executor) -> Result<Report, BuildError> {
+    pub fn run(mut self, executor: Executor) -> Result<Report, BuildError> {
         let split = matches!(executor, Executor::Kameo { .. });
-        executor::run(self.assemble(split)?, executor)
+        match self.assemble(split) {
+            Ok(ready) => executor::run(ready, executor),
+            Err(error) => {
+                self.discard();
+                Err(error)
+            }
+        }
+    }
+
+    /// Drops what users brought into a simulation that cannot start. That some of it panics then is of
+    /// no interest any more.
+    fn discard(self) {
+        let actors = self.actors.into_iter().map(|actor| dropped(actor.factory));
+        let links = self.links.into_iter().map(|link| dropped(link.carrier));
+        let controls = self
+            .controls
+            .into_iter()
+            .map(|control| dropped(control.what));
+        let observers = self.observers.into_iter().map(|o| dropped(o.observer));
+        let all = actors.chain(links).chain(controls).chain(observers);
+        all.for_each(|panicked| drop(panicked));
     }
 
     /// The least delay that any link declares, zero if there are none: how far hosts may run ahead
     /// of each other, and how long a stop takes to reach them all.
     fn look_ahead(&self) -> SimDuration {
-        let delays = self.links.iter().map(|link| link.carrier.min_delay());
+        let delays = self.links.iter().map(|link| link.min_delay);
         delays.min().unwrap_or(SimDuration::ZERO)
     }
 }

@@ -8,7 +8,7 @@ use rustc_hash::FxBuildHasher;
 
 use crate::encoding::{Schema, SchemaError};
 use crate::fault::LookupError;
-use crate::ids::{EntityId, HostIndex, KindIndex};
+use crate::ids::{EntityId, HostIndex, KindIndex, Owner};
 use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::name_hash;
@@ -240,12 +240,67 @@ pub(crate) struct Location {
 }
 
 /// Which link takes what a host sends to another.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Routes {
     /// Link to every host that has no link of its own.
-    pub(crate) uplink: Option<EntityId>,
-    /// Link by receiving host; empty if there is none.
-    pub(crate) by_host: Vec<Option<EntityId>>,
+    uplink: Option<EntityId>,
+    by_host: ByHost,
+}
+
+/// Links by receiving host.
+#[derive(Debug)]
+enum ByHost {
+    /// At the host's number.
+    Table(Vec<Option<EntityId>>),
+    /// In order of the host's number. A table for each of many hosts that reach few others would take
+    /// memory with the square of their number.
+    Few(Vec<(HostIndex, EntityId)>),
+}
+
+impl Routes {
+    /// Routes to each host once, in any order.
+    pub(crate) fn new(uplink: Option<EntityId>, mut by_host: Vec<(HostIndex, EntityId)>) -> Self {
+        /// A table may have so many places for each link, or so many at all.
+        const PLACES_A_LINK: usize = 8;
+        const PLACES: usize = 64;
+        by_host.sort_unstable_by_key(|(host, _)| *host);
+        let places = by_host.last().map_or(0, |(host, _)| *host as usize + 1);
+        let by_host = if places <= PLACES.max(PLACES_A_LINK * by_host.len()) {
+            let mut table = vec![None; places];
+            for (host, link) in by_host {
+                table[host as usize] = Some(link);
+            }
+            ByHost::Table(table)
+        } else {
+            ByHost::Few(by_host)
+        };
+        Routes { uplink, by_host }
+    }
+
+    #[inline(always)]
+    fn to(&self, host: HostIndex) -> Option<EntityId> {
+        let own = match &self.by_host {
+            ByHost::Table(table) => table.get(host as usize).copied().flatten(),
+            ByHost::Few(links) => Routes::among(links, host),
+        };
+        own.or(self.uplink)
+    }
+
+    #[inline(never)]
+    fn among(links: &[(HostIndex, EntityId)], host: HostIndex) -> Option<EntityId> {
+        let at = links.binary_search_by_key(&host, |(to, _)| *to).ok()?;
+        Some(links[at].1)
+    }
+
+    /// All its links, some perhaps several times.
+    pub(crate) fn links(&self) -> Vec<EntityId> {
+        let mut links: Vec<EntityId> = match &self.by_host {
+            ByHost::Table(table) => table.iter().flatten().copied().collect(),
+            ByHost::Few(links) => links.iter().map(|(_, link)| *link).collect(),
+        };
+        links.extend(self.uplink);
+        links
+    }
 }
 
 /// A link as the topology knows it.
@@ -292,6 +347,7 @@ impl Links {
 
 /// Everything fixed about a run.
 pub(crate) struct Topology {
+    pub(crate) owner: Owner,
     pub(crate) seed: u64,
     pub(crate) info: Arc<RunInfo>,
     pub(crate) name_hashes: Vec<u64>,
@@ -314,6 +370,8 @@ pub(crate) struct Topology {
     pub(crate) reasons: Mutex<Vec<&'static str>>,
     pub(crate) sample_kinds: Mutex<Vec<(TypeId, Arc<Kind>)>>,
     pub(crate) step_limit: u32,
+    /// After this step hops are traced.
+    pub(crate) late_step: u32,
     pub(crate) digest: bool,
     /// Someone wants records: without, and without a digest, none are made.
     pub(crate) observed: bool,
@@ -323,6 +381,15 @@ pub(crate) struct Topology {
 }
 
 impl Topology {
+    /// Of so many of the last hops at an instant that a run allows is kept what they were.
+    pub(crate) const TRACED_STEPS: u32 = 8;
+
+    /// True for an event of the last hops that are allowed at an instant, or of one more.
+    #[inline(always)]
+    pub(crate) fn is_late_step(&self, step: u32) -> bool {
+        step > self.late_step
+    }
+
     pub(crate) fn name(&self, entity: EntityId) -> &str {
         self.info.name(entity)
     }
@@ -344,13 +411,7 @@ impl Topology {
     }
 
     pub(crate) fn link(&self, from: HostIndex, to: HostIndex) -> Option<EntityId> {
-        let routes = &self.routes[from as usize];
-        routes
-            .by_host
-            .get(to as usize)
-            .copied()
-            .flatten()
-            .or(routes.uplink)
+        self.routes[from as usize].to(to)
     }
 
     /// The number in the address of the actor called `name`, and the actor's type.
@@ -408,7 +469,7 @@ impl Topology {
                 reasons.len() - 1
             });
         // Reasons are literals in the source of links: a few.
-        Reason(at as u16 + 1)
+        Reason(u16::try_from(at + 1).expect("fewer than 65,535 reasons"))
     }
 
     /// The text of a loss reason; empty for none.

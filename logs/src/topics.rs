@@ -111,6 +111,28 @@ mod tests {
         }
     }
 
+    /// What is no delivery is on topics that no actor's messages are on.
+    #[test]
+    fn topics_of_no_actor_begin_with_what_is_reserved() {
+        for class in [
+            RecordClass::Lost,
+            RecordClass::InFlight,
+            RecordClass::HandOver,
+            RecordClass::Timer,
+            RecordClass::Sample,
+            RecordClass::Start,
+            RecordClass::Crash,
+            RecordClass::Restart,
+            RecordClass::Change,
+            RecordClass::Stop,
+            RecordClass::Told,
+        ] {
+            let topic = topic_of(class, "a", "b", "Kind");
+            let first = topic.split('/').nth(1).expect("topics begin with a slash");
+            assert!(farside::record::RESERVED.contains(&first), "{topic}");
+        }
+    }
+
     #[test]
     fn one_star_stays_within_a_level() {
         let topics = Topics::new(&["/*/max_plus".to_owned(), "/lost/**".to_owned()]).unwrap();

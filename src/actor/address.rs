@@ -10,6 +10,7 @@ use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
 use crate::engine::{AnyActor, Core, Letter, Sealed};
 use crate::fault::{LookupError, Outcome};
+use crate::ids::Owner;
 use crate::payload::{Encode, Message};
 use crate::topology::{ActorType, KindEntry};
 
@@ -26,12 +27,14 @@ use crate::topology::{ActorType, KindEntry};
 /// }
 /// ```
 pub struct Address<A> {
+    pub(crate) owner: Owner,
     pub(crate) declared: u32,
     pub(crate) actor: PhantomData<fn() -> A>,
 }
 
 /// The address of an actor known only by handling `M`.
 pub struct Recipient<M> {
+    owner: Owner,
     declared: u32,
     seal: fn(M) -> Sealed,
 }
@@ -65,8 +68,9 @@ impl<M> fmt::Debug for Recipient<M> {
 }
 
 impl<A: Actor> Address<A> {
-    pub(crate) fn new(declared: u32) -> Self {
+    pub(crate) fn new(owner: Owner, declared: u32) -> Self {
         Address {
+            owner,
             declared,
             actor: PhantomData,
         }
@@ -78,6 +82,7 @@ impl<A: Actor> Address<A> {
         A: Handler<M>,
     {
         Recipient {
+            owner: self.owner,
             declared: self.declared,
             seal: seal::<A, M>,
         }
@@ -88,6 +93,7 @@ impl<M: Message> Recipient<M> {
     /// The actor with this number in its address, of this type and called so, as one that accepts
     /// `M`.
     pub(crate) fn of(
+        owner: Owner,
         declared: u32,
         actor_type: &ActorType,
         name: &str,
@@ -95,7 +101,11 @@ impl<M: Message> Recipient<M> {
         let accepted = actor_type.accepted(&KindEntry::of::<M>(), name)?;
         let seal = accepted.seal.downcast_ref::<fn(M) -> Sealed>();
         let seal = *seal.expect("what an actor accepts is kept with how it is sealed");
-        Ok(Recipient { declared, seal })
+        Ok(Recipient {
+            owner,
+            declared,
+            seal,
+        })
     }
 }
 
@@ -107,12 +117,18 @@ pub(crate) fn sealer<A: Handler<M>, M: Message>() -> fn(M) -> Sealed {
 /// What `M` can be sent to: an [`Address`] or a [`Recipient`].
 pub trait Target<M>: Copy {
     #[doc(hidden)]
+    fn owner(&self) -> Owner;
+    #[doc(hidden)]
     fn declared(&self) -> u32;
     #[doc(hidden)]
     fn seal(&self, message: M) -> Sealed;
 }
 
 impl<A: Handler<M>, M: Message> Target<M> for Address<A> {
+    fn owner(&self) -> Owner {
+        self.owner
+    }
+
     fn declared(&self) -> u32 {
         self.declared
     }
@@ -123,6 +139,10 @@ impl<A: Handler<M>, M: Message> Target<M> for Address<A> {
 }
 
 impl<M: Message> Target<M> for Recipient<M> {
+    fn owner(&self) -> Owner {
+        self.owner
+    }
+
     fn declared(&self) -> u32 {
         self.declared
     }

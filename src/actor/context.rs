@@ -46,7 +46,7 @@ impl<'a, A: Actor> Context<'a, A> {
 
     /// This actor's own address.
     pub fn address(&self) -> Address<A> {
-        Address::new(self.state.declared)
+        Address::new(self.parts.topology.owner, self.state.declared)
     }
 
     /// How often this actor was restarted; 0 in its first life.
@@ -67,7 +67,7 @@ impl<'a, A: Actor> Context<'a, A> {
                 actual: actor_type.name,
             });
         }
-        Ok(Address::new(declared))
+        Ok(Address::new(self.parts.topology.owner, declared))
     }
 
     /// The actor called `name`, whatever its type, as one that accepts `M`: so a planner of one's
@@ -113,7 +113,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// lists.
     pub fn recipient<M: Message>(&self, name: &str) -> Result<Recipient<M>, LookupError> {
         let (declared, actor_type) = self.parts.topology.actor(name)?;
-        Recipient::of(declared, actor_type, name)
+        Recipient::of(self.parts.topology.owner, declared, actor_type, name)
     }
 
     /// Sends `message`, within the host at once, to another host through the link between them.
@@ -148,6 +148,7 @@ impl<'a, A: Actor> Context<'a, A> {
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
             self.not_listed::<M>(self.me());
             return TimerId {
+                owner: self.parts.topology.owner,
                 slot: u32::MAX,
                 kind: 0,
                 ordinal: u64::MAX,
@@ -160,6 +161,10 @@ impl<'a, A: Actor> Context<'a, A> {
 
     /// Cancels a timer. False if it has fired or was cancelled before.
     pub fn cancel(&mut self, timer: TimerId) -> bool {
+        if timer.owner != self.parts.topology.owner {
+            self.of_another_simulation("timer", timer.slot);
+            return false;
+        }
         self.parts.cancel_timer(self.me(), timer)
     }
 
@@ -172,8 +177,7 @@ impl<'a, A: Actor> Context<'a, A> {
             return Vec::new();
         };
         let routes = &topology.routes[host as usize];
-        let mut links: Vec<EntityId> = routes.by_host.iter().flatten().copied().collect();
-        links.extend(routes.uplink);
+        let mut links = routes.links();
         links.retain(|link| {
             let entry = topology.links.get(*link);
             entry.is_some_and(|link| link.change_kind == *kind)
@@ -185,7 +189,7 @@ impl<'a, A: Actor> Context<'a, A> {
                 .declared_links
                 .iter()
                 .position(|known| *known == link);
-            declared.map(|declared| LinkId::new(declared as u32))
+            declared.map(|declared| LinkId::new(topology.owner, declared as u32))
         };
         links.into_iter().filter_map(id).collect()
     }
@@ -193,6 +197,9 @@ impl<'a, A: Actor> Context<'a, A> {
     /// Tells a link something: new parameters, or where this host is. The link must be one of this
     /// host's own, or a shared one; it hears of it in the next step of this instant.
     pub fn tell_link<C: Message>(&mut self, link: LinkId<C>, change: C) {
+        if link.owner != self.parts.topology.owner {
+            return self.of_another_simulation("link", link.declared);
+        }
         let link = self.parts.topology.declared_links[link.declared as usize];
         let letter = seal_change(change);
         self.parts.ask_change(self.state, self.me(), link, letter);
@@ -356,6 +363,9 @@ impl<'a, A: Actor> Context<'a, A> {
         match_key: Option<MatchKey>,
         delay: SimDuration,
     ) {
+        if target.owner() != self.parts.topology.owner {
+            return self.of_another_simulation("actor", target.declared());
+        }
         let receiver = self.parts.topology.declared[target.declared() as usize];
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
             self.not_listed::<M>(receiver);
@@ -370,6 +380,12 @@ impl<'a, A: Actor> Context<'a, A> {
             delay,
         };
         self.parts.send(self.state, self.me(), outbound);
+    }
+
+    #[cold]
+    fn of_another_simulation(&mut self, what: &'static str, number: u32) {
+        self.parts
+            .raise(FaultCause::OtherSimulation { what, number });
     }
 
     fn not_listed<M>(&mut self, receiver: EntityId) {

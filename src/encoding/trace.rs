@@ -512,6 +512,11 @@ impl<'a> de::Deserializer<'static> for Tracer<'a> {
                  default form of enum",
             ));
         }
+        // Protobuf knows no such enum, and nothing could be read as a first value.
+        if variants.is_empty() {
+            let reason = "an enum without variants has no values; leave it out";
+            return Err(self.registry.unsupported(name, reason));
+        }
         let each = |name: &&'static str| Variant {
             name,
             visits: 0,

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 use super::store::Store;
 use super::{
-    CellState, Class, Head, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side, Sink,
+    CellState, Class, Head, Hops, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side,
+    Sink,
 };
 use crate::carrier::{SealedChange, Verdicts};
 use crate::encoding::EncodeError;
@@ -80,6 +81,8 @@ pub(crate) struct Parts {
     pub(crate) stop: Option<(EventKey, EntityId, String)>,
     /// The event whose handler failed, so that its message can be counted as in flight.
     pub(crate) unfinished: Option<(EventKey, Head)>,
+    /// The last hops that are allowed at an instant.
+    pub(crate) hops: Hops,
     /// The last kind looked up: handlers tend to send one kind at a time.
     last_kind: Option<(TypeId, KindIndex)>,
 }
@@ -107,6 +110,7 @@ impl Parts {
             carrying: None,
             stop: None,
             unfinished: None,
+            hops: Hops::default(),
             last_kind: None,
         }
     }
@@ -157,7 +161,8 @@ impl Parts {
             let body = &mut self.body;
             let encoded = guarded(|| letter.0.encode(kind.schema(), body));
             if !matches!(encoded, Ok(Ok(()))) {
-                return Err(self.encoding_fault(key, kind.name().to_owned(), encoded));
+                let kind = kind.name().to_owned();
+                return Err(self.encoding_fault(key, head, kind, encoded));
             }
         }
         Ok(())
@@ -165,8 +170,9 @@ impl Parts {
 
     #[cold]
     fn encoding_fault(
-        &self,
+        &mut self,
         key: EventKey,
+        head: &Head,
         kind: String,
         encoded: Result<Result<(), EncodeError>, Box<FaultCause>>,
     ) -> Box<Fault> {
@@ -177,7 +183,14 @@ impl Parts {
                 (None, FaultCause::Encoding { kind, error })
             }
         };
-        self.fault_at(key, key.source, message, cause)
+        // What was written before it went wrong is no message.
+        self.body.clear();
+        // Nobody sends what an actor is told but the simulation.
+        let blamed = match key.source {
+            EntityId::CONTROL => head.receiver,
+            source => source,
+        };
+        self.fault_at(key, blamed, message, cause)
     }
 
     #[inline]
@@ -368,6 +381,7 @@ impl Parts {
         let slot = self.insert(key, head, Some(letter));
         // The ordinal tells a reused slot from this timer's.
         TimerId {
+            owner: self.topology.owner,
             slot,
             kind,
             ordinal,
@@ -405,15 +419,17 @@ impl Parts {
         key: EventKey,
         kind: Option<KindIndex>,
         change: SealedChange,
-    ) {
+    ) -> Result<(), Box<FaultCause>> {
         if let (Some(kind), true) = (kind, self.recording) {
-            (change.encode)(
-                &*change.value,
-                self.topology.kind(kind).schema(),
-                &mut self.body,
-            );
+            let kind = self.topology.kind(kind);
+            let encoded = (change.encode)(&*change.value, kind.schema(), &mut self.body);
+            encoded.map_err(|error| FaultCause::Encoding {
+                kind: kind.name().to_owned(),
+                error: error.to_string(),
+            })?;
         }
         self.links[local].carrier.change(change.value, key.time);
+        Ok(())
     }
 
     /// Takes every message still on its way, with the key its next event would have had.
@@ -423,7 +439,9 @@ impl Parts {
             && head.in_flight(&topology, self.side.as_ref(), until)
         {
             let body = std::mem::take(&mut self.body);
-            remains.in_flight.push((key, head, body));
+            let side = self.side.as_ref().filter(|_| head.has_side);
+            let key = head.key_in_flight(&topology, key, side);
+            remains.in_flight.push((key, head.left_over(), body));
         }
         for entry in self.queue.drain_sorted() {
             let pending = self.take(entry.slot);

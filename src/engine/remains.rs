@@ -9,7 +9,7 @@ use crate::key::EventKey;
 use crate::time::SimTime;
 use crate::topology::Topology;
 
-/// Something panicked while it was dropped.
+/// Something panicked while it was dropped, or could not be written down before.
 struct Panicked {
     /// Messages come first, in the order of their next events, then actors and links by rank: which
     /// panic is named must not hang on how hosts are dealt to engines.
@@ -52,19 +52,28 @@ impl Remains {
     ) {
         let head = pending.head;
         let letter = pending.letter.take();
-        // Until when a link would have left it parked may hang on what a fault undid.
-        let parked = pending.side.filter(|side| head.has_side && side.parked);
-        let key = match (parked, head.link()) {
-            (Some(side), Some(link)) => topology.key(SimTime::MAX, 0, link, side.token),
-            _ => key,
-        };
+        let side = pending.side.as_ref().filter(|_| head.has_side);
+        let key = head.key_in_flight(topology, key, side);
         if head.in_flight(topology, pending.side.as_ref(), until) {
             let mut body = Vec::new();
             if let (Some(letter), Some(kind), true) = (&letter, head.kind(), topology.recording()) {
-                // It will never be handled; what cannot be encoded is recorded empty.
-                let schema = topology.kind(kind).schema();
-                if !matches!(guarded(|| letter.0.encode(schema, &mut body)), Ok(Ok(()))) {
+                let kind = topology.kind(kind);
+                let encoded = match guarded(|| letter.0.encode(kind.schema(), &mut body)) {
+                    Ok(encoded) => encoded.map_err(|error| {
+                        let (kind, error) = (kind.name().to_owned(), error.to_string());
+                        Box::new(FaultCause::Encoding { kind, error })
+                    }),
+                    Err(cause) => Err(cause),
+                };
+                if let Err(cause) = encoded {
+                    // It is on its way all the same, and recorded empty.
                     body.clear();
+                    self.panicked.push(Panicked {
+                        order: (key, head.copy()),
+                        entity: head.receiver,
+                        message: head.message(topology),
+                        cause,
+                    });
                 }
             }
             self.in_flight.push((key, head.left_over(), body));
@@ -94,6 +103,20 @@ impl Remains {
 }
 
 impl Head {
+    /// The key by which a message in flight is known: that of its next event, unless its link has
+    /// parked it. Until when it would have been left there may hang on what a fault undid.
+    pub(crate) fn key_in_flight(
+        &self,
+        topology: &Topology,
+        next: EventKey,
+        side: Option<&Side>,
+    ) -> EventKey {
+        match (side.filter(|side| side.parked), self.link()) {
+            (Some(side), Some(link)) => topology.key(SimTime::MAX, 0, link, side.token),
+            _ => next,
+        }
+    }
+
     /// True for a message that was sent before `until`, which a fault left of the run.
     pub(super) fn in_flight(
         &self,

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::Ending;
+use super::{Ending, dissolved, explained};
 use crate::commit::Committer;
-use crate::engine::{Engine, Remains};
+use crate::engine::Engine;
 use crate::report::{End, Report};
 use crate::schedule::{Due, Schedule};
 use crate::topology::Topology;
@@ -20,8 +20,7 @@ pub(super) fn run(
         unreachable!("the builder gives this executor a single engine");
     };
     let ending = run_to_end(&topology, &mut engine, &mut schedule, &mut committer);
-    let mut remains = Remains::default();
-    engine.dissolve(ending.fault, &mut remains);
+    let remains = dissolved(vec![engine], ending.undone_from);
     ending.finish(&topology, schedule, committer, remains)
 }
 
@@ -33,6 +32,7 @@ fn run_to_end(
 ) -> Ending {
     loop {
         if let Err(fault) = engine.run(schedule.bound(), committer) {
+            let fault = explained(fault, topology, |key| engine.parts.hops.find(key));
             return Ending::fault(fault);
         }
         if let Some(end) = committer.verdict() {

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use kameo::Actor;
 use kameo::actor::{ActorRef, Spawn};
 use kameo::message::{Context, Message};
+use tokio::runtime::Runtime;
 
 use self::seat::Round;
 use super::inline;
@@ -25,20 +26,32 @@ use crate::report::Report;
 use crate::schedule::Schedule;
 use crate::topology::Topology;
 
-/// Runs to the end on `threads` threads of a pool of its own.
+/// The threads of a run.
+pub(super) struct Threads {
+    count: usize,
+    runtime: Runtime,
+}
+
+/// A pool of `count` threads, at least one, for one run.
+pub(super) fn threads(count: usize) -> Result<Threads, BuildError> {
+    let count = count.max(1);
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(count)
+        .thread_name("farside")
+        .build()
+        .map_err(|error| BuildError::Threads(error.to_string()))?;
+    Ok(Threads { count, runtime })
+}
+
+/// Runs to the end on these threads.
 pub(super) fn run(
     topology: Arc<Topology>,
     engines: Vec<Engine>,
     schedule: Schedule,
     committer: Committer,
-    threads: usize,
-) -> Result<Report, BuildError> {
-    let threads = threads.max(1);
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(threads)
-        .thread_name("farside")
-        .build()
-        .map_err(|error| BuildError::Threads(error.to_string()))?;
+    threads: Threads,
+) -> Report {
+    let Threads { count, runtime } = threads;
     let run = Run {
         topology,
         engines,
@@ -46,11 +59,11 @@ pub(super) fn run(
         committer,
     };
     let report = runtime.block_on(async move {
-        let leader = Leader::spawn(Leader { threads });
+        let leader = Leader::spawn(Leader { threads: count });
         let report = leader.ask(run).await;
         report.unwrap_or_else(|error| lost_worker(&error))
     });
-    Ok(*report)
+    *report
 }
 
 /// Handlers' panics are caught in the engine; a worker that is gone is a bug of this executor.

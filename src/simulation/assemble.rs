@@ -7,10 +7,11 @@ use std::sync::{Arc, Mutex};
 use super::{LinkDecl, Planned, Simulation, Target};
 use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
-use crate::fault::{BuildError, Fault};
+use crate::fault::{BuildError, Fault, FaultCause, ObserverError};
 use crate::guard::guarded;
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
+use crate::record::{NamedObserver, RESERVED, Wants};
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
@@ -57,25 +58,28 @@ fn planned(controls: &[Control]) -> Vec<PlannedEvent> {
 impl Simulation {
     /// Checks the declarations and builds the engines: one, or if `split`, one for each heavy
     /// host, one for all light ones and one for shared links.
-    pub(super) fn assemble(mut self, split: bool) -> Result<Ready, BuildError> {
+    /// What users brought in is taken only once nothing can go wrong any more.
+    pub(super) fn assemble(&mut self, split: bool) -> Result<Ready, BuildError> {
+        if let Some(mistake) = self.mistake.take() {
+            return Err(mistake);
+        }
         self.check_names()?;
         let ranked = self.rank();
         let kinds = self.trace_kinds()?;
-        let controls = self.take_controls(&ranked, &kinds)?;
+        let routes = self.routes(&ranked)?;
+        self.check_tells()?;
+        let wants = self.wants()?;
+        let controls = self.take_controls(&ranked, &kinds);
         let (engine_of_host, engine_of_shared, engine_count) = self.deal(split);
         let places = self.place(&ranked, &engine_of_host, engine_of_shared, engine_count);
         let look_ahead = self.look_ahead();
         let links = self.link_entries(&ranked, &kinds);
-        let wants: Vec<_> = self
-            .observers
-            .iter()
-            .map(|observer| observer.wants())
-            .collect();
         let mut address_numbers = vec![None; ranked.entities.len()];
         for (declared, entity) in ranked.actors.iter().enumerate() {
             address_numbers[entity.index()] = Some(declared as u32);
         }
         let topology = Arc::new(Topology {
+            owner: self.owner,
             seed: self.seed,
             name_hashes: ranked
                 .entities
@@ -89,12 +93,13 @@ impl Simulation {
             type_of_actor: self.actors.iter().map(|actor| actor.actor_type).collect(),
             places,
             host_names: self.process_names(),
-            routes: self.routes(&ranked)?,
+            routes,
             links,
             kind_of_type: kinds.of_type,
             reasons: Mutex::default(),
             sample_kinds: Mutex::default(),
             step_limit: self.step_limit,
+            late_step: self.step_limit.saturating_sub(Topology::TRACED_STEPS),
             digest: self.digest,
             observed: !wants.is_empty(),
             samples: wants.iter().any(|wants| wants.samples),
@@ -110,6 +115,7 @@ impl Simulation {
         });
         let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
+        let observers = observers.into_iter().zip(wants).collect();
         let interrupt = self.interrupt.clone();
         let (engines, fault) = self.build_engines(&topology, &ranked, engine_count);
         Ok(Ready {
@@ -125,7 +131,7 @@ impl Simulation {
     fn link_entries(&self, ranked: &Ranked, kinds: &Kinds) -> Links {
         let entry = |(link, entity): (&LinkDecl, &EntityId)| {
             let entry = LinkEntry {
-                min_delay: link.carrier.min_delay(),
+                min_delay: link.min_delay,
                 shared: link.host.is_none(),
                 change_kind: kinds.of_type[&link.change.type_id],
             };
@@ -140,6 +146,13 @@ impl Simulation {
         }
         for actor in &self.actors {
             check_name(&actor.name, "")?;
+            let first = actor.name.split('/').next().unwrap_or_default();
+            if RESERVED.contains(&first) {
+                return Err(BuildError::ReservedName {
+                    name: actor.name.clone(),
+                    first: first.to_owned(),
+                });
+            }
         }
         for link in &self.links {
             // A link is named after what it joins: `base-rover_1`.
@@ -162,7 +175,7 @@ impl Simulation {
 
     /// Numbers the entities in name order, so that nothing hangs on the order of declaration.
     fn rank(&self) -> Ranked {
-        let host_name = |host: HostId| self.hosts[host.0 as usize].name.clone();
+        let host_name = |host: HostId| self.hosts[host.index()].name.clone();
         let mut all: Vec<(Entity, Option<Target>)> = Vec::new();
         let control = Entity {
             name: "@control".to_owned(),
@@ -213,9 +226,14 @@ impl Simulation {
             if traced.iter().any(|(known, ..)| *known == entry.type_id) {
                 continue;
             }
-            let schema = (entry.trace)().map_err(|error| BuildError::Schema {
+            // It is the type's own `Deserialize` that shows what is in it.
+            let schema = match guarded(entry.trace) {
+                Ok(traced) => traced.map_err(|error| error.to_string()),
+                Err(cause) => Err(cause.to_string()),
+            };
+            let schema = schema.map_err(|error| BuildError::Schema {
                 name: entry.type_name.to_owned(),
-                error: error.to_string(),
+                error,
             })?;
             traced.push((entry.type_id, entry.type_name, Arc::new(Kind::new(schema))));
         }
@@ -302,8 +320,8 @@ impl Simulation {
             deal(
                 &mut actors_on,
                 *entity,
-                actor.host.0,
-                engine_of_host[actor.host.0 as usize],
+                actor.host.index,
+                engine_of_host[actor.host.index()],
             );
         }
         let mut shared_host = self.hosts.len() as u32;
@@ -312,8 +330,8 @@ impl Simulation {
                 Some(host) => deal(
                     &mut links_on,
                     *entity,
-                    host.0,
-                    engine_of_host[host.0 as usize],
+                    host.index,
+                    engine_of_host[host.index()],
                 ),
                 None => {
                     deal(&mut links_on, *entity, shared_host, engine_of_shared);
@@ -325,22 +343,13 @@ impl Simulation {
     }
 
     fn routes(&self, ranked: &Ranked) -> Result<Vec<Routes>, BuildError> {
-        let mut routes = vec![Routes::default(); self.hosts.len()];
+        let mut known: FixedMap<(HostId, Option<HostId>), EntityId> = FixedMap::default();
+        let mut uplinks = vec![None; self.hosts.len()];
+        let mut by_host = vec![Vec::new(); self.hosts.len()];
         for route in &self.routes {
             let link = ranked.links[route.link as usize];
-            let from = &mut routes[route.from.0 as usize];
-            let place = match route.to {
-                None => &mut from.uplink,
-                Some(to) => {
-                    let least = to.0 as usize + 1;
-                    if from.by_host.len() < least {
-                        from.by_host.resize(least, None);
-                    }
-                    &mut from.by_host[to.0 as usize]
-                }
-            };
-            if let Some(other) = place.replace(link) {
-                let name = |host: HostId| self.hosts[host.0 as usize].name.clone();
+            if let Some(other) = known.insert((route.from, route.to), link) {
+                let name = |host: HostId| self.hosts[host.index()].name.clone();
                 return Err(BuildError::DuplicateRoute {
                     from: name(route.from),
                     to: route.to.map_or_else(|| "*".to_owned(), name),
@@ -348,18 +357,39 @@ impl Simulation {
                     second: ranked.entities[link.index()].name.clone(),
                 });
             }
+            let from = route.from.index();
+            match route.to {
+                None => uplinks[from] = Some(link),
+                Some(to) => by_host[from].push((to.index, link)),
+            }
         }
-        Ok(routes)
+        let routes = uplinks.into_iter().zip(by_host);
+        Ok(routes
+            .map(|(up, by_host)| Routes::new(up, by_host))
+            .collect())
     }
 
-    fn take_controls(
-        &mut self,
-        ranked: &Ranked,
-        kinds: &Kinds,
-    ) -> Result<Vec<Control>, BuildError> {
+    /// What observers want to be shown, asked once.
+    fn wants(&self) -> Result<Vec<Wants>, ObserverError> {
+        let wants = self.observers.iter().map(NamedObserver::wants);
+        wants.collect()
+    }
+
+    /// Whoever handles a type may have left it out of `Accepts`.
+    fn check_tells(&self) -> Result<(), BuildError> {
+        for control in &self.controls {
+            if let (Some(Target::Actor(at)), Planned::Tell(kind, _)) =
+                (&control.target, &control.what)
+            {
+                let actor = &self.actors[*at as usize];
+                self.types[actor.actor_type as usize].accepted(kind, &actor.name)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_controls(&mut self, ranked: &Ranked, kinds: &Kinds) -> Vec<Control> {
         let controls = std::mem::take(&mut self.controls).into_iter().enumerate();
-        let types = &self.types;
-        let actors = &self.actors;
         let control = |(count, decl): (usize, super::ControlDecl)| {
             let entity = match decl.target {
                 Some(Target::Actor(at)) => ranked.actors[at as usize],
@@ -371,49 +401,47 @@ impl Simulation {
                 Planned::Restart => ControlAction::Entity(entity, Action::Restart),
                 Planned::Change(change) => ControlAction::Entity(entity, Action::Change(change)),
                 Planned::Tell(kind, letter) => {
-                    // Whoever handles a type may have left it out of `Accepts`.
-                    let Some(Target::Actor(at)) = decl.target else {
-                        unreachable!("actors are told, and nobody else");
-                    };
-                    let actor = &actors[at as usize];
-                    types[actor.actor_type as usize].accepted(&kind, &actor.name)?;
                     let kind = kinds.of_type[&kind.type_id];
                     ControlAction::Entity(entity, Action::Tell(kind, letter))
                 }
                 Planned::Stop(reason) => ControlAction::Stop(reason),
             };
-            Ok(Control {
+            Control {
                 time: decl.time,
                 count: count as u64,
                 what,
-            })
+            }
         };
         controls.map(control).collect()
     }
 
-    /// Builds the actors, in order of declaration, up to the first whose constructor panics.
+    /// Builds the actors, in order of declaration, up to the first whose constructor panics; none if
+    /// a link did when it was asked about itself.
     fn build_engines(
-        self,
+        &mut self,
         topology: &Arc<Topology>,
         ranked: &Ranked,
         count: u32,
     ) -> (Vec<Engine>, Option<Box<Fault>>) {
-        let mut fault = None;
+        let fault_of = |entity: EntityId, cause: FaultCause| {
+            Box::new(Fault {
+                key: topology.key(SimTime::ZERO, 0, entity, 0),
+                time: SimTime::ZERO,
+                actor: topology.name(entity).to_owned(),
+                message: None,
+                cause,
+            })
+        };
+        let asked = self.links.iter_mut().zip(&ranked.links);
+        let mut troubles = asked.filter_map(|(link, entity)| Some((*entity, link.trouble.take()?)));
+        let mut fault = troubles.next().map(|(link, cause)| fault_of(link, *cause));
         let mut actors: Vec<Vec<ActorCell>> = (0..count).map(|_| Vec::new()).collect();
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
-        for (declared, (actor, entity)) in self.actors.into_iter().zip(&ranked.actors).enumerate() {
+        let declared = std::mem::take(&mut self.actors);
+        for (declared, (actor, entity)) in declared.into_iter().zip(&ranked.actors).enumerate() {
             let built = match fault {
-                None => guarded(|| (actor.factory)(&actor.name)).map_err(|cause| {
-                    let key = topology.key(SimTime::ZERO, 0, *entity, 0);
-                    let (time, actor) = (SimTime::ZERO, actor.name.clone());
-                    fault = Some(Box::new(Fault {
-                        key,
-                        time,
-                        actor,
-                        message: None,
-                        cause: *cause,
-                    }));
-                }),
+                None => guarded(|| (actor.factory)(&actor.name))
+                    .map_err(|cause| fault = Some(fault_of(*entity, *cause))),
                 Some(_) => Err(()),
             };
             let cell = ActorCell {
@@ -422,7 +450,8 @@ impl Simulation {
             };
             actors[topology.place(*entity).engine as usize].push(cell);
         }
-        for (LinkDecl { carrier, .. }, entity) in self.links.into_iter().zip(&ranked.links) {
+        let declared = std::mem::take(&mut self.links);
+        for (LinkDecl { carrier, .. }, entity) in declared.into_iter().zip(&ranked.links) {
             links[topology.place(*entity).engine as usize].push(LinkCell::new(carrier));
         }
         let lists = actors.into_iter().zip(links).enumerate();

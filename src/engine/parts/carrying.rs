@@ -289,6 +289,9 @@ impl Parts {
         scheduled_by: Option<EventKey>,
     ) {
         let copies = self.verdicts.list.len();
+        if let Some(cause) = self.contradiction(link, head, scheduled_by.is_some()) {
+            return self.raise(cause);
+        }
         for copy in 0..copies {
             let Some(own) = (if copy + 1 == copies {
                 letter.take()
@@ -298,7 +301,7 @@ impl Parts {
                 return;
             };
             let verdict = self.verdicts.list[copy];
-            let head = head.as_copy(head.copy() + copy as u32);
+            let head = head.as_copy(self.copy_number(head, scheduled_by.is_some(), copy));
             if let Err(cause) = self.obey(link, count, verdict, (head, own), scheduled_by) {
                 return self.raise(*cause);
             }
@@ -311,6 +314,65 @@ impl Parts {
                 sender: self.topology.name(head.sender).to_owned(),
             });
         }
+    }
+
+    /// The number of the copy that a verdict is about. Of a held copy all verdicts but those about
+    /// further copies, which have numbers of their own, are about itself.
+    fn copy_number(&self, head: &Head, held: bool, verdict: usize) -> u32 {
+        match self.verdicts.list[verdict] {
+            Verdict::Park {
+                copy: Some(copy), ..
+            } => copy,
+            _ if held => head.copy(),
+            _ => head.copy() + verdict as u32,
+        }
+    }
+
+    /// Two verdicts about one copy, if there are any: it would have two fates.
+    fn contradiction(&self, link: EntityId, head: &Head, held: bool) -> Option<FaultCause> {
+        let list = &self.verdicts.list;
+        let own = |verdict: &Verdict| matches!(verdict, Verdict::Park { copy: Some(_), .. });
+        if !held && !list.iter().any(own) {
+            return None;
+        }
+        let numbers = 0..list.len();
+        let mut numbers: Vec<u32> = numbers
+            .map(|verdict| self.copy_number(head, held, verdict))
+            .collect();
+        numbers.sort_unstable();
+        let twice = numbers.windows(2).find(|pair| pair[0] == pair[1])?;
+        let kind = head.kind().map(|kind| self.topology.kind(kind).name());
+        Some(FaultCause::TwoFates {
+            link: self.topology.name(link).to_owned(),
+            copy: twice[0],
+            kind: kind.unwrap_or_default().to_owned(),
+            sender: self.topology.name(head.sender).to_owned(),
+        })
+    }
+
+    /// That a link gives a copy that it delivers a delay that is the sum of its parts.
+    fn check_parts(
+        &self,
+        link: EntityId,
+        head: &Head,
+        after: SimDuration,
+        carriage: Option<&Carriage>,
+    ) -> Result<(), Box<FaultCause>> {
+        // Longer ones do not fit into what is told of jitter, and stop at the clock's end.
+        const LONGEST: SimDuration = SimDuration::from_nanos(i64::MAX as u64);
+        let Some(carriage) = carriage else {
+            return Ok(());
+        };
+        let delay = (self.key.time + after).since(head.sent(self.key));
+        let parts = carriage.total();
+        if parts == delay || delay > LONGEST {
+            return Ok(());
+        }
+        Err(Box::new(FaultCause::PartsOfDelay {
+            link: self.topology.name(link).to_owned(),
+            delay,
+            parts,
+        }))
     }
 
     /// Does to one copy what the link decided.
@@ -332,6 +394,7 @@ impl Parts {
         let (class, engine, after, side) = match verdict {
             Verdict::Deliver { after, carriage } => {
                 self.check_delay(link, after)?;
+                self.check_parts(link, &head, after, carriage.as_ref())?;
                 let engine = self.topology.place(head.receiver).engine;
                 (Class::Message, engine, after, side(carriage))
             }
@@ -343,12 +406,7 @@ impl Parts {
                 };
                 (Class::Held, self.index, after, Some(side))
             }
-            Verdict::Park {
-                latest,
-                token,
-                copy,
-            } => {
-                head = head.as_copy(copy.unwrap_or(head.copy()));
+            Verdict::Park { latest, token, .. } => {
                 let side = Side {
                     scheduled_by,
                     token,
@@ -363,6 +421,14 @@ impl Parts {
                 reason,
                 carriage,
             } => {
+                if reason.is_empty() {
+                    let kind = head.kind().map(|kind| self.topology.kind(kind).name());
+                    return Err(Box::new(FaultCause::NoReason {
+                        link: self.topology.name(link).to_owned(),
+                        kind: kind.unwrap_or_default().to_owned(),
+                        sender: self.topology.name(head.sender).to_owned(),
+                    }));
+                }
                 head.reason = self.topology.intern(reason);
                 if after.is_zero() {
                     self.lose(head, &letter, side(carriage));

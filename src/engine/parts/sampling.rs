@@ -28,7 +28,7 @@ pub(crate) struct SampleType {
 /// The first sample of its type in one engine.
 #[derive(Clone)]
 pub(crate) struct FirstSample {
-    key: EventKey,
+    pub(crate) key: EventKey,
     actor: EntityId,
     /// The message being handled, and who sent it.
     message: Option<String>,

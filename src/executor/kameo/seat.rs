@@ -1,6 +1,6 @@
 //! Seats: the engines of a run, where whoever has time for one can take it.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 // Real time decides here who runs an engine, and nothing of what the engine does.
 #[expect(clippy::disallowed_types)]
@@ -19,24 +19,27 @@ pub(super) struct Seat {
     pub(super) batch: Batch,
     pub(super) fault: Option<Box<Fault>>,
     pub(super) stops: Vec<(EventKey, EntityId, String)>,
-    /// How long it takes for a window, as the last few have shown.
+    /// How long it takes for a window or a part of one, as the last few have shown.
     pub(super) expected: Duration,
 }
 
 impl Seat {
-    pub(super) fn new(engine: Engine) -> Self {
+    fn new(engine: Engine, interrupt: Arc<AtomicBool>) -> Self {
         Seat {
             engine,
             inbox: Vec::new(),
-            batch: Batch::default(),
+            batch: Batch::new(interrupt),
             fault: None,
             stops: Vec::new(),
             expected: Duration::ZERO,
         }
     }
 
-    /// Time and step of the first event it would handle.
+    /// Time and step of the first event it would handle; none after a fault.
     pub(super) fn peek(&mut self) -> Option<Bound> {
+        if self.fault.is_some() {
+            return None;
+        }
         let arriving = self.inbox.iter().map(|event| Bound {
             time: event.key.time,
             step: event.key.step,
@@ -44,10 +47,14 @@ impl Seat {
         arriving.chain(self.engine.peek()).min()
     }
 
-    /// Goes on until `bound`.
+    /// Goes on until `bound`, or until it is as far ahead of what is committed as it may be.
     #[expect(clippy::disallowed_types)]
     fn run(&mut self, bound: Bound) {
+        if self.fault.is_some() {
+            return;
+        }
         let begin = Instant::now();
+        self.batch.open();
         for Outgoing { key, pending, .. } in self.inbox.drain(..) {
             self.engine.parts.insert_pending(key, pending);
         }
@@ -78,10 +85,10 @@ impl Seat {
 pub(super) struct Seats(Arc<[Mutex<Seat>]>);
 
 impl Seats {
-    pub(super) fn new(engines: Vec<Engine>) -> Self {
+    pub(super) fn new(engines: Vec<Engine>, interrupt: &Arc<AtomicBool>) -> Self {
         let seats = engines
             .into_iter()
-            .map(|engine| Mutex::new(Seat::new(engine)));
+            .map(|engine| Mutex::new(Seat::new(engine, interrupt.clone())));
         Seats(seats.collect())
     }
 
@@ -110,7 +117,7 @@ impl Seats {
     }
 }
 
-/// The engines that have something to do in one window. Whoever has time claims the next one.
+/// The engines that have something to do in one part of a window. Whoever has time claims the next one.
 pub(super) struct Round {
     seats: Seats,
     pub(super) due: Vec<usize>,

@@ -1,16 +1,22 @@
-//! Windows: which engines may run up to where, and how what they did becomes one order.
+//! Windows: which engines may run up to where.
+//!
+//! A window is as long as the look-ahead, and may hold any number of events. So that it takes bounded
+//! memory, an engine that is far ahead of what is committed waits for the others: a window has parts,
+//! after each of which is committed what no engine can add to any more.
+
+mod settle;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use kameo::actor::{ActorRef, Spawn};
 
+use self::settle::Settled;
 use super::seat::{Round, Seats};
 use super::{Helper, Share, lost_worker};
 use crate::commit::Committer;
-use crate::engine::{Action, Engine, InFlight, Outgoing, Remains, SampleNames};
+use crate::engine::{Action, Engine, Outgoing, Remains, SampleNames};
 use crate::executor::Ending;
-use crate::fault::Fault;
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
 use crate::report::{End, Report};
@@ -29,6 +35,8 @@ pub(super) struct Coordinator {
     /// By seat, time and step of the first event that it would handle. Windows look at no engine
     /// that has none in them.
     next: Vec<Option<Bound>>,
+    /// By seat, whether it is as far ahead of what is committed as it may be.
+    full: Vec<bool>,
     helpers: Vec<ActorRef<Helper>>,
     /// The engine of shared links, which runs after the others in each window.
     shared: Option<usize>,
@@ -52,10 +60,11 @@ impl Coordinator {
         let shared = shared.map(|(link, _)| topology.place(link).engine as usize);
         let look_ahead = topology.info.look_ahead;
         let helpers = (0..threads).map(|_| Helper::spawn(Helper)).collect();
-        let seats = Seats::new(engines);
-        let next = (0..seats.len()).map(|at| seats.take(at).peek()).collect();
+        let seats = Seats::new(engines, &committer.interrupt);
+        let next: Vec<_> = (0..seats.len()).map(|at| seats.take(at).peek()).collect();
         Coordinator {
             topology,
+            full: vec![false; seats.len()],
             seats,
             next,
             helpers,
@@ -69,26 +78,28 @@ impl Coordinator {
     }
 
     pub(super) async fn run(mut self) -> Report {
-        let mut undone = Vec::new();
         let ending = loop {
-            if let Some(ending) = self.advance(&mut undone).await {
+            if let Some(ending) = self.advance().await {
                 break ending;
             }
         };
         let mut remains = Remains::default();
-        remains.in_flight = undone;
         for at in 0..self.seats.len() {
             let mut seat = self.seats.take(at);
-            for Outgoing { key, pending, .. } in std::mem::take(&mut seat.inbox) {
-                remains.take(&self.topology, key, pending, ending.fault);
+            if let Some(from) = ending.undone_from {
+                let undone = seat.batch.undone(from, &self.topology);
+                remains.in_flight.extend(undone);
             }
-            seat.engine.dissolve(ending.fault, &mut remains);
+            for Outgoing { key, pending, .. } in std::mem::take(&mut seat.inbox) {
+                remains.take(&self.topology, key, pending, ending.undone_from);
+            }
+            seat.engine.dissolve(ending.undone_from, &mut remains);
         }
         ending.finish(&self.topology, self.schedule, self.committer, remains)
     }
 
     /// Runs one window or applies one control event; tells if that was the last.
-    async fn advance(&mut self, undone: &mut Vec<InFlight>) -> Option<Ending> {
+    async fn advance(&mut self) -> Option<Ending> {
         if let Some(end) = self.committer.verdict() {
             return Some(Ending::early(end, self.committer.last().time));
         }
@@ -104,7 +115,7 @@ impl Coordinator {
                 } else {
                     Bound::at(earliest.time + self.look_ahead)
                 };
-                self.run_window(window.min(limit), undone).await
+                self.run_window(window.min(limit)).await
             }
             None if self.schedule.only_stops_left() => {
                 Some(Ending::early(End::Completed, self.committer.last().time))
@@ -117,31 +128,53 @@ impl Coordinator {
                     by,
                     reason,
                 )),
-                Some(Due::Control(key, entity, action)) => self.apply(key, entity, action, undone),
+                Some(Due::Control(key, entity, action)) => self.apply(key, entity, action),
                 None => Some(Ending::early(End::Completed, self.committer.last().time)),
             },
         }
     }
 
-    async fn run_window(&mut self, bound: Bound, undone: &mut Vec<InFlight>) -> Option<Ending> {
+    /// Runs all engines up to `bound`, part by part; tells if that was the last window.
+    async fn run_window(&mut self, mut bound: Bound) -> Option<Ending> {
         let shared = self.shared;
-        let independent = (0..self.seats.len()).filter(|at| Some(*at) != shared);
-        let mut finished = self.run_engines(independent, bound).await;
-        finished.extend(self.run_engines(shared.into_iter(), bound).await);
-        self.settle(&finished, undone)
+        let independent = |at: &usize| Some(*at) != shared;
+        let mut ran = Vec::new();
+        // What all wait for: it runs however far it is ahead of what is committed.
+        let mut behind = None;
+        loop {
+            let engines = (0..self.seats.len()).filter(independent);
+            self.run_engines(engines, bound, behind, &mut ran).await;
+            // The others may still hand something to shared links from where they have come to.
+            let reached = ran.iter().filter(|at| independent(at));
+            let reached = reached.filter_map(|at| self.next[*at]).min();
+            let reached = reached.map_or(bound, |reached| reached.min(bound));
+            self.run_engines(shared.into_iter(), reached, behind, &mut ran)
+                .await;
+            let settled = self.settle(&mut ran, &mut bound);
+            match settled {
+                Settled::Part(least) => behind = Some(least),
+                Settled::All(ending) => return ending,
+            }
+        }
     }
 
     /// Runs those of the engines that have something to do before `bound`, side by side, and
-    /// hands out what they sent to other engines.
+    /// hands out what they sent to other engines. Notes who ran.
     async fn run_engines(
         &mut self,
         engines: impl Iterator<Item = usize>,
         bound: Bound,
-    ) -> Vec<usize> {
-        let is_due = |at: &usize| self.next[*at].is_some_and(|next| next < bound);
+        behind: Option<Bound>,
+        ran: &mut Vec<usize>,
+    ) {
+        let is_due = |at: &usize| {
+            let next = self.next[*at];
+            let may_go_on = !self.full[*at] || next == behind;
+            may_go_on && next.is_some_and(|next| next < bound)
+        };
         let due: Vec<usize> = engines.filter(is_due).collect();
         if due.is_empty() {
-            return due;
+            return;
         }
         let threads = self.threads_worth_waking(&due);
         let round = Arc::new(Round::new(self.seats.clone(), due, bound));
@@ -162,7 +195,7 @@ impl Coordinator {
         for at in &round.due {
             self.seats.hand_out(*at, &mut self.next);
         }
-        round.due.clone()
+        ran.extend(&round.due);
     }
 
     /// How many threads are to share the work of these engines.
@@ -177,63 +210,10 @@ impl Coordinator {
         worth_it.min(most)
     }
 
-    fn apply(
-        &mut self,
-        key: EventKey,
-        entity: EntityId,
-        action: Action,
-        undone: &mut Vec<InFlight>,
-    ) -> Option<Ending> {
+    fn apply(&mut self, key: EventKey, entity: EntityId, action: Action) -> Option<Ending> {
         let at = self.topology.place(entity).engine as usize;
         self.seats.take(at).control(key, entity, action);
         self.seats.hand_out(at, &mut self.next);
-        self.settle(&[at], undone)
-    }
-
-    /// Commits what the engines did, in key order, up to the first fault.
-    fn settle(&mut self, finished: &[usize], undone: &mut Vec<InFlight>) -> Option<Ending> {
-        let mut done: Vec<_> = finished.iter().map(|at| self.seats.take(*at)).collect();
-        let samples = done
-            .iter_mut()
-            .map(|seat| std::mem::take(&mut seat.batch.first_samples));
-        let samples: Vec<_> = samples.flatten().collect();
-        let name = |actor| self.topology.name(actor).to_owned();
-        let clash = self.sample_names.take(samples, name);
-        let fault = done.iter().filter_map(|seat| seat.fault.as_ref());
-        let fault = fault.chain(&clash).min_by_key(|fault| fault.key);
-        let fault: Option<Box<Fault>> = fault.cloned();
-        self.order.clear();
-        for (place, seat) in done.iter().enumerate() {
-            let keys = (0..).map_while(|at| seat.batch.key(at).map(|key| (key, place, at)));
-            self.order.extend(keys);
-        }
-        self.order.sort_unstable();
-        let mut uncommitted: Vec<Option<usize>> = vec![None; done.len()];
-        for &(key, place, at) in &self.order {
-            if fault.as_ref().is_some_and(|fault| key >= fault.key) {
-                uncommitted[place].get_or_insert(at);
-            } else {
-                done[place].batch.commit(at, &mut self.committer);
-            }
-        }
-        if let Some(fault) = fault {
-            for (seat, at) in done.iter().zip(&uncommitted) {
-                if let Some(at) = at {
-                    undone.extend(seat.batch.undone(*at, fault.key, &self.topology));
-                }
-            }
-            return Some(Ending::fault(fault));
-        }
-        let mut stops: Vec<_> = Vec::from_iter(self.committer.stop.take());
-        for seat in &mut done {
-            stops.append(&mut seat.stops);
-            seat.batch.clear();
-        }
-        // Whoever asked first in the order of the run is heard first.
-        stops.sort_by_key(|(key, by, _)| (*key, *by == EntityId::CONTROL));
-        for (key, by, reason) in stops {
-            self.schedule.ask_stop(key, by, reason);
-        }
-        None
+        self.settle_all(&[at])
     }
 }
