@@ -2,10 +2,11 @@
 //! and a readable log, the same on every executor.
 
 use farside::prelude::*;
-use farside::record::{Flow, Observer, ObserverError, Record};
+use farside::record::{Flow, Observer, ObserverError, Record, Wants};
 use farside::{Carrier, Parcel, Verdicts};
 use farside::{End, Fault, FaultCause};
 use farside_logs::{LogOptions, LogWriter, info};
+use farside_tests::executors::agreed;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// What blows up in a run, and when.
@@ -28,6 +29,12 @@ enum Fuse {
     ToldToTheCrashed,
     ToldTooLate,
     Encoding,
+    EncodingAndDrop,
+    EncodingInFlight,
+    EncodingOfTold,
+    EncodingOfChange,
+    MinDelay,
+    Rate,
     PayloadThatPanicsToo,
 }
 
@@ -68,6 +75,11 @@ impl Drop for Call {
     fn drop(&mut self) {
         drop(Bomb { armed: self.armed });
     }
+}
+
+/// Says so if it is told to.
+fn asked(at: Fuse, fuse: Fuse) {
+    assert_ne!(at, fuse, "asked about itself");
 }
 
 fn call(armed: bool) -> Call {
@@ -139,9 +151,14 @@ impl Handler<Call> for Base {
             armed: match self.0 {
                 Fuse::MessageToTheCrashed => now == SimTime::from_secs(6),
                 Fuse::MessageInFlight | Fuse::MessageLostLate => now == SimTime::from_secs(9),
+                Fuse::EncodingAndDrop => now == SimTime::from_secs(3),
                 _ => false,
             },
-            spoils_encoding: self.0 == Fuse::Encoding && now == SimTime::from_secs(3),
+            spoils_encoding: match self.0 {
+                Fuse::Encoding | Fuse::EncodingAndDrop => now == SimTime::from_secs(3),
+                Fuse::EncodingInFlight => now == SimTime::from_secs(9),
+                _ => false,
+            },
         };
         ctx.send(rover, message);
         ctx.timer(SimDuration::from_secs(1), call(false));
@@ -149,8 +166,20 @@ impl Handler<Call> for Base {
     }
 }
 
-#[derive(Serialize, Deserialize)]
-struct Retune;
+#[derive(Deserialize)]
+struct Retune {
+    spoils_encoding: bool,
+}
+
+impl Serialize for Retune {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        assert!(!self.spoils_encoding, "the encoding went wrong");
+        let mut retune = out.serialize_struct("Retune", 1)?;
+        retune.serialize_field("spoils_encoding", &self.spoils_encoding)?;
+        retune.end()
+    }
+}
 
 struct Link {
     fuse: Fuse,
@@ -161,7 +190,13 @@ impl Carrier for Link {
     type Change = Retune;
 
     fn min_delay(&self) -> SimDuration {
+        asked(Fuse::MinDelay, self.fuse);
         SimDuration::from_millis(600)
+    }
+
+    fn rate_bit_per_s(&self) -> Option<u64> {
+        asked(Fuse::Rate, self.fuse);
+        None
     }
 
     fn carry(&mut self, _parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
@@ -222,7 +257,17 @@ fn model(fuse: Fuse, heavy: bool) -> Simulation {
     match fuse {
         Fuse::ToldToTheCrashed => sim.tell_at(SimTime::from_secs(6), target, call(true)),
         Fuse::ToldTooLate => sim.tell_at(SimTime::from_secs(60), target, call(true)),
-        Fuse::ChangeOfLink => sim.change_at(SimTime::from_secs(2), link, Retune),
+        Fuse::ChangeOfLink | Fuse::EncodingOfChange => {
+            let spoils_encoding = fuse == Fuse::EncodingOfChange;
+            sim.change_at(SimTime::from_secs(2), link, Retune { spoils_encoding });
+        }
+        Fuse::EncodingOfTold => {
+            let spoiled = Call {
+                armed: true,
+                spoils_encoding: true,
+            };
+            sim.tell_at(SimTime::from_secs(3), target, spoiled);
+        }
         _ => {}
     }
     sim.stop_at(SimTime::from_nanos(9_500_000_000), "long enough");
@@ -330,6 +375,37 @@ fn a_panic_anywhere_is_a_fault_that_says_who_and_when() {
             3600,
             "base-rover handling Call: panicked: the encoding went wrong",
         ),
+        // Dropping the message panics as well: the first fault stands.
+        (
+            Fuse::EncodingAndDrop,
+            3600,
+            "base-rover handling Call: panicked: the encoding went wrong",
+        ),
+        (
+            Fuse::EncodingInFlight,
+            9500,
+            "rover handling Call from base: panicked: the encoding went wrong",
+        ),
+        (
+            Fuse::EncodingOfTold,
+            3000,
+            "rover handling Call: panicked: the encoding went wrong",
+        ),
+        (
+            Fuse::EncodingOfChange,
+            2000,
+            "base-rover: panicked: the encoding went wrong",
+        ),
+        (
+            Fuse::MinDelay,
+            0,
+            "base-rover: panicked: assertion `left != right` failed: asked about itself",
+        ),
+        (
+            Fuse::Rate,
+            0,
+            "base-rover: panicked: assertion `left != right` failed: asked about itself",
+        ),
         (
             Fuse::PayloadThatPanicsToo,
             0,
@@ -347,18 +423,44 @@ fn a_panic_anywhere_is_a_fault_that_says_who_and_when() {
             "{fuse:?}: {told}"
         );
         assert_eq!(fault.time.as_nanos(), at_ms * 1_000_000, "{fuse:?}: {told}");
-        assert!(told.ends_with(what), "{fuse:?}: {told}");
+        assert!(told.contains(what), "{fuse:?}: {told}");
     }
 }
 
-/// A monitor that panics at the third record, or at the end.
+/// A monitor that panics at the third record, when it is asked what it wants, at the begin, or at the
+/// end.
 struct Watcher {
     records: u32,
     breaks_at: Option<u32>,
+    breaks_first: Option<First>,
     _bomb: Bomb,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum First {
+    Wants,
+    Begin,
+}
+
 impl Observer for Watcher {
+    fn wants(&self) -> Wants {
+        assert_ne!(
+            self.breaks_first,
+            Some(First::Wants),
+            "the watcher went wrong"
+        );
+        Wants::default()
+    }
+
+    fn begin(&mut self, _run: &std::sync::Arc<farside::RunInfo>) -> Result<(), ObserverError> {
+        assert_ne!(
+            self.breaks_first,
+            Some(First::Begin),
+            "the watcher went wrong"
+        );
+        Ok(())
+    }
+
     fn record(&mut self, _record: &Record<'_>) -> Result<Flow, ObserverError> {
         self.records += 1;
         assert_ne!(Some(self.records), self.breaks_at, "the watcher went wrong");
@@ -382,6 +484,7 @@ fn an_observer_that_panics_ends_the_run_like_one_that_fails() {
             sim.observe(Watcher {
                 records: 0,
                 breaks_at,
+                breaks_first: None,
                 _bomb: bomb,
             });
             let report = sim.run(executor).expect("the model can start");
@@ -389,8 +492,70 @@ fn an_observer_that_panics_ends_the_run_like_one_that_fails() {
                 panic!("{:?}", report.end);
             };
             assert!(failure.starts_with(said), "{failure}");
+            assert!(failure.ends_with("panics::Watcher)"), "{failure}");
         }
     }
+}
+
+/// What was brought in is dropped all the same, whatever of it panics then.
+#[test]
+fn an_observer_that_panics_before_the_start_keeps_a_run_from_starting() {
+    for first in [First::Wants, First::Begin] {
+        let error = agreed(|heavy| {
+            let mut sim = model(Fuse::LinkAtTheEnd, heavy);
+            sim.observe(Watcher {
+                records: 0,
+                breaks_at: None,
+                breaks_first: Some(first),
+                _bomb: Bomb { armed: true },
+            });
+            sim
+        });
+        let error = error.expect_err("it cannot start").to_string();
+        assert!(
+            error.starts_with("an observer panicked: "),
+            "{first:?}: {error}"
+        );
+        assert!(error.ends_with("panics::Watcher)"), "{first:?}: {error}");
+    }
+}
+
+/// Its `Deserialize` panics when it is traced, before there is anybody who could handle one.
+#[derive(Serialize)]
+struct Untraceable;
+
+impl<'de> Deserialize<'de> for Untraceable {
+    fn deserialize<D: serde::Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
+        panic!("not to be read")
+    }
+}
+
+struct Mute;
+
+impl Actor for Mute {
+    type Accepts = (Untraceable,);
+}
+
+impl Handler<Untraceable> for Mute {
+    fn handle(&mut self, _message: Untraceable, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_type_that_panics_when_it_is_traced_is_named() {
+    let error = agreed(|heavy| {
+        let mut sim = model(Fuse::LinkAtTheEnd, heavy);
+        let host = sim.host("rover");
+        let mute = sim.actor(host, "mute", |_| Mute);
+        sim.tell_at(SimTime::from_secs(1), mute, Untraceable);
+        sim
+    });
+    let error = error.expect_err("it cannot start").to_string();
+    assert!(
+        error.contains("Untraceable: panicked: not to be read"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -404,7 +569,10 @@ fn a_run_that_fails_ends_with_its_first_fault() {
             _own: Bomb { armed: true },
         },
     );
-    sim.change_at(SimTime::from_secs(2), link, Retune);
+    let retune = Retune {
+        spoils_encoding: false,
+    };
+    sim.change_at(SimTime::from_secs(2), link, retune);
     let report = sim.run(Executor::Inline).expect("the model can start");
     let fault = report.fault().expect("a fault");
     assert_eq!(

@@ -356,6 +356,9 @@ fn what_has_no_shape_is_refused_by_name() {
     refused::<HasHashSet>(&["HashSet", "BTreeSet"]);
     refused::<Endless>(&["Endless"]);
     refused::<Picky>(&["Picky", "never good enough"]);
+    refused::<NoVariant>(&["NoVariant", "without variants"]);
+    refused::<AllSkipped>(&["AllSkipped", "without variants"]);
+    refused::<HasNoVariant>(&["NoVariant", "HasNoVariant.rest", "without variants"]);
     refused::<Asymmetric>(&["Asymmetric", "`a`"]);
 }
 

@@ -364,6 +364,22 @@ pub(super) struct Endless {
     pub(super) inner: Box<Endless>,
 }
 
+#[derive(Serialize, Deserialize, Debug)]
+pub(super) enum NoVariant {}
+
+#[derive(Serialize, Deserialize, Debug)]
+pub(super) enum AllSkipped {
+    #[serde(skip)]
+    #[expect(dead_code, reason = "there to be skipped")]
+    A,
+}
+
+#[derive(Serialize, Deserialize, Debug)]
+pub(super) struct HasNoVariant {
+    pub(super) number: u32,
+    pub(super) rest: Vec<Option<NoVariant>>,
+}
+
 #[derive(Serialize, Debug)]
 pub(super) struct Picky {
     pub(super) never: Never,
