@@ -5,12 +5,14 @@ use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use tracing_subscriber::field::MakeExt;
 use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, check, complain, diff, draw, explain, info, plan, recover, report,
-    reproduce, run, study, verify,
+    reproduce, run, shown, study, verify,
 };
 use crate::registry::Registry;
 
@@ -88,7 +90,8 @@ const DRAW: &str = "draw";
 /// The command line of a binary that knows these systems.
 pub fn main(registry: Registry) -> ExitCode {
     // On wrong usage clap prints what is wrong and exits with 2, as we do.
-    let matches = command_line(&registry).get_matches();
+    let matches = command_line(&registry).try_get_matches();
+    let matches = matches.unwrap_or_else(|error| refuse_arguments(&error));
     let mut cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if let (Command::Draw(args), Some(given)) = (&mut cli.command, matches.subcommand_matches(DRAW))
     {
@@ -112,6 +115,17 @@ pub fn main(registry: Registry) -> ExitCode {
             error.exit().into()
         }
     }
+}
+
+/// Says what is wrong with the arguments, or what they ask of the command line itself, and exits.
+fn refuse_arguments(error: &clap::Error) -> ! {
+    let text = error.render().to_string();
+    // Arguments are quoted as they are, and those of a script may be anybody's.
+    if shown(&text) == text {
+        error.exit();
+    }
+    complain(text.trim_end());
+    std::process::exit(error.exit_code())
 }
 
 /// The command line, under the name and with the version of the binary.
@@ -224,7 +238,7 @@ fn say_on_stderr(verbose: u8) {
     let targets = from_environment.and_then(|text| match text.parse::<Targets>() {
         Ok(targets) => Some(targets),
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "FARSIDE_LOG={text}: {error}; ignored");
+            complain(format!("FARSIDE_LOG={text}: {error}; ignored"));
             None
         }
     });
@@ -242,8 +256,17 @@ fn say_on_stderr(verbose: u8) {
             targets.with_target(ours, level)
         })
     });
+    // Names in what is said may be anybody's, as in what commands print.
+    let fields = debug_fn(|out, field, value| {
+        let value = shown(&format!("{value:?}"));
+        match field.name() {
+            "message" => write!(out, "{value}"),
+            name => write!(out, "{name}={value}"),
+        }
+    });
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        .fmt_fields(fields.delimited(" "))
         .with_ansi(in_colour())
         // Which module says it is of use to who looks for more than warnings.
         .with_target(verbose > 0)

@@ -89,6 +89,9 @@ pub(crate) enum CommandError {
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
+    /// Two things that a command writes would be one file.
+    #[error("{}: is written to by this command twice: it is also {other}", .out.display())]
+    TwoOutputs { out: PathBuf, other: String },
     /// A file that is there already, and is something else than what would be written.
     #[error("{}: is there already and is no {what}: it is not replaced", .path.display())]
     InTheWay { path: PathBuf, what: &'static str },
@@ -128,6 +131,7 @@ impl CommandError {
             | CommandError::NotRepeatable { .. }
             | CommandError::NotDrawn { .. }
             | CommandError::InTheWay { .. }
+            | CommandError::TwoOutputs { .. }
             | CommandError::OtherKind { .. }
             | CommandError::Export(_)
             | CommandError::Arguments(_) => Exit::Wrong,
@@ -145,12 +149,9 @@ pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), CommandError> {
     written.map_err(CommandError::Output)
 }
 
-/// Prints a text, and a newline if it has none at its end. Names in it may be anybody's: what a
-/// terminal would obey is escaped.
+/// Prints a text, and a newline if it has none at its end; see [`shown`].
 pub(crate) fn print(text: impl ToString) -> Result<(), CommandError> {
-    print_lines(obeyed_by_no_terminal(&text.to_string(), &|letter| {
-        letter.escape_default().to_string()
-    }))
+    print_lines(shown(&text.to_string()))
 }
 
 /// Prints a document that programs read, JSON or TOML: escapes are those of its strings.
@@ -174,10 +175,14 @@ pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
 
 /// Says something on standard error. If that is gone, the exit code still tells.
 pub(crate) fn complain(text: impl ToString) {
-    let text = obeyed_by_no_terminal(&text.to_string(), &|letter| {
-        letter.escape_default().to_string()
-    });
+    let text = shown(&text.to_string());
     let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// A text for people, as all that is printed or said is shown: names in it may be anybody's, and what
+/// a terminal would obey is escaped.
+pub(crate) fn shown(text: &str) -> String {
+    obeyed_by_no_terminal(text, &|letter| letter.escape_default().to_string())
 }
 
 /// A text of several lines in which what a terminal would obey is escaped, except for the ends of

@@ -169,7 +169,7 @@ pub use runner::{Ended, Progress, RunOptions, run};
 pub use store::Shard;
 
 pub(crate) use reproduce::{Reproduction, find_run, reproduce};
-pub(crate) use store::replace;
+pub(crate) use store::{outputs, replace};
 
 #[cfg(test)]
 pub(crate) mod fabricated;

@@ -136,6 +136,12 @@ pub enum LogError {
         /// The log it was to be compared with.
         path: PathBuf,
     },
+    /// The file to write is being written by another run, of this process or another.
+    #[error("{path}: another run is writing it")]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file to write is the file to read.
     #[error("{path}: is read by this command, which does not write over what it reads")]
     SameFile {

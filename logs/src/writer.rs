@@ -174,14 +174,25 @@ struct Channels {
 }
 
 impl LogWriter {
-    /// A writer to a new file at `path`; a file that is there already is replaced.
+    /// A writer to a new file at `path`; a file that is there already is replaced. From now on the
+    /// file says what scenario it is of, whenever the run begins.
     ///
     /// # Errors
-    /// If the file cannot be created, or a glob cannot be read.
+    /// If the file cannot be created, if another run is writing it, or if a glob cannot be read.
     pub fn create(path: impl AsRef<Path>, options: LogOptions) -> Result<LogWriter, LogError> {
         let path = path.as_ref().to_owned();
         let exclude = Topics::new(&options.exclude)?;
-        let file = thread::create(&path, options.compression, &options.code_version)?;
+        let mut file = thread::create(&path, options.compression, &options.code_version)?;
+        let scenario = Attachment {
+            name: SCENARIO_ATTACHMENT.to_owned(),
+            media_type: "application/toml".to_owned(),
+            bytes: options.resolved.clone().into_bytes(),
+        };
+        put_attachment(&mut file, scenario, options.epoch_ns)
+            .map_err(|error| LogError::io(&path, "write", error))?;
+        // Whoever kills a run early has this. A disk that is full says so again when the first chunk
+        // is written, and that ends the run as any later time.
+        let _ = file.flush();
         Ok(LogWriter {
             path,
             options,
@@ -226,23 +237,10 @@ impl LogWriter {
         ] {
             file.metadata(name, metadata).map_err(refused)?;
         }
-        let scenario = Attachment {
-            name: SCENARIO_ATTACHMENT.to_owned(),
-            media_type: "application/toml".to_owned(),
-            bytes: std::mem::take(&mut options.resolved).into_bytes(),
-        };
-        let attachments = std::mem::take(&mut options.attachments);
-        for attachment in std::iter::once(scenario).chain(attachments) {
-            let head = AttachmentHeader {
-                log_time: options.epoch_ns,
-                create_time: options.epoch_ns,
-                name: attachment.name,
-                media_type: attachment.media_type,
-            };
-            file.attachment(head, &attachment.bytes).map_err(refused)?;
+        for attachment in std::mem::take(&mut options.attachments) {
+            put_attachment(&mut file, attachment, options.epoch_ns).map_err(refused)?;
         }
-        // Whoever opens the log while the run goes on sees what it is of. A disk that is full says
-        // so again when the first chunk is written, and that ends the run as any later time.
+        // Whoever opens the log while the run goes on sees what it is of.
         let _ = file.flush();
         let worker = Worker::spawn(self.path.clone(), file)?;
         let mut chunk = Chunk::default();
@@ -271,6 +269,16 @@ impl LogWriter {
         live.draw_begin()?;
         Ok(live)
     }
+}
+
+fn put_attachment(file: &mut File, attachment: Attachment, epoch_ns: u64) -> std::io::Result<()> {
+    let head = AttachmentHeader {
+        log_time: epoch_ns,
+        create_time: epoch_ns,
+        name: attachment.name,
+        media_type: attachment.media_type,
+    };
+    file.attachment(head, &attachment.bytes)
 }
 
 impl Channels {

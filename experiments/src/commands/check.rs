@@ -3,8 +3,8 @@
 use super::Exit;
 use super::describe::commented;
 use super::kinds::{self, FileKind};
-use super::{CommandError, print_document};
-use std::path::Path;
+use super::{CommandError, output, print_document};
+use std::path::{Path, PathBuf};
 
 use farside_logs::escaped;
 
@@ -28,6 +28,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
     // Much of what can be wrong shows only in the world that is built.
     let assembled = scenario.assemble()?;
+    let mut inputs = assembled.files.paths();
+    inputs.push(PathBuf::from(&args.scenario));
+    output::spare(&inputs, &[])?;
     let mut text = scenario.resolved()?;
     if args.comments {
         text = commented(&text, registry);

@@ -6,7 +6,7 @@ use farside_logs::DiffOptions;
 
 use super::Exit;
 use super::kinds::{self, FileKind};
-use super::{CommandError, print, print_json};
+use super::{CommandError, output, print, print_json};
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -41,6 +41,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.a, registry)?;
     kinds::expect(FileKind::Log, &args.b, registry)?;
+    output::spare(&[args.a.clone(), args.b.clone()], &[])?;
     let options = DiffOptions {
         tolerance: args.tolerance,
         ignore: args.ignore.clone(),

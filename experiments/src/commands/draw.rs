@@ -141,6 +141,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let pictures = registry.find(name).map(|system| system.pictures());
     let pictures = pictures.unwrap_or_default();
     if args.list {
+        output::spare(std::slice::from_ref(path), &[])?;
         return list(args, pictures);
     }
     let figure = draw(args, &log, &scenario, pictures).map_err(|error| CommandError::NotDrawn {
@@ -161,12 +162,14 @@ fn write(args: &Args, figure: &Figure, kinds: &[FigureFormat]) -> Result<Exit, C
         args.log.with_file_name(name)
     });
     let inputs = std::slice::from_ref(&args.log);
+    let path = |(index, kind): (usize, &FigureFormat)| match index {
+        0 => out.clone(),
+        _ => out.with_extension(kind.ending()),
+    };
+    let paths: Vec<PathBuf> = kinds.iter().enumerate().map(path).collect();
+    output::spare(inputs, &paths)?;
     let mut files = Vec::new();
-    for (index, kind) in kinds.iter().enumerate() {
-        let path = match index {
-            0 => out.clone(),
-            _ => out.with_extension(kind.ending()),
-        };
+    for (path, kind) in paths.into_iter().zip(kinds) {
         files.push(output::write_figure(path, figure, *kind, inputs)?);
     }
     if args.json {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::Exit;
 use super::kinds::{self, FileKind};
-use super::{CommandError, print, print_json};
+use super::{CommandError, output, print, print_json};
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -22,6 +22,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.log, registry)?;
+    output::spare(std::slice::from_ref(&args.log), &[])?;
     let info = farside_logs::info(&args.log)?;
     if args.json {
         print_json(&info)?;

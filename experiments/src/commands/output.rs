@@ -1,6 +1,7 @@
 //! Files that commands write: never over what the same command reads, nor over what is there and of
 //! another kind.
 
+use std::fs::Metadata;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -54,6 +55,116 @@ impl Format {
             Format::Junit => "JUnit file",
             Format::Plan => "plan",
         }
+    }
+}
+
+/// That a command may write these files, and print what it prints: none is one of the `inputs`, and no
+/// two are one file, by whatever name. To be asked by every command before it opens any of them for
+/// writing; a command that only prints has no `outputs`.
+///
+/// # Errors
+/// [`LogError::SameFile`](farside_logs::LogError::SameFile) or [`CommandError::TwoOutputs`].
+pub(super) fn spare(inputs: &[PathBuf], outputs: &[PathBuf]) -> Result<(), CommandError> {
+    for out in outputs {
+        refuse_input(out, inputs)?;
+    }
+    for (at, out) in outputs.iter().enumerate() {
+        let other = outputs[..at].iter().find(|other| are_one(out, other));
+        if let Some(other) = other {
+            return Err(two_outputs(out, &other.display().to_string()));
+        }
+    }
+    for (stream, name) in [
+        (opened(std::io::stdout()), "standard output"),
+        (opened(std::io::stderr()), "standard error"),
+    ] {
+        let Some(stream) = stream.filter(can_lose) else {
+            continue;
+        };
+        // Appended to, a file would be changed while it is read.
+        let appended = inputs.iter().find(|input| is_it(input, &stream));
+        if let Some(path) = appended {
+            let path = path.clone();
+            return Err(farside_logs::LogError::SameFile { path }.into());
+        }
+        if let Some(out) = outputs.iter().find(|out| is_it(out, &stream)) {
+            return Err(two_outputs(out, name));
+        }
+    }
+    Ok(())
+}
+
+fn two_outputs(out: &Path, other: &str) -> CommandError {
+    CommandError::TwoOutputs {
+        out: out.to_owned(),
+        other: other.to_owned(),
+    }
+}
+
+/// What a stream of this process leads to.
+#[cfg(unix)]
+fn opened(stream: impl std::os::fd::AsFd) -> Option<Metadata> {
+    let stream = stream.as_fd().try_clone_to_owned().ok()?;
+    std::fs::File::from(stream).metadata().ok()
+}
+
+#[cfg(not(unix))]
+fn opened<T>(_stream: T) -> Option<Metadata> {
+    None
+}
+
+/// False for devices, which hold nothing and take what comes.
+#[cfg(unix)]
+fn can_lose(found: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    found.is_file() || found.file_type().is_fifo() || found.file_type().is_socket()
+}
+
+#[cfg(not(unix))]
+fn can_lose(found: &Metadata) -> bool {
+    found.is_file()
+}
+
+/// Whether a path leads to this file.
+#[cfg(unix)]
+fn is_it(path: &Path, file: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let found = std::fs::metadata(path);
+    found.is_ok_and(|found| (found.dev(), found.ino()) == (file.dev(), file.ino()))
+}
+
+#[cfg(not(unix))]
+fn is_it(_path: &Path, _file: &Metadata) -> bool {
+    false
+}
+
+/// Whether two paths lead to one file, or would once it is there.
+fn are_one(one: &Path, other: &Path) -> bool {
+    match (std::fs::metadata(one), std::fs::metadata(other)) {
+        (Ok(_), Ok(found)) if is_it(one, &found) => can_lose(&found),
+        (Ok(found), Ok(_)) => can_lose(&found) && place(one) == place(other),
+        _ => place(one) == place(other),
+    }
+}
+
+/// Where a file is or would be made: symbolic links are followed, also those to nothing yet.
+fn place(path: &Path) -> PathBuf {
+    /// As far as systems follow them.
+    const LINKS: usize = 40;
+    let mut path = path.to_owned();
+    for _ in 0..LINKS {
+        let Ok(target) = std::fs::read_link(&path) else {
+            break;
+        };
+        path = path.parent().unwrap_or(Path::new("")).join(target);
+    }
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+    match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path,
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::Exit;
 use super::kinds::{self, FileKind};
-use super::{CommandError, print, print_json};
+use super::{CommandError, output, print, print_json};
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -23,6 +23,8 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.broken, registry)?;
+    let inputs = std::slice::from_ref(&args.broken);
+    output::spare(inputs, std::slice::from_ref(&args.out))?;
     let report = farside_logs::recover(&args.broken, &args.out)?;
     if args.json {
         print_json(&report)?;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use farside_actors::figure::Figure;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -36,6 +37,16 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// What a report has besides plots.
+const TABLES_AND_PAGE: [&str; 6] = [
+    "results.csv",
+    "summary.csv",
+    "values.csv",
+    "series.csv",
+    "published.csv",
+    "report.html",
+];
 
 /// What `report --json` prints.
 #[derive(Serialize)]
@@ -116,6 +127,17 @@ fn write(
     results: &Results,
 ) -> Result<Document, CommandError> {
     let plots = out.join("plots");
+    let figures = report.figures.iter();
+    let files = figures.flat_map(|figure| kinds.iter().map(move |kind| (figure, *kind)));
+    let files: Vec<(PathBuf, &Figure, FigureFormat)> = files
+        .map(|(figure, kind)| {
+            let path = plots.join(&figure.file).with_extension(kind.ending());
+            (path, figure, kind)
+        })
+        .collect();
+    let mut outputs: Vec<PathBuf> = files.iter().map(|(path, ..)| path.clone()).collect();
+    outputs.extend(TABLES_AND_PAGE.map(|name| out.join(name)));
+    output::spare(inputs, &outputs)?;
     std::fs::create_dir_all(&plots).map_err(|source| CommandError::Write {
         path: plots.clone(),
         source,
@@ -139,13 +161,9 @@ fn write(
             beside: beside.clone(),
         })
     });
-    let figures = report.figures.iter();
-    let files = figures.flat_map(|figure| kinds.iter().map(move |kind| (figure, *kind)));
     let plots: Result<Vec<String>, CommandError> = files
-        .map(|(figure, kind)| {
-            let path = plots.join(&figure.file).with_extension(kind.ending());
-            output::write_figure(path, figure, kind, inputs)
-        })
+        .into_iter()
+        .map(|(path, figure, kind)| output::write_figure(path, figure, kind, inputs))
         .collect();
     let failed = |run: &&RunRecord| {
         matches!(

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::Exit;
 use super::kinds::{self, FileKind};
 use super::run::log_options;
-use super::{CommandError, complain, interrupt, print, print_json, progress};
+use super::{CommandError, complain, interrupt, output, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario};
 use crate::study::results::{Manifest, Results, RunOutcome, RunRecord};
@@ -66,7 +66,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let interrupts = Interrupts::default();
     let raised = interrupts.clone();
     interrupt::on_interrupt(move || raised.raise());
-    may_hold_log(&args.out, &Results::files(&args.folder))?;
+    let inputs = Results::files(&args.folder);
+    output::spare(&inputs, std::slice::from_ref(&args.out))?;
+    may_hold_log(&args.out, &inputs)?;
     let mut trouble = None;
     let again = reproduce(
         manifest,

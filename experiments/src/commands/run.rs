@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use super::Exit;
 use super::kinds::{self, FileKind};
 use super::table::{self, Group};
-use super::{CommandError, complain, interrupt, print, print_json, progress};
+use super::{CommandError, complain, interrupt, output, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
 use farside_actors::system::Results;
 
@@ -158,9 +158,10 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         tracing::warn!("{remark}");
     }
     let log = (!args.no_log).then_some(&args.out);
+    let mut inputs = assembled.files.paths();
+    inputs.push(PathBuf::from(&args.scenario));
+    output::spare(&inputs, log.map_or(&[], std::slice::from_ref))?;
     if let Some(path) = log {
-        let mut inputs = assembled.files.paths();
-        inputs.push(PathBuf::from(&args.scenario));
         may_hold_log(path, &inputs)?;
         let mut options = log_options(&scenario, &assembled, executor, registry)?;
         let draws = scenario.shared().log.viewer;

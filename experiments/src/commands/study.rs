@@ -121,6 +121,14 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     if let Some(shards) = args.array {
         return array::write(args, shards, &plan, &folder);
     }
+    let mut inputs = plan.inputs.clone();
+    inputs.push(PathBuf::from(&args.study));
+    let mut outputs = study::outputs(&folder, args.shard.unwrap_or(Shard::WHOLE));
+    outputs.extend(args.junit.clone());
+    output::spare(&inputs, &outputs)?;
+    if let (Some(junit), Some(check)) = (&args.junit, &args.check) {
+        output::spare(&against::files(check), std::slice::from_ref(junit))?;
+    }
     let before = args.check.as_deref();
     let before = before.map(|path| against::open(path, &plan.manifest));
     let before = before.transpose()?;

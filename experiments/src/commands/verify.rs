@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::Exit;
 use super::kinds::{self, FileKind};
 use super::run::{ExecutorName, FILE_PREFIX};
-use super::{CommandError, interrupt, print, print_json, progress};
+use super::{CommandError, interrupt, output, print, print_json, progress};
 use crate::scenario::{Scenario, ScenarioError};
 use farside_actors::system::Files;
 
@@ -56,6 +56,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         reason,
     };
     kinds::expect(FileKind::Log, path, registry)?;
+    output::spare(std::slice::from_ref(path), &[])?;
     let info = farside_logs::info(path)?;
     let Some(summary) = info.run else {
         return Err(not_repeatable(

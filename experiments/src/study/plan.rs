@@ -50,11 +50,15 @@ pub struct StudyPlan {
     pub(super) scenarios: Vec<Scenario>,
     /// What the scenario says in some cell that has no effect, for people.
     pub remarks: Vec<String>,
+    /// The files that its scenario was read from.
+    pub(crate) inputs: Vec<PathBuf>,
     source: Source,
 }
 
 /// Scenarios of cells, the files that they read, and what is remarked on them.
 struct Built {
+    /// Where on disk the files lie.
+    paths: Vec<PathBuf>,
     scenarios: Vec<Scenario>,
     files: FilesByName,
     remarks: Vec<String>,
@@ -163,7 +167,9 @@ impl Study {
         self.check_axes(&blame)?;
         super::blocks::check_problem(&base, block, &blame)?;
         let scenario_text = base.resolved()?;
+        let scenario_file = self.folder.join(&self.file.scenario);
         let Built {
+            paths,
             scenarios,
             files,
             remarks,
@@ -187,10 +193,14 @@ impl Study {
             report: self.file.report,
         };
         super::load::check_names(&manifest).map_err(StudyError::Argument)?;
+        let mut inputs = paths;
+        // What is built in lies nowhere: a path at which nothing is harms nobody.
+        inputs.push(scenario_file);
         Ok(StudyPlan {
             manifest,
             scenarios,
             remarks,
+            inputs,
             source: self.source,
         })
     }
@@ -403,7 +413,7 @@ impl Study {
             }
             files = read;
         }
-        let all = files.all().clone();
+        let (all, paths) = (files.all().clone(), files.paths());
         for scenario in &mut scenarios {
             // What is on disk may change while the study runs.
             scenario.keep_files(Files::kept(all.clone()));
@@ -414,6 +424,7 @@ impl Study {
             .map(|(remark, within)| told_of_cells(&remark, &within, cells));
         Ok(Built {
             remarks: base.renamed_remarks().chain(remarks).collect(),
+            paths,
             scenarios,
             files: all,
         })

@@ -217,6 +217,15 @@ fn append((path, file): &mut (PathBuf, File), line: &impl Serialize) -> Result<(
     written.map_err(io(path, "cannot write to it"))
 }
 
+/// The files that this shard of a study writes in its results folder.
+pub(crate) fn outputs(folder: &Path, shard: Shard) -> Vec<PathBuf> {
+    let own = [("lock", ""), ("runs", ".jsonl"), ("times", ".jsonl")];
+    let own = own.map(|(stem, ending)| shard.file(stem, ending));
+    let common = [MANIFEST, "results.csv", "values.csv"].map(str::to_owned);
+    let names = own.into_iter().chain(common);
+    names.map(|name| folder.join(name)).collect()
+}
+
 /// The first entry of a folder that no killed process of ours can have left in an empty one.
 fn foreign_entry(folder: &Path) -> Result<Option<String>, StoreError> {
     let entries = match std::fs::read_dir(folder) {

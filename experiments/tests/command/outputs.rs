@@ -186,6 +186,148 @@ fn reports_and_runs_again_spare_what_is_there() {
     refused(at, &report, "results/manifest.json", READ);
 }
 
+/// The command with its standard output appended to a file.
+fn appending(folder: &Path, arguments: &[&str], to: &str) -> Output {
+    let file = std::fs::File::options()
+        .append(true)
+        .create(true)
+        .open(folder.join(to));
+    std::process::Command::new(env!("CARGO_BIN_EXE_farside"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(file.unwrap())
+        .output()
+        .unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_printed_is_an_output_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    assert!(farside(at, &["run", "s.toml"]).status.success());
+    let refused = |arguments: &[&str], to: &str, why: &str| {
+        let before = std::fs::read(at.join(to)).unwrap_or_default();
+        let output = appending(at, arguments, to);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(why), "{arguments:?}: {said}");
+        let after = std::fs::read(at.join(to)).unwrap();
+        assert_eq!(after, before, "{arguments:?} changed {to}");
+    };
+    // Appended to what is read.
+    std::fs::hard_link(at.join("run.mcap"), at.join("hard.mcap")).unwrap();
+    std::os::unix::fs::symlink("s.toml", at.join("soft.toml")).unwrap();
+    refused(&["check", "s.toml"], "s.toml", READ);
+    refused(&["check", "soft.toml"], "s.toml", READ);
+    refused(&["run", "s.toml", "--no-log"], "s.toml", READ);
+    refused(&["info", "run.mcap"], "hard.mcap", READ);
+    refused(&["verify", "run.mcap"], "run.mcap", READ);
+    refused(&["diff", "run.mcap", "hard.mcap"], "run.mcap", READ);
+    refused(&["draw", "run.mcap", "--list"], "run.mcap", READ);
+    refused(&["draw", "run.mcap", "--out", "map.svg"], "run.mcap", READ);
+    // The log in the middle of what is printed.
+    let twice = "is written to by this command twice: it is also standard output";
+    for out in ["/dev/stdout", "/dev/fd/1", "new.mcap"] {
+        refused(&["run", "s.toml", "--out", out], "new.mcap", twice);
+    }
+    // A pipe is one file too.
+    let output = farside(at, &["run", "s.toml", "--out", "/dev/stdout"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty(), "{}", output.stdout.len());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_study_spares_what_it_reads_whatever_its_folder_leads_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let study = "question = 'How late?'\nscenario = 's.toml'\nseeds = 1\nmetrics = ['time_ratio']\n\
+        [[factor]]\nname = 'loss'\nkey = 'links.default.loss'\nvalues = ['0%', '10%']\n";
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let run = ["study", "study.toml", "--out", "results"];
+    let made = farside(at, &run);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    for name in [
+        "results.csv",
+        "values.csv",
+        "times.jsonl",
+        "runs.jsonl",
+        "lock",
+    ] {
+        let path = at.join("results").join(name);
+        let kept = std::fs::read(&path).ok();
+        for input in ["s.toml", "study.toml"] {
+            let _ = std::fs::remove_file(&path);
+            std::os::unix::fs::symlink(at.join(input), &path).unwrap();
+            refused(at, &run, input, READ);
+            std::fs::remove_file(&path).unwrap();
+            std::fs::hard_link(at.join(input), &path).unwrap();
+            refused(at, &run, input, READ);
+        }
+        std::fs::remove_file(&path).unwrap();
+        if let Some(kept) = kept {
+            std::fs::write(&path, kept).unwrap();
+        }
+    }
+    let junit = |out| [&run[..], &["--junit", out]].concat();
+    for (out, kept, why) in [
+        ("study.toml", "study.toml", READ),
+        ("s.toml", "s.toml", READ),
+        (
+            "results/results.csv",
+            "results/results.csv",
+            "is written to by this command twice",
+        ),
+        (
+            "results/../results/runs.jsonl",
+            "results/runs.jsonl",
+            "twice",
+        ),
+    ] {
+        refused(at, &junit(out), kept, why);
+    }
+    let check = ["study", "study.toml", "--out", "new", "--check", "results"];
+    let check = [&check[..], &["--junit", "results/manifest.json"]].concat();
+    refused(at, &check, "results/manifest.json", READ);
+    // Tables of a report that are one file.
+    std::fs::create_dir(at.join("mine")).unwrap();
+    std::fs::write(at.join("mine/results.csv"), "").unwrap();
+    std::fs::hard_link(at.join("mine/results.csv"), at.join("mine/summary.csv")).unwrap();
+    let report = ["report", "results", "--out", "mine"];
+    refused(
+        at,
+        &report,
+        "mine/results.csv",
+        "is written to by this command twice",
+    );
+}
+
+/// The second of two runs into one file leaves the first alone.
+#[test]
+fn a_log_that_is_being_written_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("s.toml"), SCENARIO).unwrap();
+    let options = farside_logs::LogOptions {
+        scenario: "first".to_owned(),
+        resolved: SCENARIO.to_owned(),
+        ..farside_logs::LogOptions::default()
+    };
+    let writer = farside_logs::LogWriter::create(at.join("run.mcap"), options).unwrap();
+    refused(
+        at,
+        &["run", "s.toml"],
+        "run.mcap",
+        "another run is writing it",
+    );
+    drop(writer);
+    let output = farside(at, &["run", "s.toml"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
 /// Letters that a terminal obeys: the end of lines and tabs aside.
 fn obeyed(text: &str) -> Option<char> {
     text.chars()
@@ -221,6 +363,12 @@ fn no_output_has_letters_that_a_terminal_obeys() {
         &["recover", log, "--out", "x\u{9b}.mcap", "--json"],
         &["report", "no\u{9b}where"],
         &["study", "no\u{1b}where"],
+        // What the command line itself refuses.
+        &["run", "--no\u{9b}2Jthing"],
+        &["run", "--seed", "\u{1b}[2J"],
+        &["no\u{1b}[2Jthing"],
+        // What is said besides: a warning of a file's name.
+        &["plan", "check", "mo\u{9b}del.ddl"],
     ] {
         let output = farside(at, arguments);
         for said in [&output.stdout, &output.stderr] {

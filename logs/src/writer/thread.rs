@@ -2,6 +2,7 @@
 //! their buffers back.
 
 use std::collections::BTreeMap;
+use std::fs::{OpenOptions, TryLockError};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
@@ -17,13 +18,31 @@ const QUEUE_CHUNKS: usize = 3;
 
 pub(super) type File = McapFile<BufWriter<std::fs::File>>;
 
-/// Creates the file and writes MCAP's own header.
+/// Creates the file and writes MCAP's own header. A file that another run is writing stays as it is.
 pub(super) fn create(
     path: &Path,
     compression: Compression,
     code_version: &str,
 ) -> Result<File, LogError> {
-    let file = std::fs::File::create(path).map_err(|error| LogError::io(path, "create", error))?;
+    let failed = |error| LogError::io(path, "create", error);
+    let mut options = OpenOptions::new();
+    let file = options.write(true).create(true).truncate(false).open(path);
+    let file = file.map_err(failed)?;
+    // Devices and pipes take what comes, whoever it is from.
+    if file.metadata().is_ok_and(|found| found.is_file()) {
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(LogError::Busy {
+                    path: path.to_owned(),
+                });
+            }
+            // Some file systems know no locks.
+            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error)) => return Err(LogError::io(path, "lock", error)),
+        }
+        file.set_len(0).map_err(failed)?;
+    }
     // What is larger than the buffer, as chunks mostly are, is not copied into it.
     McapFile::create(BufWriter::new(file), compression, library(code_version))
         .map_err(|error| LogError::io(path, "write", error))

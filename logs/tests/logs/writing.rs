@@ -50,6 +50,60 @@ fn logging_changes_nothing() {
     assert_eq!(report, bare);
 }
 
+/// Whoever kills a run early, or looks at its log meanwhile, finds what it is of.
+#[test]
+fn a_log_has_its_scenario_before_the_run_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let resolved = "system = 'network'".to_owned();
+    let writer = LogWriter::create(
+        &path,
+        LogOptions {
+            resolved,
+            ..options()
+        },
+    )
+    .unwrap();
+    let early = std::fs::read(&path).unwrap();
+    assert!(early.starts_with(b"\x89MCAP0\r\n"));
+    let text = b"system = 'network'";
+    assert!(early.windows(text.len()).any(|part| part == text));
+    drop(writer);
+}
+
+#[test]
+fn one_run_at_a_time_writes_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let first = LogWriter::create(&path, options()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let link = folder.path().join("other.mcap");
+    std::fs::hard_link(&path, &link).unwrap();
+    for path in [&path, &link] {
+        let second = LogWriter::create(path, options()).map(drop);
+        let error = second.unwrap_err();
+        assert!(
+            matches!(error, farside_logs::LogError::Busy { .. }),
+            "{error}"
+        );
+        assert!(
+            !error.is_of_output(),
+            "whoever asked for that asked wrongly"
+        );
+    }
+    assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    let mut sim = build(&Plan::default());
+    sim.observe(first);
+    sim.run(Executor::Inline).unwrap();
+    // Written and closed, it gives way to the next.
+    drop(LogWriter::create(&path, options()).unwrap());
+    // Devices take what comes.
+    #[cfg(unix)]
+    for _ in 0..2 {
+        std::mem::forget(LogWriter::create("/dev/null", options()).unwrap());
+    }
+}
+
 #[test]
 fn the_same_run_gives_the_same_bytes() {
     let (_a, first, _) = logged(&Plan::default());

@@ -25,6 +25,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
         source,
     })?;
     let inputs = std::slice::from_ref(&args.plan);
+    output::spare(inputs, std::slice::from_ref(&args.out))?;
     output::write_whole(&args.out, svg.as_bytes(), Format::Svg, inputs)?;
     print(format!(
         "{}: {} tokens of {}",

@@ -38,6 +38,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
             source,
         }
     })?;
+    output::spare(std::slice::from_ref(&args.file), &[])?;
     let is_so = formatted == text;
     if args.check {
         if !is_so {

@@ -125,6 +125,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
     task.warn();
     if let Some(out) = &args.out {
         // Before the search, which may take long.
+        output::spare(&task.files, std::slice::from_ref(out))?;
         output::may_write(out, plan_beginning().as_bytes(), Format::Plan, &task.files)?;
     }
     let settings = Settings {

@@ -13,21 +13,32 @@ pub(super) struct Before {
     results: Results,
 }
 
-/// Opens a results folder, or that of a file in one, and sees whether it fits to the study: before
-/// anything is run.
-///
-/// # Errors
-/// When it is none, or of another study.
-pub(super) fn open(path: &Path, plan: &Manifest) -> Result<Before, CommandError> {
-    let folder = match path.is_file() {
+/// A results folder, or that of a file in one.
+fn folder_of(path: &Path) -> &Path {
+    match path.is_file() {
         // The folder of a file that is named alone is this one.
         true => path
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty())
             .unwrap_or(Path::new(".")),
         false => path,
-    };
-    let results = Results::load(folder)?;
+    }
+}
+
+/// The files that are read of it.
+pub(super) fn files(path: &Path) -> Vec<PathBuf> {
+    let mut files = Results::files(folder_of(path));
+    files.push(path.to_owned());
+    files
+}
+
+/// Opens a results folder, or that of a file in one, and sees whether it fits to the study: before
+/// anything is run.
+///
+/// # Errors
+/// When it is none, or of another study.
+pub(super) fn open(path: &Path, plan: &Manifest) -> Result<Before, CommandError> {
+    let results = Results::load(folder_of(path))?;
     check::fitting(plan, &results.manifest).map_err(|message| wrong(path, &message))?;
     Ok(Before {
         path: path.to_owned(),
