@@ -198,6 +198,62 @@ fn who_asks_for_a_stop_is_heard_at_the_end_of_the_clock_too() {
     }
 }
 
+/// Sets all its timers at the start.
+struct Patient {
+    delays_ns: Vec<u64>,
+}
+
+impl Actor for Patient {
+    type Accepts = (Call,);
+
+    fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        for delay_ns in &self.delays_ns {
+            ctx.timer(SimDuration::from_nanos(*delay_ns), Call);
+        }
+        Ok(())
+    }
+}
+
+impl Handler<Call> for Patient {
+    fn handle(&mut self, _call: Call, _ctx: &mut Context<'_, Self>) -> Outcome {
+        Ok(())
+    }
+}
+
+/// Enough events to be spread over buckets, which are as wide as the clock is long, or end with it.
+#[test]
+fn many_timers_fire_up_to_the_end_of_the_clock() {
+    let soon = || (0..150).map(|at| 1_000 + at);
+    let never = std::iter::repeat_n(u64::MAX, 150);
+    let last = (0..150).map(|at| u64::MAX - 1 - at % 7);
+    let few = [1 << 20, 1 << 40, (1 << 63) + 5, u64::MAX - 1];
+    for (late, fire) in [
+        (Vec::from(few), 4),
+        (never.clone().collect(), 0),
+        (last.clone().collect(), 150),
+        (few.into_iter().chain(never).chain(last).collect(), 154),
+    ] {
+        let delays_ns: Vec<u64> = soon().chain(late).collect();
+        let report = agreed(|heavy| {
+            let mut sim = Simulation::new(1);
+            let hosts = ["a", "b"].map(|name| sim.host(name));
+            for (host, name) in hosts.into_iter().zip(["a", "b"]) {
+                if heavy {
+                    sim.heavy(host);
+                }
+                let delays_ns = delays_ns.clone();
+                sim.actor(host, name, move |_| Patient {
+                    delays_ns: delays_ns.clone(),
+                });
+            }
+            sim
+        });
+        let report = report.expect("it can start");
+        assert_eq!(report.end.name(), "completed");
+        assert_eq!(report.counts.events, 2 * (1 + 150 + fire));
+    }
+}
+
 #[test]
 fn a_delay_past_the_clock_undercuts_nothing() {
     let model = Late {
