@@ -135,6 +135,12 @@ impl CommandError {
             | CommandError::OtherKind { .. }
             | CommandError::Export(_)
             | CommandError::Arguments(_) => Exit::Wrong,
+            // Names come from scenarios.
+            CommandError::Build(
+                BuildError::BadName { .. }
+                | BuildError::ReservedName { .. }
+                | BuildError::DuplicateName { .. },
+            ) => Exit::Wrong,
             CommandError::Build(_)
             | CommandError::Write { .. }
             | CommandError::Output(_)

@@ -45,7 +45,7 @@ settings! {
         /// What their names begin with.
         pub prefix: String, named("the beginning of names");
         /// How many there are.
-        pub count: u32 = 0, 1..=1_000_000;
+        pub count: u32 = 0, 1..;
     }
 }
 

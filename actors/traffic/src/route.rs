@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use farside::Pattern;
 use farside::random::name_hash;
+use farside::record::RESERVED;
 use farside::suggest::{closest, did_you_mean};
 
 use super::config::{FlowConfig, TrafficConfig, TrafficError};
@@ -164,6 +165,11 @@ fn hosts(config: &TrafficConfig) -> Result<Vec<String>, TrafficError> {
         let good = |c: char| c.is_ascii_alphanumeric() || c == '_';
         if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(good) {
             let message = format!("{name:?}: expected 1 to {MAX_NAME} letters, digits and `_`");
+            return Err(TrafficError::new(key, message));
+        }
+        // Each host has an actor of its name.
+        if RESERVED.contains(&name.as_str()) {
+            let message = format!("{name:?}: logs use this name for topics of their own");
             return Err(TrafficError::new(key, message));
         }
         if hosts.len() == MAX_HOSTS {

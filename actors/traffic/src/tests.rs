@@ -354,8 +354,12 @@ fn each_mistake_names_its_key() {
             "traffic.hosts.1: \"b c\": expected 1 to 64 letters",
         ),
         (
+            "hosts = ['a', 'lost']",
+            "traffic.hosts.1: \"lost\": logs use this name",
+        ),
+        (
             "groups = [{ prefix = 'x', count = 0 }]",
-            "traffic.groups.0.count: 0: expected 1 to 1000000",
+            "traffic.groups.0.count: 0: expected at least 1",
         ),
         (
             "groups = [{ prefix = 'x', count = 99999 }]",
