@@ -12,6 +12,7 @@ use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::record::{Checkpoint, Flow, Observer, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
+use crate::ruling::Rulings;
 use crate::time::SimTime;
 use crate::topology::{Kind, Topology};
 
@@ -119,6 +120,11 @@ impl Committer {
             counts: self.counts,
             end_time,
             end,
+            rulings: topology
+                .rulings
+                .as_ref()
+                .map(Rulings::ends)
+                .unwrap_or_default(),
         };
         if let Some(failure) = self.failure {
             report.end = End::ObserverFailed(failure);

@@ -202,7 +202,8 @@ pub enum BuildError {
         /// The other.
         second: String,
     },
-    /// An actor was to be told something, and there is no such actor, or it does not accept that.
+    /// An actor was to be told something, or a message was ruled on, and there is no such actor or
+    /// message, or the actor does not accept that.
     #[error(transparent)]
     Lookup(#[from] LookupError),
     /// An observer failed before the first event.
@@ -222,6 +223,14 @@ pub enum LookupError {
         /// The name.
         name: String,
         /// The actor whose name is closest to it.
+        nearest: Option<String>,
+    },
+    /// No message of the run is of the kind.
+    #[error("no message is a {kind:?}{}", suggestion(.nearest.as_deref()))]
+    UnknownKind {
+        /// The kind.
+        kind: String,
+        /// The kind whose name is closest to it.
         nearest: Option<String>,
     },
     /// The actor is of another type.
@@ -253,6 +262,15 @@ impl LookupError {
         LookupError::Unknown {
             name: name.to_owned(),
             nearest: nearest(name, actors),
+        }
+    }
+}
+
+impl LookupError {
+    pub(crate) fn unknown_kind<'a>(kind: &str, kinds: impl Iterator<Item = &'a str>) -> Self {
+        LookupError::UnknownKind {
+            kind: kind.to_owned(),
+            nearest: nearest(kind, kinds),
         }
     }
 }

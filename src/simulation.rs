@@ -16,6 +16,7 @@ use crate::ids::{HostId, LinkId};
 use crate::payload::Message;
 use crate::record::Observer;
 use crate::report::Report;
+use crate::ruling::{MessageId, Ruling};
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{ActorType, FixedMap, KindEntry};
 
@@ -85,6 +86,7 @@ pub struct Simulation {
     step_limit: u32,
     digest: bool,
     check_min_delay: bool,
+    rulings: Vec<(MessageId, Ruling)>,
 }
 
 impl Simulation {
@@ -105,6 +107,7 @@ impl Simulation {
             step_limit: 10_000,
             digest: true,
             check_min_delay: true,
+            rulings: Vec::new(),
         }
     }
 
@@ -463,6 +466,45 @@ impl Simulation {
     pub fn change_at<C: Message>(&mut self, time: SimTime, link: LinkId<C>, change: C) {
         let what = Planned::Change(SealedChange::new(change));
         self.control(time, Some(Target::Link(link.declared)), what);
+    }
+
+    /// Decides what becomes of a message that goes through a link, whatever the link decides. Of several
+    /// rulings on one message each sees what the one before has left. What came of them is in
+    /// [`Report::rulings`], in the order in which they were declared.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// use farside::ruling::{Ruling, RulingEnd};
+    /// use serde::{Deserialize, Serialize};
+    ///
+    /// #[derive(Serialize, Deserialize)]
+    /// struct Ping;
+    /// struct Sink;
+    /// impl Actor for Sink { type Accepts = (Ping,); }
+    /// impl Handler<Ping> for Sink {
+    ///     fn handle(&mut self, _: Ping, _: &mut Context<'_, Self>) -> Outcome { Ok(()) }
+    /// }
+    /// struct Source(Address<Sink>);
+    /// impl Actor for Source {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         for _ in 0..3 { ctx.send(self.0, Ping); }
+    ///         Ok(())
+    ///     }
+    /// }
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// let sink = sim.actor(b, "sink", |_| Sink);
+    /// sim.actor(a, "source", move |_| Source(sink));
+    /// sim.link(a, b, "a-b", FixedDelay::new(SimDuration::from_millis(5)));
+    /// sim.rule("source,sink,Ping,1".parse()?, Ruling::Lose);
+    /// let report = sim.run(Executor::Inline)?;
+    /// assert_eq!((report.counts.delivered, report.counts.lost_by_reason["ruled"]), (2, 1));
+    /// assert_eq!(report.rulings, [RulingEnd::Applied]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn rule(&mut self, message: MessageId, ruling: Ruling) {
+        self.rulings.push((message, ruling));
     }
 
     /// Stops the run at `time`, before anything that would happen then.

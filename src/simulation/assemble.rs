@@ -11,6 +11,7 @@ use crate::fault::{BuildError, Fault};
 use crate::guard::guarded;
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
+use crate::ruling::Rulings;
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
@@ -75,6 +76,18 @@ impl Simulation {
         for (declared, entity) in ranked.actors.iter().enumerate() {
             address_numbers[entity.index()] = Some(declared as u32);
         }
+        let info = Arc::new(RunInfo {
+            seed: self.seed,
+            tie_seed: self.tie_seed,
+            entities: ranked.entities.clone(),
+            kinds: kinds.list,
+            look_ahead,
+            planned: planned(&controls),
+        });
+        let rulings = match &self.rulings[..] {
+            [] => None,
+            declared => Some(Rulings::new(declared, &info)?),
+        };
         let topology = Arc::new(Topology {
             seed: self.seed,
             name_hashes: ranked
@@ -99,14 +112,8 @@ impl Simulation {
             observed: !wants.is_empty(),
             samples: wants.iter().any(|wants| wants.samples),
             check_min_delay: self.check_min_delay,
-            info: Arc::new(RunInfo {
-                seed: self.seed,
-                tie_seed: self.tie_seed,
-                entities: ranked.entities.clone(),
-                kinds: kinds.list,
-                look_ahead,
-                planned: planned(&controls),
-            }),
+            rulings,
+            info,
         });
         let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
@@ -357,7 +364,11 @@ impl Simulation {
         ranked: &Ranked,
         kinds: &Kinds,
     ) -> Result<Vec<Control>, BuildError> {
-        let controls = std::mem::take(&mut self.controls).into_iter().enumerate();
+        let mut controls = std::mem::take(&mut self.controls);
+        // Numbered in order of time, so that what is planned for later has no part in the keys of what
+        // comes before: a fork of a run is that run up to where it begins.
+        controls.sort_by_key(|control| control.time);
+        let controls = controls.into_iter().enumerate();
         let types = &self.types;
         let actors = &self.actors;
         let control = |(count, decl): (usize, super::ControlDecl)| {
