@@ -206,6 +206,16 @@ pub enum BuildError {
     /// message, or the actor does not accept that.
     #[error(transparent)]
     Lookup(#[from] LookupError),
+    /// Actors cannot be built as another simulation builds them.
+    #[error(
+        "{own} here is {its} there: expected the same hosts, actors and links in the same order"
+    )]
+    OtherTeam {
+        /// What this simulation has.
+        own: String,
+        /// What the other has in its place.
+        its: String,
+    },
     /// An observer failed before the first event.
     #[error(transparent)]
     Observer(#[from] ObserverError),

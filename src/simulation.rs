@@ -56,6 +56,7 @@ enum Target {
 enum Planned {
     Crash,
     Restart,
+    Rebuild(Factory),
     Change(SealedChange),
     Tell(KindEntry, Sealed),
     Stop(String),
@@ -342,6 +343,78 @@ impl Simulation {
         Ok(())
     }
 
+    /// From `time` on the actors whose names `which` picks are built as `other` builds them: those that have
+    /// not crashed are restarted then, in a new incarnation, and keep what is durable. A fork of a run changes
+    /// the settings of actors so. Returns their names.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// struct Rover(u32);
+    /// impl Actor for Rover {
+    ///     type Accepts = ();
+    ///     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+    ///         match self.0 {
+    ///             1 => Ok(()),
+    ///             speed => Ok(ctx.stop(format!("at speed {speed}"))),
+    ///         }
+    ///     }
+    /// }
+    /// let assemble = |speed| {
+    ///     let mut sim = Simulation::new(1);
+    ///     let host = sim.host("rover_01");
+    ///     sim.actor(host, "rover_01", move |_| Rover(speed));
+    ///     sim
+    /// };
+    /// let mut sim = assemble(1);
+    /// let rebuilt = sim.rebuild_at(SimTime::from_secs(9), assemble(5), |name| name.starts_with("rover"));
+    /// assert_eq!(rebuilt?, ["rover_01"]);
+    /// let report = sim.run(Executor::Inline)?;
+    /// assert_eq!((report.end_time.as_nanos(), report.end.detail().as_str()), (9_000_000_000, "rover_01: at speed 5"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When `other` has not the same hosts, actors and links, in the same order: addresses that its actors
+    /// hold would mean others here.
+    pub fn rebuild_at(
+        &mut self,
+        time: SimTime,
+        other: Simulation,
+        which: impl Fn(&str) -> bool,
+    ) -> Result<Vec<String>, BuildError> {
+        if let Some((own, its)) = self.first_difference(&other) {
+            return Err(BuildError::OtherTeam { own, its });
+        }
+        let mut rebuilt = Vec::new();
+        for (declared, actor) in (0..).zip(other.actors) {
+            if which(&actor.name) {
+                let target = Some(Target::Actor(declared));
+                self.control(time, target, Planned::Rebuild(actor.factory));
+                rebuilt.push(actor.name);
+            }
+        }
+        Ok(rebuilt)
+    }
+
+    /// The first host, actor or link that the two do not have alike, as either has it.
+    fn first_difference(&self, other: &Simulation) -> Option<(String, String)> {
+        let hosts =
+            |sim: &Simulation| -> Vec<String> { sim.host_names().map(str::to_owned).collect() };
+        let links =
+            |sim: &Simulation| -> Vec<String> { sim.link_names().map(str::to_owned).collect() };
+        let actors = |sim: &Simulation| -> Vec<String> {
+            let actor = |actor: &ActorDecl| {
+                let host = &sim.hosts[actor.host.0 as usize].name;
+                let of = sim.types[actor.actor_type as usize].name;
+                format!("{} on {host}, a {of}", actor.name)
+            };
+            sim.actors.iter().map(actor).collect()
+        };
+        differs("host", &hosts(self), &hosts(other))
+            .or_else(|| differs("actor", &actors(self), &actors(other)))
+            .or_else(|| differs("link", &links(self), &links(other)))
+    }
+
     /// Tells an actor something at `time`: a goal that arrives at noon, a fault to inject. The
     /// message is handled before anything else that happens at its instant; at time zero, before
     /// the actor's `started`. A crashed actor is told in vain, and the log says that it was told.
@@ -586,4 +659,16 @@ impl Simulation {
         let delays = self.links.iter().map(|link| link.carrier.min_delay());
         delays.min().unwrap_or(SimDuration::ZERO)
     }
+}
+
+/// Where two lists of names first differ, and what either has there.
+fn differs(what: &str, own: &[String], its: &[String]) -> Option<(String, String)> {
+    let shorter = own.len().min(its.len());
+    let at = own.iter().zip(its).position(|(own, its)| own != its);
+    let at = at.or((own.len() != its.len()).then_some(shorter))?;
+    let named = |names: &[String]| match names.get(at) {
+        Some(name) => format!("{what} {name}"),
+        None => format!("no further {what}"),
+    };
+    Some((named(own), named(its)))
 }

@@ -43,7 +43,7 @@ fn planned(controls: &[Control]) -> Vec<PlannedEvent> {
             entity: *entity,
             action: match action {
                 Action::Crash => PlannedAction::Crash,
-                Action::Restart => PlannedAction::Restart,
+                Action::Restart | Action::Rebuild(_) => PlannedAction::Restart,
                 Action::Change(_) => PlannedAction::Change,
                 Action::Tell(..) => PlannedAction::Tell,
             },
@@ -380,6 +380,9 @@ impl Simulation {
             let what = match decl.what {
                 Planned::Crash => ControlAction::Entity(entity, Action::Crash),
                 Planned::Restart => ControlAction::Entity(entity, Action::Restart),
+                Planned::Rebuild(factory) => {
+                    ControlAction::Entity(entity, Action::Rebuild(factory))
+                }
                 Planned::Change(change) => ControlAction::Entity(entity, Action::Change(change)),
                 Planned::Tell(kind, letter) => {
                     // Whoever handles a type may have left it out of `Accepts`.
