@@ -6,6 +6,7 @@ mod contacts;
 mod coupling;
 mod determinism;
 mod end_of_time;
+mod forks;
 mod golden;
 mod house;
 mod layering;
