@@ -8,7 +8,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::encoding::{EncodeError, Schema};
-use crate::ids::{EntityId, HostId, MatchKey};
+use crate::ids::{EntityId, HostId, KindIndex, MatchKey};
 use crate::payload::{Encode, Message};
 use crate::random::RandomKey;
 use crate::time::{SimDuration, SimTime};
@@ -52,6 +52,7 @@ pub struct Parcel<'a> {
     pub(crate) sender: EntityId,
     pub(crate) receiver: EntityId,
     pub(crate) kind: &'a Kind,
+    pub(crate) kind_index: KindIndex,
     pub(crate) ordinal: u64,
     pub(crate) repeat: u32,
     pub(crate) copy: u32,
@@ -136,6 +137,17 @@ impl Parcel<'_> {
         let size = scratch.len() as u64;
         self.size.set(Some(size));
         size
+    }
+
+    /// Whether a copy of the message is to arrive whatever chance does, see
+    /// [`Ruling::Deliver`](crate::ruling::Ruling::Deliver). A link that is about to lose it by chance asks this
+    /// first, and gives it the delay that it would have had; else the kernel delivers it after the loss.
+    #[inline]
+    pub fn is_spared(&self, copy: u32) -> bool {
+        match &self.topology.rulings {
+            None => false,
+            Some(rulings) => rulings.spares(self, copy),
+        }
     }
 
     /// The address of this link's draws for this message: (run seed, link, purpose, message

@@ -11,6 +11,7 @@ use crate::ids::EntityId;
 use crate::key::EventKey;
 use crate::record::{Checkpoint, Flow, NamedObserver, RecordClass, Wants};
 use crate::report::{Counts, End, Report};
+use crate::ruling::Rulings;
 use crate::time::SimTime;
 use crate::topology::{Kind, Topology};
 
@@ -129,6 +130,11 @@ impl Committer {
             counts: self.counts,
             end_time,
             end,
+            rulings: topology
+                .rulings
+                .as_ref()
+                .map(Rulings::ends)
+                .unwrap_or_default(),
         };
         if let Some(failure) = self.failure {
             report.end = End::ObserverFailed(failure);

@@ -72,6 +72,8 @@ impl LinkCell {
 pub(crate) enum Action {
     Crash,
     Restart,
+    /// From now on, and at once unless it lies crashed, the actor is built so.
+    Rebuild(Factory),
     Change(SealedChange),
     Tell(KindIndex, Sealed),
 }
@@ -414,16 +416,15 @@ impl Engine {
                 self.commit(RecordClass::Crash, key, &head, sink);
                 Ok(())
             }
-            Action::Restart => {
+            Action::Restart => self.restart(key, entity, &head, sink),
+            Action::Rebuild(factory) => {
                 let cell = &mut self.actors[local];
-                cell.state.incarnation += 1;
-                cell.state.clear_streams();
-                let (topology, factory) = (&self.parts.topology, &cell.state.rest.factory);
-                let old = dropped(cell.actor.take());
-                let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
-                cell.actor =
-                    Some(built.map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?);
-                self.run_handler(RecordClass::Restart, key, &head, None, sink)
+                let old = std::mem::replace(&mut cell.state.rest.factory, factory);
+                dropped(old).map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?;
+                match self.actors[local].actor.is_some() {
+                    true => self.restart(key, entity, &head, sink),
+                    false => Ok(()),
+                }
             }
             Action::Change(change) => {
                 let links = &self.parts.topology.links;
@@ -437,6 +438,25 @@ impl Engine {
             }
             Action::Tell(kind, letter) => self.tell_actor(key, head, kind, letter, sink),
         }
+    }
+
+    /// Builds an actor anew, in a new incarnation.
+    fn restart(
+        &mut self,
+        key: EventKey,
+        entity: EntityId,
+        head: &Head,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        let local = self.parts.topology.place(entity).local as usize;
+        let cell = &mut self.actors[local];
+        cell.state.incarnation += 1;
+        cell.state.clear_streams();
+        let (topology, factory) = (&self.parts.topology, &cell.state.rest.factory);
+        let old = dropped(cell.actor.take());
+        let built = old.and_then(|()| guarded(|| factory(topology.name(entity))));
+        cell.actor = Some(built.map_err(|cause| self.parts.fault_at(key, entity, None, *cause))?);
+        self.run_handler(RecordClass::Restart, key, head, None, sink)
     }
 
     /// Hands an actor a message from a control event. A crashed actor is told in vain.

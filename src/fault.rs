@@ -270,9 +270,20 @@ pub enum BuildError {
         /// Its number there, in order of declaration.
         number: u32,
     },
-    /// An actor was to be told something, and there is no such actor, or it does not accept that.
+    /// An actor was to be told something, or a message was ruled on, and there is no such actor or
+    /// message, or the actor does not accept that.
     #[error(transparent)]
     Lookup(#[from] LookupError),
+    /// Actors cannot be built as another simulation builds them.
+    #[error(
+        "{own} here is {its} there: expected the same hosts, actors and links in the same order"
+    )]
+    OtherTeam {
+        /// What this simulation has.
+        own: String,
+        /// What the other has in its place.
+        its: String,
+    },
     /// An observer failed before the first event.
     #[error(transparent)]
     Observer(#[from] ObserverError),
@@ -290,6 +301,14 @@ pub enum LookupError {
         /// The name.
         name: String,
         /// The actor whose name is closest to it.
+        nearest: Option<String>,
+    },
+    /// No message of the run is of the kind.
+    #[error("no message is a {kind:?}{}", suggestion(.nearest.as_deref()))]
+    UnknownKind {
+        /// The kind.
+        kind: String,
+        /// The kind whose name is closest to it.
         nearest: Option<String>,
     },
     /// The actor is of another type.
@@ -321,6 +340,15 @@ impl LookupError {
         LookupError::Unknown {
             name: name.to_owned(),
             nearest: nearest(name, actors),
+        }
+    }
+}
+
+impl LookupError {
+    pub(crate) fn unknown_kind<'a>(kind: &str, kinds: impl Iterator<Item = &'a str>) -> Self {
+        LookupError::UnknownKind {
+            kind: kind.to_owned(),
+            nearest: nearest(kind, kinds),
         }
     }
 }

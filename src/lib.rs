@@ -146,6 +146,7 @@ mod queue;
 pub mod random;
 pub mod record;
 pub mod report;
+pub mod ruling;
 pub mod scene;
 mod schedule;
 mod simulation;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
 use crate::fault::Fault;
+use crate::ruling::RulingEnd;
 use crate::time::SimTime;
 
 /// Why a run ended.
@@ -81,6 +82,9 @@ pub struct Report {
     pub end_time: SimTime,
     /// Why it ended.
     pub end: End,
+    /// What came of each ruling on a message, in the order of
+    /// [`Simulation::rule`](crate::Simulation::rule).
+    pub rulings: Vec<RulingEnd>,
 }
 
 impl Report {

@@ -2,6 +2,7 @@
 
 mod assemble;
 mod controls;
+mod forks;
 
 use std::any::TypeId;
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use crate::ids::{HostId, LinkId, Owner};
 use crate::payload::Message;
 use crate::record::{NamedObserver, Observer};
 use crate::report::Report;
+use crate::ruling::{MessageId, Ruling};
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{ActorType, FixedMap, KindEntry};
 
@@ -64,6 +66,7 @@ enum Target {
 enum Planned {
     Crash,
     Restart,
+    Rebuild(Factory),
     Change(SealedChange),
     Tell(KindEntry, Sealed),
     Stop(String),
@@ -100,6 +103,7 @@ pub struct Simulation {
     check_min_delay: bool,
     /// The first mistake that was noticed as it was made.
     mistake: Option<BuildError>,
+    rulings: Vec<(MessageId, Ruling)>,
 }
 
 impl Simulation {
@@ -123,6 +127,7 @@ impl Simulation {
             digest: true,
             check_min_delay: true,
             mistake: None,
+            rulings: Vec::new(),
         }
     }
 

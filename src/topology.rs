@@ -12,6 +12,7 @@ use crate::ids::{EntityId, HostIndex, KindIndex, Owner};
 use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::name_hash;
+use crate::ruling::Rulings;
 use crate::time::{SimDuration, SimTime};
 
 /// A hash map that is only ever asked for a key, with a hasher that is the same on every machine.
@@ -378,6 +379,8 @@ pub(crate) struct Topology {
     pub(crate) samples: bool,
     /// False only in the test that shows why the check of `min_delay` is there.
     pub(crate) check_min_delay: bool,
+    /// What becomes of single messages whatever links decide; none in nearly all runs.
+    pub(crate) rulings: Option<Rulings>,
 }
 
 impl Topology {

@@ -7,6 +7,7 @@ mod coupling;
 mod determinism;
 mod end_of_time;
 mod foreign_ids;
+mod forks;
 mod golden;
 mod house;
 mod layering;

@@ -286,7 +286,7 @@ impl Link {
         let params = &span.params;
         for copy in 0..stage::copies(params, parcel) {
             let draws = Draws::first(copy);
-            if draws.happens(parcel, Purpose::Loss, params.loss) {
+            if draws.happens(parcel, Purpose::Loss, params.loss) && !parcel.is_spared(copy) {
                 verdicts.lose(LOSS);
             } else {
                 let way = stage::way(params, params.latency, span.floor, parcel, draws);

@@ -19,7 +19,7 @@ pub mod settings;
 use std::sync::Arc;
 
 use farside::scene::Scene;
-use farside::{Report, SimDuration, Simulation};
+use farside::{Pattern, Report, SimDuration, Simulation};
 use farside_worlds::contacts::ContactPlan;
 use serde_json::{Map, Value};
 
@@ -118,6 +118,12 @@ pub trait Settings: Send + Sync {
     /// # Errors
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
+
+    /// Whose restart takes up another value of this key in mid-run, as patterns over actors' names: what a
+    /// fork of a run may set. None, the default, for a key with which the world or the team is built.
+    fn taken_up_by(&self, _key: &str) -> Option<Vec<Pattern>> {
+        None
+    }
 
     /// Draws one of [`System::pictures`] from what a run recorded. `setup` is what the run was built
     /// from: what a system works out of its settings and links it works out in one place, for runs

@@ -11,7 +11,7 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, plan, recover, report,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, recover, report,
     reproduce, run, shown, study, verify,
 };
 use crate::registry::Registry;
@@ -63,6 +63,8 @@ enum Command {
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
     Diff(diff::Args),
+    /// Run a log's scenario again with something changed from an instant on, and compare
+    Fork(fork::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
@@ -209,6 +211,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Info(args) => info::run(&args, registry),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args, registry),
+        Command::Fork(args) => fork::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),

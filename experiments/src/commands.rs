@@ -6,6 +6,7 @@ mod describe;
 pub(crate) mod diff;
 pub(crate) mod draw;
 pub(crate) mod explain;
+pub(crate) mod fork;
 pub(crate) mod info;
 mod interrupt;
 mod kinds;

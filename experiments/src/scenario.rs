@@ -8,9 +8,11 @@ mod blame;
 pub mod contacts;
 mod crash;
 mod error;
+mod fork;
 mod location;
 mod planned;
 mod reference;
+mod rulings;
 mod seeds;
 mod source;
 
@@ -18,7 +20,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::suggest::nearest;
-use farside::{End, SimDuration, SimTime, Simulation};
+use farside::{End, Report, SimDuration, SimTime, Simulation};
 use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinksConfig};
 use farside_actors::radio::RadioConfig;
@@ -38,9 +40,12 @@ use crate::registry::Registry;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
+use fork::Changed;
+pub use fork::Fork;
 pub use location::SourceLocation;
 pub use planned::{Never, Planned};
 pub use reference::shared_sections;
+pub use rulings::{Delay, Deliver, Lose};
 pub(crate) use source::Source;
 
 /// The most bytes of a scenario or study that are read.
@@ -78,6 +83,14 @@ settings! {
         pub degrade: Vec<Degrade> [skip_serializing_if = "Vec::is_empty"];
         /// When actors crash.
         pub crash: Vec<Crash> [skip_serializing_if = "Vec::is_empty"];
+        /// Messages that are lost, whatever their links decide.
+        pub lose: Vec<Lose> [skip_serializing_if = "Vec::is_empty"];
+        /// Messages that arrive, whatever their links decide.
+        pub deliver: Vec<Deliver> [skip_serializing_if = "Vec::is_empty"];
+        /// Messages that arrive later than their links decide.
+        pub delay: Vec<Delay> [skip_serializing_if = "Vec::is_empty"];
+        /// Other settings from an instant on.
+        pub fork: Vec<Fork> [skip_serializing_if = "Vec::is_empty"];
         /// What the log holds.
         pub log: LogSettings;
     }
@@ -123,6 +136,8 @@ pub struct Scenario {
     settings: Box<dyn Settings>,
     source: Source,
     files: Files,
+    /// What holds from each of its forks on.
+    changed: Vec<Changed>,
 }
 
 /// A simulation built from a scenario, ready to run.
@@ -197,7 +212,7 @@ impl Scenario {
         registry: &Registry,
         files: Files,
     ) -> Result<Scenario, ScenarioError> {
-        let mut source = Source::new(name, text, sets)?;
+        let mut source = Source::new(name, text.clone(), sets)?;
         let system = {
             let document = source.document()?;
             let system = registry.find(&system_name(&source, document.get_ref())?);
@@ -220,7 +235,7 @@ impl Scenario {
                 settings.map_err(|error| ScenarioError::from_toml(&source, &error))?,
             )
         };
-        let scenario = Scenario {
+        let mut scenario = Scenario {
             name: if registry.scenario(name).is_some() {
                 name.to_owned()
             } else {
@@ -230,10 +245,14 @@ impl Scenario {
             settings,
             source,
             files,
+            changed: Vec::new(),
         };
         let checked = scenario.settings.check();
         checked.map_err(|error| ScenarioError::from_setup(&scenario.source, error))?;
         scenario.check_crashes()?;
+        rulings::check(&scenario.shared)
+            .map_err(|mistake| scenario.invalid(mistake.key, mistake.message))?;
+        scenario.read_forks(&text, sets, registry)?;
         Ok(scenario)
     }
 
@@ -259,6 +278,11 @@ impl Scenario {
         self.source.remarks()
     }
 
+    /// Which of its entries about single messages met none, or changed nothing, for people.
+    pub(crate) fn unmet_rulings(&self, report: &Report) -> Vec<String> {
+        rulings::remarks(&self.shared, report)
+    }
+
     /// Where it reads files.
     pub(crate) fn files(&self) -> &Files {
         &self.files
@@ -272,6 +296,9 @@ impl Scenario {
     /// Replaces the end, as `--until` does.
     pub fn set_until(&mut self, until: SimDuration) {
         self.shared.until = Some(until);
+        for changed in &mut self.changed {
+            changed.set_until(until);
+        }
     }
 
     /// The scenario with everything that was left to defaults filled in, as TOML. Read again, it
@@ -292,6 +319,17 @@ impl Scenario {
         all.extend(own);
         all.extend(shared_tables);
         toml::to_string(&all).map_err(unwritable)
+    }
+
+    /// The same, as it is from its last fork on.
+    ///
+    /// # Errors
+    /// Those of [`Scenario::resolved`].
+    pub(crate) fn last_resolved(&self) -> Result<String, ScenarioError> {
+        let shared = self.changed.last().map_or(&self.shared, Changed::shared);
+        toml::to_string(shared).map_err(|error| ScenarioError::Unwritable {
+            message: error.to_string(),
+        })
     }
 
     /// Builds the simulation.
@@ -319,7 +357,7 @@ impl Scenario {
             contacts,
             mut notes,
         } = declared;
-        let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
+        let mut setup = Setup::new(seeds, self.until(), &mut sim, &mut files, links);
         let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);
@@ -332,21 +370,25 @@ impl Scenario {
             contacts.check_hosts(&sim).map_err(wrong)?;
             notes.extend(contacts.notes(&sim));
         }
-        for (index, crash) in self.shared.crash.iter().enumerate() {
-            let times = crash.plan(&mut sim, seed, index, self.shared.until);
-            let times = times.map_err(|mistake| self.crash_error(index, mistake))?;
-            let each = |what| (!crash.goes_on()).then_some(what);
-            planned.add(format!("crash.{index}"), "is", each("crashes"), times.down);
-            let key = format!("crash.{index}.restart");
-            planned.add(key, "is", each("restarts"), times.up);
+        for (shared, from, until) in self.eras() {
+            for (index, crash) in shared.crash.iter().enumerate() {
+                let times = crash.plan(&mut sim, seed, index, self.until(), (from, until));
+                let times = times.map_err(|mistake| self.crash_error(index, mistake))?;
+                let each = |what| (!crash.goes_on()).then_some(what);
+                planned.add(format!("crash.{index}"), "is", each("crashes"), times.down);
+                let key = format!("crash.{index}.restart");
+                planned.add(key, "is", each("restarts"), times.up);
+            }
         }
+        self.rebuild(&mut sim, seeds)?;
+        rulings::declare(&self.shared, &mut sim);
         let remarks = remarks
             .into_iter()
             .chain(planned.behind_until())
             .chain(self.source.remarks())
             .chain(contacts.iter().flat_map(LinkContacts::remarks))
             .collect();
-        if let Some(until) = self.shared.until {
+        if let Some(until) = self.until() {
             sim.stop_at(SimTime::ZERO + until, &reason_of(until));
         }
         Ok(Assembled {
@@ -363,7 +405,10 @@ impl Scenario {
     /// The links as the scenario has them, before hosts are known.
     fn links(&self, files: &mut Files) -> Result<DeclaredLinks, SetupError> {
         let mut links = LinkBuilder::new(&self.shared.links, &self.shared.degrade)?;
-        links.until(self.shared.until);
+        for (index, changed) in self.changed.iter().enumerate() {
+            links.change_from(changed.at(), changed.links(index)?);
+        }
+        links.until(self.until());
         links.radios(&self.shared.radios)?;
         for (host, [x, y, z]) in &self.shared.places {
             links.place(host, Point3::new(x.0, y.0, z.0));
@@ -389,10 +434,18 @@ impl Scenario {
 
     /// What is planned for instants of the run, but for crashes.
     fn planned(&self, sim: &Simulation, contacts: Option<&LinkContacts>) -> Planned {
-        let mut planned = Planned::new(self.shared.until);
-        for (index, degrade) in self.shared.degrade.iter().enumerate() {
-            let key = format!("degrade.{index}");
-            planned.add(key, "begins", None, vec![degrade.at]);
+        let mut planned = Planned::new(self.until());
+        for (shared, from, until) in self.eras() {
+            for (index, degrade) in shared.degrade.iter().enumerate() {
+                let is_here = degrade.at >= from && until.is_none_or(|until| degrade.at < until);
+                if is_here {
+                    let key = format!("degrade.{index}");
+                    planned.add(key, "begins", None, vec![degrade.at]);
+                }
+            }
+        }
+        for (index, changed) in self.changed.iter().enumerate() {
+            planned.add(format!("fork.{index}"), "begins", None, vec![changed.at()]);
         }
         planned.add_contacts(contacts, &self.shared.links, sim);
         planned.add_tells(sim);
@@ -412,13 +465,13 @@ impl Scenario {
         let (seeds, mut files) = (run.seeds(), self.files.clone());
         let links = self.links(&mut files)?.links;
         let mut sim = Simulation::new(seeds.run);
-        let mut setup = Setup::new(seeds, self.shared.until, &mut sim, &mut files, links);
+        let mut setup = Setup::new(seeds, self.until(), &mut sim, &mut files, links);
         self.settings.draw(picture, run, request, &mut setup)
     }
 
     /// Whether a run ended because its time was over.
     pub(crate) fn is_time_out(&self, end: &End) -> bool {
-        match (end, self.shared.until) {
+        match (end, self.until()) {
             (End::Stopped { by, reason }, Some(until)) => {
                 by.starts_with('@') && *reason == reason_of(until)
             }
@@ -449,6 +502,15 @@ impl Scenario {
             checked.map_err(|mistake| self.crash_error(index, mistake))?;
         }
         Ok(())
+    }
+
+    /// A mistake in a key.
+    fn invalid(&self, key: Vec<String>, message: String) -> ScenarioError {
+        ScenarioError::Invalid {
+            place: self.source.place_of_key(&key),
+            key: key.join("."),
+            message,
+        }
     }
 
     fn crash_error(&self, index: usize, mistake: crash::Mistake) -> ScenarioError {

@@ -72,6 +72,9 @@ fn is_zero(count: &u64) -> bool {
 /// How one of the two logs has a message.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Carried {
+    /// What the message is called in this log, for `fork` and for scenarios: sender, receiver, kind, and its
+    /// number in that flow.
+    pub id: String,
     /// When it was sent, in nanoseconds.
     pub sent_ns: u64,
     /// When its fate was, in nanoseconds.

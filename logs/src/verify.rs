@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::record::{Checkpoint, Flow, Observer, ObserverError, Record, RecordClass, Wants};
-use farside::{Kind, Report, RunInfo};
+use farside::{Kind, Report, RunInfo, SimTime};
 use serde::Serialize;
 
 use crate::LogError;
@@ -115,6 +115,8 @@ pub struct Verifier {
     checkpoints: u64,
     last_ns: Option<u64>,
     last_checkpoint_ns: Option<u64>,
+    /// Where the comparison ends and the run goes on, if it is not compared as a whole.
+    compared_until: Option<SimTime>,
     done: bool,
     outcome: Shared,
 }
@@ -169,9 +171,18 @@ impl Verifier {
             checkpoints: 0,
             last_ns: None,
             last_checkpoint_ns: None,
+            compared_until: None,
             done: false,
             outcome: Shared::default(),
         })
+    }
+
+    /// A verifier against what the log at `path` has before `until`; from then on the run goes on and is not
+    /// compared. The outcome of a run that is the same so far is [`VerifyOutcome::Prefix`].
+    pub fn open_until(path: impl AsRef<Path>, until: SimTime) -> Result<Verifier, LogError> {
+        let mut verifier = Verifier::open(path)?;
+        verifier.compared_until = Some(until);
+        Ok(verifier)
     }
 
     /// The log: seed, scenario and attachments, from which the run can be built again.
@@ -546,8 +557,19 @@ impl Observer for Verifier {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        if self.done {
-            return Ok(Flow::Stop("the comparison with the log is over".to_owned()));
+        let is_over = self
+            .compared_until
+            .is_some_and(|until| record.time() >= until);
+        if is_over && !self.done {
+            match self.candidate.take() {
+                Some((_, mismatch)) => self.different(mismatch),
+                None => self.prefix("it is compared up to here".to_owned()),
+            }
+        }
+        match self.done {
+            true if is_over => return Ok(Flow::Continue),
+            true => return Ok(Flow::Stop("the comparison with the log is over".to_owned())),
+            false => {}
         }
         let compared = self.compare(record);
         self.settle(compared).map(|()| Flow::Continue)

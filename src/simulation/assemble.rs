@@ -12,6 +12,7 @@ use crate::guard::guarded;
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
 use crate::record::{NamedObserver, RESERVED, Wants};
+use crate::ruling::Rulings;
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
@@ -43,7 +44,7 @@ fn planned(controls: &[Control]) -> Vec<PlannedEvent> {
             entity: *entity,
             action: match action {
                 Action::Crash => PlannedAction::Crash,
-                Action::Restart => PlannedAction::Restart,
+                Action::Restart | Action::Rebuild(_) => PlannedAction::Restart,
                 Action::Change(_) => PlannedAction::Change,
                 Action::Tell(..) => PlannedAction::Tell,
             },
@@ -78,6 +79,18 @@ impl Simulation {
         for (declared, entity) in ranked.actors.iter().enumerate() {
             address_numbers[entity.index()] = Some(declared as u32);
         }
+        let info = Arc::new(RunInfo {
+            seed: self.seed,
+            tie_seed: self.tie_seed,
+            entities: ranked.entities.clone(),
+            kinds: kinds.list,
+            look_ahead,
+            planned: planned(&controls),
+        });
+        let rulings = match &self.rulings[..] {
+            [] => None,
+            declared => Some(Rulings::new(declared, &info)?),
+        };
         let topology = Arc::new(Topology {
             owner: self.owner,
             seed: self.seed,
@@ -104,14 +117,8 @@ impl Simulation {
             observed: !wants.is_empty(),
             samples: wants.iter().any(|wants| wants.samples),
             check_min_delay: self.check_min_delay,
-            info: Arc::new(RunInfo {
-                seed: self.seed,
-                tie_seed: self.tie_seed,
-                entities: ranked.entities.clone(),
-                kinds: kinds.list,
-                look_ahead,
-                planned: planned(&controls),
-            }),
+            rulings,
+            info,
         });
         let schedule = Schedule::new(controls, look_ahead);
         let observers = std::mem::take(&mut self.observers);
@@ -389,7 +396,11 @@ impl Simulation {
     }
 
     fn take_controls(&mut self, ranked: &Ranked, kinds: &Kinds) -> Vec<Control> {
-        let controls = std::mem::take(&mut self.controls).into_iter().enumerate();
+        let mut controls = std::mem::take(&mut self.controls);
+        // Numbered in order of time, so that what is planned for later has no part in the keys of what
+        // comes before: a fork of a run is that run up to where it begins.
+        controls.sort_by_key(|control| control.time);
+        let controls = controls.into_iter().enumerate();
         let control = |(count, decl): (usize, super::ControlDecl)| {
             let entity = match decl.target {
                 Some(Target::Actor(at)) => ranked.actors[at as usize],
@@ -399,6 +410,9 @@ impl Simulation {
             let what = match decl.what {
                 Planned::Crash => ControlAction::Entity(entity, Action::Crash),
                 Planned::Restart => ControlAction::Entity(entity, Action::Restart),
+                Planned::Rebuild(factory) => {
+                    ControlAction::Entity(entity, Action::Rebuild(factory))
+                }
                 Planned::Change(change) => ControlAction::Entity(entity, Action::Change(change)),
                 Planned::Tell(kind, letter) => {
                     let kind = kinds.of_type[&kind.type_id];

@@ -204,7 +204,7 @@ impl Simulation {
         self.control(time, None, Planned::Stop(reason.to_owned()));
     }
 
-    fn control(&mut self, time: SimTime, target: Option<Target>, what: Planned) {
+    pub(super) fn control(&mut self, time: SimTime, target: Option<Target>, what: Planned) {
         self.controls.push(ControlDecl { time, target, what });
     }
 }

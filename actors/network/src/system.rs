@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use farside::Report;
+use farside::{Pattern, Report};
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
@@ -105,6 +105,13 @@ impl Settings for NetworkScenario {
         Table::check(&self.team, "team")?;
         let checked = self.network.check();
         checked.map_err(|error| blame(NetworkError::Config(error)))
+    }
+
+    /// How its nodes plan; the policy itself is what they keep durably, and what they promise each other.
+    fn taken_up_by(&self, key: &str) -> Option<Vec<Pattern>> {
+        let of_policy = ["network.max_plus.", "network.complete."];
+        let is_taken_up = of_policy.iter().any(|table| key.starts_with(table));
+        is_taken_up.then(|| Pattern::over_names("node_*").into_iter().collect())
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

@@ -95,6 +95,15 @@ impl Timeline {
         self
     }
 
+    /// The same, without any change from `from` on.
+    #[must_use]
+    pub(crate) fn cut_off(mut self, from: SimTime) -> Self {
+        self.spans
+            .retain(|span| span.from < from || span.from == SimTime::ZERO);
+        self.settle();
+        self
+    }
+
     /// Replaces some parameters from `from` on, whatever else is to change later.
     pub fn replace_from(&mut self, from: SimTime, over: &LinkOverrides) {
         let at = self.index(from);

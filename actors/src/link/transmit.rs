@@ -403,7 +403,10 @@ impl Transmitter {
         attempt.energy_j = params.tx_power_w * attempt.end.since(start).as_secs_f64();
         attempt.failed = match cut {
             Some((_, reason)) => Some(reason),
-            None => self.lost_on_air(parcel, draws, index, start, path),
+            None => {
+                let lost = self.lost_on_air(parcel, draws, index, start, path);
+                lost.filter(|_| !parcel.is_spared(draws.copy))
+            }
         };
         if attempt.failed.is_some() {
             return attempt;
@@ -416,7 +419,7 @@ impl Transmitter {
         attempt.propagation = propagation;
         // Only a change that nobody declared can be faster than what the run counts on.
         attempt.at = (attempt.end + way).max(parcel.now() + self.floor);
-        if is_corrupt(params, parcel, draws, piece) {
+        if is_corrupt(params, parcel, draws, piece) && !parcel.is_spared(draws.copy) {
             attempt.failed = Some(CORRUPT);
         } else {
             attempt.receive_j = params.rx_power_w * airtime.as_secs_f64();

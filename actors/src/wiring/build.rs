@@ -65,6 +65,8 @@ pub struct LinkBuilder {
     planned: Vec<Degrade>,
     /// What links were given before: most of them share a base and the degradations they meet.
     known: Vec<SharedTimeline>,
+    /// What holds instead, from which instant on, in order.
+    changed: Vec<(SimDuration, LinkBuilder)>,
 }
 
 /// The most patterns, and the most degradations.
@@ -133,6 +135,30 @@ impl LinkBuilder {
         Ok(builder)
     }
 
+    /// From `at` on links and processors are as `changed` says, as if they had been so from the start: base
+    /// and degradations. Later than what was changed before. What `changed` knows of radios, plans and places
+    /// is not asked.
+    ///
+    /// ```
+    /// use farside::{SimDuration, SimTime, Simulation};
+    /// use farside_actors::link::LinksConfig;
+    /// use farside_actors::wiring::{LinkBuilder, Wiring};
+    /// let builder = |text| LinkBuilder::new(&toml::from_str::<LinksConfig>(text).unwrap(), &[]);
+    /// let mut links = builder("default = { loss = 0.1, latency = '5ms' }")?;
+    /// links.change_from(SimDuration::from_secs(30), builder("default = { loss = 0.4, latency = '9ms' }")?);
+    /// let mut sim = Simulation::new(1);
+    /// let (a, b) = (sim.host("a"), sim.host("b"));
+    /// let mut wiring = Wiring::default();
+    /// wiring.link((a, "a"), (b, "b"));
+    /// let links = links.build(&mut sim, &wiring)?;
+    /// assert_eq!(sim.slowest_link(), SimDuration::from_millis(5));
+    /// assert_eq!(links.nominal("a", "b").unwrap().loss, 0.1);
+    /// # Ok::<(), farside_actors::link::LinkConfigError>(())
+    /// ```
+    pub fn change_from(&mut self, at: SimDuration, changed: LinkBuilder) {
+        self.changed.push((at, changed));
+    }
+
     /// What is worse when, in the order of the scenario.
     pub fn degrades(&self) -> &[Degrade] {
         &self.planned
@@ -142,6 +168,9 @@ impl LinkBuilder {
     /// `contacts` there replaces the plan's. A link between hosts that the plan does not both name
     /// is left alone; one between hosts that it names, without a contact, is closed.
     pub fn set_plan(&mut self, plan: Arc<ContactPlan>) {
+        for (_, changed) in &mut self.changed {
+            changed.plan = Some(plan.clone());
+        }
         self.plan = Some(plan);
     }
 
@@ -230,6 +259,9 @@ impl LinkBuilder {
             let trace = worse.over.trace.iter_mut().flatten();
             all.extend(trace.map(|trace| (place(&worse.pattern), trace)));
         }
+        for (_, changed) in &mut self.changed {
+            all.extend(changed.traces());
+        }
         all
     }
 
@@ -277,7 +309,9 @@ impl LinkBuilder {
             self.connect(sim, (from, to), timeline, back);
             links.add(from.1, to.1, nominal);
         }
-        links.processors = self.slowdowns.apply(&wiring.processors)?;
+        let changed = self.changed.iter_mut();
+        let changed = changed.map(|(at, changed)| (*at, &mut changed.slowdowns));
+        links.processors = self.slowdowns.apply(changed, &wiring.processors)?;
         let back = |(from, to)| known.get(&(to, from)).map(|(back, _)| back);
         let met = known
             .iter()
@@ -362,6 +396,22 @@ impl LinkBuilder {
     /// What the link `{from}-{to}` has, and when.
     fn resolve(&mut self, from: &str, to: &str) -> &SharedTimeline {
         let name = format!("{from}-{to}");
+        let (base, degrades) = self.params(from, to, &name);
+        let changed = self.changed.iter_mut();
+        let changed = changed.map(|(_, changed)| changed.params(from, to, &name));
+        let changed: Vec<_> = changed.collect();
+        if changed.iter().any(|(later, _)| later.radio != base.radio) {
+            self.mistake.get_or_insert(LinkConfigError::Value {
+                key: vec!["fork".to_owned()],
+                message: format!("link {name}: a link cannot change its radio during a run"),
+            });
+        }
+        self.names.push(name);
+        self.timeline(base, degrades, changed)
+    }
+
+    /// What the link called `name` has, and by number what it meets of what is worse.
+    fn params(&mut self, from: &str, to: &str, name: &str) -> (LinkParams, Vec<usize>) {
         let mut base = self.default.clone();
         if base.contacts.is_none() {
             let windows = self
@@ -371,43 +421,70 @@ impl LinkBuilder {
             base.contacts = windows.map(Contacts::of_plan);
         }
         for (pattern, over) in &mut self.overrides {
-            if pattern.matches(&name) {
+            if pattern.matches(name) {
                 base = base.with(over);
             }
         }
         let mut degrades = Vec::new();
         for (index, worse) in self.degrades.iter_mut().enumerate() {
-            if worse.pattern.matches(&name) {
+            if worse.pattern.matches(name) {
                 degrades.push(index);
             }
         }
-        self.names.push(name);
-        self.timeline(base, degrades)
+        (base, degrades)
     }
 
-    /// What such a link has from each instant on at which a degradation begins or ends.
-    fn timeline(&mut self, base: LinkParams, degrades: Vec<usize>) -> &SharedTimeline {
-        let same = |known: &SharedTimeline| known.degrades == degrades && *known.base == base;
+    /// What such a link has from each instant on at which a degradation begins or ends, or all changes.
+    fn timeline(
+        &mut self,
+        base: LinkParams,
+        degrades: Vec<usize>,
+        changed: Vec<(LinkParams, Vec<usize>)>,
+    ) -> &SharedTimeline {
+        let same = |known: &SharedTimeline| {
+            known.degrades == degrades && *known.base == base && known.changed == changed
+        };
         if let Some(at) = self.known.iter().position(same) {
             return &self.known[at];
         }
+        let mut timeline = Timeline::new(base.clone());
+        for (at, params) in self.spans(&base, &degrades) {
+            timeline = timeline.then(SimTime::ZERO + at, params);
+        }
+        for ((from, builder), (base, degrades)) in self.changed.iter().zip(&changed) {
+            let spans = builder.spans(base, degrades);
+            let (before, after): (Vec<_>, Vec<_>) =
+                spans.into_iter().partition(|(at, _)| at <= from);
+            let first = before.into_iter().next_back();
+            let first = first.map_or_else(|| base.clone(), |(_, params)| params);
+            for (at, params) in [(*from, first)].into_iter().chain(after) {
+                if *timeline.at(SimTime::ZERO + at) != params {
+                    timeline = timeline.then(SimTime::ZERO + at, params);
+                } else {
+                    timeline = timeline.cut_off(SimTime::ZERO + at);
+                }
+            }
+        }
+        let at = self.known.len();
+        self.known.push(SharedTimeline {
+            base: Arc::new(base),
+            degrades,
+            changed,
+            timeline: Arc::new(timeline),
+        });
+        &self.known[at]
+    }
+
+    /// What a link has from each instant on at which a degradation that it meets begins or ends.
+    fn spans(&self, base: &LinkParams, degrades: &[usize]) -> Vec<(SimDuration, LinkParams)> {
         let mine = degrades.iter().map(|&index| &self.degrades[index]);
         let mine: Vec<&Worse> = mine.collect();
         let params_at = |at: SimDuration| {
             let active = mine.iter().filter(|worse| worse.when.is_active(at));
             active.fold(base.clone(), |params, worse| params.with(&worse.over))
         };
-        let mut timeline = Timeline::new(base.clone());
-        for at in Degrade::instants(mine.iter().map(|worse| &worse.when)) {
-            timeline = timeline.then(SimTime::ZERO + at, params_at(at));
-        }
-        let at = self.known.len();
-        self.known.push(SharedTimeline {
-            base: Arc::new(base),
-            degrades,
-            timeline: Arc::new(timeline),
-        });
-        &self.known[at]
+        let instants = Degrade::instants(mine.iter().map(|worse| &worse.when));
+        instants.into_iter().map(|at| (at, params_at(at))).collect()
     }
 
     /// Declares the radios with the links through them, and checks that every pattern has matched
@@ -432,9 +509,24 @@ impl LinkBuilder {
             let message = format!("{:?} was not read", trace.name().unwrap_or_default());
             return Err(LinkConfigError::Value { key, message });
         }
-        let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
-        let degrades = self.degrades.iter().map(|worse| &worse.pattern);
-        match overrides.chain(degrades).find(|pattern| !pattern.used) {
+        for number in 0..self.changed.len() {
+            let unused = self.changed[number].1.unused();
+            if let Some(unused) = unused {
+                let nearest = self.nearest(unused);
+                let message = LinkConfigError::NoSuchLink {
+                    key: unused.key.clone(),
+                    pattern: unused.text.clone(),
+                    nearest,
+                };
+                let message = format!("{}: {message}", unused.key.join("."));
+                let key = ["fork".to_owned(), number.to_string(), "set".to_owned()];
+                return Err(LinkConfigError::Value {
+                    key: key.to_vec(),
+                    message,
+                });
+            }
+        }
+        match self.unused() {
             None => Ok(()),
             Some(unused) => Err(LinkConfigError::NoSuchLink {
                 key: unused.key.clone(),
@@ -446,6 +538,13 @@ impl LinkBuilder {
 }
 
 impl LinkBuilder {
+    /// A pattern that has matched no link.
+    fn unused(&self) -> Option<&Pattern> {
+        let overrides = self.overrides.iter().map(|(pattern, _)| pattern);
+        let degrades = self.degrades.iter().map(|worse| &worse.pattern);
+        overrides.chain(degrades).find(|pattern| !pattern.used)
+    }
+
     /// The link name, or the pattern that names with other numbers share, closest to a pattern; in
     /// `[links]` it may also have been meant for `default`.
     fn nearest(&self, pattern: &Pattern) -> Option<String> {

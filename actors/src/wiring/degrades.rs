@@ -20,6 +20,8 @@ pub(super) struct SharedTimeline {
     pub(super) base: Arc<LinkParams>,
     /// Indices into the degradations.
     pub(super) degrades: Vec<usize>,
+    /// The same for each change of all that links have.
+    pub(super) changed: Vec<(LinkParams, Vec<usize>)>,
     pub(super) timeline: Arc<Timeline>,
 }
 

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use farside::SimTime;
 use farside::suggest::closest;
+use farside::{SimDuration, SimTime};
 
 use super::pattern::{Pattern, shape};
 use crate::link::{Degrade, LinkConfigError};
@@ -50,26 +50,41 @@ impl Slowdowns {
         self.0.push((pattern, when, slowdown));
     }
 
-    /// The wanted processors with their timelines.
+    /// The wanted processors with their timelines; from each of some instants on as other degradations say.
     ///
     /// # Errors
     /// When a pattern matches none of them, with the nearest name.
-    pub(super) fn apply(&mut self, wanted: &[Wanted]) -> Result<Processors, LinkConfigError> {
+    pub(super) fn apply<'a>(
+        &mut self,
+        changed: impl Iterator<Item = (SimDuration, &'a mut Slowdowns)>,
+        wanted: &[Wanted],
+    ) -> Result<Processors, LinkConfigError> {
         let mut all = Processors::healthy(wanted);
+        let mut changed: Vec<_> = changed.collect();
+        let first = changed.first().map(|(at, _)| *at);
         for (host, name, _) in wanted {
             let name = format!("{host}/{name}");
-            let mut mine = Vec::new();
-            for (pattern, when, slowdown) in &mut self.0 {
-                // Both are asked, so that a pattern counts as used whichever it matches.
-                if pattern.matches(&name) || pattern.matches(host) {
-                    mine.push((&*when, *slowdown));
-                }
+            let mut mine = self.between(&name, host, (SimDuration::ZERO, first));
+            for number in 0..changed.len() {
+                let until = changed.get(number + 1).map(|(at, _)| *at);
+                let (from, later) = &mut changed[number];
+                mine.extend(later.between(&name, host, (*from, until)));
             }
+            let mine: Vec<_> = mine
+                .iter()
+                .map(|(when, slowdown)| (when, *slowdown))
+                .collect();
             if let Some(processor) = all.0.get_mut(&name) {
                 *processor = slowed(processor.clone(), &mine);
             }
         }
-        match self.0.iter().find(|(pattern, ..)| !pattern.used) {
+        let later = changed.iter().flat_map(|(_, later)| &later.0);
+        match self
+            .0
+            .iter()
+            .chain(later)
+            .find(|(pattern, ..)| !pattern.used)
+        {
             None => Ok(all),
             Some((unused, ..)) => Err(LinkConfigError::NoSuchProcessor {
                 key: unused.key.clone(),
@@ -77,6 +92,32 @@ impl Slowdowns {
                 nearest: nearest(&unused.text, wanted),
             }),
         }
+    }
+}
+
+impl Slowdowns {
+    /// What slows a processor down from an instant until another, or for ever.
+    fn between(
+        &mut self,
+        name: &str,
+        host: &str,
+        (from, until): (SimDuration, Option<SimDuration>),
+    ) -> Vec<(Degrade, Slowdown)> {
+        let mut mine = Vec::new();
+        for (pattern, when, slowdown) in &mut self.0 {
+            // Both are asked, so that a pattern counts as used whichever it matches.
+            if pattern.matches(name) || pattern.matches(host) {
+                let clipped = Degrade {
+                    at: when.at.max(from),
+                    until: [when.until, until].into_iter().flatten().min(),
+                    what: when.what.clone(),
+                };
+                if clipped.until.is_none_or(|until| clipped.at < until) {
+                    mine.push((clipped, *slowdown));
+                }
+            }
+        }
+        mine
     }
 }
 

@@ -158,7 +158,7 @@ fn observe(
         .sim
         .observe(LogWriter::create(&args.out, options)?);
     let goal = assembled.system.goal.take();
-    progress::show(&mut assembled.sim, goal, scenario.shared().until);
+    progress::show(&mut assembled.sim, goal, scenario.until());
     Ok(())
 }
 

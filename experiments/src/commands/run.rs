@@ -169,14 +169,15 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         tracing::info!("logging to {}", path.display());
         assembled.sim.observe(LogWriter::create(path, options)?);
     }
-    let until = scenario.shared().until;
+    let until = scenario.until();
     progress::show(&mut assembled.sim, assembled.system.goal, until);
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
     let (planned, remarks) = (assembled.planned, assembled.remarks);
     let (report, wall_s) = timed(|| assembled.sim.run(executor));
     let report = report?;
     let results = (assembled.system.conclude)(&report);
-    let never_reached = planned.never_reached(&report);
+    let mut never_reached = planned.never_reached(&report);
+    never_reached.extend(scenario.unmet_rulings(&report));
     for never in &never_reached {
         tracing::warn!("{never}");
     }
@@ -323,7 +324,7 @@ impl Outcome<'_> {
 }
 
 /// How the run ended, in a sentence.
-fn ending(report: &Report) -> String {
+pub(super) fn ending(report: &Report) -> String {
     let at = report.end_time;
     match &report.end {
         End::Completed => format!("completed at {at}, nothing was left to happen"),

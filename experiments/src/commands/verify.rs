@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let verifier = Verifier::open(path)?;
     let handle = verifier.handle();
     assembled.sim.observe(verifier);
-    let until = scenario.shared().until;
+    let until = scenario.until();
     progress::show(&mut assembled.sim, assembled.system.goal, until);
     let interrupt = assembled.sim.interrupt();
     interrupt::raise_on_interrupt(interrupt);

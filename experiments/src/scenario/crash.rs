@@ -172,14 +172,16 @@ impl Crash {
     }
 
     /// Plans this entry's crashes and restarts, and says when they are; `index` is its place among
-    /// the entries.
+    /// the entries. Those before `from`, and from `to` on, are not planned.
     pub(super) fn plan(
         &self,
         sim: &mut Simulation,
         seed: u64,
         index: usize,
         until: Option<SimDuration>,
+        (from, to): (SimDuration, Option<SimDuration>),
     ) -> Result<Times, Mistake> {
+        let is_planned = |at: &SimDuration| *at >= from && to.is_none_or(|to| *at < to);
         let draws = |name: &str| {
             let key = RandomKey::new(seed).text("crash").number(index as u64);
             key.text(name)
@@ -187,7 +189,8 @@ impl Crash {
         let mut planned = Times::default();
         for name in self.chosen(sim, &draws)? {
             for (down, up) in self.times(&draws(&name), until) {
-                planned.down.push(down);
+                let (down, up) = (Some(down).filter(is_planned), up.filter(is_planned));
+                planned.down.extend(down);
                 planned.up.extend(up);
                 if planned.down.len() * 2 > MAX_EVENTS {
                     let message = format!("more than {MAX_EVENTS} crashes and restarts");
@@ -210,19 +213,21 @@ impl Crash {
         &self,
         sim: &mut Simulation,
         name: &str,
-        down: SimDuration,
+        down: Option<SimDuration>,
         up: Option<SimDuration>,
     ) {
-        let (down, up) = (SimTime::ZERO + down, up.map(|up| SimTime::ZERO + up));
+        let [down, up] = [down, up].map(|at| at.map(|at| SimTime::ZERO + at));
         if self.host.is_some() {
             let host = sim.host(name);
-            sim.crash_host_at(down, host);
+            if let Some(down) = down {
+                sim.crash_host_at(down, host);
+            }
             if let Some(up) = up {
                 sim.restart_host_at(up, host);
             }
             return;
         }
-        let crash = sim.crash_named_at(down, name);
+        let crash = down.map_or(Ok(()), |down| sim.crash_named_at(down, name));
         let restart = up.map_or(Ok(()), |up| sim.restart_named_at(up, name));
         debug_assert!(
             crash.and(restart).is_ok(),

@@ -7,7 +7,7 @@ use farside_actors::system::{Key, Section};
 
 use super::contacts::ContactsConfig;
 use super::crash::Crash;
-use super::{LogSettings, Shared};
+use super::{Delay, Deliver, Fork, LogSettings, Lose, Shared};
 
 /// The tables that every scenario may have, each with its keys. The first, without a name, holds
 /// those at the top of the file.
@@ -41,6 +41,10 @@ pub fn shared_sections() -> Vec<Section> {
     all.extend(ContactsConfig::sections("contacts"));
     all.extend(RadioConfig::sections("radios.NAME"));
     all.extend(Crash::sections("crash"));
+    all.extend(Lose::sections("lose"));
+    all.extend(Deliver::sections("deliver"));
+    all.extend(Delay::sections("delay"));
+    all.extend(Fork::sections("fork"));
     all.extend(LogSettings::sections("log"));
     all
 }

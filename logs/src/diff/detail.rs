@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use farside::MatchKey;
 use farside::record::RecordClass;
+use farside::ruling::{MessageId, MessageNumber};
 use mcap::records::MessageHeader;
 
 use super::entry::{Entry, Mode, Names};
@@ -156,6 +157,7 @@ pub(super) fn describe(
     let carriage = record.carriage.map(|carriage| carriage.to_string());
     first.carriage = carriage.unwrap_or_default();
     first.carried_a = (!record.link.is_empty()).then(|| Carried {
+        id: message_id(&record).to_string(),
         sent_ns: record.sent_ns,
         at_ns: record.key.time_ns,
         fate: record.class.name().to_owned(),
@@ -165,6 +167,17 @@ pub(super) fn describe(
     let cause = record.cause.map(|key| LoggedKey::of(&key));
     trace(index, names, cause, &mut first)?;
     Ok(first)
+}
+
+/// What the message of a record is called in its own log.
+pub(super) fn message_id(record: &RecordRef<'_>) -> MessageId {
+    MessageId {
+        sender: record.sender.to_owned(),
+        receiver: record.receiver.to_owned(),
+        kind: record.kind.to_owned(),
+        number: MessageNumber::Ordinal(record.ordinal),
+        copy: record.copy,
+    }
 }
 
 /// Whether a cause is the same timer as the one that it led to: in a chain they say nothing new.

@@ -227,7 +227,13 @@ fn write_carried(
             carriage => writeln!(f, ": {carriage}")?,
         }
     }
-    Ok(())
+    let ids =
+        [&first.carried_a, &first.carried_b].map(|carried| carried.as_ref().map(|one| &one.id));
+    match ids {
+        [Some(a), Some(b)] if a != b => writeln!(f, "  id  {} | {}", Shown(a), Shown(b)),
+        [Some(id), _] | [None, Some(id)] => writeln!(f, "  id  {}", Shown(id)),
+        [None, None] => Ok(()),
+    }
 }
 
 fn write_causes(f: &mut fmt::Formatter<'_>, first: &FirstDifference) -> fmt::Result {

@@ -43,6 +43,7 @@ impl Parts {
             sender: head.sender,
             receiver: head.receiver,
             kind: topology.kind(kind),
+            kind_index: kind,
             ordinal: head.ordinal,
             repeat: head.repeat(),
             copy: head.copy(),
@@ -56,6 +57,10 @@ impl Parts {
             cell.parked.remove(&held.token);
         }
         cell.carrier.carry(&parcel, &mut self.verdicts);
+        if let Some(rulings) = &topology.rulings {
+            let min_delay = topology.links.get(link).map(|link| link.min_delay);
+            rulings.apply(&parcel, &mut self.verdicts, min_delay.unwrap_or_default());
+        }
         let mut count = cell.count;
         self.execute(link, &mut count, head, letter);
         for at in 0..self.verdicts.wakes.len() {

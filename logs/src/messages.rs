@@ -1,0 +1,141 @@
+//! Finding single messages in a log by what they are called.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use farside::record::RecordClass;
+use farside::ruling::{MessageId, MessageNumber};
+use farside::suggest::nearest;
+use farside::{MatchKey, SimTime};
+
+use crate::LogError;
+use crate::log::Log;
+
+/// A message as a log has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundMessage {
+    /// When it was sent.
+    pub sent: SimTime,
+    /// The link that carried it; none within a host.
+    pub link: Option<String>,
+    /// What became of it: delivered, lost or in flight at the end.
+    pub class: RecordClass,
+    /// When.
+    pub at: SimTime,
+}
+
+/// A copy of a message of a flow.
+struct Copy {
+    ordinal: u64,
+    copy: u32,
+    key: Option<MatchKey>,
+    found: FoundMessage,
+}
+
+/// Finds messages in the log of a run; for each that is not there what a reader should know, with the
+/// nearest name.
+///
+/// ```no_run
+/// let id: farside::ruling::MessageId = "node_03,rover_07,Grant,12".parse()?;
+/// for found in farside_logs::find_messages("run.mcap", &[id])? {
+///     println!("{:?}", found?.class);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// If the log cannot be read.
+pub fn find_messages(
+    path: impl AsRef<Path>,
+    ids: &[MessageId],
+) -> Result<Vec<Result<FoundMessage, String>>, LogError> {
+    if ids.is_empty() {
+        return Ok(Vec::new());
+    }
+    let log = Log::open(path)?;
+    let mut flows: BTreeMap<[String; 3], Vec<Copy>> = BTreeMap::new();
+    for id in ids {
+        flows.entry(flow(id)).or_default();
+    }
+    let mut known: BTreeMap<[String; 3], u64> = BTreeMap::new();
+    let mut records = log.records()?;
+    while let Some((record, _)) = records.next_ref()? {
+        if !record.class.is_fate() {
+            continue;
+        }
+        let name = [record.sender, record.receiver, record.kind].map(str::to_owned);
+        if let Some(copies) = flows.get_mut(&name) {
+            copies.push(Copy {
+                ordinal: record.ordinal,
+                copy: record.copy,
+                key: record.match_key.map(MatchKey::from_bits),
+                found: FoundMessage {
+                    sent: SimTime::from_nanos(record.sent_ns),
+                    link: (!record.link.is_empty()).then(|| record.link.to_owned()),
+                    class: record.class,
+                    at: SimTime::from_nanos(record.key.time_ns),
+                },
+            });
+        }
+        *known.entry(name).or_default() += 1;
+    }
+    for copies in flows.values_mut() {
+        copies.sort_by_key(|copy| (copy.ordinal, copy.copy));
+    }
+    let find = |id: &MessageId| {
+        let copies = &flows[&flow(id)];
+        let found = numbered(copies, id.number).find(|copy| copy.copy == id.copy);
+        let found = found.map(|copy| copy.found.clone());
+        found.ok_or_else(|| missing(id, copies, &known, log.exclude()))
+    };
+    Ok(ids.iter().map(find).collect())
+}
+
+fn flow(id: &MessageId) -> [String; 3] {
+    [&id.sender, &id.receiver, &id.kind].map(Clone::clone)
+}
+
+/// The copies of a message, from those of its flow in order.
+fn numbered(copies: &[Copy], number: MessageNumber) -> impl Iterator<Item = &Copy> {
+    let ordinal = match number {
+        MessageNumber::Ordinal(ordinal) => Some(ordinal),
+        MessageNumber::Key { key, repeat } => {
+            let mut before: Option<(u64, Option<MatchKey>, u32)> = None;
+            copies.iter().find_map(|copy| {
+                let repeats = match before {
+                    Some((ordinal, _, repeats)) if ordinal == copy.ordinal => repeats,
+                    Some((_, last, repeats)) if last == copy.key => repeats + 1,
+                    _ => 0,
+                };
+                before = Some((copy.ordinal, copy.key, repeats));
+                let is_it = copy.key == Some(key) && repeats == repeat;
+                is_it.then_some(copy.ordinal)
+            })
+        }
+    };
+    copies
+        .iter()
+        .filter(move |copy| Some(copy.ordinal) == ordinal)
+}
+
+/// Why a message is not found.
+fn missing(
+    id: &MessageId,
+    copies: &[Copy],
+    known: &BTreeMap<[String; 3], u64>,
+    exclude: &[String],
+) -> String {
+    let filtered = match exclude {
+        [] => String::new(),
+        topics => format!("; topics that were not written: {}", topics.join(", ")),
+    };
+    if let (Some(first), Some(last)) = (copies.first(), copies.last()) {
+        let (first, last) = (first.ordinal, last.ordinal);
+        let flow = flow(id).join(",");
+        return format!("{id}: the log has {flow} from number {first} to {last} only{filtered}");
+    }
+    let names: Vec<String> = known.keys().map(|flow| flow.join(",")).collect();
+    let close = nearest(&flow(id).join(","), names.iter().map(String::as_str));
+    let hint = close.map_or_else(String::new, |name| format!("; did you mean {name},...?"));
+    format!("{id}: the log has no message of this kind between these two{hint}{filtered}")
+}
