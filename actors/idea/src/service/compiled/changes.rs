@@ -1,10 +1,12 @@
 //! A cycle on the table without copies: what began and ended is read from where the table has it.
 
+use std::fmt;
+
 use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, Value};
 
 use super::Compiled;
-use super::table::{NONE, Names, Registers, Row as TableRow};
+use super::table::{Lane, NONE, Row as TableRow};
 use crate::service::{Contract, Ended, Outcome, Started};
 
 /// Where what began and ended with the last cycle stands.
@@ -35,15 +37,17 @@ pub struct Began<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a>(Values<'a>);
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 enum Values<'a> {
     Known(&'a [Option<Value>]),
-    /// From constants and registers.
-    Sources {
-        sources: &'a [u32],
-        names: &'a Names,
-        registers: &'a Registers,
-    },
+    /// From constants and registers, by a row.
+    Row(&'a Compiled, u32),
+}
+
+impl fmt::Debug for Values<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(Row(*self).iter()).finish()
+    }
 }
 
 impl Row<'_> {
@@ -51,7 +55,7 @@ impl Row<'_> {
     pub fn len(&self) -> usize {
         match self.0 {
             Values::Known(values) => values.len(),
-            Values::Sources { sources, .. } => sources.len(),
+            Values::Row(table, row) => usize::from(table.table.rows[row as usize].count),
         }
     }
 
@@ -69,11 +73,10 @@ impl Row<'_> {
     pub fn get(&self, place: usize) -> Option<Value> {
         match self.0 {
             Values::Known(values) => values[place],
-            Values::Sources {
-                sources,
-                names,
-                registers,
-            } => names.value(sources[place], registers),
+            Values::Row(of, row) => {
+                let sources = of.table.sources(&of.table.rows[row as usize]);
+                of.table.names.value(sources[place], &of.registers)
+            }
         }
     }
 
@@ -138,6 +141,7 @@ impl Compiled {
     }
 
     /// The tokens that have begun with the last cycle, by timeline.
+    #[inline]
     pub fn each_started(&self) -> impl Iterator<Item = Began<'_>> {
         let listed = self.lists().0.iter().map(|at| Began {
             contract: at.contract,
@@ -149,6 +153,7 @@ impl Compiled {
     }
 
     /// The tokens that have ended with the last cycle, by timeline.
+    #[inline]
     pub fn each_ended(&self) -> impl Iterator<Item = Began<'_>> {
         let listed = self.lists().1.iter().map(|at| Began {
             contract: at.contract,
@@ -160,6 +165,7 @@ impl Compiled {
     }
 
     /// What began and ended, if that is listed.
+    #[inline]
     pub(super) fn lists(&self) -> (&[Started], &[Ended]) {
         match self.recent {
             Recent::Listed => (&self.started, &self.ended),
@@ -168,12 +174,12 @@ impl Compiled {
     }
 
     /// The rows of what ended and of what began, if that is not listed.
+    #[inline]
     fn rows(&self) -> (&[u32], &[u32]) {
         match self.recent {
             Recent::Row(effect) => {
                 let effect = &self.table.effects[effect as usize];
-                let [.., ended, started] = self.table.named(effect);
-                (ended, started)
+                (self.table.ended(effect), self.table.started(effect))
             }
             _ => (&[], &[]),
         }
@@ -181,78 +187,72 @@ impl Compiled {
 
     #[inline]
     fn began(&self, row: u32, started: bool) -> Began<'_> {
-        let row = &self.table.rows[row as usize];
-        let (contract, start) = self.which(row, started);
+        let at = &self.table.rows[row as usize];
+        let (contract, start) = which(&self.lanes, at, started);
         Began {
             contract,
-            predicate: usize::from(row.predicate),
+            predicate: usize::from(at.predicate),
             start,
-            parameters: Row(Values::Sources {
-                sources: self.table.sources(row),
-                names: &self.table.names,
-                registers: &self.registers,
-            }),
+            parameters: Row(Values::Row(self, row)),
         }
     }
 
-    /// Which token a row is of, and when that began.
-    #[inline]
-    fn which(&self, row: &TableRow, started: bool) -> (Contract, Ticks) {
-        let lane = &self.lanes[usize::from(row.timeline)];
-        // On its timeline another has begun, if it ended.
-        let (number, start) = match started {
-            true => (lane.number, lane.start),
-            false => (lane.number - 1, lane.before),
-        };
-        let contract = Contract {
-            timeline: row.timeline,
-            number,
-        };
-        (contract, start)
-    }
-
-    /// Copies what began and ended to the lists. If they are of the same effect as before, only
-    /// what differs is copied.
+    /// Copies what began and ended to the lists. Of what is of the same effect as what they had,
+    /// only what differs is copied.
     pub(super) fn list(&mut self, effect: u32) {
-        let (mut started, mut ended) = (
-            std::mem::take(&mut self.started),
-            std::mem::take(&mut self.ended),
-        );
-        let (rows_ended, rows_started) = self.rows();
-        let names = &self.table.names;
+        let (table, lanes, registers) = (&self.table, &self.lanes, &self.registers);
+        let now = self.now;
+        let at = &table.effects[effect as usize];
+        let (ended, started) = (table.ended(at), table.started(at));
         if self.listed == effect {
-            for (at, &row) in started.iter_mut().zip(rows_started) {
-                let row = &self.table.rows[row as usize];
-                at.contract.number = self.lanes[usize::from(row.timeline)].number;
-                for pair in self.table.varying(row).chunks_exact(2) {
-                    at.parameters[pair[0] as usize] = names.value(pair[1], &self.registers);
-                }
+            for (at, &row) in self.started.iter_mut().zip(started) {
+                (at.contract, _) = which(lanes, &table.rows[row as usize], true);
+                table.update(&mut at.parameters, row, registers);
             }
-            for (at, &row) in ended.iter_mut().zip(rows_ended) {
-                let row = &self.table.rows[row as usize];
-                (at.contract, at.start) = self.which(row, false);
-                at.finish = self.now;
-                for pair in self.table.varying(row).chunks_exact(2) {
-                    at.parameters[pair[0] as usize] = names.value(pair[1], &self.registers);
-                }
+            for (at, &row) in self.ended.iter_mut().zip(ended) {
+                (at.contract, at.start) = which(lanes, &table.rows[row as usize], false);
+                at.finish = now;
+                table.update(&mut at.parameters, row, registers);
             }
         } else {
-            started.clear();
-            started.extend(self.each_started().map(|at| Started {
-                contract: at.contract,
-                predicate: at.predicate,
-                parameters: at.parameters.iter().collect(),
+            self.started.clear();
+            self.started.extend(started.iter().map(|&row| {
+                let at = &table.rows[row as usize];
+                Started {
+                    contract: which(lanes, at, true).0,
+                    predicate: usize::from(at.predicate),
+                    parameters: table.parameters(row, registers),
+                }
             }));
-            ended.clear();
-            ended.extend(self.each_ended().map(|at| Ended {
-                contract: at.contract,
-                predicate: at.predicate,
-                start: at.start,
-                finish: self.now,
-                parameters: at.parameters.iter().collect(),
+            self.ended.clear();
+            self.ended.extend(ended.iter().map(|&row| {
+                let at = &table.rows[row as usize];
+                let (contract, start) = which(lanes, at, false);
+                Ended {
+                    contract,
+                    predicate: usize::from(at.predicate),
+                    start,
+                    finish: now,
+                    parameters: table.parameters(row, registers),
+                }
             }));
         }
-        (self.started, self.ended) = (started, ended);
         (self.listed, self.recent) = (effect, Recent::Listed);
     }
+}
+
+/// Which token a row is of, and when that began.
+#[inline]
+fn which(lanes: &[Lane], row: &TableRow, started: bool) -> (Contract, Ticks) {
+    let lane = &lanes[usize::from(row.timeline)];
+    // On its timeline another has begun, if it ended.
+    let (number, start) = match started {
+        true => (lane.number, lane.start),
+        false => (lane.number - 1, lane.before),
+    };
+    let contract = Contract {
+        timeline: row.timeline,
+        number,
+    };
+    (contract, start)
 }

@@ -176,19 +176,23 @@ impl Slots {
         &self.slots[given]
     }
 
-    /// The class of a value, if it is one of the type.
+    /// The class of a value; 0 if it is none of the type.
     #[inline]
-    pub(super) fn class(&self, slot: &Slot, value: Value) -> Option<u32> {
+    pub(super) fn class(&self, slot: &Slot, value: Value) -> u32 {
         let place = value.wrapping_sub(slot.least) as u64;
         if place < u64::from(slot.known) {
-            let class = self.classes[slot.first as usize + place as usize];
-            (class > 0).then_some(u32::from(class))
+            u32::from(self.classes[slot.first as usize + place as usize])
         } else if slot.known == 0 {
-            let (values, classes) = &self.wide[slot.first as usize];
-            Some(classes.of_type(values, value)? + 1)
+            self.wide_class(slot, value)
         } else {
-            None
+            0
         }
+    }
+
+    #[inline(never)]
+    fn wide_class(&self, slot: &Slot, value: Value) -> u32 {
+        let (values, classes) = &self.wide[slot.first as usize];
+        classes.of_type(values, value).map_or(0, |class| class + 1)
     }
 }
 

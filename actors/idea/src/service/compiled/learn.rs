@@ -238,6 +238,7 @@ impl Compiled {
         }
         let effect = Effect {
             code: 0,
+            rows: 0,
             cells: cells as u16,
             ends: (named.len() / 2 - cells) as u16,
             ended: ended.len() as u16,

@@ -10,9 +10,9 @@ use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, RelationshipKind, TimelineId, Value};
 use smallvec::SmallVec;
 
-use crate::service::Contract;
 use crate::service::propositional::Propositional;
 use crate::service::propositional::state::{Far, reckon};
+use crate::service::{Contract, Parameters};
 
 /// No node, effect or place.
 pub(super) const NONE: u32 = u32::MAX;
@@ -60,8 +60,9 @@ pub(super) struct Row {
 /// What a cycle decides. All that it names stands in [`Table::codes`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effect {
-    /// Where that begins.
+    /// Where that begins, and where its rows do.
     pub(super) code: u32,
+    pub(super) rows: u32,
     /// How many registers are filled: each is a pair, the register and its source.
     pub(super) cells: u16,
     /// How many far ends there are that were not before, in pairs, too.
@@ -193,6 +194,8 @@ pub(super) struct Table {
     pub(super) effects: Vec<Effect>,
     effect_places: BTreeMap<Box<[u32]>, u32>,
     pub(super) rows: Vec<Row>,
+    /// By row: the values of its parameters, but for those that vary.
+    parameters: Vec<Parameters>,
     row_places: BTreeMap<Box<[u32]>, u32>,
     /// What effects and rows consist of.
     pub(super) codes: Vec<u32>,
@@ -268,6 +271,12 @@ impl Table {
         let varying = { (0..).zip(&key[1..]) }.filter(|at| at.1 >> KIND != VALUE);
         self.codes
             .extend(varying.flat_map(|(place, &source)| [place, source]));
+        let constant = |&source: &u32| match source >> KIND {
+            VALUE => self.names.constant(source),
+            _ => None,
+        };
+        self.parameters
+            .push(key[1..].iter().map(constant).collect());
         self.rows.push(row);
         let place = (self.rows.len() - 1) as u32;
         self.row_places.insert(key.into(), place);
@@ -290,21 +299,51 @@ impl Table {
         }
         let code = self.codes.len() as u32;
         self.codes.extend(named);
-        self.effects.push(Effect { code, ..effect });
+        let rows = code + 2 * (u32::from(effect.cells) + u32::from(effect.ends));
+        self.effects.push(Effect {
+            code,
+            rows,
+            ..effect
+        });
         let place = (self.effects.len() - 1) as u32;
         self.effect_places.insert(key.into(), place);
         place
     }
 
-    /// What an effect names: registers and their sources, far ends and theirs, what ended, and what
-    /// started.
-    #[inline]
-    pub(super) fn named(&self, effect: &Effect) -> [&[u32]; 4] {
+    /// Which registers an effect fills, and which far ends, with their sources.
+    pub(super) fn filled(&self, effect: &Effect) -> [&[u32]; 2] {
         let code = &self.codes[effect.code as usize..];
         let (cells, code) = code.split_at(2 * usize::from(effect.cells));
-        let (ends, code) = code.split_at(2 * usize::from(effect.ends));
-        let (ended, code) = code.split_at(usize::from(effect.ended));
-        [cells, ends, ended, &code[..usize::from(effect.started)]]
+        [cells, &code[..2 * usize::from(effect.ends)]]
+    }
+
+    /// The rows of what ended.
+    #[inline]
+    pub(super) fn ended(&self, effect: &Effect) -> &[u32] {
+        &self.codes[effect.rows as usize..][..usize::from(effect.ended)]
+    }
+
+    /// The rows of what started.
+    #[inline]
+    pub(super) fn started(&self, effect: &Effect) -> &[u32] {
+        let first = effect.rows as usize + usize::from(effect.ended);
+        &self.codes[first..][..usize::from(effect.started)]
+    }
+
+    /// The values of a row's parameters.
+    #[inline]
+    pub(super) fn parameters(&self, row: u32, registers: &Registers) -> Parameters {
+        let mut parameters = Parameters::from_slice(&self.parameters[row as usize]);
+        self.update(&mut parameters, row, registers);
+        parameters
+    }
+
+    /// Gives those of a row's parameters that vary their values.
+    #[inline]
+    pub(super) fn update(&self, parameters: &mut Parameters, row: u32, registers: &Registers) {
+        for pair in self.varying(&self.rows[row as usize]).chunks_exact(2) {
+            parameters[pair[0] as usize] = self.names.value(pair[1], registers);
+        }
     }
 
     /// The sources of a row's parameters.
@@ -315,7 +354,7 @@ impl Table {
 
     /// The places and sources of a row's parameters that vary.
     #[inline]
-    pub(super) fn varying(&self, row: &Row) -> &[u32] {
+    fn varying(&self, row: &Row) -> &[u32] {
         let first = row.code as usize + usize::from(row.count);
         &self.codes[first..][..2 * usize::from(row.varying)]
     }
@@ -328,6 +367,7 @@ impl Table {
             + others.sum::<usize>()
             + size_of_val(&*self.effects)
             + size_of_val(&*self.rows)
+            + size_of_val(&*self.parameters)
             + size_of_val(&*self.codes)
             + size_of_val(&*self.names.values);
         let forms = { self.forms.iter() }

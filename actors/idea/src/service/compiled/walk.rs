@@ -30,11 +30,14 @@ impl Compiled {
         let mut mixed = 0;
         for (value, slot) in values.iter().zip(slots) {
             let class = match *value {
-                Some(value) => self.slots.class(slot, value),
-                None => Some(0),
+                Some(value) => {
+                    let class = self.slots.class(slot, value);
+                    right &= class > 0;
+                    class
+                }
+                None => 0,
             };
-            right &= class.is_some();
-            mixed = mixed * slot.count + u64::from(class.unwrap_or(0));
+            mixed = mixed * slot.count + u64::from(class);
         }
         if !right {
             let what = if is_goal { "inputs" } else { "outputs" };
@@ -114,7 +117,7 @@ impl Compiled {
         let place = source & REST;
         if self.pending != NONE {
             let effect = &self.table.effects[self.pending as usize];
-            let [cells, ..] = self.table.named(effect);
+            let [cells, _] = self.table.filled(effect);
             let filled = cells.chunks_exact(2).find(|pair| pair[0] == place);
             if let Some(pair) = filled {
                 return self.table.names.value(pair[1], &self.registers);
@@ -137,8 +140,7 @@ impl Compiled {
     #[inline]
     pub(super) fn follow(&mut self, node: Node) {
         let effect = &self.table.effects[node.effect as usize];
-        let [.., started] = self.table.named(effect);
-        for &row in started {
+        for &row in self.table.started(effect) {
             let row = &self.table.rows[row as usize];
             let lane = &mut self.lanes[usize::from(row.timeline)];
             lane.number += 1;
@@ -181,7 +183,7 @@ impl Compiled {
 
     fn fill_registers(&mut self, effect: &Effect) {
         let (names, from) = (&self.table.names, &self.registers);
-        let [cells, ends, ..] = self.table.named(effect);
+        let [cells, ends] = self.table.filled(effect);
         // A register may be from another that is filled, too.
         self.spare.cells.clear();
         let values = cells.chunks_exact(2).map(|pair| names.value(pair[1], from));
