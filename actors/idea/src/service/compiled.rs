@@ -317,6 +317,7 @@ impl Compiled {
     }
 
     /// Something is posted: along the table, or to the interpreter, which makes a new node.
+    #[inline(always)]
     fn post(
         &mut self,
         number: u64,
@@ -330,20 +331,26 @@ impl Compiled {
             first: self.registers.posted.len() as u32,
             count: values.len() as u32,
         };
-        if self.interpreter.is_none()
-            && let Some(child) = self.child(number)
-        {
-            self.node = Some(child);
-            self.posted.push(posted);
-            self.registers.posted.extend_from_slice(values);
-            return Ok(());
+        match self.child(number) {
+            Some(child) if self.interpreter.is_none() => self.node = Some(child),
+            _ => self.post_anew(number, &posted, values)?,
         }
-        let interpreter = self.wake();
-        // What is refused leaves no trace, and is refused by the interpreter again.
-        post(interpreter, &posted, values)?;
-        let loose = interpreter.world.state.loose.get();
         self.posted.push(posted);
         self.registers.posted.extend_from_slice(values);
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn post_anew(
+        &mut self,
+        number: u64,
+        posted: &Posted,
+        values: &[Option<Value>],
+    ) -> Result<(), Refusal> {
+        let interpreter = self.wake();
+        // What is refused leaves no trace, and is refused by the interpreter again.
+        post(interpreter, posted, values)?;
+        let loose = interpreter.world.state.loose.get();
         self.node = match self.node {
             Some(_) if loose => None,
             Some(node) => self.child(number).or_else(|| self.add_node(node, number)),

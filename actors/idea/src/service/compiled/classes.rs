@@ -166,7 +166,7 @@ impl Slots {
     }
 
     /// The parameters that a goal gives, or a status.
-    #[inline]
+    #[inline(always)]
     pub(super) fn given(&self, predicate: PredicateId, is_goal: bool) -> &[Slot] {
         let [first, inputs, all] = self.said[predicate].map(|at| at as usize);
         let given = match is_goal {
@@ -177,7 +177,7 @@ impl Slots {
     }
 
     /// The class of a value; 0 if it is none of the type.
-    #[inline]
+    #[inline(always)]
     pub(super) fn class(&self, slot: &Slot, value: Value) -> u32 {
         let place = value.wrapping_sub(slot.least) as u64;
         if place < u64::from(slot.known) {

@@ -207,7 +207,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    #[inline]
+    #[inline(always)]
     pub(super) fn child(&self, node: u32, number: u64) -> Option<u32> {
         let node = &self.nodes[node as usize];
         if node.number == number {

@@ -15,7 +15,7 @@ impl Compiled {
     /// # Errors
     ///
     /// If there is another number of values, or one is not of its type.
-    #[inline]
+    #[inline(always)]
     pub(super) fn number(
         &self,
         kind: u64,
@@ -40,8 +40,7 @@ impl Compiled {
             mixed = mixed * slot.count + u64::from(class);
         }
         if !right {
-            let what = if is_goal { "inputs" } else { "outputs" };
-            check::values(&self.model, predicate, what, values)?;
+            self.check_values(is_goal, predicate, values)?;
         }
         let predicate = if is_goal { predicate as u64 } else { 0 };
         Ok(kind << 61
@@ -51,8 +50,20 @@ impl Compiled {
             | mixed)
     }
 
+    #[cold]
+    #[inline(never)]
+    fn check_values(
+        &self,
+        is_goal: bool,
+        predicate: PredicateId,
+        values: &[Option<Value>],
+    ) -> Result<(), Refusal> {
+        let what = if is_goal { "inputs" } else { "outputs" };
+        check::values(&self.model, predicate, what, values)
+    }
+
     /// What the token of an active contract says, as far as the table knows.
-    #[inline]
+    #[inline(always)]
     pub(super) fn on_table(&self, contract: Contract) -> Result<Option<PredicateId>, Refusal> {
         if self.node.is_none() {
             return Ok(None);
@@ -65,7 +76,7 @@ impl Compiled {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn child(&self, number: u64) -> Option<u32> {
         self.table.child(self.node?, number)
     }
@@ -165,11 +176,15 @@ impl Compiled {
     }
 
     /// A new cycle begins: what the last one decided is in the registers then.
-    #[inline]
+    #[inline(always)]
     pub(super) fn settle(&mut self) {
-        if self.pending == NONE {
-            return;
+        if self.pending != NONE {
+            self.settle_effect();
         }
+    }
+
+    #[inline(never)]
+    fn settle_effect(&mut self) {
         let effect = self.table.effects[self.pending as usize];
         self.pending = NONE;
         if effect.cells > 0 || effect.ends > 0 {
