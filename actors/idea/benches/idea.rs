@@ -263,9 +263,15 @@ fn compare(name: &str, chances: Chances, ticks: Ticks) {
         );
     }
     println!(
-        "table: {} states, {} nodes, {} transitions, {} bytes ({} with the interpreter's copies); \
-         {} and then {again} cycles were interpreted\n",
-        size.states, size.nodes, size.transitions, size.table_bytes, size.bytes, size.interpreted
+        "table: {} states, {} nodes, {} transitions with {} effects, {} bytes ({} with the \
+         interpreter's copies); {} and then {again} cycles were interpreted\n",
+        size.states,
+        size.nodes,
+        size.transitions,
+        size.effects,
+        size.table_bytes,
+        size.bytes,
+        size.interpreted
     );
 }
 

@@ -242,6 +242,7 @@ impl Database {
     }
 
     /// The model.
+    #[inline]
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
@@ -252,6 +253,7 @@ impl Database {
     }
 
     /// A token, if it is there.
+    #[inline]
     pub fn token(&self, token: TokenId) -> Option<&Token> {
         self.tokens.get(token)
     }
@@ -272,16 +274,19 @@ impl Database {
     }
 
     /// How many timelines there are.
+    #[inline]
     pub(crate) fn lanes(&self) -> usize {
         self.lanes.len()
     }
 
     /// The first token of a timeline.
+    #[inline]
     pub fn first(&self, timeline: TimelineId) -> Option<TokenId> {
         self.lanes[timeline].first
     }
 
     /// The last token of a timeline.
+    #[inline]
     pub fn last(&self, timeline: TimelineId) -> Option<TokenId> {
         self.lanes[timeline].last
     }
@@ -292,6 +297,7 @@ impl Database {
     }
 
     /// A rule as it holds for a token.
+    #[inline]
     pub fn instance(&self, instance: InstanceId) -> Option<&Instance> {
         self.instances.get(instance)
     }
@@ -354,6 +360,7 @@ impl Database {
     }
 
     /// The value of an operand, if it has one only.
+    #[inline]
     pub fn value(&self, operand: Operand) -> Option<i64> {
         match operand {
             Operand::Value(value) => Some(value),
@@ -380,11 +387,13 @@ impl Database {
     }
 
     /// A token that is there.
+    #[inline]
     fn at(&self, token: TokenId) -> &Token {
         self.tokens.get(token).expect("the token is there")
     }
 
     /// An instance that is there.
+    #[inline]
     fn instance_at(&self, instance: InstanceId) -> &Instance {
         self.instances.get(instance).expect("the instance is there")
     }

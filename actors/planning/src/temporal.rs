@@ -308,9 +308,21 @@ impl<O: Clone> Network<O> {
     /// # Panics
     ///
     /// If it is not there.
+    #[inline]
     pub fn bounds(&self, point: Point) -> Span {
         let node = self.nodes.get(point).expect("the point is there");
         Span::new(node.value[EARLIEST], -node.value[LATEST])
+    }
+
+    /// The latest time of a point.
+    ///
+    /// # Panics
+    ///
+    /// If it is not there.
+    #[inline]
+    pub fn latest(&self, point: Point) -> Ticks {
+        let node = self.nodes.get(point).expect("the point is there");
+        -node.value[LATEST]
     }
 
     /// Within what a point was added: the horizon or less.

@@ -3,9 +3,10 @@
 //!
 //! A state is what the [propositional](super::propositional) technology knows between two cycles, but
 //! for what makes no difference: numbers of one class are alike, and of a far end it only counts that
-//! it is far. What differs is kept in registers. In a state, statuses, goals, cancels
-//! and ends that come near lead from node to node; at the last one stands what the cycle decides: the
-//! next state, what began and ended, and from where its registers are filled. A node or a decision
+//! it is far. What differs is kept in registers, which stay where they are from state to state. In a
+//! state, statuses, goals, cancels and ends that come near lead from node to node; at the last one
+//! stands what the cycle decides: the next state, and an effect, which is what began and ended, and
+//! which registers are filled from where. Effects are few: many nodes have the same. A node or a decision
 //! that is not there yet is made by running the interpreter, once. Where the interpreter decided by
 //! numbers or times that states do not tell apart, nothing is made, and it is run again.
 //!
@@ -19,7 +20,6 @@ mod learn;
 mod table;
 mod walk;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use farside_planning::Ticks;
@@ -35,9 +35,9 @@ use super::{
 };
 use changes::Recent;
 pub use changes::{Began, Row};
-use classes::{Slot, Sorts, classes, slots};
+use classes::{Slots, Sorts, classes};
 use key::{check_present, exact_ticks, is_far};
-use table::{Codes, Form, Lane, Names, Node, Posted, Registers, Transition, What};
+use table::{Lane, NONE, Posted, Registers, Table, What};
 
 /// Why a model does not become a table.
 #[derive(Debug, Error)]
@@ -88,6 +88,8 @@ pub struct TableSize {
     pub nodes: usize,
     /// What is decided: one for each set of stimuli that a state has met.
     pub transitions: usize,
+    /// What transitions do, with those counted once that do the same.
+    pub effects: usize,
     /// All of it, with the interpreter's copies that new entries are made from.
     pub bytes: usize,
     /// The part that cycles read.
@@ -118,33 +120,30 @@ pub struct TableSize {
 pub struct Compiled {
     model: Arc<Model>,
     sorts: Sorts,
-    /// By predicate, by place.
-    slots: Vec<Box<[Slot]>>,
-    /// By predicate.
-    inputs: Vec<usize>,
+    slots: Slots,
     exact: Ticks,
-    forms: Vec<Form>,
-    by_key: BTreeMap<Vec<u32>, u32>,
-    nodes: Vec<Node>,
-    transitions: Vec<Transition>,
-    codes: Codes,
-    names: Names,
+    table: Table,
     /// The state; none, while the interpreter is asked.
     state: u32,
     /// Where what was posted leads; none, if there is no such node.
     node: Option<u32>,
     posted: Vec<Posted>,
     registers: Registers,
+    /// The effect whose registers are still to be filled; [`NONE`] without.
+    pending: u32,
+    /// Kept for its memory.
     spare: Registers,
     /// By timeline.
     lanes: Vec<Lane>,
-    /// From when on a far end is near.
+    /// From when on a far end is near; not later than that.
     near: Ticks,
     now: Ticks,
     solved: Option<Ticks>,
     /// Who decides, if not the table.
     interpreter: Option<Box<Propositional>>,
     recent: Recent,
+    /// Of which effect the lists are; [`NONE`], if of none.
+    listed: u32,
     started: Vec<Started>,
     ended: Vec<Ended>,
     counters: ServiceCounters,
@@ -181,30 +180,42 @@ impl Compiled {
     ///
     /// As [`new`](Compiled::new), and if a fact cannot be, with those before it.
     pub fn begin(model: Arc<Model>, problem: &Problem) -> Result<Self, NotCompiled> {
-        let mut interpreter = Propositional::begin(model.clone(), problem)?;
+        let interpreter = Propositional::begin(model.clone(), problem)?;
         check_present(&interpreter.tables)?;
         let exact = exact_ticks(&interpreter.tables);
-        interpreter.world.state.exact = exact;
         let sorts = classes(&interpreter.tables)?;
-        let slots = slots(&model, &sorts);
+        let slots = Slots::of(&model, &sorts);
         check_counts(&model, &slots)?;
+        let table = Table::default();
+        Ok(Compiled::start(interpreter, sorts, slots, exact, table))
+    }
+
+    fn start(
+        mut interpreter: Propositional,
+        sorts: Sorts,
+        slots: Slots,
+        exact: Ticks,
+        table: Table,
+    ) -> Self {
+        interpreter.world.state.exact = exact;
+        let model = interpreter.model().clone();
         let timelines = model.timelines.len();
-        Ok(Compiled {
+        let registers = Registers {
+            cells: vec![None; table.width],
+            posted: Vec::new(),
+            ends: vec![0; 2 * timelines],
+        };
+        Compiled {
+            model,
             sorts,
             slots,
-            inputs: model.predicates.iter().map(|at| at.inputs).collect(),
-            model,
             exact,
-            forms: Vec::new(),
-            by_key: BTreeMap::new(),
-            nodes: Vec::new(),
-            transitions: Vec::new(),
-            codes: Codes::new(),
-            names: Names::default(),
+            table,
             state: 0,
             node: None,
             posted: Vec::new(),
-            registers: Registers::default(),
+            registers,
+            pending: NONE,
             spare: Registers::default(),
             lanes: vec![Lane::default(); timelines],
             near: Ticks::MAX,
@@ -212,12 +223,13 @@ impl Compiled {
             solved: None,
             interpreter: Some(Box::new(interpreter)),
             recent: Recent::Listed,
+            listed: NONE,
             started: Vec::new(),
             ended: Vec::new(),
             counters: ServiceCounters::default(),
             base: ServiceCounters::default(),
             interpreted: 0,
-        })
+        }
     }
 
     /// From the start again, with the table as it is by now.
@@ -226,54 +238,36 @@ impl Compiled {
     ///
     /// As [`new`](Compiled::new).
     pub fn restarted(self) -> Result<Self, NotCompiled> {
-        let fresh = Compiled::new(self.model.clone())?;
-        Ok(Compiled {
-            forms: self.forms,
-            by_key: self.by_key,
-            nodes: self.nodes,
-            transitions: self.transitions,
-            codes: self.codes,
-            names: self.names,
-            ..fresh
-        })
+        let interpreter = Propositional::new(self.model)?;
+        let (sorts, slots) = (self.sorts, self.slots);
+        Ok(Compiled::start(
+            interpreter,
+            sorts,
+            slots,
+            self.exact,
+            self.table,
+        ))
     }
 
     /// How large the table is by now.
     pub fn size(&self) -> TableSize {
-        let nodes: usize = { self.nodes.iter() }
-            .map(|at| {
-                let spilled = if at.children.spilled() {
-                    at.children.capacity()
-                } else {
-                    0
-                };
-                size_of::<Node>() + spilled * size_of::<(u64, u32)>()
-            })
-            .sum();
-        let transitions = size_of_val(&*self.transitions) + size_of_val(&*self.codes);
-        let forms: usize = { self.forms.iter() }
-            .map(|at| {
-                let held = size_of_val(&*at.cells) + size_of_val(&*at.ends);
-                let lanes = size_of_val(&*at.lanes) + size_of_val(&*at.times);
-                size_of::<Form>() + held + lanes + size_of_val(&*at.over)
-            })
-            .sum();
-        let keys: usize = self.by_key.keys().map(|key| 24 + 4 * key.len()).sum();
-        let copies: usize = { self.forms.iter() }.map(|at| at.interpreter.bytes()).sum();
+        let (table_bytes, bytes) = self.table.bytes();
         TableSize {
-            states: self.forms.len(),
-            nodes: self.nodes.len(),
-            transitions: self.transitions.len(),
-            bytes: nodes + transitions + forms + keys + copies,
-            table_bytes: nodes + transitions + forms,
+            states: self.table.forms.len(),
+            nodes: self.table.nodes.len(),
+            transitions: self.table.transitions,
+            effects: self.table.effects.len(),
+            bytes,
+            table_bytes,
             interpreted: self.interpreted,
         }
     }
 
     /// The interpreter, with what was posted in this cycle.
     fn wake(&mut self) -> &mut Propositional {
+        self.settle();
         if self.interpreter.is_none() {
-            let mut interpreter = self.forms[self.state as usize].interpreter.clone();
+            let mut interpreter = self.table.forms[self.state as usize].interpreter.clone();
             // The form may be of a later tick, of before a restart.
             (interpreter.now, interpreter.world.state.tick) = (self.now, self.now);
             interpreter.posted = 0;
@@ -290,20 +284,20 @@ impl Compiled {
 
     /// The values of something that was posted in this cycle.
     fn values(&self, posted: &Posted) -> &[Option<Value>] {
-        &self.registers.cells[posted.first as usize..][..posted.count as usize]
+        &self.registers.posted[posted.first as usize..][..posted.count as usize]
     }
 
     /// Fills a state's form from its registers.
     fn fill(&self, interpreter: &mut Propositional) {
         let (state, form) = (
             &mut interpreter.world.state,
-            &self.forms[self.state as usize],
+            &self.table.forms[self.state as usize],
         );
         state.exact = self.exact;
         state.loose.set(false);
         state.formulas.clear();
-        for (place, (known, &held)) in (0..).zip(state.cells.iter_mut().zip(&form.cells)) {
-            (known.value, known.origin) = (self.cell(held), Origin::Cell(place));
+        for (place, (known, &source)) in (0..).zip(state.cells.iter_mut().zip(&form.cells)) {
+            (known.value, known.origin) = (self.cell(source), Origin::Cell(place));
         }
         for (place, (bounds, &held)) in (0..).zip(state.finishes.iter_mut().zip(&form.ends)) {
             let from = |time: Ticks| -> Fars {
@@ -323,32 +317,40 @@ impl Compiled {
     }
 
     /// Something is posted: along the table, or to the interpreter, which makes a new node.
+    #[inline(always)]
     fn post(
         &mut self,
         number: u64,
         (what, predicate): (What, PredicateId),
         values: &[Option<Value>],
     ) -> Result<(), Refusal> {
+        self.settle();
         let posted = Posted {
             what,
             predicate,
-            first: self.registers.cells.len() as u32,
+            first: self.registers.posted.len() as u32,
             count: values.len() as u32,
         };
-        if self.interpreter.is_none()
-            && let Some(child) = self.child(number)
-        {
-            self.node = Some(child);
-            self.posted.push(posted);
-            self.registers.cells.extend(values.iter().copied());
-            return Ok(());
+        match self.child(number) {
+            Some(child) if self.interpreter.is_none() => self.node = Some(child),
+            _ => self.post_anew(number, &posted, values)?,
         }
+        self.posted.push(posted);
+        self.registers.posted.extend_from_slice(values);
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn post_anew(
+        &mut self,
+        number: u64,
+        posted: &Posted,
+        values: &[Option<Value>],
+    ) -> Result<(), Refusal> {
         let interpreter = self.wake();
         // What is refused leaves no trace, and is refused by the interpreter again.
-        post(interpreter, &posted, values)?;
+        post(interpreter, posted, values)?;
         let loose = interpreter.world.state.loose.get();
-        self.posted.push(posted);
-        self.registers.cells.extend_from_slice(values);
         self.node = match self.node {
             Some(_) if loose => None,
             Some(node) => self.child(number).or_else(|| self.add_node(node, number)),
@@ -358,13 +360,8 @@ impl Compiled {
     }
 
     fn add_node(&mut self, parent: u32, number: u64) -> Option<u32> {
-        if self.nodes.len() >= MOST_NODES {
-            return None;
-        }
-        let child = self.nodes.len() as u32;
-        self.nodes.push(Node::default());
-        self.nodes[parent as usize].children.push((number, child));
-        Some(child)
+        let grows = self.table.nodes.len() < MOST_NODES;
+        grows.then(|| self.table.add_child(parent, number))
     }
 
     /// The interpreter decides.
@@ -393,7 +390,7 @@ impl Compiled {
 }
 
 /// Whether what may be posted can be numbered.
-fn check_counts(model: &Model, slots: &[Box<[Slot]>]) -> Result<(), NotCompiled> {
+fn check_counts(model: &Model, slots: &Slots) -> Result<(), NotCompiled> {
     let check = |what: &str, expected: u64, actual: u64| {
         if actual <= expected {
             return Ok(());
@@ -407,16 +404,11 @@ fn check_counts(model: &Model, slots: &[Box<[Slot]>]) -> Result<(), NotCompiled>
     };
     check("timelines", 1 << 12, model.timelines.len() as u64)?;
     check("predicates", 1 << 12, model.predicates.len() as u64)?;
-    for (predicate, slots) in model.predicates.iter().zip(slots) {
-        for places in [
-            0..predicate.inputs,
-            predicate.inputs..predicate.parameters.len(),
-        ] {
-            let all = slots[places]
-                .iter()
-                .map(|at| at.count)
-                .fold(1, u64::saturating_mul);
-            let what = format!("classes of what {} says", predicate.name);
+    for (predicate, said) in model.predicates.iter().enumerate() {
+        for is_goal in [true, false] {
+            let counts = slots.given(predicate, is_goal).iter().map(|at| at.count);
+            let all = counts.fold(1, u64::saturating_mul);
+            let what = format!("classes of what {} says", said.name);
             check(&what, 1 << CLASS_BITS, all)?;
         }
     }
@@ -445,6 +437,7 @@ impl PlanService for Compiled {
     }
 
     fn advance(&mut self, now: Ticks) {
+        self.settle();
         let again = now <= self.now && self.solved != Some(now);
         if self.interpreter.is_none() && !again {
             self.now = now.max(self.now);
@@ -475,7 +468,9 @@ impl PlanService for Compiled {
             None => 0,
         };
         let what = What::Status(contract, ends);
-        self.post(number, (what, known.unwrap_or(0)), outputs)
+        self.post(number, (what, known.unwrap_or(0)), outputs)?;
+        self.lanes[timeline].over |= ends;
+        Ok(())
     }
 
     fn insert_goal(
@@ -500,36 +495,35 @@ impl PlanService for Compiled {
 
     fn solve(&mut self, horizon: Ticks, budget: u64) -> Outcome {
         let outcome = self.decide(horizon, budget);
-        if let Recent::Row(_) = self.recent {
-            self.list();
+        if let Recent::Row(effect) = self.recent {
+            self.list(effect);
         }
         outcome
     }
 
     fn started(&self) -> &[Started] {
-        &self.started
+        self.lists().0
     }
 
     fn ended(&self) -> &[Ended] {
-        &self.ended
+        self.lists().1
     }
 
     fn present(&self, timeline: TimelineId) -> Option<Present> {
         if let Some(interpreter) = &self.interpreter {
             return interpreter.present(timeline);
         }
-        let form = &self.forms[self.state as usize];
-        let (predicate, cells) = form.lanes.get(timeline)?;
-        let held = cells.iter().map(|&cell| form.cells[usize::from(cell)]);
-        let parameters = held.map(|held| self.cell(held));
+        let form = &self.table.forms[self.state as usize];
+        let row = &self.table.rows[*form.lanes.get(timeline)? as usize];
+        let sources = self.table.sources(row).iter();
         Some(Present {
             contract: Contract {
                 timeline: timeline as u16,
                 number: self.lanes[timeline].number,
             },
-            predicate: *predicate,
+            predicate: usize::from(row.predicate),
             start: self.lanes[timeline].start,
-            parameters: parameters.collect(),
+            parameters: sources.map(|&source| self.cell(source)).collect(),
         })
     }
 
@@ -548,6 +542,10 @@ impl PlanService for Compiled {
     }
 
     fn commit(&mut self, snapshot: &Snapshot, plan: Plan) -> Result<(), Stale> {
+        if let Recent::Row(effect) = self.recent {
+            // Its registers are filled now.
+            self.list(effect);
+        }
         self.node = None;
         self.wake().commit(snapshot, plan)
     }

@@ -4,6 +4,7 @@
 use smallvec::SmallVec;
 
 use super::resources::Effected;
+use super::token::copy;
 use super::trail::Change;
 use super::{Conflict, Database, InstanceId, Owner, TokenId};
 use crate::model::{
@@ -42,6 +43,8 @@ pub(crate) struct Flat {
     pub(crate) top: Vec<Step>,
     /// Whether the rule holds from the first, without a guard.
     pub(crate) unguarded: bool,
+    /// Whether bounds of its times are variables.
+    pub(super) varies: bool,
     /// The variables among the master's arguments, each with the first place that it has.
     pub(super) named: Vec<(VariableId, usize)>,
     /// The places of the master's arguments that its guard asks of.
@@ -65,6 +68,9 @@ impl Flat {
             }
         }
         flat.unguarded = rule.when.is_empty() && flat.guarding.is_empty();
+        let distances = flat.relations.iter().flat_map(|at| &at.distances);
+        let bounds = distances.map(|at| [at.min, at.max]).chain(rule.duration);
+        flat.varies = { bounds.flatten() }.any(|at| matches!(at, Bound::Variable(_)));
         flat
     }
 
@@ -129,13 +135,13 @@ pub struct Instance {
 impl Clone for Instance {
     fn clone(&self) -> Self {
         Instance {
-            variables: SmallVec::from_slice(&self.variables),
-            labels: SmallVec::from_slice(&self.labels),
-            chosen: SmallVec::from_slice(&self.chosen),
-            times: SmallVec::from_slice(&self.times),
-            values: SmallVec::from_slice(&self.values),
-            effects: SmallVec::from_slice(&self.effects),
-            watched: SmallVec::from_slice(&self.watched),
+            variables: copy(&self.variables),
+            labels: copy(&self.labels),
+            chosen: copy(&self.chosen),
+            times: copy(&self.times),
+            values: copy(&self.values),
+            effects: copy(&self.effects),
+            watched: copy(&self.watched),
             ..*self
         }
     }
@@ -233,11 +239,11 @@ impl Database {
         let (Some(timeline), predicate) = (at.timeline, at.predicate) else {
             return Ok(());
         };
-        for place in 0..self.model.rules_of(timeline, predicate).len() {
-            let rule = self.model.rules_of(timeline, predicate)[place];
-            if self.never_holds(rule, token) {
-                continue;
-            }
+        let rules = self.model.rules_of(timeline, predicate);
+        let rules: SmallVec<[RuleId; 16]> = { rules.iter().copied() }
+            .filter(|&rule| !self.never_holds(rule, token))
+            .collect();
+        for rule in rules {
             let id = self.instances.insert(Instance {
                 rule,
                 master: token,
@@ -479,6 +485,9 @@ impl Database {
 
     /// Bounds of times follow their variables.
     pub(super) fn follow_bounds(&mut self, instance: InstanceId) -> Result<(), Conflict> {
+        if !self.flats[self.instance_at(instance).rule].varies {
+            return Ok(());
+        }
         let flats = self.flats.clone();
         for place in 0..self.instance_at(instance).times.len() {
             let at = self.instance_at(instance);

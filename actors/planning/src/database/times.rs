@@ -26,6 +26,7 @@ impl Database {
     /// # Panics
     ///
     /// If the token is not there.
+    #[inline]
     pub fn time(&self, token: TokenId, end: End) -> Time {
         let at = self.at(token);
         match end {
@@ -35,6 +36,7 @@ impl Database {
     }
 
     /// The earliest and the latest tick of a time.
+    #[inline]
     pub fn bounds_of(&self, time: Time) -> Span {
         match time {
             Time::At(tick) => Span::exactly(tick),
@@ -43,13 +45,24 @@ impl Database {
     }
 
     /// The earliest and the latest start of a token \[ticks\].
+    #[inline]
     pub fn start(&self, token: TokenId) -> Span {
         self.bounds_of(self.at(token).start)
     }
 
     /// The earliest and the latest end of a token \[ticks\].
+    #[inline]
     pub fn finish(&self, token: TokenId) -> Span {
         self.bounds_of(self.at(token).finish)
+    }
+
+    /// Whether a token has ended by a tick.
+    #[inline]
+    pub(crate) fn has_ended(&self, token: TokenId, tick: Ticks) -> bool {
+        match self.at(token).finish {
+            Time::At(finish) => finish <= tick,
+            Time::Point(point) => self.network.latest(point) <= tick,
+        }
     }
 
     /// How long the rules that hold for a token let it last at most \[ticks\]; none, if they do not

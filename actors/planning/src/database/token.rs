@@ -1,6 +1,6 @@
 //! What the database keeps of a token, and of who asked for it.
 
-use smallvec::SmallVec;
+use smallvec::{Array, SmallVec};
 
 use crate::Ticks;
 use crate::arena::Id;
@@ -151,27 +151,38 @@ pub struct Token {
 impl Clone for Token {
     fn clone(&self) -> Self {
         Token {
-            parameters: SmallVec::from_slice(&self.parameters),
-            orders: SmallVec::from_slice(&self.orders),
-            times: SmallVec::from_slice(&self.times),
-            values: SmallVec::from_slice(&self.values),
-            instances: SmallVec::from_slice(&self.instances),
-            supported: SmallVec::from_slice(&self.supported),
-            merged: SmallVec::from_slice(&self.merged),
-            merged_times: SmallVec::from_slice(&self.merged_times),
-            merged_values: SmallVec::from_slice(&self.merged_values),
+            parameters: copy(&self.parameters),
+            orders: copy(&self.orders),
+            times: copy(&self.times),
+            values: copy(&self.values),
+            instances: copy(&self.instances),
+            supported: copy(&self.supported),
+            merged: copy(&self.merged),
+            merged_times: copy(&self.merged_times),
+            merged_values: copy(&self.merged_values),
             ..*self
         }
     }
 }
 
+/// A copy of a list, which most often is empty.
+#[inline]
+pub(super) fn copy<A: Array<Item: Copy>>(list: &SmallVec<A>) -> SmallVec<A> {
+    match &list[..] {
+        [] => SmallVec::new(),
+        all => SmallVec::from_slice(all),
+    }
+}
+
 impl Token {
     /// The token before it on its timeline.
+    #[inline]
     pub fn before(&self) -> Option<TokenId> {
         self.before
     }
 
     /// The token after it on its timeline.
+    #[inline]
     pub fn after(&self) -> Option<TokenId> {
         self.after
     }

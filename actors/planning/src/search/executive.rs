@@ -111,6 +111,7 @@ impl Executive {
     }
 
     /// Its database, to be asked.
+    #[inline]
     pub fn database(&self) -> &Database {
         &self.database
     }
@@ -186,6 +187,7 @@ impl Executive {
             for (place, &output) in (inputs..).zip(outputs) {
                 match output.into() {
                     Some(value) => known.push(value),
+                    None if known.is_empty() => {}
                     None => {
                         database.learn(token, place - known.len(), &known)?;
                         known.clear();
@@ -193,7 +195,9 @@ impl Executive {
                 }
             }
             let end = inputs + outputs.len();
-            database.learn(token, end - known.len(), &known)?;
+            if !known.is_empty() {
+                database.learn(token, end - known.len(), &known)?;
+            }
             if ends {
                 let earliest = database.finish(token).min.max(tick);
                 database.end(token, earliest)?;

@@ -1,10 +1,12 @@
 //! A cycle on the table without copies: what began and ended is read from where the table has it.
 
+use std::fmt;
+
 use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, Value};
 
 use super::Compiled;
-use super::table::Transition;
+use super::table::{Lane, NONE, Row as TableRow};
 use crate::service::{Contract, Ended, Outcome, Started};
 
 /// Where what began and ended with the last cycle stands.
@@ -12,8 +14,10 @@ use crate::service::{Contract, Ended, Outcome, Started};
 pub(super) enum Recent {
     /// In the lists of tokens.
     Listed,
-    /// In a transition's row, with the registers of before.
-    Row(Transition),
+    /// In the rows that an effect names, with the registers of before.
+    Row(u32),
+    /// Nowhere any more: another cycle goes on.
+    Gone,
 }
 
 /// A token that began or ended with the last cycle.
@@ -33,15 +37,17 @@ pub struct Began<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a>(Values<'a>);
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 enum Values<'a> {
     Known(&'a [Option<Value>]),
-    /// From constants and registers.
-    Sources {
-        sources: &'a [u32],
-        names: &'a super::Names,
-        registers: &'a [Option<Value>],
-    },
+    /// From constants and registers, by a row.
+    Row(&'a Compiled, u32),
+}
+
+impl fmt::Debug for Values<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(Row(*self).iter()).finish()
+    }
 }
 
 impl Row<'_> {
@@ -49,7 +55,7 @@ impl Row<'_> {
     pub fn len(&self) -> usize {
         match self.0 {
             Values::Known(values) => values.len(),
-            Values::Sources { sources, .. } => sources.len(),
+            Values::Row(table, row) => usize::from(table.table.rows[row as usize].count),
         }
     }
 
@@ -67,11 +73,10 @@ impl Row<'_> {
     pub fn get(&self, place: usize) -> Option<Value> {
         match self.0 {
             Values::Known(values) => values[place],
-            Values::Sources {
-                sources,
-                names,
-                registers,
-            } => names.value(sources[place], registers),
+            Values::Row(of, row) => {
+                let sources = of.table.sources(&of.table.rows[row as usize]);
+                of.table.names.value(sources[place], &of.registers)
+            }
         }
     }
 
@@ -82,8 +87,9 @@ impl Row<'_> {
 }
 
 impl Compiled {
-    /// As [`solve`](crate::service::PlanService::solve), but nothing is copied that the table has: what began and
-    /// ended is read with [`each_started`](Self::each_started) and [`each_ended`](Self::each_ended).
+    /// As [`solve`](crate::service::PlanService::solve), but nothing is copied that the table has: what
+    /// began and ended is read with [`each_started`](Self::each_started) and
+    /// [`each_ended`](Self::each_ended), until something is posted or it is another tick.
     /// [`started`](crate::service::PlanService::started) and
     /// [`ended`](crate::service::PlanService::ended) are then empty, or what
     /// the interpreter decided.
@@ -104,122 +110,149 @@ impl Compiled {
     /// assert_eq!((ended.contract, ended.parameters.get(1)), (poll, Some(301)));
     /// ```
     pub fn decide(&mut self, horizon: Ticks, budget: u64) -> Outcome {
-        self.started.clear();
-        self.ended.clear();
-        self.recent = Recent::Listed;
+        self.settle();
         let spent = 1 + self.posted.len() as u64;
-        let known = { self.node.filter(|_| self.interpreter.is_none()) }
-            .and_then(|node| self.nodes[node as usize].transition);
-        match known {
-            Some(_) if spent > budget => {
+        if self.interpreter.is_none()
+            && let Some(node) = self.node
+        {
+            let node = self.table.nodes[node as usize];
+            if node.effect != NONE && spent <= budget {
+                self.counters.operations += spent;
+                self.follow(node);
+                self.recent = Recent::Row(node.effect);
+                return Outcome::Decided;
+            }
+            if node.effect != NONE {
                 // What was posted stands, and the interpreter keeps it.
+                self.clear_lists();
                 self.wake();
                 self.node = None;
-                Outcome::OverBudget
+                return Outcome::OverBudget;
             }
-            Some(transition) => {
-                self.counters.operations += spent;
-                let transition = self.transitions[transition as usize];
-                self.follow(transition);
-                self.recent = Recent::Row(transition);
-                Outcome::Decided
-            }
-            None => self.interpret(horizon, budget),
         }
+        self.clear_lists();
+        self.interpret(horizon, budget)
+    }
+
+    fn clear_lists(&mut self) {
+        self.started.clear();
+        self.ended.clear();
+        (self.listed, self.recent) = (NONE, Recent::Listed);
     }
 
     /// The tokens that have begun with the last cycle, by timeline.
+    #[inline]
     pub fn each_started(&self) -> impl Iterator<Item = Began<'_>> {
-        let listed = self.started.iter().map(|at| Began {
+        let listed = self.lists().0.iter().map(|at| Began {
             contract: at.contract,
             predicate: at.predicate,
             start: self.now,
             parameters: Row(Values::Known(&at.parameters)),
         });
-        let at = self.transition();
-        let skipped = at.map_or(0, |at| at.ended);
-        listed.chain(self.rows(true).skip(usize::from(skipped)))
+        listed.chain(self.rows().1.iter().map(|&row| self.began(row, true)))
     }
 
     /// The tokens that have ended with the last cycle, by timeline.
+    #[inline]
     pub fn each_ended(&self) -> impl Iterator<Item = Began<'_>> {
-        let listed = self.ended.iter().map(|at| Began {
+        let listed = self.lists().1.iter().map(|at| Began {
             contract: at.contract,
             predicate: at.predicate,
             start: at.start,
             parameters: Row(Values::Known(&at.parameters)),
         });
-        let at = self.transition();
-        let count = at.map_or(0, |at| at.ended);
-        listed.chain(self.rows(false).take(usize::from(count)))
+        listed.chain(self.rows().0.iter().map(|&row| self.began(row, false)))
     }
 
-    fn transition(&self) -> Option<Transition> {
+    /// What began and ended, if that is listed.
+    #[inline]
+    pub(super) fn lists(&self) -> (&[Started], &[Ended]) {
         match self.recent {
-            Recent::Listed => None,
-            Recent::Row(at) => Some(at),
+            Recent::Listed => (&self.started, &self.ended),
+            _ => (&[], &[]),
         }
     }
 
-    /// What the last transition names: what ended, and then what started.
-    fn rows(&self, started: bool) -> impl Iterator<Item = Began<'_>> {
-        let (mut code, mut left) = match self.transition() {
-            Some(at) => {
-                let before = u32::from(at.cells) + u32::from(at.ends) + u32::from(at.started);
-                let code = &self.codes[(at.code + before) as usize..];
-                (code, at.ended + at.started)
+    /// The rows of what ended and of what began, if that is not listed.
+    #[inline]
+    fn rows(&self) -> (&[u32], &[u32]) {
+        match self.recent {
+            Recent::Row(effect) => {
+                let effect = &self.table.effects[effect as usize];
+                (self.table.ended(effect), self.table.started(effect))
             }
-            None => (&[][..], 0),
-        };
-        std::iter::from_fn(move || {
-            left = left.checked_sub(1)?;
-            let (sources, rest) = code[2..].split_at(code[1] as usize);
-            let timeline = code[0] >> 16;
-            let predicate = (code[0] & 0xffff) as PredicateId;
-            code = rest;
-            let lane = &self.lanes[timeline as usize];
-            // On its timeline another has begun.
-            let (number, start) = match started {
-                true => (lane.number, lane.start),
-                false => (lane.number - 1, lane.before),
-            };
-            let contract = Contract {
-                timeline: timeline as u16,
-                number,
-            };
-            let parameters = Row(Values::Sources {
-                sources,
-                names: &self.names,
-                registers: &self.spare.cells,
-            });
-            Some(Began {
-                contract,
-                predicate,
-                start,
-                parameters,
-            })
-        })
+            _ => (&[], &[]),
+        }
     }
 
-    /// Copies what began and ended to the lists.
-    pub(super) fn list(&mut self) {
-        let (mut started, mut ended) = (
-            std::mem::take(&mut self.started),
-            std::mem::take(&mut self.ended),
-        );
-        started.extend(self.each_started().map(|at| Started {
-            contract: at.contract,
-            predicate: at.predicate,
-            parameters: at.parameters.iter().collect(),
-        }));
-        ended.extend(self.each_ended().map(|at| Ended {
-            contract: at.contract,
-            predicate: at.predicate,
-            start: at.start,
-            finish: self.now,
-            parameters: at.parameters.iter().collect(),
-        }));
-        (self.started, self.ended) = (started, ended);
-        self.recent = Recent::Listed;
+    #[inline]
+    fn began(&self, row: u32, started: bool) -> Began<'_> {
+        let at = &self.table.rows[row as usize];
+        let (contract, start) = which(&self.lanes, at, started);
+        Began {
+            contract,
+            predicate: usize::from(at.predicate),
+            start,
+            parameters: Row(Values::Row(self, row)),
+        }
     }
+
+    /// Copies what began and ended to the lists. Of what is of the same effect as what they had,
+    /// only what differs is copied.
+    pub(super) fn list(&mut self, effect: u32) {
+        let (table, lanes, registers) = (&self.table, &self.lanes, &self.registers);
+        let now = self.now;
+        let at = &table.effects[effect as usize];
+        let (ended, started) = (table.ended(at), table.started(at));
+        if self.listed == effect {
+            for (at, &row) in self.started.iter_mut().zip(started) {
+                (at.contract, _) = which(lanes, &table.rows[row as usize], true);
+                table.update(&mut at.parameters, row, registers);
+            }
+            for (at, &row) in self.ended.iter_mut().zip(ended) {
+                (at.contract, at.start) = which(lanes, &table.rows[row as usize], false);
+                at.finish = now;
+                table.update(&mut at.parameters, row, registers);
+            }
+        } else {
+            self.started.clear();
+            self.started.extend(started.iter().map(|&row| {
+                let at = &table.rows[row as usize];
+                Started {
+                    contract: which(lanes, at, true).0,
+                    predicate: usize::from(at.predicate),
+                    parameters: table.parameters(row, registers),
+                }
+            }));
+            self.ended.clear();
+            self.ended.extend(ended.iter().map(|&row| {
+                let at = &table.rows[row as usize];
+                let (contract, start) = which(lanes, at, false);
+                Ended {
+                    contract,
+                    predicate: usize::from(at.predicate),
+                    start,
+                    finish: now,
+                    parameters: table.parameters(row, registers),
+                }
+            }));
+        }
+        (self.listed, self.recent) = (effect, Recent::Listed);
+    }
+}
+
+/// Which token a row is of, and when that began.
+#[inline]
+fn which(lanes: &[Lane], row: &TableRow, started: bool) -> (Contract, Ticks) {
+    let lane = &lanes[usize::from(row.timeline)];
+    // On its timeline another has begun, if it ended.
+    let (number, start) = match started {
+        true => (lane.number, lane.start),
+        false => (lane.number - 1, lane.before),
+    };
+    let contract = Contract {
+        timeline: row.timeline,
+        number,
+    };
+    (contract, start)
 }

@@ -84,23 +84,57 @@ pub(super) struct Sorts {
     pub(super) variables: Vec<Vec<Classes>>,
 }
 
-/// A parameter, for what is posted: its values by class, from 1 on, with 0 for what is not known.
+/// All parameters, for what is posted: their values by class, from 1 on, with 0 for what is not
+/// known.
 #[derive(Clone, Debug)]
+pub(super) struct Slots {
+    /// By predicate: where its parameters begin, how many are inputs, and how many there are.
+    said: Vec<[u32; 3]>,
+    slots: Vec<Slot>,
+    /// The classes of the values of narrow parameters, one parameter after another; 0 for what is no
+    /// value of the type.
+    classes: Vec<u16>,
+    /// What is too wide for that.
+    wide: Vec<(Values, Classes)>,
+}
+
+/// A parameter.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     /// How many classes there are, with one for what is not known.
     pub(super) count: u64,
     least: Value,
-    /// By value from the least one on: its class; 0 for what is no value of the type.
-    classes: Box<[u16]>,
-    /// What is too wide for that.
-    wide: Option<(Values, Classes)>,
+    /// How many values from the least one on have their class in [`Slots::classes`]; none, if they
+    /// are too many.
+    known: u32,
+    /// Where they begin there, or its place in [`Slots::wide`].
+    first: u32,
 }
 
 /// The most values of which a slot knows each.
 const MOST_KNOWN: usize = 1 << 10;
 
-impl Slot {
-    fn of(model: &Model, of: TypeId, classes: &Classes) -> Slot {
+impl Slots {
+    pub(super) fn of(model: &Model, sorts: &Sorts) -> Slots {
+        let mut all = Slots {
+            said: Vec::new(),
+            slots: Vec::new(),
+            classes: Vec::new(),
+            wide: Vec::new(),
+        };
+        for (said, sorts) in model.predicates.iter().zip(&sorts.parameters) {
+            let first = all.slots.len();
+            let counts = [first, said.inputs, said.parameters.len()];
+            all.said.push(counts.map(|at| at as u32));
+            for (at, classes) in said.parameters.iter().zip(sorts) {
+                let slot = all.slot(model, at.of, classes);
+                all.slots.push(slot);
+            }
+        }
+        all
+    }
+
+    fn slot(&mut self, model: &Model, of: TypeId, classes: &Classes) -> Slot {
         let values = &model.types[of].values;
         let (least, most) = match values {
             Values::Truth => (0, 1),
@@ -114,40 +148,52 @@ impl Slot {
         let known = most.saturating_sub(least).saturating_add(1);
         let narrow = known <= MOST_KNOWN as Value && count < u64::from(u16::MAX);
         let class = |value| { classes.of_type(values, value) }.map_or(0, |at| at as u16 + 1);
+        let (known, first) = match narrow {
+            true => (known as u32, self.classes.len()),
+            false => (0, self.wide.len()),
+        };
+        if narrow {
+            self.classes.extend((least..=most).map(class));
+        } else {
+            self.wide.push((values.clone(), classes.clone()));
+        }
         Slot {
             count,
             least,
-            classes: match narrow {
-                true => (least..=most).map(class).collect(),
-                false => Box::default(),
-            },
-            wide: (!narrow).then(|| (values.clone(), classes.clone())),
+            known,
+            first: first as u32,
         }
     }
 
-    /// The class of a value, if it is one of the type.
-    #[inline]
-    pub(super) fn class(&self, value: Value) -> Option<u32> {
-        let place = value.wrapping_sub(self.least) as usize;
-        match self.classes.get(place) {
-            Some(&class) => (class > 0).then_some(u32::from(class)),
-            None => {
-                let (values, classes) = self.wide.as_ref()?;
-                Some(classes.of_type(values, value)? + 1)
-            }
+    /// The parameters that a goal gives, or a status.
+    #[inline(always)]
+    pub(super) fn given(&self, predicate: PredicateId, is_goal: bool) -> &[Slot] {
+        let [first, inputs, all] = self.said[predicate].map(|at| at as usize);
+        let given = match is_goal {
+            true => first..first + inputs,
+            false => first + inputs..first + all,
+        };
+        &self.slots[given]
+    }
+
+    /// The class of a value; 0 if it is none of the type.
+    #[inline(always)]
+    pub(super) fn class(&self, slot: &Slot, value: Value) -> u32 {
+        let place = value.wrapping_sub(slot.least) as u64;
+        if place < u64::from(slot.known) {
+            u32::from(self.classes[slot.first as usize + place as usize])
+        } else if slot.known == 0 {
+            self.wide_class(slot, value)
+        } else {
+            0
         }
     }
-}
 
-/// By predicate, by place: its classes, for what is posted.
-pub(super) fn slots(model: &Model, sorts: &Sorts) -> Vec<Box<[Slot]>> {
-    let predicates = model.predicates.iter().zip(&sorts.parameters);
-    let slots = predicates.map(|(said, sorts)| {
-        let parameters = said.parameters.iter().zip(sorts);
-        let slots = parameters.map(|(at, classes)| Slot::of(model, at.of, classes));
-        slots.collect()
-    });
-    slots.collect()
+    #[inline(never)]
+    fn wide_class(&self, slot: &Slot, value: Value) -> u32 {
+        let (values, classes) = &self.wide[slot.first as usize];
+        classes.of_type(values, value).map_or(0, |class| class + 1)
+    }
 }
 
 /// What is asked of the values of a parameter or a variable.

@@ -1,15 +1,23 @@
 //! How a table grows: from what the interpreter decided.
 
 use farside_planning::Ticks;
-use farside_planning::model::{RelationshipKind, Value};
+use farside_planning::model::{PredicateId, RelationshipKind, TimelineId, Value};
+use smallvec::SmallVec;
 
 use super::Compiled;
 use super::key::{key, longest};
-use super::table::{Bound, Change, Form, Held, Node, REST, Source, Time, Transition, What};
+use super::table::{Bound, Effect, Form, Held, KIND, NONE, REGISTER, REST, Source, Time, What};
 use crate::service::PlanService;
 use crate::service::ServiceCounters;
 use crate::service::propositional::Propositional;
 use crate::service::propositional::state::{Far, Origin};
+
+/// A token that begins or ends.
+struct Change {
+    timeline: TimelineId,
+    predicate: PredicateId,
+    parameters: SmallVec<[Source; 4]>,
+}
 
 impl Compiled {
     /// What the interpreter decided becomes a state, and, if it may, a transition to it.
@@ -27,80 +35,119 @@ impl Compiled {
             interpreter.world.state.formulas.clear();
             (self.node, self.interpreter) = (None, Some(interpreter));
             self.posted.clear();
+            self.registers.posted.clear();
             self.solved = Some(self.now);
             return;
         };
-        let next = match self.by_key.get(&key) {
+        let next = match self.table.by_key.get(&key) {
             Some(&next) => next,
             None => self.add_form(key, &stripped),
         };
         let spent = interpreter.counters();
         if let (Some(node), Some(ended), false) = (self.node, ended, loose)
             && let Some(started) = self.changes_of(&stripped, false)
-            && let Some(mut transition) = self.encode(&stripped, next, (ended, started))
+            && let Some((mut effect, named)) = self.encode(&stripped, next, (ended, started))
         {
-            transition.decisions = (spent.decisions - before.decisions) as u32;
-            transition.guards = (spent.guards - before.guards) as u32;
-            transition.backtracks = (spent.backtracks - before.backtracks) as u32;
-            self.nodes[node as usize].transition = Some(self.transitions.len() as u32);
-            self.transitions.push(transition);
+            effect.decisions = (spent.decisions - before.decisions) as u32;
+            effect.guards = (spent.guards - before.guards) as u32;
+            effect.backtracks = (spent.backtracks - before.backtracks) as u32;
+            let effect = self.table.effect(effect, &named);
+            let root = self.table.forms[next as usize].node;
+            let node = &mut self.table.nodes[node as usize];
+            (node.effect, node.state, node.root) = (effect, next, root);
+            self.table.transitions += 1;
         }
         self.read(&stripped, next);
     }
 
     /// The registers of a state that the interpreter is in.
     fn read(&mut self, is: &Propositional, state: u32) {
-        let (known, form) = (&is.world.state, &self.forms[state as usize]);
-        self.registers.cells.clear();
-        for (at, held) in known.cells.iter().zip(&form.cells) {
-            if let Held::Register(_) = held {
-                self.registers.cells.push(at.value);
+        let (known, form) = (&is.world.state, &self.table.forms[state as usize]);
+        self.registers.posted.clear();
+        for (at, &source) in known.cells.iter().zip(&form.cells) {
+            if source >> KIND == REGISTER {
+                self.registers.cells[(source & REST) as usize] = at.value;
             }
         }
-        self.registers.ends.clear();
+        self.near = Ticks::MAX;
         for (at, held) in known.finishes.iter().zip(&form.ends) {
             for (time, held) in [at.min, at.max].into_iter().zip(held) {
-                if let Held::Register(_) = held {
-                    self.registers.ends.push(time);
+                if let Held::Register(place) = *held {
+                    self.registers.ends[usize::from(place)] = time;
+                    self.near = self.near.min(time.saturating_sub(self.exact));
                 }
             }
         }
-        for (lane, at) in self.lanes.iter_mut().zip(&known.lanes) {
+        for (timeline, (lane, at)) in self.lanes.iter_mut().zip(&known.lanes).enumerate() {
             lane.number = at.number;
+            lane.over = is.ends[timeline];
             if let Some(&token) = at.tokens.last() {
-                lane.start = known.at(token).start;
+                let token = known.at(token);
+                (lane.start, lane.predicate) = (token.start, token.predicate as u16);
             }
         }
-        let ends = self.registers.ends.iter();
-        let near = ends.map(|&at| at.saturating_sub(self.exact)).min();
-        self.near = near.unwrap_or(Ticks::MAX);
-        self.enter(state);
+        self.enter(state, form.node);
+    }
+
+    /// The registers of a state's cells: those of the first parameters that have them. Behind these
+    /// stand the registers of cells that are no parameters.
+    fn registers_of(&self, is: &Propositional) -> Vec<u32> {
+        let known = &is.world.state;
+        let mut registers = vec![NONE; known.cells.len()];
+        let mut first = 0;
+        for (said, lane) in self.model.timelines.iter().zip(&known.lanes) {
+            let token = lane.tokens.last().expect("each timeline says something");
+            for (place, &cell) in (first..).zip(&known.at(*token).parameters) {
+                let register = &mut registers[usize::from(cell)];
+                *register = place.min(*register);
+            }
+            let counts = said.predicates.iter();
+            let counts = counts.map(|&at| self.model.predicates[at].parameters.len());
+            first += counts.max().unwrap_or(0) as u32;
+        }
+        for register in registers.iter_mut().filter(|at| **at == NONE) {
+            *register = first;
+            first += 1;
+        }
+        registers
     }
 
     fn add_form(&mut self, key: Vec<u32>, is: &Propositional) -> u32 {
-        let node = self.nodes.len() as u32;
-        self.nodes.push(Node::default());
+        let node = self.table.add_root();
         let known = &is.world.state;
-        let lanes = known.lanes.iter().map(|lane| {
+        let registers = self.registers_of(is);
+        let cells = { known.cells.iter().zip(registers) }.map(|(at, register)| match at.value {
+            Some(_) if is.tables.is_measured(at.of) => Source::Register(register),
+            value => Source::Value(value),
+        });
+        let cells: Vec<Source> = cells.collect();
+        let lanes = known.lanes.iter().enumerate().map(|(timeline, lane)| {
             let token = lane.tokens.last().expect("each timeline says something");
             let at = known.at(*token);
-            (at.predicate, at.parameters.iter().copied().collect())
+            let parameters = at.parameters.iter();
+            let sources = parameters.map(|&cell| cells[usize::from(cell)].clone());
+            self.table.row(timeline, at.predicate, sources)
         });
-        let mut registers = 0..;
-        let mut register = || registers.next().expect("there are few");
-        let cells = known.cells.iter().map(|at| match at.value {
-            Some(_) if is.tables.is_measured(at.of) => Held::Register(register()),
-            value => Held::Same(value),
-        });
-        let cells = cells.collect();
-        let mut times = 0..;
-        let ends = known.finishes.iter().map(|at| {
-            [at.min, at.max].map(|time| match time {
-                Ticks::MAX => Held::Same(Ticks::MAX),
-                time if known.is_far(time) => Held::Register(times.next().expect("there are few")),
-                time => Held::Same((time - self.now).max(0)),
-            })
-        });
+        let lanes = lanes.collect();
+        let cells: Box<[u32]> = { cells.into_iter() }
+            .map(|at| self.table.names.source(at))
+            .collect();
+        let filled = cells.iter().filter(|&&at| at >> KIND == REGISTER);
+        let width = filled.map(|&at| (at & REST) as usize + 1).max();
+        self.table.width = self.table.width.max(width.unwrap_or(0));
+        self.registers.cells.resize(self.table.width, None);
+        let mut firsts = vec![0; known.finishes.len()];
+        for (timeline, lane) in known.lanes.iter().enumerate().rev() {
+            let token = lane.tokens.last().expect("each timeline says something");
+            firsts[usize::from(known.end(known.at(*token).finish))] = timeline as u16;
+        }
+        let held = |time: Ticks, register: u16| match time {
+            Ticks::MAX => Held::Same(Ticks::MAX),
+            time if known.is_far(time) => Held::Register(register),
+            time => Held::Same((time - self.now).max(0)),
+        };
+        let ends = { known.finishes.iter().zip(&firsts) }
+            .map(|(at, &first)| [held(at.min, 2 * first), held(at.max, 2 * first + 1)]);
         let ends: Box<[[Held<Ticks>; 2]]> = ends.collect();
         let mut asked: Vec<Time> = Vec::new();
         let registers = |held: &Held<Ticks>| match *held {
@@ -120,17 +167,16 @@ impl Compiled {
         }
         let mut interpreter = Box::new(is.clone());
         interpreter.shrink();
-        self.forms.push(Form {
+        self.table.forms.push(Form {
             node,
-            lanes: lanes.collect(),
-            over: is.ends.clone().into(),
+            lanes,
             cells,
             ends,
             times: asked.into(),
             interpreter,
         });
-        let state = (self.forms.len() - 1) as u32;
-        self.by_key.insert(key, state);
+        let state = (self.table.forms.len() - 1) as u32;
+        self.table.by_key.insert(key, state);
         state
     }
 
@@ -150,7 +196,7 @@ impl Compiled {
             }
             let parameters = at.parameters.iter().map(|&cell| self.source(is, cell));
             changes.push(Change {
-                timeline: timeline as u16,
+                timeline,
                 predicate: at.predicate,
                 parameters: parameters.collect(),
             });
@@ -158,56 +204,64 @@ impl Compiled {
         Some(changes)
     }
 
-    /// From where a state's registers are filled, and what began and ended; none, if it is not
-    /// clear.
+    /// From where a state's registers are filled, and what began and ended, with all that this
+    /// names; none, if it is not clear. A register that stays as it is is not filled.
     fn encode(
         &mut self,
         is: &Propositional,
         next: u32,
         (ended, started): (Vec<Change>, Vec<Change>),
-    ) -> Option<Transition> {
-        let (known, form) = (&is.world.state, &self.forms[next as usize]);
-        let mut sources: Vec<Source> = Vec::new();
-        for (cell, held) in (0..).zip(&form.cells) {
-            if let Held::Register(_) = held {
-                sources.push(self.source(is, cell));
-            }
-        }
-        let mut bounds: Vec<Bound> = Vec::new();
-        for (at, held) in known.finishes.iter().zip(&form.ends) {
-            for (side, fars) in [&at.lows, &at.highs].into_iter().enumerate() {
-                if let Held::Register(_) = held[side] {
-                    bounds.push(self.far_bound(side, fars)?);
+    ) -> Option<(Effect, Vec<u32>)> {
+        let known = &is.world.state;
+        let mut named: Vec<u32> = Vec::new();
+        for cell in 0..known.cells.len() {
+            let register = self.table.forms[next as usize].cells[cell];
+            if register >> KIND == REGISTER {
+                let source = self.source(is, cell as u16);
+                let source = self.table.names.source(source);
+                if source != register {
+                    named.extend([register & REST, source]);
                 }
             }
         }
-        let transition = Transition {
-            next,
-            code: self.codes.len() as u32,
-            cells: sources.len() as u16,
-            ends: bounds.len() as u16,
+        let cells = named.len() / 2;
+        for (end, at) in known.finishes.iter().enumerate() {
+            for (side, fars) in [&at.lows, &at.highs].into_iter().enumerate() {
+                if let Held::Register(place) = self.table.forms[next as usize].ends[end][side] {
+                    let bound = self.far_bound(side, fars)?;
+                    if bound != Bound::Register(place) {
+                        let bound = self.table.names.bound(bound);
+                        named.extend([u32::from(place), bound]);
+                    }
+                }
+            }
+        }
+        let effect = Effect {
+            code: 0,
+            rows: 0,
+            cells: cells as u16,
+            ends: (named.len() / 2 - cells) as u16,
             ended: ended.len() as u16,
             started: started.len() as u16,
             decisions: 0,
             guards: 0,
             backtracks: 0,
         };
-        let (names, codes) = (&mut self.names, &mut self.codes);
-        codes.extend(sources.into_iter().map(|at| names.source(at)));
-        codes.extend(bounds.into_iter().map(|at| names.bound(at)));
-        codes.extend(started.iter().map(|at| u32::from(at.timeline)));
         for change in ended.into_iter().chain(started) {
-            codes.push(u32::from(change.timeline) << 16 | change.predicate as u32);
-            codes.push(change.parameters.len() as u32);
-            codes.extend(change.parameters.into_iter().map(|at| names.source(at)));
+            let Change {
+                timeline,
+                predicate,
+                parameters,
+            } = change;
+            named.push(self.table.row(timeline, predicate, parameters));
         }
-        Some(transition)
+        Some((effect, named))
     }
 
     /// From where a far bound is, the earliest (0) or the latest (1) tick of an end; none, if it is
     /// not clear.
     fn far_bound(&self, side: usize, fars: &[Far]) -> Option<Bound> {
-        let form = &self.forms[self.state as usize];
+        let form = &self.table.forms[self.state as usize];
         let in_registers = |at: &Far| match *at {
             Far::Ahead(ticks) => (ticks <= Ticks::from(REST)).then_some(Far::Ahead(ticks)),
             Far::End(end) => match form.ends.get(usize::from(end))?[side] {
@@ -238,10 +292,13 @@ impl Compiled {
     fn source_of(&self, is: &Propositional, value: Value, origin: Origin) -> Source {
         match origin {
             Origin::Model => Source::Value(Some(value)),
-            Origin::Cell(cell) => match self.forms[self.state as usize].cells[usize::from(cell)] {
-                Held::Register(place) => Source::Register(u32::from(place)),
-                Held::Same(_) => Source::Value(Some(value)),
-            },
+            Origin::Cell(cell) => {
+                let form = &self.table.forms[self.state as usize];
+                match form.cells[usize::from(cell)] {
+                    source if source >> KIND == REGISTER => Source::Register(source & REST),
+                    _ => Source::Value(Some(value)),
+                }
+            }
             Origin::Posted(which, place) => {
                 let at = &self.posted[usize::from(which)];
                 let said = &self.model.predicates[at.predicate];
@@ -251,7 +308,7 @@ impl Compiled {
                 };
                 let of = said.parameters[first + usize::from(place)].of;
                 if is.tables.is_measured(of) {
-                    Source::Register(at.first + u32::from(place))
+                    Source::Posted(at.first + u32::from(place))
                 } else {
                     Source::Value(Some(value))
                 }

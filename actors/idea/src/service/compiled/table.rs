@@ -1,4 +1,8 @@
 //! What a table consists of.
+//!
+//! Cycles read nodes, effects and rows. A node is small, and those that follow each other lie side by
+//! side, most often; what a cycle does is an effect, which many nodes share, and what begins or ends
+//! is a row, which many effects share: so that what is read again and again stays near.
 
 use std::collections::BTreeMap;
 
@@ -6,17 +10,22 @@ use farside_planning::Ticks;
 use farside_planning::model::{PredicateId, RelationshipKind, TimelineId, Value};
 use smallvec::SmallVec;
 
-use crate::service::Contract;
 use crate::service::propositional::Propositional;
 use crate::service::propositional::state::{Far, reckon};
+use crate::service::{Contract, Parameters};
+
+/// No node, effect or place.
+pub(super) const NONE: u32 = u32::MAX;
 
 /// From where a register is filled, or a parameter of a token that began or ended.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
     /// It is the same whenever this is decided.
     Value(Option<Value>),
-    /// A register of before, or a value that was posted: these stand behind the registers.
+    /// A register of before.
     Register(u32),
+    /// A value that was posted, by its place among all of the cycle.
+    Posted(u32),
     /// A number that is made from others.
     Computed(Computation, Vec<Source>),
 }
@@ -35,23 +44,30 @@ pub(super) enum Bound {
     Most(Box<[Far]>),
 }
 
-/// A token that begins or ends.
-pub(super) struct Change {
+/// A token that begins or ends, or is there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
     pub(super) timeline: u16,
-    pub(super) predicate: PredicateId,
-    pub(super) parameters: SmallVec<[Source; 4]>,
+    pub(super) predicate: u16,
+    /// How many parameters it has, and how many of them are not the same whenever this is decided.
+    pub(super) count: u16,
+    pub(super) varying: u16,
+    /// Where it begins in [`Table::codes`]: the sources of its parameters, then, in pairs, the
+    /// places and the sources of those that vary.
+    pub(super) code: u32,
 }
 
-/// What a cycle decides. All that it names stands in one row of [`Codes`], so that few lines of
-/// memory are read: from where each register is filled, then each far end, the timelines on which
-/// something began, and what ended and began.
+/// What a cycle decides. All that it names stands in [`Table::codes`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Transition {
-    pub(super) next: u32,
-    /// Where its row begins.
+pub(super) struct Effect {
+    /// Where that begins, and where its rows do.
     pub(super) code: u32,
+    pub(super) rows: u32,
+    /// How many registers are filled: each is a pair, the register and its source.
     pub(super) cells: u16,
+    /// How many far ends there are that were not before, in pairs, too.
     pub(super) ends: u16,
+    /// How many rows there are of what ended, and then of what started.
     pub(super) ended: u16,
     pub(super) started: u16,
     pub(super) decisions: u32,
@@ -59,29 +75,34 @@ pub(super) struct Transition {
     pub(super) backtracks: u32,
 }
 
-/// The rows of all transitions, one after another.
-pub(super) type Codes = Vec<u32>;
+/// What was posted, and what may be posted next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// What leads to its first child, which is the one that is asked for most often; 0 without.
+    number: u64,
+    child: u32,
+    /// Where its other children stand.
+    others: u32,
+    /// What is decided if nothing else is posted; [`NONE`], if it is not known.
+    pub(super) effect: u32,
+    /// The state after that, and its node.
+    pub(super) state: u32,
+    pub(super) root: u32,
+}
 
 /// The highest bits of a number say what it is.
 pub(super) const KIND: u32 = 30;
 
 pub(super) const REST: u32 = (1 << KIND) - 1;
 
-/// Values and times that transitions name by their places.
+/// Values and times that effects name by their places.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
-    pub(super) values: Vec<Option<Value>>,
-    pub(super) value_places: BTreeMap<Option<Value>, u32>,
+    values: Vec<Option<Value>>,
+    value_places: BTreeMap<Option<Value>, u32>,
     pub(super) several: Vec<Box<[Far]>>,
     /// Numbers that are made from others.
-    pub(super) computed: Vec<(Computation, Box<[u32]>)>,
-}
-
-/// What may be posted next.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Node {
-    pub(super) children: SmallVec<[(u64, u32); 1]>,
-    pub(super) transition: Option<u32>,
+    computed: Vec<(Computation, Box<[u32]>)>,
 }
 
 /// What a state holds: itself, if it is the same whenever the state is entered, or in a register.
@@ -94,11 +115,10 @@ pub(super) enum Held<T> {
 /// A state's part that is the same whatever its registers hold.
 pub(super) struct Form {
     pub(super) node: u32,
-    /// By timeline: what it says, and which cells its parameters are.
-    pub(super) lanes: Box<[(PredicateId, SmallVec<[u16; 4]>)]>,
-    /// By timeline: whether a status ended its token, which goes on.
-    pub(super) over: Box<[bool]>,
-    pub(super) cells: Box<[Held<Option<Value>>]>,
+    /// By timeline: the row of what it says.
+    pub(super) lanes: Box<[u32]>,
+    /// By cell: its source, which is a value or a register.
+    pub(super) cells: Box<[u32]>,
     /// The earliest and the latest tick of each end: from when the state is entered, or far and in a
     /// register of times.
     pub(super) ends: Box<[[Held<Ticks>; 2]]>,
@@ -118,13 +138,13 @@ pub(super) struct Time {
     pub(super) whose: Option<(u16, Ticks)>,
 }
 
-/// What was posted in this cycle. Its values stand behind the registers.
+/// What was posted in this cycle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Posted {
     pub(super) what: What,
     /// Of what its first value is a parameter.
     pub(super) predicate: PredicateId,
-    /// Where its values stand, and how many there are.
+    /// Where its values stand among all that were posted, and how many there are.
     pub(super) first: u32,
     pub(super) count: u32,
 }
@@ -138,10 +158,14 @@ pub(super) enum What {
 }
 
 /// What differs from one time that a state is entered to another.
+///
+/// A value's register is that of the first parameter that has it, by timeline and place, whatever the
+/// state; an end's that of the first timeline whose token has it. So what goes on stays where it is.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Registers {
-    /// Values, and behind them those that were posted.
     pub(super) cells: Vec<Option<Value>>,
+    /// Values that were posted in this cycle.
+    pub(super) posted: Vec<Option<Value>>,
     /// Ends that were far when the state was entered.
     pub(super) ends: Vec<Ticks>,
 }
@@ -154,22 +178,236 @@ pub(super) struct Lane {
     pub(super) start: Ticks,
     /// When the token before it began.
     pub(super) before: Ticks,
+    pub(super) predicate: u16,
+    /// Whether a status ended it, though it may have to go on for a while.
+    pub(super) over: bool,
 }
+
+/// The table: what all that use it share, and that grows.
+#[derive(Default)]
+pub(super) struct Table {
+    pub(super) forms: Vec<Form>,
+    pub(super) by_key: BTreeMap<Vec<u32>, u32>,
+    pub(super) nodes: Vec<Node>,
+    /// The children of nodes after their first ones.
+    others: Vec<Vec<(u64, u32)>>,
+    pub(super) effects: Vec<Effect>,
+    effect_places: BTreeMap<Box<[u32]>, u32>,
+    pub(super) rows: Vec<Row>,
+    /// By row: the values of its parameters, but for those that vary.
+    parameters: Vec<Parameters>,
+    row_places: BTreeMap<Box<[u32]>, u32>,
+    /// What effects and rows consist of.
+    pub(super) codes: Vec<u32>,
+    pub(super) names: Names,
+    /// How many nodes have an effect.
+    pub(super) transitions: usize,
+    /// How many registers of values there are.
+    pub(super) width: usize,
+}
+
+impl Table {
+    #[inline(always)]
+    pub(super) fn child(&self, node: u32, number: u64) -> Option<u32> {
+        let node = &self.nodes[node as usize];
+        if node.number == number {
+            return Some(node.child);
+        }
+        let others = self.others.get(node.others as usize)?;
+        let child = others.iter().find(|child| child.0 == number);
+        child.map(|&(_, child)| child)
+    }
+
+    /// A node that nothing leads to yet.
+    pub(super) fn add_root(&mut self) -> u32 {
+        self.nodes.push(Node {
+            number: 0,
+            child: NONE,
+            others: NONE,
+            effect: NONE,
+            state: NONE,
+            root: NONE,
+        });
+        (self.nodes.len() - 1) as u32
+    }
+
+    pub(super) fn add_child(&mut self, parent: u32, number: u64) -> u32 {
+        let child = self.add_root();
+        let node = &mut self.nodes[parent as usize];
+        if node.number == 0 {
+            (node.number, node.child) = (number, child);
+            return child;
+        }
+        if node.others == NONE {
+            node.others = self.others.len() as u32;
+            self.others.push(Vec::new());
+        }
+        self.others[node.others as usize].push((number, child));
+        child
+    }
+
+    /// The row of a token.
+    pub(super) fn row(
+        &mut self,
+        timeline: usize,
+        predicate: PredicateId,
+        parameters: impl IntoIterator<Item = Source>,
+    ) -> u32 {
+        let (timeline, predicate) = (timeline as u16, predicate as u16);
+        let names = &mut self.names;
+        let mut key = vec![u32::from(timeline) << 16 | u32::from(predicate)];
+        key.extend(parameters.into_iter().map(|at| names.source(at)));
+        let row = Row {
+            timeline,
+            predicate,
+            count: (key.len() - 1) as u16,
+            varying: key[1..].iter().filter(|&&at| at >> KIND != VALUE).count() as u16,
+            code: self.codes.len() as u32,
+        };
+        if let Some(&known) = self.row_places.get(&key[..]) {
+            return known;
+        }
+        self.codes.extend(&key[1..]);
+        let varying = { (0..).zip(&key[1..]) }.filter(|at| at.1 >> KIND != VALUE);
+        self.codes
+            .extend(varying.flat_map(|(place, &source)| [place, source]));
+        let constant = |&source: &u32| match source >> KIND {
+            VALUE => self.names.constant(source),
+            _ => None,
+        };
+        self.parameters
+            .push(key[1..].iter().map(constant).collect());
+        self.rows.push(row);
+        let place = (self.rows.len() - 1) as u32;
+        self.row_places.insert(key.into(), place);
+        place
+    }
+
+    /// An effect: with what it names.
+    pub(super) fn effect(&mut self, effect: Effect, named: &[u32]) -> u32 {
+        let pair = |one: u16, other: u16| u32::from(one) << 16 | u32::from(other);
+        let mut key = vec![
+            pair(effect.cells, effect.ends),
+            pair(effect.ended, effect.started),
+            effect.decisions,
+            effect.guards,
+            effect.backtracks,
+        ];
+        key.extend(named);
+        if let Some(&known) = self.effect_places.get(&key[..]) {
+            return known;
+        }
+        let code = self.codes.len() as u32;
+        self.codes.extend(named);
+        let rows = code + 2 * (u32::from(effect.cells) + u32::from(effect.ends));
+        self.effects.push(Effect {
+            code,
+            rows,
+            ..effect
+        });
+        let place = (self.effects.len() - 1) as u32;
+        self.effect_places.insert(key.into(), place);
+        place
+    }
+
+    /// Which registers an effect fills, and which far ends, with their sources.
+    pub(super) fn filled(&self, effect: &Effect) -> [&[u32]; 2] {
+        let code = &self.codes[effect.code as usize..];
+        let (cells, code) = code.split_at(2 * usize::from(effect.cells));
+        [cells, &code[..2 * usize::from(effect.ends)]]
+    }
+
+    /// The rows of what ended.
+    #[inline]
+    pub(super) fn ended(&self, effect: &Effect) -> &[u32] {
+        &self.codes[effect.rows as usize..][..usize::from(effect.ended)]
+    }
+
+    /// The rows of what started.
+    #[inline]
+    pub(super) fn started(&self, effect: &Effect) -> &[u32] {
+        let first = effect.rows as usize + usize::from(effect.ended);
+        &self.codes[first..][..usize::from(effect.started)]
+    }
+
+    /// The values of a row's parameters.
+    #[inline]
+    pub(super) fn parameters(&self, row: u32, registers: &Registers) -> Parameters {
+        let mut parameters = Parameters::from_slice(&self.parameters[row as usize]);
+        self.update(&mut parameters, row, registers);
+        parameters
+    }
+
+    /// Gives those of a row's parameters that vary their values.
+    #[inline]
+    pub(super) fn update(&self, parameters: &mut Parameters, row: u32, registers: &Registers) {
+        for pair in self.varying(&self.rows[row as usize]).chunks_exact(2) {
+            parameters[pair[0] as usize] = self.names.value(pair[1], registers);
+        }
+    }
+
+    /// The sources of a row's parameters.
+    #[inline]
+    pub(super) fn sources(&self, row: &Row) -> &[u32] {
+        &self.codes[row.code as usize..][..usize::from(row.count)]
+    }
+
+    /// The places and sources of a row's parameters that vary.
+    #[inline]
+    fn varying(&self, row: &Row) -> &[u32] {
+        let first = row.code as usize + usize::from(row.count);
+        &self.codes[first..][..2 * usize::from(row.varying)]
+    }
+
+    /// How many bytes cycles read, and all that are there.
+    pub(super) fn bytes(&self) -> (usize, usize) {
+        let others = self.others.iter();
+        let others = others.map(|at| size_of_val(at) + at.capacity() * size_of::<(u64, u32)>());
+        let read = size_of_val(&*self.nodes)
+            + others.sum::<usize>()
+            + size_of_val(&*self.effects)
+            + size_of_val(&*self.rows)
+            + size_of_val(&*self.parameters)
+            + size_of_val(&*self.codes)
+            + size_of_val(&*self.names.values);
+        let forms = { self.forms.iter() }
+            .map(|at| size_of::<Form>() + size_of_val(&*at.lanes) + size_of_val(&*at.times));
+        let read = read + forms.sum::<usize>();
+        let copies = { self.forms.iter() }
+            .map(|at| size_of_val(&*at.cells) + size_of_val(&*at.ends) + at.interpreter.bytes());
+        let keys = self.by_key.keys().map(|key| 24 + 4 * key.len());
+        let places = { self.effect_places.keys().chain(self.row_places.keys()) }
+            .map(|key| 20 + 4 * key.len());
+        let all = read + copies.sum::<usize>() + keys.sum::<usize>() + places.sum::<usize>();
+        (read, all)
+    }
+}
+
+/// What a source is.
+pub(super) const VALUE: u32 = 0;
+pub(super) const REGISTER: u32 = 1;
+const POSTED: u32 = 2;
 
 impl Names {
     /// What a source gives.
     #[inline]
-    pub(super) fn value(&self, source: u32, registers: &[Option<Value>]) -> Option<Value> {
+    pub(super) fn value(&self, source: u32, registers: &Registers) -> Option<Value> {
         let place = (source & REST) as usize;
         match source >> KIND {
-            0 => self.values[place],
-            1 => registers[place],
+            VALUE => self.values[place],
+            REGISTER => registers.cells[place],
+            POSTED => registers.posted[place],
             _ => self.compute(place, registers),
         }
     }
 
+    /// The value of a source that is one.
+    pub(super) fn constant(&self, source: u32) -> Option<Value> {
+        self.values[(source & REST) as usize]
+    }
+
     #[inline(never)]
-    fn compute(&self, place: usize, registers: &[Option<Value>]) -> Option<Value> {
+    fn compute(&self, place: usize, registers: &Registers) -> Option<Value> {
         let ((kind, call), inputs) = &self.computed[place];
         let inputs = inputs.iter().map(|&at| self.value(at, registers));
         let inputs: Option<SmallVec<[Value; 4]>> = inputs.collect();
@@ -187,9 +425,10 @@ impl Names {
                 if place == next {
                     self.values.push(value);
                 }
-                place
+                VALUE << KIND | place
             }
-            Source::Register(place) => 1 << KIND | place,
+            Source::Register(place) => REGISTER << KIND | place,
+            Source::Posted(place) => POSTED << KIND | place,
             Source::Computed(how, inputs) => {
                 let inputs: Box<[u32]> = inputs.into_iter().map(|at| self.source(at)).collect();
                 let is = |at: &(Computation, Box<[u32]>)| at.0.0 == how.0 && at.1 == inputs;
@@ -198,7 +437,7 @@ impl Names {
                 if place == self.computed.len() {
                     self.computed.push((how, inputs));
                 }
-                2 << KIND | place as u32
+                3 << KIND | place as u32
             }
         }
     }

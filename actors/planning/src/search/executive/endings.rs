@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use crate::Ticks;
-use crate::database::{Conflict, Database, TokenId};
+use crate::database::{Conflict, Database, Token, TokenId};
 use crate::model::{Model, PredicateId, TimelineId, TimelineKind, Value};
 
 /// How a token ends of which no status says how.
@@ -27,6 +27,12 @@ impl Endings {
             timed_out: SmallVec::from_slice(&predicate.timed_out),
             preempted: SmallVec::from_slice(&predicate.preempted),
         }
+    }
+
+    /// Whether all outputs of a token that say how it ended have values, or there are none.
+    fn is_said(&self, database: &Database, token: &Token) -> bool {
+        let mut outputs = self.timed_out.iter().chain(&self.preempted);
+        outputs.all(|&(place, _)| database.value(token.parameters[place]).is_some())
     }
 
     /// Whether no output says how a token ended.
@@ -75,10 +81,11 @@ pub(super) fn close(
     let finish = database.finish(token);
     let at = finish.max.min(now);
     let open = finish.min != finish.max;
-    let silent = database
+    // Most often there is nothing to say, or a status said it.
+    if database
         .token(token)
-        .is_none_or(|at| endings[at.predicate].is_silent());
-    if silent {
+        .is_none_or(|of| endings[of.predicate].is_said(database, of))
+    {
         if open {
             database.end(token, at)?;
         }

@@ -455,7 +455,7 @@ impl Now {
 
 /// Whether a token has ended by a tick.
 fn is_over(database: &Database, token: TokenId, tick: Ticks) -> bool {
-    database.finish(token).max <= tick
+    database.has_ended(token, tick)
 }
 
 /// A timeline says its default from now on, or what it says first.
