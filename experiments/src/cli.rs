@@ -9,8 +9,8 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, plan, recover, report,
-    reproduce, run, study, verify,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, info, plan, problem,
+    recover, report, reproduce, run, study, verify,
 };
 use crate::registry::Registry;
 
@@ -73,6 +73,8 @@ enum Command {
     Report(report::Args),
     /// Save what can be saved of a cut or damaged log
     Recover(recover::Args),
+    /// Write what a scenario's planners have to solve, for other programs
+    Problem(problem::Args),
     /// Check, solve, validate and draw problems of planning
     Plan(plan::Args),
     /// Print completions for a shell
@@ -201,6 +203,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args, registry),
         Command::Recover(args) => recover::run(&args, registry),
+        Command::Problem(args) => problem::run(&args, registry),
         Command::Plan(args) => plan::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

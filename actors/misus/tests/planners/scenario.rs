@@ -9,7 +9,7 @@ use farside_actors::link::LinksConfig;
 use farside_actors::system::{Files, Results, Seeds, Series, Settings, Setup, System};
 use farside_actors::wiring::LinkBuilder;
 use farside_misus::PlanningSystem;
-use farside_misus::planning::PlannerStep;
+use farside_misus::planning::{PlanSettled, PlannedStop, PlannerStep};
 
 /// How a run is made.
 pub(crate) struct Run<'a> {
@@ -43,8 +43,8 @@ pub(crate) struct Ran {
     pub(crate) plans: Vec<Vec<(usize, usize, i64)>>,
 }
 
-/// Keeps the last plan of each rover.
-struct Listen(Arc<Mutex<Vec<(String, PlannerStep)>>>, Vec<String>);
+/// Keeps the plans of each rover.
+struct Listen(Arc<Mutex<Vec<(String, Vec<PlannedStop>)>>>, Vec<String>);
 
 impl Observer for Listen {
     fn wants(&self) -> Wants {
@@ -65,13 +65,23 @@ impl Observer for Listen {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        if let (RecordClass::Sample, Some(kind)) = (record.class, record.kind)
-            && kind.name() == "PlannerStep"
-        {
-            let step = kind.schema().decode(record.body).expect("it is one");
-            let name = self.1[record.sender.index()].clone();
-            self.0.lock().expect("nobody panics").push((name, step));
-        }
+        let (RecordClass::Sample, Some(kind)) = (record.class, record.kind) else {
+            return Ok(Flow::Continue);
+        };
+        let schema = kind.schema();
+        let plan = match kind.name() {
+            "PlannerStep" => {
+                let step: PlannerStep = schema.decode(record.body).expect("it is one");
+                step.plan
+            }
+            "PlanSettled" => {
+                let settled: PlanSettled = schema.decode(record.body).expect("it is one");
+                settled.plan
+            }
+            _ => return Ok(Flow::Continue),
+        };
+        let name = self.1[record.sender.index()].clone();
+        self.0.lock().expect("nobody panics").push((name, plan));
         Ok(Flow::Continue)
     }
 }
@@ -131,7 +141,7 @@ impl Run<'_> {
         names.dedup();
         let plan = |name: &&String| {
             let last = steps.iter().rfind(|(of, _)| of == *name);
-            let stops = last.iter().flat_map(|(_, step)| &step.plan);
+            let stops = last.iter().flat_map(|(_, plan)| plan);
             let stop = stops.map(|stop| (stop.task as usize, stop.sol as usize, stop.start_ms));
             stop.collect()
         };
