@@ -182,6 +182,7 @@ impl Team {
         rounds.shed += shed.len() as u64;
         // Links carry what is held after a step, and only then what comes of it.
         self.tell(instance);
+        self.enter(instance).push(rounds);
         let mut assigned = Vec::new();
         for (goal, rovers) in by_goal(&shed) {
             if instance.task(goal).rovers > 1 {
@@ -196,7 +197,6 @@ impl Team {
         }
         rounds.reassigned += assigned.len() as u64;
         self.deliver(instance, assigned)?;
-        self.enter(instance).push(rounds);
         rounds.iterations.push(f64::from(iterations));
         rounds.operations.push(operations as f64);
         Ok(())

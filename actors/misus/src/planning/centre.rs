@@ -116,7 +116,9 @@ impl Memory {
         for (goal, rovers) in by_goal(&shed) {
             assigned.extend(self.central.shed_by(instance, goal, &rovers));
         }
-        if shed.is_empty() {
+        // Who keeps to the centre's plan has no use for what it left out.
+        let rovers_choose = self.plans.iter().all(Vec::is_empty);
+        if shed.is_empty() && rovers_choose {
             assigned.extend(self.central.offer_pool(instance));
         }
         for assignment in &assigned {
