@@ -20,6 +20,8 @@ pub(crate) struct Run<'a> {
     pub(crate) executor: Executor,
     /// Crashes and restarts: who, when it crashes and when it restarts \[s\].
     pub(crate) crashes: &'a [(&'a str, u64, u64)],
+    /// The only files that there are; those on disk unless given.
+    pub(crate) files: &'a [(&'a str, &'a str)],
 }
 
 impl Default for Run<'_> {
@@ -31,6 +33,7 @@ impl Default for Run<'_> {
             seed: 1,
             executor: Executor::Inline,
             crashes: &[],
+            files: &[],
         }
     }
 }
@@ -101,6 +104,36 @@ impl Run<'_> {
             .unwrap_or_else(|error| panic!("{error}"))
     }
 
+    /// What the planners of the run have to solve, as text.
+    pub(crate) fn exported(&self) -> String {
+        let (mut sim, mut files) = (Simulation::new(self.seed), self.read());
+        let mut setup = Setup::new(self.seeds(), None, &mut sim, &mut files, self.wired());
+        let settings = settings(self.text).expect("they are right");
+        let problem = settings.problem(&mut setup).expect("it can be");
+        problem.expect("there is one")
+    }
+
+    fn seeds(&self) -> Seeds {
+        Seeds {
+            run: self.seed,
+            problem: self.problem,
+        }
+    }
+
+    fn read(&self) -> Files {
+        if self.files.is_empty() {
+            return Files::on_disk(".".into());
+        }
+        let files = self.files.iter();
+        let files = files.map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        Files::kept(files.collect())
+    }
+
+    fn wired(&self) -> LinkBuilder {
+        let links: LinksConfig = toml::from_str(self.links).expect("they are links");
+        LinkBuilder::new(&links, &[]).expect("they are right")
+    }
+
     /// What is said of a scenario that cannot be.
     pub(crate) fn refused(&self) -> String {
         let tried = self.tried(Some(SimDuration::from_secs(3600)));
@@ -109,15 +142,8 @@ impl Run<'_> {
 
     pub(crate) fn tried(&self, until: Option<SimDuration>) -> Result<Ran, String> {
         let settings = settings(self.text)?;
-        let links: LinksConfig = toml::from_str(self.links).expect("they are links");
-        let links = LinkBuilder::new(&links, &[]).expect("they are right");
-        let mut sim = Simulation::new(self.seed);
-        let mut files = Files::on_disk(".".into());
-        let seeds = Seeds {
-            run: self.seed,
-            problem: self.problem,
-        };
-        let mut setup = Setup::new(seeds, until, &mut sim, &mut files, links);
+        let (mut sim, mut files) = (Simulation::new(self.seed), self.read());
+        let mut setup = Setup::new(self.seeds(), until, &mut sim, &mut files, self.wired());
         let assembly = settings.assemble(&mut setup);
         let assembly = assembly.map_err(|error| error.to_string())?;
         setup.close().expect("all keys match");
