@@ -404,6 +404,16 @@ fn team_plan(shared: &Shared, plans: &[(Vec<PlannedStop>, u64)]) -> TeamPlan {
     }
 }
 
+/// Whether fewer rovers do a goal than it needs. That is counted by itself: it is what became of the last word.
+fn is_half(violation: &PlanViolation) -> bool {
+    match violation {
+        PlanViolation::Together {
+            rovers, expected, ..
+        } => *rovers < *expected as usize,
+        _ => false,
+    }
+}
+
 /// What came of a run.
 pub(super) fn results(team: &Team) -> Results {
     let tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
@@ -413,8 +423,6 @@ pub(super) fn results(team: &Team) -> Results {
     let worth = worth(&shared.instance, &mut Score::new(&shared.instance), &routes);
     let mut curves = curves(shared, &tally);
     curves.conclude(&worth);
-    // Half of a pair is counted by itself: it is what became of the last word.
-    let is_half = |violation: &PlanViolation| matches!(violation, PlanViolation::Together { rovers, expected, .. } if rovers < &(*expected as usize));
     let mut violated = violations(&shared.problem, &team_plan(shared, &plans));
     violated.retain(|violation| !is_half(violation));
     let metrics = metrics(shared, &tally, &worth, violated.len() as u32);
