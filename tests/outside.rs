@@ -59,6 +59,11 @@ fn every_command_speaks_of_a_system_of_somebody_elses() {
     assert!(said(folder, &["diff", "run.mcap", "run.mcap"]).contains("identical"));
     said(folder, &["recover", "run.mcap", "--out", "saved.mcap"]);
     said(folder, &["check", "beacons/quiet"]);
+    let problem = said(folder, &["problem", "beacons/quiet", "--out", "calls.txt"]);
+    assert!(
+        problem.starts_with("calls.txt: the problem of beacons/quiet"),
+        "{problem}"
+    );
     let text = said(folder, &["draw", "run.mcap", "--list"]);
     assert_eq!(text, "calls  when calls were heard\n");
     let text = said(folder, &["draw", "run.mcap"]);

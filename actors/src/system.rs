@@ -74,6 +74,12 @@ pub trait System: Send + Sync {
         &[]
     }
 
+    /// What `problem` exports of its scenarios, in a line: what there is to plan, as a file for other
+    /// programs to solve. None for a system whose planners have no such problem.
+    fn problem(&self) -> Option<&str> {
+        None
+    }
+
     /// Keys that once had other names. Scenarios, `--set` and studies may use the old ones: they
     /// are read as the new ones, and whoever uses them is told.
     fn renamed(&self) -> Vec<Renamed> {
@@ -123,6 +129,16 @@ pub trait Settings: Send + Sync {
     /// fork of a run may set. None, the default, for a key with which the world or the team is built.
     fn taken_up_by(&self, _key: &str) -> Option<Vec<Pattern>> {
         None
+    }
+
+    /// What the planners of a run have to solve, as the text of a file, if its system has such a
+    /// thing ([`System::problem`]). `setup` is what the run would be built from: the same seeds give the
+    /// problem that the run plans.
+    ///
+    /// # Errors
+    /// When the settings cannot be; the error names the key.
+    fn problem(&self, _setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        Ok(None)
     }
 
     /// Draws one of [`System::pictures`] from what a run recorded. `setup` is what the run was built

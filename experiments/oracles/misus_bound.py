@@ -9,23 +9,30 @@ refused. See README.md.
 """
 
 import argparse
+import csv
 import json
 import math
 import pathlib
+import shlex
 import subprocess
 import sys
 import tempfile
 
 from ortools.sat.python import cp_model
 
+from rcpsp_max import farside
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Weights are taken to so much.
 GRAIN = 10_000
 
 
-def example(name, *words):
-    command = ["cargo", "run", "--quiet", "--release", "-p", "farside-misus", "--example", name, "--"]
-    done = subprocess.run([*command, *map(str, words)], cwd=ROOT, capture_output=True, text=True)
+# What plans exported problems.
+SOLVE = "cargo run --quiet --release -p farside-misus --example solve_problem --"
+
+
+def said(command, *words):
+    done = subprocess.run([*shlex.split(command), *map(str, words)], cwd=ROOT, capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(done.stderr)
     return done.stdout
@@ -209,22 +216,41 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("files", nargs="*", help="exported problems; without, problems are drawn")
     parser.add_argument("--seeds", default="0-19", help="which problems are drawn, as 0-19")
-    parser.add_argument("--rocks", type=int, default=6, help="of how many rocks")
+    parser.add_argument("--rocks", type=int, help="of how many rocks; 10 to 30 unless given")
     parser.add_argument("--seconds", type=float, default=60, help="of CP-SAT for each problem")
     parser.add_argument("--workers", type=int, default=1, help="threads of CP-SAT")
     parser.add_argument("--operations", type=int, default=50_000_000, help="of the search by neighbourhoods")
     parser.add_argument("--hint", choices=["lns", "idgs", "none"], default="lns", help="where CP-SAT starts")
+    parser.add_argument("--table", type=pathlib.Path, help="where bounds are written to; others there are kept")
+    parser.add_argument("--farside", default=farside(), help="the command that exports problems")
+    parser.add_argument("--solve", default=SOLVE, help="the command that plans them")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         files = options.files
         if not files:
+            keys = [f"problem.rocks_{end}={options.rocks}" for end in ("least", "most") if options.rocks]
+            sets = [word for key in keys for word in ("--set", key)]
             for seed in numbers(options.seeds):
-                path = pathlib.Path(folder) / f"seed {seed}"
-                path.write_text(example("export_problem", "--seed", seed, "--rocks", options.rocks))
+                path = pathlib.Path(folder) / f"{seed}.json"
+                said(options.farside, "problem", "misus/planners", "--seed", seed, "--out", path, *sets)
                 files.append(str(path))
         paths = [str(pathlib.Path(file).resolve()) for file in files]
-        lines = example("solve_problem", *paths, "--operations", options.operations)
+        lines = said(options.solve, *paths, "--operations", options.operations)
         compare(paths, [json.loads(line) for line in lines.splitlines()], options)
+
+
+def enter(table, digest, bound, proven, name):
+    """Adds a bound to a table, or takes it for a greater one."""
+    rows = {}
+    if table.exists():
+        with table.open(newline="") as file:
+            rows = {row["digest"]: row for row in csv.DictReader(file)}
+    if digest not in rows or bound < float(rows[digest]["bound"]):
+        rows[digest] = {"digest": digest, "bound": bound, "optimal": str(proven).lower(), "problem": name}
+    with table.open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["digest", "bound", "optimal", "problem"], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(sorted(rows.values(), key=lambda row: row["digest"]))
 
 
 def compare(paths, ours, options):
@@ -244,6 +270,8 @@ def compare(paths, ours, options):
             f"  {'yes' if optimal else 'no':<6} {seconds:6.1f}",
             flush=True,
         )
+        if options.table and bound < math.inf:
+            enter(options.table, our["digest"], bound, optimal, problem["name"])
         if max(idgs, lns) > bound + 1e-3:
             print(f"  a plan is worth more than the bound: {max(idgs, lns)}")
             wrong += 1

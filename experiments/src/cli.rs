@@ -11,8 +11,8 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, recover, report,
-    reproduce, run, shown, study, verify,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, problem,
+    recover, report, reproduce, run, shown, study, verify,
 };
 use crate::registry::Registry;
 
@@ -77,6 +77,8 @@ enum Command {
     Report(report::Args),
     /// Save what can be saved of a cut or damaged log
     Recover(recover::Args),
+    /// Write what a scenario's planners have to solve, for other programs
+    Problem(problem::Args),
     /// Check, solve, validate and draw problems of planning
     Plan(plan::Args),
     /// Print completions for a shell
@@ -218,6 +220,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Reproduce(args) => reproduce::run(&args, registry),
         Command::Report(args) => report::run(&args, registry),
         Command::Recover(args) => recover::run(&args, registry),
+        Command::Problem(args) => problem::run(&args, registry),
         Command::Plan(args) => plan::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

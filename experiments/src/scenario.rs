@@ -15,19 +15,18 @@ mod reference;
 mod rulings;
 mod seeds;
 mod source;
+mod without_run;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::suggest::nearest;
 use farside::{End, Report, SimDuration, SimTime, Simulation};
-use farside_actors::figure::Figure;
 use farside_actors::link::{Degrade, LinksConfig};
 use farside_actors::radio::RadioConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Files, PictureError, PictureRequest, Recording, Seeds, Settings, Setup, SetupError,
-    System, no_file,
+    Assembly, Files, Seeds, Settings, Setup, SetupError, System, no_file,
 };
 use farside_actors::wiring::LinkBuilder;
 use farside_actors::{settings, units};
@@ -450,23 +449,6 @@ impl Scenario {
         planned.add_contacts(contacts, &self.shared.links, sim);
         planned.add_tells(sim);
         planned
-    }
-
-    /// Draws a picture that its system has, from what a run of it recorded.
-    ///
-    /// # Errors
-    /// When there is no such picture, or the recording has not what it shows.
-    pub(crate) fn draw(
-        &self,
-        picture: &str,
-        run: &dyn Recording,
-        request: &PictureRequest,
-    ) -> Result<Figure, PictureError> {
-        let (seeds, mut files) = (run.seeds(), self.files.clone());
-        let links = self.links(&mut files)?.links;
-        let mut sim = Simulation::new(seeds.run);
-        let mut setup = Setup::new(seeds, self.until(), &mut sim, &mut files, links);
-        self.settings.draw(picture, run, request, &mut setup)
     }
 
     /// Whether a run ended because its time was over.

@@ -1,7 +1,10 @@
 //! The paper's evaluation (section 5): Figures 3, 4 and 5, and the traverse, of 30 problems with 5 runs of three
 //! planners each, beside what the paper says of them.
 //!
-//!     cargo run --release -p farside-misus --example figures_3_4_5
+//!     cargo run --release -p farside-misus --example figures_3_4_5 [-- STEP_END [ITERATIONS]]
+//!
+//! With another end of steps (`iterations`, `first-better`, `restart`) and so many iterations, if these are given:
+//! what the paper leaves open.
 //!
 //! Means are over all runs; differences are paired by problem: t is that of the means of each problem's runs,
 //! and over 2.05 a difference is significant (29 degrees of freedom, two-sided, 5 %).
@@ -9,7 +12,7 @@
 use std::error::Error;
 
 use farside::random::RandomKey;
-use farside_misus::planner::casper::{Choice, PlannerConfig};
+use farside_misus::planner::casper::{Choice, PlannerConfig, StepEnd};
 use farside_misus::planner::instance::Instance;
 use farside_misus::planner::plan::violations;
 use farside_misus::planner::problem::{ProblemConfig, generate};
@@ -36,7 +39,29 @@ struct Curves {
     shed: u64,
 }
 
+/// How rovers plan, but for the choice of the next goal: the defaults, or what the command line says.
+fn protocol() -> Result<PlannerConfig, Box<dyn Error>> {
+    let mut config = PlannerConfig::default();
+    let mut words = std::env::args().skip(1);
+    if let Some(word) = words.next() {
+        config.step_end = match word.as_str() {
+            "iterations" => StepEnd::Iterations,
+            "first-better" => StepEnd::FirstBetter,
+            "restart" => StepEnd::Restart,
+            _ => {
+                let message = format!("{word}: expected iterations, first-better or restart");
+                return Err(message.into());
+            }
+        };
+    }
+    if let Some(word) = words.next() {
+        config.iterations = word.parse().map_err(|error| format!("{word}: {error}"))?;
+    }
+    Ok(config)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
+    let protocol = protocol()?;
     let mut curves: [Curves; 3] = Default::default();
     let mut violated = 0;
     let mut incomplete = 0;
@@ -47,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (choice, curves) in CHOICES.into_iter().zip(&mut curves) {
             let config = PlannerConfig {
                 choice,
-                ..PlannerConfig::default()
+                ..protocol.clone()
             };
             let runs = (0..RUNS).map(|number| {
                 let key = RandomKey::new(seed).text("run").number(number);

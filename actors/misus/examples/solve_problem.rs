@@ -45,6 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let line = serde_json::json!({
             "file": file,
+            "digest": problem.digest(),
             "idgs": { "score": score(&problem, &idgs), "plan": idgs.rovers },
             "lns": { "score": score(&problem, &lns), "plan": lns.rovers },
         });

@@ -14,9 +14,11 @@
 //! | [`casper`] | a rover's planner: iterative repair, and three ways to choose the next goal |
 //! | [`central`] | who is assigned which goal, and what becomes of shed ones |
 //! | [`lns`] | a planner of the whole team by large-neighbourhood search |
+//! | [`bounds`] | what plans of known problems are worth at the most |
 //! | [`rounds`] | the paper's evaluation: planners synchronised after each step, links perfect |
 //! | [`plan`] | a team's plan as data, and whether it is valid: shares no code with the planners |
 
+pub mod bounds;
 pub mod casper;
 pub mod central;
 pub mod chain;

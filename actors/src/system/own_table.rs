@@ -61,11 +61,22 @@ pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
     /// As [`System::pictures`].
     const PICTURES: &'static [PictureInfo] = &[];
 
+    /// As [`System::problem`].
+    const PROBLEM: Option<&'static str> = None;
+
     /// As [`Settings::assemble`].
     ///
     /// # Errors
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
+
+    /// As [`Settings::problem`].
+    ///
+    /// # Errors
+    /// When the settings cannot be; the error names the key.
+    fn problem(&self, _setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        Ok(None)
+    }
 
     /// As [`Settings::draw`].
     ///
@@ -120,6 +131,10 @@ impl<T: OwnTable> System for OfTable<T> {
         T::PICTURES
     }
 
+    fn problem(&self) -> Option<&str> {
+        T::PROBLEM
+    }
+
     fn parse(&self, keys: toml::Deserializer<'_>) -> Result<Box<dyn Settings>, toml::de::Error> {
         let mut tables = BTreeMap::<String, T>::deserialize(keys)?;
         Ok(Box::new(Alone(tables.remove(T::NAME).unwrap_or_default())))
@@ -141,6 +156,10 @@ impl<T: OwnTable> Settings for Alone<T> {
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         self.0.assemble(setup)
+    }
+
+    fn problem(&self, setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        self.0.problem(setup)
     }
 
     fn draw(

@@ -28,6 +28,8 @@ pub(super) enum Format {
     Png,
     /// A plan in JSON: all are alike up to the version of their format.
     Plan,
+    /// What there is to plan: all are alike up to the first point, in the version of their format.
+    Problem,
 }
 
 impl Format {
@@ -39,6 +41,7 @@ impl Format {
             Format::Table => b",",
             Format::Junit => b"name=",
             Format::Plan => b"/",
+            Format::Problem => b".",
             Format::Pdf => return &bytes[..bytes.len().min(5)],
             Format::Png => return &bytes[..bytes.len().min(8)],
         };
@@ -54,6 +57,7 @@ impl Format {
             Format::Table => "table of this kind",
             Format::Junit => "JUnit file",
             Format::Plan => "plan",
+            Format::Problem => "problem of this kind",
         }
     }
 }

@@ -10,6 +10,7 @@ mod logs;
 mod outputs;
 mod pictures;
 mod plan;
+mod problem;
 mod report;
 mod running;
 mod scenarios;

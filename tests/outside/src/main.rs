@@ -106,6 +106,13 @@ impl OwnTable for Beacons {
         extras: &[],
     }];
 
+    const PROBLEM: Option<&'static str> = Some("how many beacons call, and how often, as a line");
+
+    fn problem(&self, _setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        let calls = self.count * self.calls;
+        Ok(Some(format!("{calls} calls of {} beacons.", self.count)))
+    }
+
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let (lander, mut wiring) = (setup.sim.host("lander"), Wiring::default());
         setup.sim.actor(lander, "lander", |_| Lander);

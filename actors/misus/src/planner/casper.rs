@@ -2,9 +2,9 @@
 //!
 //! First comes a plan of what is mandatory. Then come optimisation steps. A step starts from the best plan
 //! and has so many iterations at the most. An iteration of a plan in conflict repairs it; one of a plan
-//! without adds the next goal, where it violates least and then drives least. The step ends at the first plan
-//! without conflict whose score is better than the best by Equation 1, over the rover's own goals and those
-//! that others were last heard to hold. Three planners differ in how the next goal is chosen ([`Choice`])
+//! without adds the next goal, where it violates least and then drives least. A plan without conflict whose
+//! score is better than the best by Equation 1, over the rover's own goals and those that others were last heard
+//! to hold, becomes the best; whether the step goes on then is a key ([`StepEnd`]). Three planners differ in how the next goal is chosen ([`Choice`])
 //! and in nothing else. A goal that repairs have deleted three times, and that the best plan does not have, is
 //! shed at the end of the step.
 //!
@@ -21,7 +21,7 @@ use super::chain::{Chain, Violation, Visit};
 use super::instance::Instance;
 use super::score::Score;
 
-pub use settings::{Choice, PlannerConfig};
+pub use settings::{Choice, PlannerConfig, StepEnd};
 
 /// Scores that differ by less are equal: sums are taken in one order, weights need not be whole.
 const EQUAL: f64 = 1e-9;
@@ -282,11 +282,20 @@ impl Casper {
             } else if !self.add(instance, &mut step) {
                 break;
             }
-            let better = || self.score.value() > self.best_value + EQUAL;
-            if self.current.violation().is_none() && better() {
-                std::mem::swap(&mut self.best, &mut self.current);
+            if !self.current.violation().is_none() {
+                continue;
+            }
+            if self.score.value() > self.best_value + EQUAL {
                 step.improved = true;
-                break;
+                if self.config.step_end == StepEnd::FirstBetter {
+                    std::mem::swap(&mut self.best, &mut self.current);
+                    break;
+                }
+                self.best.clone_from(&self.current);
+                self.best_value = self.score.value();
+            } else if self.config.step_end == StepEnd::Restart {
+                self.current.clone_from(&self.best);
+                self.reset(instance);
             }
         }
         self.reset(instance);

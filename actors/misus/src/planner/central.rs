@@ -165,11 +165,30 @@ impl Central {
     /// two rovers is withdrawn from both; what required a shed goal should be shed by the rover, too.
     /// Nothing happens if the goal is not assigned to the rover.
     pub fn shed(&mut self, instance: &Instance, goal: usize, rover: usize) -> Option<Assignment> {
-        match &self.states[goal] {
-            State::Assigned(assignment) if assignment.rovers.contains(&rover) => {}
-            _ => return None,
+        self.shed_by(instance, goal, &[rover])
+    }
+
+    /// The same for a goal that these rovers have shed, none of which is asked again at once: both may shed a
+    /// goal for two.
+    pub fn shed_by(
+        &mut self,
+        instance: &Instance,
+        goal: usize,
+        rovers: &[usize],
+    ) -> Option<Assignment> {
+        let State::Assigned(assignment) = &self.states[goal] else {
+            return None;
+        };
+        let had = rovers
+            .iter()
+            .filter(|rover| assignment.rovers.contains(rover));
+        let had: Vec<usize> = had.copied().collect();
+        if had.is_empty() {
+            return None;
         }
-        self.refused[goal][rover] = true;
+        for rover in had {
+            self.refused[goal][rover] = true;
+        }
         self.tours.remove(goal);
         self.states[goal] = State::Pooled;
         self.offer(instance, goal)

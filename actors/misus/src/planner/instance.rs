@@ -184,6 +184,16 @@ impl Instance {
         &self.partners[goal]
     }
 
+    /// Whether a goal needs several rovers at one time.
+    pub fn is_joint(&self, goal: usize) -> bool {
+        self.tasks[goal].rovers > 1
+    }
+
+    /// Whether any goal does.
+    pub fn has_joint(&self) -> bool {
+        self.tasks.iter().any(|task| task.rovers > 1)
+    }
+
     /// The goals that the same rover has to have achieved before a goal.
     pub fn requires(&self, goal: usize) -> &[usize] {
         &self.requires[goal]

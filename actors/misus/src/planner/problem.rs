@@ -205,6 +205,15 @@ impl Problem {
         serde_json::to_string_pretty(self).expect("a problem has no keys but texts")
     }
 
+    /// What the problem is known by in tables of bounds: XXH3 of its JSON as [`Problem::to_json`] has it, 128
+    /// bits as 32 hexadecimal digits. Equal for equal problems, on any machine.
+    pub fn digest(&self) -> String {
+        format!(
+            "{:032x}",
+            xxhash_rust::xxh3::xxh3_128(self.to_json().as_bytes())
+        )
+    }
+
     /// Checks that the problem makes sense, and finds what its names stand for.
     ///
     /// # Errors

@@ -180,22 +180,23 @@ impl Team {
             shed.extend(step.shed.into_iter().map(|goal| (goal, number)));
         }
         rounds.shed += shed.len() as u64;
+        // Links carry what is held after a step, and only then what comes of it.
+        self.tell(instance);
+        self.enter(instance).push(rounds);
         let mut assigned = Vec::new();
-        for &(goal, rover) in &shed {
+        for (goal, rovers) in by_goal(&shed) {
             if instance.task(goal).rovers > 1 {
                 // Nobody waits for who does not come.
                 let mut rovers = self.rovers.iter_mut();
                 rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
             }
-            assigned.extend(self.central.shed(instance, goal, rover));
+            assigned.extend(self.central.shed_by(instance, goal, &rovers));
         }
         if shed.is_empty() {
             assigned.extend(self.central.offer_pool(instance));
         }
         rounds.reassigned += assigned.len() as u64;
         self.deliver(instance, assigned)?;
-        self.tell(instance);
-        self.enter(instance).push(rounds);
         rounds.iterations.push(f64::from(iterations));
         rounds.operations.push(operations as f64);
         Ok(())
@@ -248,6 +249,18 @@ impl Team {
             traverse_m: traverse_mm as f64 / 1e3,
         }
     }
+}
+
+/// Goals that were shed, each once, in the order in which they were first, and by whom.
+pub(crate) fn by_goal(shed: &[(usize, usize)]) -> Vec<(usize, Vec<usize>)> {
+    let mut goals: Vec<(usize, Vec<usize>)> = Vec::new();
+    for &(goal, rover) in shed {
+        match goals.iter_mut().find(|(known, _)| *known == goal) {
+            Some((_, rovers)) => rovers.push(rover),
+            None => goals.push((goal, vec![rover])),
+        }
+    }
+    goals
 }
 
 /// How many goals have to be achieved one after the other before a goal.

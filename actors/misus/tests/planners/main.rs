@@ -1,6 +1,8 @@
 //! The planners as actors: they plan what they plan without a network, links cost no goal, and what cannot be
 //! is said by key.
 
+mod exported;
+mod joint;
 mod links;
 mod refusals;
 mod scenario;

@@ -39,7 +39,10 @@ fn bad_values_are_refused() {
     check("rounds.processor = \"fast\"", "fast");
     check("lns.operations = 0", "lns.operations: 0");
     check("problem.rovers = 0", "problem.rovers: 0: expected 1 to 50");
-    check("problem.joint = 0.5", "problem.joint: 0.5: expected 0");
+    check(
+        "problem.bounds = \"none.csv\"",
+        "problem.bounds: ./none.csv: cannot read it",
+    );
     check("team.rovers = 3", "unknown field `team`");
 }
 

@@ -9,7 +9,7 @@ use farside_actors::link::LinksConfig;
 use farside_actors::system::{Files, Results, Seeds, Series, Settings, Setup, System};
 use farside_actors::wiring::LinkBuilder;
 use farside_misus::PlanningSystem;
-use farside_misus::survey::PlannerStep;
+use farside_misus::planning::{PlanSettled, PlannedStop, PlannerStep};
 
 /// How a run is made.
 pub(crate) struct Run<'a> {
@@ -20,6 +20,8 @@ pub(crate) struct Run<'a> {
     pub(crate) executor: Executor,
     /// Crashes and restarts: who, when it crashes and when it restarts \[s\].
     pub(crate) crashes: &'a [(&'a str, u64, u64)],
+    /// The only files that there are; those on disk unless given.
+    pub(crate) files: &'a [(&'a str, &'a str)],
 }
 
 impl Default for Run<'_> {
@@ -31,6 +33,7 @@ impl Default for Run<'_> {
             seed: 1,
             executor: Executor::Inline,
             crashes: &[],
+            files: &[],
         }
     }
 }
@@ -43,8 +46,8 @@ pub(crate) struct Ran {
     pub(crate) plans: Vec<Vec<(usize, usize, i64)>>,
 }
 
-/// Keeps the last plan of each rover.
-struct Listen(Arc<Mutex<Vec<(String, PlannerStep)>>>, Vec<String>);
+/// Keeps the plans of each rover.
+struct Listen(Arc<Mutex<Vec<(String, Vec<PlannedStop>)>>>, Vec<String>);
 
 impl Observer for Listen {
     fn wants(&self) -> Wants {
@@ -65,13 +68,23 @@ impl Observer for Listen {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
-        if let (RecordClass::Sample, Some(kind)) = (record.class, record.kind)
-            && kind.name() == "PlannerStep"
-        {
-            let step = kind.schema().decode(record.body).expect("it is one");
-            let name = self.1[record.sender.index()].clone();
-            self.0.lock().expect("nobody panics").push((name, step));
-        }
+        let (RecordClass::Sample, Some(kind)) = (record.class, record.kind) else {
+            return Ok(Flow::Continue);
+        };
+        let schema = kind.schema();
+        let plan = match kind.name() {
+            "PlannerStep" => {
+                let step: PlannerStep = schema.decode(record.body).expect("it is one");
+                step.plan
+            }
+            "PlanSettled" => {
+                let settled: PlanSettled = schema.decode(record.body).expect("it is one");
+                settled.plan
+            }
+            _ => return Ok(Flow::Continue),
+        };
+        let name = self.1[record.sender.index()].clone();
+        self.0.lock().expect("nobody panics").push((name, plan));
         Ok(Flow::Continue)
     }
 }
@@ -91,6 +104,36 @@ impl Run<'_> {
             .unwrap_or_else(|error| panic!("{error}"))
     }
 
+    /// What the planners of the run have to solve, as text.
+    pub(crate) fn exported(&self) -> String {
+        let (mut sim, mut files) = (Simulation::new(self.seed), self.read());
+        let mut setup = Setup::new(self.seeds(), None, &mut sim, &mut files, self.wired());
+        let settings = settings(self.text).expect("they are right");
+        let problem = settings.problem(&mut setup).expect("it can be");
+        problem.expect("there is one")
+    }
+
+    fn seeds(&self) -> Seeds {
+        Seeds {
+            run: self.seed,
+            problem: self.problem,
+        }
+    }
+
+    fn read(&self) -> Files {
+        if self.files.is_empty() {
+            return Files::on_disk(".".into());
+        }
+        let files = self.files.iter();
+        let files = files.map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        Files::kept(files.collect())
+    }
+
+    fn wired(&self) -> LinkBuilder {
+        let links: LinksConfig = toml::from_str(self.links).expect("they are links");
+        LinkBuilder::new(&links, &[]).expect("they are right")
+    }
+
     /// What is said of a scenario that cannot be.
     pub(crate) fn refused(&self) -> String {
         let tried = self.tried(Some(SimDuration::from_secs(3600)));
@@ -99,15 +142,8 @@ impl Run<'_> {
 
     pub(crate) fn tried(&self, until: Option<SimDuration>) -> Result<Ran, String> {
         let settings = settings(self.text)?;
-        let links: LinksConfig = toml::from_str(self.links).expect("they are links");
-        let links = LinkBuilder::new(&links, &[]).expect("they are right");
-        let mut sim = Simulation::new(self.seed);
-        let mut files = Files::on_disk(".".into());
-        let seeds = Seeds {
-            run: self.seed,
-            problem: self.problem,
-        };
-        let mut setup = Setup::new(seeds, until, &mut sim, &mut files, links);
+        let (mut sim, mut files) = (Simulation::new(self.seed), self.read());
+        let mut setup = Setup::new(self.seeds(), until, &mut sim, &mut files, self.wired());
         let assembly = settings.assemble(&mut setup);
         let assembly = assembly.map_err(|error| error.to_string())?;
         setup.close().expect("all keys match");
@@ -131,7 +167,7 @@ impl Run<'_> {
         names.dedup();
         let plan = |name: &&String| {
             let last = steps.iter().rfind(|(of, _)| of == *name);
-            let stops = last.iter().flat_map(|(_, step)| &step.plan);
+            let stops = last.iter().flat_map(|(_, plan)| plan);
             let stop = stops.map(|stop| (stop.task as usize, stop.sol as usize, stop.start_ms));
             stop.collect()
         };

@@ -10,14 +10,23 @@ use farside_misus::planner::rounds::{Rounds, run};
 
 use super::scenario::{Ran, Run};
 
-const CHOICES: [(Choice, &str); 3] = [
+pub(crate) const CHOICES: [(Choice, &str); 3] = [
     (Choice::Idgs, "planner.choice = \"idgs\""),
     (Choice::SimpleReward, "planner.choice = \"simple-reward\""),
     (Choice::Random, "planner.choice = \"random\""),
 ];
 
 fn without_network(choice: Choice, problem: u64, seed: u64) -> Rounds {
-    let problem = generate(&ProblemConfig::default(), problem).unwrap();
+    without_network_of(&ProblemConfig::default(), choice, problem, seed)
+}
+
+pub(crate) fn without_network_of(
+    problems: &ProblemConfig,
+    choice: Choice,
+    problem: u64,
+    seed: u64,
+) -> Rounds {
+    let problem = generate(problems, problem).unwrap();
     let instance = Instance::new(&problem).unwrap();
     let config = PlannerConfig {
         choice,
@@ -26,7 +35,7 @@ fn without_network(choice: Choice, problem: u64, seed: u64) -> Rounds {
     run(&problem, &instance, &config, RandomKey::new(seed)).unwrap()
 }
 
-fn assert_equal(ran: &Ran, rounds: &Rounds) {
+pub(crate) fn assert_equal(ran: &Ran, rounds: &Rounds) {
     let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
     for (metric, values) in [
         ("score_by_step", &rounds.score),

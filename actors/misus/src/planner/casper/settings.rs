@@ -21,13 +21,30 @@ pub enum Choice {
     Lns,
 }
 
+/// When an optimisation step of a rover ends. Section 4.2 of the paper says both that a step consists of so many
+/// iterations, and that the next begins when a plan is the best so far. Only with all iterations is planning
+/// time independent of how far planners are from their best, as Figure 5 has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StepEnd {
+    /// After all iterations: a plan that is better becomes the best, and the step goes on from it.
+    #[default]
+    Iterations,
+    /// At the first plan that is better than the best, or after all iterations.
+    FirstBetter,
+    /// As `Iterations`, and a plan without conflict that is no better is left for the best one.
+    Restart,
+}
+
 settings! {
     /// The `[planner]` table: how rovers plan (the paper's section 4.2).
     pub struct PlannerConfig {
         /// How the next goal is chosen.
         pub choice: Choice, one_of(&["idgs", "simple-reward", "random", "lns"]);
         /// How many iterations an optimisation step of a rover has at the most.
-        pub iterations: u32 = 50, 1..=100_000;
+        pub iterations: u32 = 20, 1..=100_000;
+        /// When a step ends.
+        pub step_end: StepEnd, one_of(&["iterations", "first-better", "restart"]);
         /// How many optimisation steps there are.
         pub steps: u32 = 20, 1..=100_000;
         /// How often any goal is chosen instead of the best.

@@ -155,3 +155,19 @@ fn a_goal_for_two_needs_two() {
         instance.goals() / 3
     );
 }
+
+/// Both may shed a goal for two in one round: neither is asked again at once.
+#[test]
+fn a_goal_that_both_shed_goes_to_neither() {
+    let instance = Instance::new(&problem(1.0)).unwrap();
+    let mut central = central(&instance, 2);
+    let goal = (0..instance.goals())
+        .find(|&goal| matches!(central.state(goal), State::Assigned(at) if at.rovers.len() == 2));
+    let goal = goal.expect("some are assigned");
+    let State::Assigned(first) = central.state(goal).clone() else {
+        panic!("it is assigned");
+    };
+    assert_eq!(central.shed_by(&instance, goal, &first.rovers), None);
+    assert_eq!(central.state(goal), &State::Pooled);
+    assert_eq!(central.shed_by(&instance, goal, &first.rovers), None);
+}

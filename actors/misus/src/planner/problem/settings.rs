@@ -106,5 +106,8 @@ settings! {
         pub joint_share as "joint": f64 [with = "units::fraction"] = 0.0;
         /// What a goal that needs two rovers is worth, by how much it would be with one.
         pub joint_factor: f64 = 3.0, 0.0..=100.0;
+        /// A CSV file with what plans are worth at the most, by the problem's digest, as the oracle
+        /// `misus_bound.py --table` writes it; the bounds that are built in unless given.
+        pub bounds: String [skip_serializing_if = "String::is_empty"];
     }
 }

@@ -9,10 +9,14 @@ pub(super) const SCENARIOS: [Builtin; 1] = [Builtin {
 }];
 
 /// Sorted by name.
-pub(super) const STUDIES: [Builtin; 2] = [
+pub(super) const STUDIES: [Builtin; 3] = [
     Builtin {
         name: "misus/figures-3-4-5",
         text: include_str!("../../studies/figures-3-4-5.toml"),
+    },
+    Builtin {
+        name: "misus/joint-goals",
+        text: include_str!("../../studies/joint-goals.toml"),
     },
     Builtin {
         name: "misus/planners-over-links",

@@ -7,11 +7,13 @@ use farside::prelude::*;
 use farside_actors::processor::{Processor, ProcessorChange};
 
 use super::messages::{
-    Assigned, GoalsAssigned, PlanHeld, PlannedStop, PlannerStep, StepBegins, StepEnds, StillWaits,
+    Assigned, GoalsAssigned, PlanHeld, PlanSettled, PlannedStop, PlannerStep, Reserved, StepBegins,
+    StepEnds, StillWaits,
 };
 use super::shared::{CENTRE, Shared};
-use crate::planner::casper::{Casper, Step};
+use crate::planner::casper::{Casper, Step, Unmet};
 use crate::planner::chain::Visit;
+use crate::planner::instance::Instance;
 
 /// What a planner knows. It outlives crashes as it was when the last step had been made.
 #[derive(Clone)]
@@ -28,6 +30,8 @@ struct Memory {
     assignments: Vec<u32>,
     /// What was shed, as long as the centre may not know.
     shed: Vec<Assigned>,
+    /// How many goals for two rovers left the plan since the last step.
+    withdrawn: u32,
     /// By rover: what it said of its last two steps. Those who wait for each other are one step apart at
     /// the most.
     heard: Vec<[PlanHeld; 2]>,
@@ -88,9 +92,17 @@ impl RoverPlanner {
         ctx.timer(at.since(ctx.now()), StepBegins);
     }
 
-    /// What a planner that is synchronised has not heard yet.
+    /// What a planner has not heard yet: one that is synchronised what it needs for the next step, and any
+    /// after the last step which goals for two rovers are carried out.
     fn lacks(&self, memory: &Memory) -> Lacking {
         let is_over = memory.steps >= self.shared.planner.steps;
+        if !self.shared.rounds.synchronised {
+            let is_open = is_over && self.shared.instance.has_joint();
+            return Lacking {
+                centre: is_open && !memory.assigned.settled,
+                rovers: Vec::new(),
+            };
+        }
         let silent = |other: &usize| {
             let heard = &memory.heard[*other][(memory.steps % 2) as usize];
             memory.steps > 0 && !is_over && heard.steps != memory.steps
@@ -112,7 +124,8 @@ impl RoverPlanner {
         }
         let mut said = memory.said[(memory.steps % 2) as usize].clone();
         said.rover = self.rover as u32;
-        for other in self.others() {
+        let others = self.others();
+        for other in others.filter(|_| self.shared.rounds.synchronised) {
             let name = &self.shared.rovers[other];
             said.asks = lacking.rovers.contains(&other);
             if said.asks && memory.steps > 1 {
@@ -132,7 +145,8 @@ impl RoverPlanner {
 
     /// Looks again in a while whether everything is there.
     fn wait(&self, ctx: &mut Context<'_, Self>) {
-        if let (true, Some(memory)) = (self.shared.rounds.synchronised, &self.memory) {
+        let Some(memory) = &self.memory else { return };
+        if self.shared.rounds.synchronised || self.lacks(memory).centre {
             let steps = memory.steps;
             ctx.timer(self.shared.rounds.every, StillWaits { steps });
         }
@@ -151,14 +165,15 @@ impl RoverPlanner {
         let Some(memory) = &mut self.memory else {
             return Ok(0);
         };
-        let failed = |unmet: crate::planner::casper::Unmet| HandlerError::new(unmet.to_string());
+        let failed = |unmet: Unmet| HandlerError::new(unmet.to_string());
         let mut operations = 0;
         if memory.taken < memory.assigned.round {
+            memory.part(instance).map_err(failed)?;
             for one in &memory.assigned.goals {
                 let goal = one.goal as usize;
                 if memory.assignments[goal] < one.assignment {
                     memory.assignments[goal] = one.assignment;
-                    let assigned = memory.casper.assign(instance, goal, None);
+                    let assigned = memory.casper.assign(instance, goal, one.start_ms);
                     assigned.map_err(failed)?;
                 }
             }
@@ -166,8 +181,11 @@ impl RoverPlanner {
             memory.shed.retain(|one| goals.contains(&pair(one)));
             if memory.taken == 0 && !memory.assigned.plan.is_empty() {
                 let plan = memory.assigned.plan.iter();
-                let visit = |goal: u32| Visit::new(instance, goal as usize);
-                let plan: Vec<_> = plan.map(|at| (at.sol as usize, visit(at.goal))).collect();
+                let visit = |at: &Reserved| match at.start_ms {
+                    Some(start_ms) => Visit::at(instance, at.goal as usize, start_ms),
+                    None => Visit::new(instance, at.goal as usize),
+                };
+                let plan: Vec<_> = plan.map(|at| (at.sol as usize, visit(at))).collect();
                 operations += memory.casper.resume(instance, &plan).map_err(failed)?;
             }
             memory.taken = memory.assigned.round;
@@ -185,6 +203,29 @@ impl RoverPlanner {
         Ok(operations)
     }
 
+    /// After the last step, once the centre has said its last word: no half of a pair stays in the plan.
+    fn settle(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        let instance = &self.shared.instance;
+        let is_last = self.shared.planner.steps;
+        let Some(memory) = &mut self.memory else {
+            return Ok(());
+        };
+        if !memory.assigned.settled || memory.steps < is_last || !instance.has_joint() {
+            return Ok(());
+        }
+        let parted = memory.part(instance);
+        parted.map_err(|unmet| HandlerError::new(unmet.to_string()))?;
+        let plan = memory.casper.plan();
+        let sample = PlanSettled {
+            withdrawn: std::mem::take(&mut memory.withdrawn),
+            traverse_mm: plan.drive_mm(instance),
+            plan: plan.nodes().iter().map(PlannedStop::from).collect(),
+        };
+        ctx.durable::<Kept>().0.clone_from(&self.memory);
+        ctx.sample(&sample);
+        Ok(())
+    }
+
     /// What the planner says after a step.
     fn conclude(&mut self, step: &Step) -> Option<(PlanHeld, PlannerStep)> {
         let instance = &self.shared.instance;
@@ -193,14 +234,17 @@ impl RoverPlanner {
         let shed = step.shed.iter().map(|&goal| Assigned {
             goal: goal as u32,
             assignment: memory.assignments[goal],
+            start_ms: None,
         });
         memory.shed.extend(shed);
         let held = memory.casper.held(instance);
+        let halves = memory.halves(instance);
         let said = PlanHeld {
             rover: self.rover as u32,
             steps: memory.steps,
             held: held.into_iter().map(|goal| goal as u32).collect(),
             shed: memory.shed.clone(),
+            halves,
             asks: false,
         };
         memory.said[(memory.steps % 2) as usize] = said.clone();
@@ -211,6 +255,8 @@ impl RoverPlanner {
             iterations: step.iterations,
             operations: step.operations,
             shed: step.shed.len() as u32,
+            unheard: memory.shed.clone(),
+            withdrawn: std::mem::take(&mut memory.withdrawn),
             traverse_mm: plan.drive_mm(instance),
             plan: stops.collect(),
         };
@@ -220,6 +266,36 @@ impl RoverPlanner {
 
 fn pair(one: &Assigned) -> (u32, u32) {
     (one.goal, one.assignment)
+}
+
+impl Memory {
+    /// The goals for two rovers that the plan has.
+    fn halves(&self, instance: &Instance) -> Vec<Assigned> {
+        let goals = self.casper.plan().goals(instance);
+        let mut goals: Vec<usize> = goals.filter(|goal| instance.is_joint(*goal)).collect();
+        goals.sort_unstable();
+        let half = |goal: usize| Assigned {
+            goal: goal as u32,
+            assignment: self.assignments[goal],
+            start_ms: None,
+        };
+        goals.into_iter().map(half).collect()
+    }
+
+    /// Gives up the goals for two rovers that the centre has withdrawn: nobody waits for who does not come.
+    fn part(&mut self, instance: &Instance) -> Result<(), Unmet> {
+        let named: BTreeSet<(u32, u32)> = self.assigned.goals.iter().map(pair).collect();
+        let joint = self
+            .casper
+            .assigned()
+            .filter(|goal| instance.is_joint(*goal));
+        let gone = joint.filter(|&goal| !named.contains(&(goal as u32, self.assignments[goal])));
+        for goal in gone.collect::<Vec<usize>>() {
+            self.withdrawn += u32::from(self.casper.score().holds(goal));
+            self.casper.withdraw(instance, goal)?;
+        }
+        Ok(())
+    }
 }
 
 /// Whose word is lacking.
@@ -257,6 +333,7 @@ impl Actor for RoverPlanner {
                 taken: 0,
                 assignments: vec![0; shared.instance.goals()],
                 shed: Vec::new(),
+                withdrawn: 0,
                 heard: vec![Default::default(); shared.rovers.len()],
                 said: Default::default(),
             },
@@ -273,14 +350,18 @@ impl Handler<GoalsAssigned> for RoverPlanner {
         let Some(memory) = &mut self.memory else {
             return Ok(());
         };
-        if message.round > memory.assigned.round {
+        let is_new = message.round > memory.assigned.round;
+        if is_new {
             memory.assigned = message;
         }
         let is_over = memory.steps >= self.shared.planner.steps;
-        if is_over && !self.shared.rounds.synchronised {
+        if is_over && !self.shared.rounds.synchronised && !memory.assigned.settled {
             // The centre asks until it has heard the last word of all.
             let said = memory.said[(memory.steps % 2) as usize].clone();
-            return self.tell(ctx, CENTRE, said);
+            self.tell(ctx, CENTRE, said)?;
+        }
+        if is_new {
+            self.settle(ctx)?;
         }
         self.go_on(ctx);
         Ok(())

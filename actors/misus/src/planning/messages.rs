@@ -11,6 +11,8 @@ pub struct Assigned {
     pub goal: u32,
     /// How many times it had been assigned to any rover, with this time.
     pub assignment: u32,
+    /// When it is to begin \[ms\], where two rovers have to be there at one time.
+    pub start_ms: Option<i64>,
 }
 
 /// A goal in a plan that the centre has made, in the order of the plan.
@@ -20,6 +22,8 @@ pub struct Reserved {
     pub goal: u32,
     /// In which of the rover's sols.
     pub sol: u32,
+    /// When it begins \[ms\], where two rovers have to be there at one time.
+    pub start_ms: Option<i64>,
 }
 
 /// The centre to a rover: all that it may plan now.
@@ -31,6 +35,9 @@ pub struct GoalsAssigned {
     pub goals: Vec<Assigned>,
     /// The plan that the rover begins with, if the centre plans for the team.
     pub plan: Vec<Reserved>,
+    /// Whether this is the centre's last word, after the last steps of all: of the goals for two rovers it
+    /// names those that both have planned, and no other is carried out.
+    pub settled: bool,
 }
 
 /// A rover to the centre and to the other rovers: how its plan stands.
@@ -44,7 +51,9 @@ pub struct PlanHeld {
     pub held: Vec<u32>,
     /// What it has shed, as it was assigned, as long as the centre may not know.
     pub shed: Vec<Assigned>,
-    /// Whether it waits for the receiver's word on the same step.
+    /// The goals for two rovers that its plan has, as they were assigned.
+    pub halves: Vec<Assigned>,
+    /// Whether it waits for the receiver's word: on the same step, or the centre's last.
     pub asks: bool,
 }
 
@@ -103,6 +112,21 @@ pub struct PlannerStep {
     pub operations: u64,
     /// How many goals it shed.
     pub shed: u32,
+    /// What it has shed, as it was assigned, as long as the centre may not know.
+    pub unheard: Vec<Assigned>,
+    /// How many goals for two rovers left its plan before the step, because the centre withdrew them.
+    pub withdrawn: u32,
+    /// How far the plan drives \[mm\].
+    pub traverse_mm: u64,
+    /// The plan, in order.
+    pub plan: Vec<PlannedStop>,
+}
+
+/// A state sample: a rover has heard the centre's last word on goals for two rovers.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlanSettled {
+    /// How many goals for two rovers left its plan.
+    pub withdrawn: u32,
     /// How far the plan drives \[mm\].
     pub traverse_mm: u64,
     /// The plan, in order.
@@ -120,4 +144,8 @@ pub struct CentralRound {
     pub operations: u64,
     /// The goals that it has given up so far.
     pub deleted: Vec<u32>,
+    /// The goals that nobody is to plan now, because all have refused them.
+    pub pooled: Vec<u32>,
+    /// By goal: how many times it has been assigned.
+    pub assignments: Vec<u32>,
 }

@@ -13,6 +13,7 @@ use crate::planner::casper::{Choice, PlannerConfig};
 use crate::planner::central::{Assignment, Central, State};
 use crate::planner::instance::Instance;
 use crate::planner::lns;
+use crate::planner::rounds::by_goal;
 
 /// What the centre knows. It outlives crashes as it was when goals had been assigned last.
 #[derive(Clone)]
@@ -26,6 +27,8 @@ struct Memory {
     said: Vec<PlanHeld>,
     /// By rover: the plan that it begins with, where the centre plans for the team.
     plans: Vec<Vec<Reserved>>,
+    /// Whether its last word is said: which goals for two rovers both have planned.
+    settled: bool,
 }
 
 /// What the centre looked at in a round.
@@ -33,6 +36,8 @@ struct Memory {
 struct Work {
     reassigned: u32,
     operations: u64,
+    /// Whether it was the last round.
+    settles: bool,
 }
 
 /// The central planner.
@@ -61,6 +66,7 @@ impl Memory {
             assignments: vec![0; instance.goals()],
             said: vec![PlanHeld::default(); rovers],
             plans: vec![Vec::new(); rovers],
+            settled: false,
         }
     }
 
@@ -82,7 +88,11 @@ impl Memory {
             plan.extend(goals.map(|node| Reserved {
                 goal: node.visit.task as u32,
                 sol: node.sol as u32,
+                start_ms: instance.is_joint(node.visit.task).then_some(node.start_ms),
             }));
+        }
+        for reserved in self.plans.iter().flatten() {
+            self.assignments[reserved.goal as usize] = 1;
         }
         Ok(found.operations)
     }
@@ -92,22 +102,23 @@ impl Memory {
     }
 
     /// Assigns what was shed to others; if nothing was, what waits in the pool to whoever is nearest.
-    fn revise(&mut self, instance: &Instance) -> Work {
+    fn revise(&mut self, instance: &Instance, steps: u32) -> Work {
         let before = self.central.operations();
         let shed = self.said.iter().enumerate();
-        let shed = shed.flat_map(|(rover, said)| said.shed.iter().map(move |one| (rover, *one)));
-        let shed: Vec<(usize, Assigned)> = shed.collect();
-        let (mut is_news, mut assigned) = (false, Vec::new());
-        for (rover, one) in shed {
-            let goal = one.goal as usize;
-            let has = matches!(self.central.state(goal), State::Assigned(at) if at.rovers.contains(&rover));
-            if !has || one.assignment != self.assignments[goal] {
-                continue;
-            }
-            is_news = true;
-            assigned.extend(self.central.shed(instance, goal, rover));
+        let shed = shed.flat_map(|(rover, said)| said.shed.iter().map(move |one| (rover, one)));
+        let is_news = |(rover, one): &(usize, &Assigned)| {
+            one.assignment == self.assignments[one.goal as usize]
+                && self.has(*rover, one.goal as usize)
+        };
+        let shed = shed.filter(is_news);
+        let shed: Vec<(usize, usize)> = shed.map(|(at, one)| (one.goal as usize, at)).collect();
+        let mut assigned = Vec::new();
+        for (goal, rovers) in by_goal(&shed) {
+            assigned.extend(self.central.shed_by(instance, goal, &rovers));
         }
-        if !is_news {
+        // Who keeps to the centre's plan has no use for what it left out.
+        let rovers_choose = self.plans.iter().all(Vec::is_empty);
+        if shed.is_empty() && rovers_choose {
             assigned.extend(self.central.offer_pool(instance));
         }
         for assignment in &assigned {
@@ -116,29 +127,69 @@ impl Memory {
         Work {
             reassigned: assigned.len() as u32,
             operations: self.central.operations() - before,
+            settles: self.is_over(steps),
         }
     }
 
-    /// All that a rover may plan now.
-    fn assigned_to(&self, rover: usize) -> GoalsAssigned {
-        let plan = self.plans[rover].clone();
-        let mut reserved: Vec<u32> = plan.iter().map(|one| one.goal).collect();
-        reserved.sort_unstable();
-        let has = |goal: &usize| matches!(self.central.state(*goal), State::Assigned(at) if at.rovers.contains(&rover));
-        let goals = (0..self.assignments.len()).filter(has);
+    /// Whether all have said that they made so many steps.
+    fn is_over(&self, steps: u32) -> bool {
+        self.said.iter().all(|said| said.steps >= steps)
+    }
+
+    /// Whether a goal is assigned to a rover.
+    fn has(&self, rover: usize, goal: usize) -> bool {
+        let plan = &self.plans[rover];
+        plan.iter().any(|one| one.goal as usize == goal)
+            || matches!(self.central.state(goal), State::Assigned(at) if at.rovers.contains(&rover))
+    }
+
+    /// When a goal that is assigned to a rover is to begin, if that is agreed on.
+    fn start_ms(&self, rover: usize, goal: usize) -> Option<i64> {
+        let mut plan = self.plans[rover].iter();
+        match plan.find(|one| one.goal as usize == goal) {
+            Some(reserved) => reserved.start_ms,
+            None => match self.central.state(goal) {
+                State::Assigned(assignment) => assignment.start_ms,
+                _ => None,
+            },
+        }
+    }
+
+    /// Whether as many rovers have planned a goal, as it was assigned last, as it needs.
+    fn is_whole(&self, instance: &Instance, goal: usize) -> bool {
+        let assignment = self.assignments[goal];
+        let has = |half: &Assigned| half.goal as usize == goal && half.assignment == assignment;
+        let halves = self.said.iter().filter(|said| said.halves.iter().any(has));
+        halves.count() >= instance.task(goal).rovers as usize
+    }
+
+    /// All that a rover may plan now; after the last round, all that it may carry out.
+    fn assigned_to(&self, instance: &Instance, rover: usize) -> GoalsAssigned {
+        let goals = (0..self.assignments.len()).filter(|&goal| {
+            self.has(rover, goal)
+                && (!self.settled || !instance.is_joint(goal) || self.is_whole(instance, goal))
+        });
         let goals = goals.map(|goal| Assigned {
             goal: goal as u32,
             assignment: self.assignments[goal],
-        });
-        let reserved = reserved.into_iter().map(|goal| Assigned {
-            goal,
-            assignment: 1,
+            start_ms: self.start_ms(rover, goal),
         });
         GoalsAssigned {
             round: self.round,
-            goals: goals.chain(reserved).collect(),
-            plan,
+            goals: goals.collect(),
+            plan: self.plans[rover].clone(),
+            settled: self.settled,
         }
+    }
+
+    /// The goals that nobody is to plan now.
+    fn pooled(&self) -> Vec<u32> {
+        let goals = 0..self.assignments.len();
+        let pooled = goals.filter(|&goal| {
+            *self.central.state(goal) == State::Pooled
+                && !(0..self.said.len()).any(|rover| self.has(rover, goal))
+        });
+        pooled.map(|goal| goal as u32).collect()
     }
 
     fn deleted(&self) -> Vec<u32> {
@@ -166,16 +217,16 @@ impl CentralPlanner {
 
     fn revise(&mut self, ctx: &mut Context<'_, Self>) {
         if let (Some(memory), None) = (&mut self.memory, self.in_hand) {
-            let work = memory.revise(&self.shared.instance);
+            let work = memory.revise(&self.shared.instance, self.shared.planner.steps);
             self.compute(work, ctx);
         }
     }
 
-    /// Looks around again after `delay`, unless all have made all steps.
+    /// Looks around again after `delay`, unless all have made all steps and what two rovers do is settled.
     fn look_later(&self, delay: SimDuration, ctx: &mut Context<'_, Self>) {
         let Some(memory) = &self.memory else { return };
-        let done = |said: &PlanHeld| said.steps >= self.shared.planner.steps;
-        if !memory.said.iter().all(done) {
+        let is_open = self.shared.instance.has_joint() && !memory.settled;
+        if is_open || !memory.is_over(self.shared.planner.steps) {
             ctx.timer(delay, LooksAround);
         }
     }
@@ -197,7 +248,7 @@ impl CentralPlanner {
     fn assign_to(&self, rover: usize, ctx: &mut Context<'_, Self>) -> Outcome {
         if let Some(memory) = &self.memory {
             let recipient = ctx.recipient::<GoalsAssigned>(&self.shared.rovers[rover])?;
-            ctx.send(recipient, memory.assigned_to(rover));
+            ctx.send(recipient, memory.assigned_to(&self.shared.instance, rover));
         }
         Ok(())
     }
@@ -216,14 +267,11 @@ impl Actor for CentralPlanner {
         let mut memory = Memory::new(&self.shared.instance, &self.shared.planner);
         let operations = memory.begin(&self.shared)?;
         self.memory = Some(memory);
-        let reassigned = 0;
-        self.compute(
-            Work {
-                reassigned,
-                operations,
-            },
-            ctx,
-        );
+        let work = Work {
+            operations,
+            ..Work::default()
+        };
+        self.compute(work, ctx);
         // Between the steps of rovers that begin together.
         self.look_later(SimDuration::from_nanos(every.as_nanos() / 2), ctx);
         Ok(())
@@ -241,14 +289,18 @@ impl Handler<PlanHeld> for CentralPlanner {
             memory.said[from] = message;
         }
         if !self.shared.rounds.synchronised {
-            return Ok(());
+            // Who asks has made all steps, and waits for the last word.
+            return match asks && memory.settled {
+                true => self.assign_to(from, ctx),
+                false => Ok(()),
+            };
         }
-        let round = memory.round;
+        let (round, is_settled) = (memory.round, memory.settled);
         let all_said = memory.said.iter().all(|said| said.steps >= round);
         if asks && is_known {
             self.assign_to(from, ctx)?;
         }
-        if round > 0 && all_said {
+        if round > 0 && all_said && !is_settled {
             self.revise(ctx);
         }
         Ok(())
@@ -272,11 +324,14 @@ impl Handler<AssignmentsLeave> for CentralPlanner {
             return Ok(());
         };
         memory.round += 1;
+        memory.settled |= work.settles;
         let sample = CentralRound {
             round: memory.round,
             reassigned: work.reassigned,
             operations: work.operations,
             deleted: memory.deleted(),
+            pooled: memory.pooled(),
+            assignments: memory.assignments.clone(),
         };
         // What is assigned is kept before it is said.
         ctx.durable::<Kept>().0.clone_from(&self.memory);
@@ -317,14 +372,15 @@ mod tests {
             memory.said[rover].shed = vec![Assigned {
                 goal: 0,
                 assignment: time,
+                start_ms: None,
             }];
-            memory.revise(&instance);
+            memory.revise(&instance, 20);
         }
         assert_eq!(owner(&memory), None);
-        assert_eq!(memory.revise(&instance).reassigned, 1);
+        assert_eq!(memory.revise(&instance, 20).reassigned, 1);
         let back = owner(&memory);
         assert!(back.is_some());
-        assert_eq!(memory.revise(&instance).reassigned, 0);
+        assert_eq!(memory.revise(&instance, 20).reassigned, 0);
         assert_eq!((owner(&memory), memory.assignments[0]), (back, 4));
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use farside::RunInfo;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 
-use super::messages::{CentralRound, PlannerStep};
+use super::messages::{CentralRound, PlanSettled, PlannerStep};
 use super::shared::{CENTRE, Shared};
 
 /// What is known of all planners.
@@ -14,6 +14,8 @@ use super::shared::{CENTRE, Shared};
 pub(super) struct Tally {
     /// By rover: its steps, in order.
     pub(super) steps: Vec<Vec<PlannerStep>>,
+    /// By rover: its plan after the centre's last word on goals for two rovers, if it heard that.
+    pub(super) settled: Vec<Option<PlanSettled>>,
     pub(super) reassigned: u64,
     /// What the centre looked at.
     pub(super) central_operations: u64,
@@ -41,6 +43,7 @@ impl Monitor {
     pub(super) fn new(shared: Arc<Shared>) -> (Monitor, Arc<Mutex<Tally>>) {
         let tally = Arc::new(Mutex::new(Tally {
             steps: vec![Vec::new(); shared.rovers.len()],
+            settled: vec![None; shared.rovers.len()],
             ..Tally::default()
         }));
         let monitor = Monitor {
@@ -86,6 +89,10 @@ impl Observer for Monitor {
             (Role::Rover(rover), "PlannerStep") => {
                 let step: PlannerStep = kind.schema().decode(record.body).map_err(failed)?;
                 tally.steps[rover].push(step);
+            }
+            (Role::Rover(rover), "PlanSettled") => {
+                let settled = kind.schema().decode(record.body).map_err(failed)?;
+                tally.settled[rover] = Some(settled);
             }
             (Role::Centre, "CentralRound") => {
                 let round: CentralRound = kind.schema().decode(record.body).map_err(failed)?;

@@ -1,16 +1,18 @@
 //! Planners over links as scenarios see them: `[problem]`, `[planner]`, `[lns]`, `[rounds]`.
 
 use farside::Report;
+use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
+    Seeds, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
 use super::assemble::assemble;
 use super::config::{PlanningScenario, RoundsConfig};
-use super::shared::shared;
-use super::{builtin, metrics};
+use super::shared::{problem, shared};
+use super::{builtin, metrics, picture};
 use crate::planner::casper::PlannerConfig;
 use crate::planner::lns::LnsConfig;
 use crate::planner::problem::ProblemConfig;
@@ -57,6 +59,14 @@ impl System for PlanningSystem {
         &builtin::STUDIES
     }
 
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
+    }
+
+    fn problem(&self) -> Option<&str> {
+        Some("rovers, observations, what these are worth alone and together, as JSON")
+    }
+
     fn parse(
         &self,
         sections: toml::Deserializer<'_>,
@@ -74,16 +84,34 @@ impl Settings for PlanningScenario {
         self.check_all()
     }
 
+    fn problem(&self, setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        Ok(Some(problem(self, setup.problem_seed)?.to_json()))
+    }
+
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         if setup.until.is_none() {
             let message = "missing: planners that wait for each other need an end";
             return Err(SetupError::value("until", message));
         }
-        let shared = shared(self, setup.problem_seed, setup.run_seed)?;
+        let seeds = Seeds {
+            run: setup.run_seed,
+            problem: setup.problem_seed,
+        };
+        let shared = shared(self, seeds, setup.files)?;
         let team = setup.wired(|sim, wire| assemble(sim, shared, wire))?;
         let name = team.shared.problem.name.clone();
         let goals = team.shared.instance.goals();
         let assembly = Assembly::new(move |_: &Report| metrics::results(&team));
         Ok(assembly.with_notes(vec![format!("problem: {name}, {goals} goals")]))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        setup: &mut Setup<'_>,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, setup)
     }
 }

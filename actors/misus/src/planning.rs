@@ -21,13 +21,15 @@ mod config;
 mod messages;
 mod metrics;
 mod monitor;
+mod picture;
 mod rover;
 mod shared;
 mod system;
 
 pub use config::RoundsConfig;
 pub use messages::{
-    Assigned, CentralRound, GoalsAssigned, PlanHeld, PlannedStop, PlannerStep, Reserved,
+    Assigned, CentralRound, GoalsAssigned, PlanHeld, PlanSettled, PlannedStop, PlannerStep,
+    Reserved,
 };
 pub use metrics::PlanningMetrics;
 pub use system::PlanningSystem;

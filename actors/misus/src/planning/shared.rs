@@ -1,9 +1,10 @@
 //! What all planners carry: the problem, how they plan, and who there is.
 
 use farside::random::RandomKey;
-use farside_actors::system::SetupError;
+use farside_actors::system::{Files, Seeds, SetupError};
 
 use super::config::{PlanningScenario, RoundsConfig};
+use crate::planner::bounds::Bounds;
 use crate::planner::casper::{Casper, PlannerConfig, Unmet};
 use crate::planner::instance::Instance;
 use crate::planner::lns::LnsConfig;
@@ -11,6 +12,9 @@ use crate::planner::problem::{Problem, generate};
 
 /// The name of the centre's host and of its planner.
 pub(super) const CENTRE: &str = "centre";
+
+/// The most bytes of a table of bounds that are read.
+const BOUNDS_BYTES: u64 = 64 << 20;
 
 /// What all planners carry.
 pub(super) struct Shared {
@@ -22,18 +26,29 @@ pub(super) struct Shared {
     /// The names of the rovers' hosts and planners.
     pub(super) rovers: Vec<String>,
     pub(super) key: RandomKey,
+    /// What a plan is worth at the most, if that is known.
+    pub(super) bound: Option<f64>,
+}
+
+/// What planners have to solve in runs with this seed of problems.
+pub(super) fn problem(
+    scenario: &PlanningScenario,
+    problem_seed: u64,
+) -> Result<Problem, SetupError> {
+    generate(&scenario.problem, problem_seed).map_err(|error| SetupError::value("problem", error))
 }
 
 /// What planners carry in a run with these seeds.
 pub(super) fn shared(
     scenario: &PlanningScenario,
-    problem_seed: u64,
-    run_seed: u64,
+    seeds: Seeds,
+    files: &mut Files,
 ) -> Result<Shared, SetupError> {
-    let wrong = |error| SetupError::value("problem", error);
-    let problem = generate(&scenario.problem, problem_seed).map_err(wrong)?;
-    let instance = Instance::new(&problem).map_err(wrong)?;
-    let key = RandomKey::new(run_seed);
+    let problem = problem(scenario, seeds.problem)?;
+    let bound = bound(&scenario.problem.bounds, &problem, files)
+        .map_err(|error| SetupError::value("problem.bounds", error))?;
+    let instance = Instance::new(&problem).map_err(|error| SetupError::value("problem", error))?;
+    let key = RandomKey::new(seeds.run);
     for rover in 0..problem.rovers.len() {
         Casper::new(&instance, rover, &scenario.planner, key)
             .map_err(|unmet| blame(&problem, &unmet))?;
@@ -46,7 +61,20 @@ pub(super) fn shared(
         problem,
         instance,
         key,
+        bound,
     })
+}
+
+/// What a plan of a problem is worth at the most, as a table says: that of a file, or the one that is built in.
+fn bound(file: &str, problem: &Problem, files: &mut Files) -> Result<Option<f64>, String> {
+    let digest = problem.digest();
+    if file.is_empty() {
+        return Ok(Bounds::builtin().of(&digest));
+    }
+    let bytes = files.read(file, BOUNDS_BYTES)?;
+    let text = String::from_utf8(bytes).map_err(|error| format!("{file}: {error}"))?;
+    let bounds = Bounds::parse(&text).map_err(|error| format!("{file}: {error}"))?;
+    Ok(bounds.of(&digest))
 }
 
 /// Which key of the scenario keeps a rover from what it has to do in any case.
