@@ -31,6 +31,7 @@ mod scientist;
 pub mod shac;
 pub mod sharing;
 mod site;
+pub mod survey;
 mod system;
 mod tools;
 pub mod tour;
