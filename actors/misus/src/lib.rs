@@ -5,7 +5,7 @@
 //! Interdependent Science Objectives", AAMAS 2005. Built so far: its environment (section 2), as
 //! rock fields of [`farside_worlds`] and rover hardware of [`farside_actors::rover`], and its data
 //! [`analysis`], which runs distributed over the rovers. Tours are fixed; [`planner`] has the planners of
-//! sections 3 and 4, and [`survey`] puts them into actors: the paper's evaluation (section 5), and the same
+//! sections 3 and 4, and [`planning`] puts them into actors: the paper's evaluation (section 5), and the same
 //! over links that are not perfect.
 //!
 //! On each rover there are two actors: the hardware, and the scientist, who sends the rover from rock
@@ -24,13 +24,13 @@ mod metrics;
 mod monitor;
 mod picture;
 pub mod planner;
+pub mod planning;
 mod scenario;
 mod scene;
 mod scientist;
 pub mod shac;
 pub mod sharing;
 mod site;
-pub mod survey;
 mod system;
 mod tools;
 pub mod tour;
@@ -38,5 +38,5 @@ pub mod tour;
 pub use config::{LearnConfig, Objective, TeamConfig, Tour};
 pub use messages::{FieldModel, RockLabel, Stop};
 pub use metrics::MisusMetrics;
-pub use survey::PlanningSystem;
+pub use planning::PlanningSystem;
 pub use system::MisusSystem;

@@ -9,7 +9,7 @@ use farside_actors::link::LinksConfig;
 use farside_actors::system::{Files, Results, Seeds, Series, Settings, Setup, System};
 use farside_actors::wiring::LinkBuilder;
 use farside_misus::PlanningSystem;
-use farside_misus::survey::PlannerStep;
+use farside_misus::planning::PlannerStep;
 
 /// How a run is made.
 pub(crate) struct Run<'a> {
