@@ -6,10 +6,14 @@
 //! a plan of those that it has, carries it out, and makes another when the world turns out otherwise.
 
 mod costs;
+mod execution;
+mod explorer;
 mod messages;
+pub mod outlook;
 mod shared;
 
 pub use costs::Cost;
+pub use execution::ExecutionConfig;
 pub use messages::{
     Activity, ActivityBegan, ActivityEnd, ActivityEnded, GoalList, GoalListHeld, ListedCombination,
     ListedGoal, PlanMade, PlanMode, PlannedActivity, ReplanCause, Window,

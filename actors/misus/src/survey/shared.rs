@@ -11,6 +11,7 @@ use crate::planner::casper::PlannerConfig;
 use crate::shac::Settings;
 use crate::sharing::Names;
 use crate::site::SharedSite;
+use crate::survey::execution::ExecutionConfig;
 
 /// The name of the scientist at the site of the centre.
 pub(crate) const SCIENTIST: &str = "scientist";
@@ -24,6 +25,8 @@ pub(crate) struct Shared {
     pub(crate) rover: RoverConfig,
     /// `[planner]`.
     pub(crate) planner: PlannerConfig,
+    /// `[execution]`.
+    pub(crate) execution: ExecutionConfig,
     /// Who takes part in the protocol, and how.
     pub(crate) settings: Arc<Settings>,
     /// The actors of the protocol's parties: `planner_01` and so on for owners, `centre` (with elections
