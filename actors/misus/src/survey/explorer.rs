@@ -24,7 +24,7 @@ use farside_actors::rover::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::messages::{ActivityEnd, GoalList, GoalListHeld, ReplanCause};
+use super::messages::{GoalList, GoalListHeld, ReplanCause};
 use super::outlook::{Forecast, Known, Means, Outlook, Plan};
 use super::shared::{SCIENTIST, Shared};
 use crate::shac::{
@@ -33,7 +33,7 @@ use crate::shac::{
 };
 use crate::sharing::{OwnerSeat, SharingDue, receives};
 use goals::Desk;
-use logbook::{Logbook, Under};
+use logbook::Logbook;
 
 /// A timer: the plan that was begun with is ready.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -90,8 +90,6 @@ pub(crate) struct Explorer {
     took_ms: i64,
     /// Why what runs is broken off.
     broken_off: Option<Reason>,
-    /// What has ended and is told once the hardware has said how it is.
-    ended: Vec<(Under, ActivityEnd)>,
 }
 
 /// A plan that is being made.
@@ -141,7 +139,6 @@ impl Explorer {
             has_gained: false,
             took_ms: 0,
             broken_off: None,
-            ended: Vec::new(),
             shared,
             number,
             processor,

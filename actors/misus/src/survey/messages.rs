@@ -207,3 +207,53 @@ pub struct ActivityEnded {
     /// What memory holds, as last measured \[bit\].
     pub memory_bits: i64,
 }
+
+/// The centre to the scientist at its site: the goals that it knows to be achieved, in the order of their names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoalsAchieved {
+    /// All of them.
+    pub goals: Vec<GoalKey>,
+}
+
+/// A timer: it is time to ask the prioritiser.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct LoopDue;
+
+/// A timer: goals of one's own come, change or go.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct WishesDue;
+
+/// A timer: who has not said that it has the list is told again.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct ListDue;
+
+/// A state sample: the goal list was looked at again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LoopMade {
+    /// How often the prioritiser was asked after new readings had come, with this time: the turns of the
+    /// closed loop.
+    pub loops: u32,
+    /// How many readings it knew.
+    pub readings: u32,
+    /// The edition of the list since then.
+    pub edition: u64,
+    /// How many goals are new.
+    pub added: u32,
+    /// How many have another weight or place.
+    pub changed: u32,
+    /// How many are no longer wished for.
+    pub withdrawn: u32,
+}
+
+/// A state sample: a centre has shared out open goals.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GoalsShared {
+    /// How many goals were open.
+    pub open: u32,
+    /// How many of them some rover had or was asked for before.
+    pub shed: u32,
+    /// How many were given to somebody.
+    pub given: u32,
+    /// What it looked at.
+    pub operations: u64,
+}

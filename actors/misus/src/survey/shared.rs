@@ -7,11 +7,13 @@ use farside::SimTime;
 use farside::random::RandomKey;
 use farside_actors::rover::RoverConfig;
 
+use super::config::SurveyConfig;
+use super::execution::ExecutionConfig;
+use super::wishes::OwnWishes;
 use crate::planner::casper::PlannerConfig;
-use crate::shac::Settings;
+use crate::shac::{Party, Settings};
 use crate::sharing::Names;
 use crate::site::SharedSite;
-use crate::survey::execution::ExecutionConfig;
 
 /// The name of the scientist at the site of the centre.
 pub(crate) const SCIENTIST: &str = "scientist";
@@ -23,10 +25,16 @@ pub(crate) struct Shared {
     pub(crate) site: SharedSite,
     /// How rovers are built.
     pub(crate) rover: RoverConfig,
+    /// `[survey]`.
+    pub(crate) survey: SurveyConfig,
     /// `[planner]`.
     pub(crate) planner: PlannerConfig,
     /// `[execution]`.
     pub(crate) execution: ExecutionConfig,
+    /// Goals of the users' own.
+    pub(crate) own: OwnWishes,
+    /// Where rovers start, east and north \[m\].
+    pub(crate) starts_m: Vec<[f64; 2]>,
     /// Who takes part in the protocol, and how.
     pub(crate) settings: Arc<Settings>,
     /// The actors of the protocol's parties: `planner_01` and so on for owners, `centre` (with elections
@@ -36,4 +44,17 @@ pub(crate) struct Shared {
     pub(crate) key: RandomKey,
     /// When the run ends.
     pub(crate) until: SimTime,
+}
+
+impl Shared {
+    /// The site of the first centre, where the scientist is who closes the loop.
+    pub(crate) fn site_of_centre(&self) -> u32 {
+        self.settings.candidates[0]
+    }
+
+    /// Whether a party is on the host of that scientist.
+    pub(crate) fn is_at_site(&self, party: Party) -> bool {
+        let (Party::Owner(site) | Party::Centre(site)) = party;
+        site == self.site_of_centre()
+    }
 }

@@ -339,7 +339,7 @@ impl Explorer {
             }
             Err(reason) => self.failed(ctx, &under, reason)?,
         };
-        self.ended.push((under, ended));
+        self.log.ended.push((under, ended));
         // What it says of itself now is what the next plan and the next activity begin with.
         self.ask(ctx)
     }
@@ -442,7 +442,7 @@ impl Explorer {
 
     /// Tells what has ended, with what the hardware says now.
     pub(super) fn tell_ended(&mut self, ctx: &mut Context<'_, Self>, state: &RoverState) {
-        for (under, end) in self.ended.drain(..) {
+        for (under, end) in self.log.ended.drain(..) {
             ctx.sample(&ActivityEnded {
                 plan: under.plan,
                 planned: planned(&under.piece),

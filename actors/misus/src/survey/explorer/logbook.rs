@@ -7,7 +7,7 @@ use farside::SimTime;
 
 use super::conduct::{Drive, Look};
 use crate::shac::{GoalKey, Reason};
-use crate::survey::messages::GoalList;
+use crate::survey::messages::{ActivityEnd, GoalList};
 use crate::survey::outlook::{Piece, Plan};
 
 /// What a rover's planner remembers through a crash.
@@ -23,6 +23,8 @@ pub(super) struct Logbook {
     pub(super) ahead: Vec<Piece>,
     /// What runs.
     pub(super) under: Option<Under>,
+    /// What has ended and is told once the hardware has said how it is.
+    pub(super) ended: Vec<(Under, ActivityEnd)>,
     /// The list of goals with the highest edition.
     pub(super) list: GoalList,
     /// How often goals have failed since they were taken, and when they may be tried again \[ms\].

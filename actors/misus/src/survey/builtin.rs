@@ -1,0 +1,12 @@
+//! The scenarios and studies that come with the system.
+
+use farside_actors::system::Builtin;
+
+/// Sorted by name.
+pub(super) const SCENARIOS: [Builtin; 1] = [Builtin {
+    name: "misus/mars-survey",
+    text: include_str!("../../scenarios/mars-survey.toml"),
+}];
+
+/// Sorted by name.
+pub(super) const STUDIES: [Builtin; 0] = [];
