@@ -19,6 +19,7 @@ mod invariants;
 mod messages;
 mod metrics;
 mod monitor;
+pub mod outlook;
 mod own_goals;
 mod scenario;
 mod science;
