@@ -9,4 +9,17 @@ pub(super) const SCENARIOS: [Builtin; 1] = [Builtin {
 }];
 
 /// Sorted by name.
-pub(super) const STUDIES: [Builtin; 0] = [];
+pub(super) const STUDIES: [Builtin; 3] = [
+    Builtin {
+        name: "misus/batch-or-continuous",
+        text: include_str!("../../studies/batch-or-continuous.toml"),
+    },
+    Builtin {
+        name: "misus/central-outage",
+        text: include_str!("../../studies/central-outage.toml"),
+    },
+    Builtin {
+        name: "misus/degradation",
+        text: include_str!("../../studies/degradation.toml"),
+    },
+];
