@@ -19,8 +19,8 @@ use crate::shac::{
 };
 use crate::sharing::{TeamMind, TeamMove};
 
-/// A year \[ms\]: the centre knows of no night.
-const LONG_MS: i64 = 32_000_000_000;
+/// The longest time that a problem has for a sol \[ms\]: the centre knows of no night.
+const LONG_MS: i64 = 100_000_000;
 
 /// What the centre decides.
 pub(super) struct TeamPlanner {
