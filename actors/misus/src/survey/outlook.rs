@@ -255,3 +255,6 @@ impl Outlook {
         &mut self.forecast
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,5 +7,8 @@ fn rovers_plan_drive_observe_and_plan_anew() {
     let ran = Run::default().run();
     println!("{}", told(&ran.diary, "planner_01"));
     println!("{:?} {:?}", ran.report.end, ran.results.violations);
-    println!("{}", serde_json::to_string_pretty(&ran.results.metrics).unwrap_or_default());
+    println!(
+        "{}",
+        serde_json::to_string_pretty(&ran.results.metrics).unwrap_or_default()
+    );
 }

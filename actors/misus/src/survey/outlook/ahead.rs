@@ -387,13 +387,16 @@ fn order_of(forecast: &mut Forecast, plan: &Plan) -> Vec<(u32, Activity)> {
 /// An order as visits of a problem, as far as it is still to be done.
 fn visits(instance: &Instance, posed: &Posed, order: &[(u32, Activity)]) -> Vec<(usize, Visit)> {
     let visit = |&(sol, activity): &(u32, Activity)| {
-        let sol = posed.sols.iter().position(|at| *at == sol)?;
-        let Activity::Goal(key) = activity else {
-            return None;
+        let number = posed.sols.iter().position(|at| *at == sol)?;
+        let task = match activity {
+            Activity::Goal(key) => posed.keys[..posed.own].iter().position(|at| *at == key)?,
+            Activity::Communication(_) => {
+                let duty = posed.duties.iter().position(|at| *at == sol)?;
+                instance.goals() + duty
+            }
+            Activity::Drive(_) | Activity::Sleep => return None,
         };
-        let own = &posed.keys[..posed.own];
-        let goal = own.iter().position(|at| *at == key)?;
-        Some((sol, Visit::new(instance, goal)))
+        Some((number, Visit::new(instance, task)))
     };
     order.iter().filter_map(visit).collect()
 }
