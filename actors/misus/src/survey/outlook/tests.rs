@@ -135,10 +135,15 @@ prop_compose! {
 fn wrong(outlook: &mut Outlook, known: &Known, plan: &Plan) -> Vec<PlanViolation> {
     let means = outlook.means.clone();
     let posed = pose(&means, &mut outlook.forecast, known, &Cut::default()).unwrap();
-    let Some(posed) = posed else {
+    let Some(mut posed) = posed else {
         assert_eq!(plan.goals().count(), posing::fixed_goals(known).count());
         return Vec::new();
     };
+    for (duty, sol) in posed.problem.activities.iter_mut().zip(&posed.duties) {
+        // Planners prefer the first half of it.
+        let until_s = means.communicates_s[1];
+        duty.window_ms[1] = outlook.forecast.time_ms(*sol, until_s);
+    }
     let free = plan.pieces.iter().skip(known.fixed.len());
     let stop = |piece: &Piece| {
         let sol = outlook.forecast.sol_at(piece.starts_ms);
