@@ -15,7 +15,7 @@ mod logbook;
 mod replanning;
 mod updates;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use farside::prelude::*;
@@ -83,6 +83,8 @@ pub(crate) struct Explorer {
     there_m: Option<[f64; 2]>,
     /// Where rocks were seen from where the rover stands now \[m\].
     seen_m: BTreeMap<u32, [f64; 2]>,
+    /// Rocks that were looked round for in vain from where the rover stands now.
+    unseen: BTreeSet<u32>,
     /// The share of its power that the array yields.
     clean: f64,
     /// What memory could hold when it was last looked at \[bit\].
@@ -138,6 +140,7 @@ impl Explorer {
             due: None,
             there_m: None,
             seen_m: BTreeMap::new(),
+            unseen: BTreeSet::new(),
             clean: 1.0,
             memory_size_bits: None,
             has_gained: false,

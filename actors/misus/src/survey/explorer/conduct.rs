@@ -183,6 +183,17 @@ impl Look {
         self.has_searched
     }
 
+    /// The rock, and whether it was looked round for: in vain, if the observation has failed for want of a way.
+    pub(super) fn searched(&self) -> Option<u32> {
+        self.rock.filter(|_| self.has_searched)
+    }
+
+    /// The same for a rover that has looked round for the rock already: it does not again.
+    pub(super) fn without_search(mut self) -> Look {
+        self.has_searched = true;
+        self
+    }
+
     /// The first command.
     pub(super) fn start(&mut self, with: &Instruments) -> Next {
         match self.is_panorama() {

@@ -24,6 +24,9 @@ const PANORAMA_M: [f64; 2] = [2.0, 10.0];
 /// From how far, beyond where it should stand, a rover observes a rock all the same \[m\].
 const REACH_M: f64 = 3.0;
 
+/// How much nearer it goes each time that it has not seen what it observes.
+const NEARER: f64 = 0.75;
+
 /// How long it rests where the battery is low \[ms\].
 const REST_MS: i64 = 3_600_000;
 
@@ -280,10 +283,17 @@ impl Explorer {
                 let rock = rock.filter(|_| is_point);
                 let seen_m = rock.and_then(|rock| self.seen_m.get(&rock)).copied();
                 let place_m = seen_m.unwrap_or(piece.position_m);
-                Conduct::Look(Look::new(observation, rock, place_m))
+                let look = Look::new(observation, rock, place_m);
+                match rock.is_some_and(|rock| self.unseen.contains(&rock)) {
+                    true => Conduct::Look(look.without_search()),
+                    false => Conduct::Look(look),
+                }
             }
             _ => {
                 let [stands_m, reach_m] = self.distances_m(observation, rock);
+                // Each time from nearer by.
+                let tries = self.log.tried.get(&goal).map_or(0, |(tries, _)| *tries);
+                let stands_m = stands_m * libm::pow(NEARER, f64::from(tries));
                 Conduct::Drive(Drive::new(piece.position_m, stands_m, reach_m))
             }
         }
@@ -342,6 +352,7 @@ impl Explorer {
             Next::Command(command) => {
                 if let Command::Drive { .. } | Command::BackUp { .. } = command {
                     self.seen_m.clear();
+                    self.unseen.clear();
                 }
                 let id = self.command(ctx, command)?;
                 if let Some(under) = &mut self.log.under {
@@ -434,8 +445,6 @@ impl Explorer {
             _ => ReplanCause::Failed,
         });
         let retries = self.shared.execution.retries;
-        let later_ms = (self.shared.execution.retry_after.as_nanos() / 1_000_000) as i64;
-        let again_ms = Self::now_ms(ctx) + later_ms;
         if let Activity::Communication(sol) = under.piece.activity {
             self.log.communication_tries += 1;
             let is_over = self.log.communication_tries > retries || reason == Reason::Time;
@@ -455,9 +464,24 @@ impl Explorer {
         if !self.holds(goal) {
             return Ok(ActivityEnd::Interrupted(reason));
         }
-        let (tries, from_ms) = self.log.tried.entry(goal).or_default();
-        *tries += 1;
-        *from_ms = again_ms;
+        let again_ms = self.again_ms(Self::now_ms(ctx), reason);
+        let searched = match &under.conduct {
+            Conduct::Look(look) if reason == Reason::Path => look.searched(),
+            _ => None,
+        };
+        // What one observation does not see others do not see either.
+        let mut missed = vec![goal];
+        if let Some(rock) = searched {
+            self.unseen.insert(rock);
+            self.there_m = None;
+            let of_rock = |other: &GoalKey| self.rock(*other) == Some(rock) && *other != goal;
+            missed.extend(self.held_keys().into_iter().filter(of_rock));
+        }
+        for goal in missed {
+            let (tries, from_ms) = self.log.tried.entry(goal).or_default();
+            *tries += 1;
+            *from_ms = again_ms;
+        }
         let is_mandatory = self.listed(goal).is_some_and(|listed| listed.mandatory);
         let tries = self.log.tried[&goal].0;
         if tries <= retries || (is_mandatory && reason != Reason::Time) {
@@ -465,6 +489,18 @@ impl Explorer {
         }
         self.give_up(goal, reason, ctx)?;
         Ok(ActivityEnd::Failed(reason))
+    }
+
+    /// When something that failed for want of something may be tried again: where memory lacks, once
+    /// something was sent.
+    fn again_ms(&mut self, now_ms: i64, reason: Reason) -> i64 {
+        let later_ms = now_ms + (self.shared.execution.retry_after.as_nanos() / 1_000_000) as i64;
+        if reason != Reason::Memory {
+            return later_ms;
+        }
+        let is_duty = |piece: &&Piece| matches!(piece.activity, Activity::Communication(_));
+        let duty = self.log.ahead.iter().find(is_duty);
+        duty.map_or(later_ms, |piece| piece.ends_ms.max(later_ms))
     }
 
     /// Gives a goal back: it has failed if it has started, and is released if not.

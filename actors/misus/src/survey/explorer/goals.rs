@@ -133,7 +133,7 @@ impl Explorer {
         !held.is_subset(&known)
     }
 
-    fn held_keys(&self) -> BTreeSet<GoalKey> {
+    pub(super) fn held_keys(&self) -> BTreeSet<GoalKey> {
         self.holdings().map(|holding| holding.goal.key).collect()
     }
 
