@@ -77,7 +77,7 @@ mod tests {
         let error = wrong.check_together("execution").unwrap_err().to_string();
         assert_eq!(
             error,
-            "execution.communicate_until: 13h: expected 10min or more after 13h"
+            "execution.communicate_until: 46800s: expected 600s or more after 46800s"
         );
     }
 }

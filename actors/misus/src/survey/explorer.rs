@@ -15,6 +15,7 @@ mod logbook;
 mod replanning;
 mod updates;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use farside::prelude::*;
@@ -80,6 +81,8 @@ pub(crate) struct Explorer {
     due: Option<(SimTime, TimerId)>,
     /// The place of the observation that the rover has driven to \[m\].
     there_m: Option<[f64; 2]>,
+    /// Where rocks were seen from where the rover stands now \[m\].
+    seen_m: BTreeMap<u32, [f64; 2]>,
     /// The share of its power that the array yields.
     clean: f64,
     /// What memory could hold when it was last looked at \[bit\].
@@ -134,6 +137,7 @@ impl Explorer {
             in_hand: None,
             due: None,
             there_m: None,
+            seen_m: BTreeMap::new(),
             clean: 1.0,
             memory_size_bits: None,
             has_gained: false,

@@ -77,10 +77,10 @@ impl Worth {
     /// ```
     pub fn of(&self, goals: &BTreeSet<GoalKey>) -> f64 {
         let alone = self.weights.iter().filter(|(goal, _)| goals.contains(goal));
-        let alone: f64 = alone.map(|(_, weight)| weight).sum();
+        let alone = alone.fold(0.0, |sum, (_, weight)| sum + weight);
         let is_whole = |at: &&ListedCombination| at.goals.iter().all(|goal| goals.contains(goal));
         let together = self.combinations.iter().filter(is_whole);
-        alone + together.map(|at| at.weight).sum::<f64>()
+        together.fold(alone, |sum, at| sum + at.weight)
     }
 }
 
@@ -255,3 +255,6 @@ impl Outlook {
         &mut self.forecast
     }
 }
+
+#[cfg(test)]
+mod tests;

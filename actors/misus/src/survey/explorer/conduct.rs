@@ -61,9 +61,9 @@ impl Drive {
         }
     }
 
-    /// Whether something was in the way so far.
-    pub(super) fn was_blocked(&self) -> bool {
-        self.detours > 0
+    /// How often something was in the way so far.
+    pub(super) fn detours(&self) -> u32 {
+        self.detours
     }
 
     fn left_m(&self, pose: &PoseEstimate) -> Vector2<f64> {
@@ -171,6 +171,16 @@ impl Look {
             self.observation,
             Observation::PanoramicImage | Observation::PanoramicSpectrum
         )
+    }
+
+    /// Whether a rock is observed.
+    pub(super) fn is_of_rock(&self) -> bool {
+        self.rock.is_some()
+    }
+
+    /// Whether the rover had to look round for the rock.
+    pub(super) fn has_searched(&self) -> bool {
+        self.has_searched
     }
 
     /// The first command.

@@ -27,6 +27,12 @@ const REACH_M: f64 = 3.0;
 /// How long it rests where the battery is low \[ms\].
 const REST_MS: i64 = 3_600_000;
 
+/// How long it rests at the least \[ms\].
+const LEAST_REST_MS: i64 = 60_000;
+
+/// How much farther it drives to get round something that is in its way \[m\].
+const DETOUR_M: f64 = 6.0;
+
 /// How many times as long as planned an activity may take, and how much longer at the least \[ms\].
 const OVERDUE: (i64, i64) = (3, 3_600_000);
 
@@ -47,13 +53,44 @@ impl Explorer {
                 self.wake_at(ctx, time(due_ms));
                 return Ok(());
             }
-            if piece.activity != Activity::Sleep && self.must_rest() {
+            let next = self.urgent(now_ms, &piece).unwrap_or(0);
+            let piece = self.log.ahead[next];
+            let is_optional = goal_of(piece.activity).is_some();
+            if is_optional && self.must_rest() {
                 return self.rest(ctx);
             }
-            self.log.ahead.remove(0);
+            self.log.ahead.remove(next);
             self.begin(ctx, piece)?;
         }
         Ok(())
+    }
+
+    /// The place of the sol's communication among what is ahead, if it would fail after what is next.
+    fn urgent(&mut self, now_ms: i64, next: &Piece) -> Option<usize> {
+        let goal = goal_of(next.activity)?;
+        let sol = self.outlook.forecast().sol_at(now_ms);
+        let duty = Activity::Communication(sol);
+        let at = self
+            .log
+            .ahead
+            .iter()
+            .position(|piece| piece.activity == duty)?;
+        let [opens_ms, closes_ms] = self.communicates_ms(sol);
+        let of_goal = self
+            .log
+            .ahead
+            .iter()
+            .filter(|piece| goal_of(piece.activity) == Some(goal));
+        let lasts_ms: i64 = of_goal.map(|piece| piece.ends_ms - piece.starts_ms).sum();
+        let tolerance_ms = (self.shared.execution.late_tolerance.as_nanos() / 1_000_000) as i64;
+        let duty_ms = self.outlook.means().communication_ms + tolerance_ms;
+        (opens_ms <= now_ms && now_ms + lasts_ms + duty_ms > closes_ms).then_some(at)
+    }
+
+    /// When a sol's communication may be \[ms\].
+    pub(super) fn communicates_ms(&mut self, sol: u32) -> [i64; 2] {
+        let window_s = self.outlook.means().communicates_s;
+        window_s.map(|at_s| self.outlook.forecast().time_ms(sol, at_s))
     }
 
     /// Whether the hardware was heard of since the start, and obeys.
@@ -125,8 +162,16 @@ impl Explorer {
     /// Rests until the Sun has given something, and plans anew then.
     fn rest(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         self.plan_anew(ReplanCause::Power);
-        let until_ms = Self::now_ms(ctx) + REST_MS;
-        self.sleep(ctx, until_ms)
+        let now_ms = Self::now_ms(ctx);
+        let is_duty = |piece: &&Piece| matches!(piece.activity, Activity::Communication(_));
+        let duty_ms = self
+            .log
+            .ahead
+            .iter()
+            .find(is_duty)
+            .map(|piece| piece.starts_ms);
+        let until_ms = duty_ms.map_or(i64::MAX, |at_ms| at_ms.max(now_ms + LEAST_REST_MS));
+        self.sleep(ctx, until_ms.min(now_ms + REST_MS))
     }
 
     /// A sleep that no plan has.
@@ -197,8 +242,7 @@ impl Explorer {
         match piece.activity {
             Activity::Sleep => Ok(None),
             Activity::Communication(sol) => {
-                let until_s = self.outlook.means().communicates_s[1];
-                let until_ms = self.outlook.forecast().time_ms(sol, until_s);
+                let [_, until_ms] = self.communicates_ms(sol);
                 Ok((ends_ms > until_ms).then_some(Reason::Time))
             }
             Activity::Drive(goal) => Ok((!self.holds(goal)).then_some(Reason::Revoked)),
@@ -234,7 +278,9 @@ impl Explorer {
                     Observation::PointImage | Observation::PointSpectrum
                 );
                 let rock = rock.filter(|_| is_point);
-                Conduct::Look(Look::new(observation, rock, piece.position_m))
+                let seen_m = rock.and_then(|rock| self.seen_m.get(&rock)).copied();
+                let place_m = seen_m.unwrap_or(piece.position_m);
+                Conduct::Look(Look::new(observation, rock, place_m))
             }
             _ => {
                 let [stands_m, reach_m] = self.distances_m(observation, rock);
@@ -294,6 +340,9 @@ impl Explorer {
         match next {
             Next::Over(end) => self.end(ctx, end),
             Next::Command(command) => {
+                if let Command::Drive { .. } | Command::BackUp { .. } = command {
+                    self.seen_m.clear();
+                }
                 let id = self.command(ctx, command)?;
                 if let Some(under) = &mut self.log.under {
                     under.command = id;
@@ -349,6 +398,11 @@ impl Explorer {
             Activity::Goal(goal) => {
                 self.log.tried.remove(&goal);
                 self.log.left_out.remove(&goal);
+                if let Conduct::Look(look) = &under.conduct
+                    && look.is_of_rock()
+                {
+                    self.note_search(look.has_searched());
+                }
                 // Nothing else ends a goal that has started.
                 self.seat.decide(RoverMove::Done(goal), ctx)?.ok();
             }
@@ -370,7 +424,7 @@ impl Explorer {
         reason: Reason,
     ) -> Result<ActivityEnd, HandlerError> {
         let was_blocked = match &under.conduct {
-            Conduct::Drive(drive) => drive.was_blocked(),
+            Conduct::Drive(drive) => drive.detours() > 0,
             _ => false,
         };
         self.plan_anew(match reason {
@@ -485,6 +539,9 @@ impl Handler<CommandReport> for Explorer {
             let scientist = &self.shared.site.rovers[self.number as usize];
             let scientist = ctx.recipient::<CommandReport>(scientist)?;
             ctx.send(scientist, report.clone());
+            let rocks = report.readings.iter();
+            let rocks = rocks.filter_map(|at| Some((at.rock?, [at.east_m, at.north_m])));
+            self.seen_m.extend(rocks);
         }
         self.note_pose(&report.pose);
         let instruments = &self.shared.site.instruments;
@@ -494,20 +551,30 @@ impl Handler<CommandReport> for Explorer {
         if under.command != report.id || report.id == 0 {
             return Ok(());
         }
-        let (next, is_blocked) = match &mut under.conduct {
+        let (next, more) = match &mut under.conduct {
             Conduct::Drive(drive) => {
-                let before = drive.was_blocked();
+                let before = drive.detours();
                 let next = drive.next(&report);
-                (next, !before && drive.was_blocked())
+                (
+                    next,
+                    (drive.detours() > before).then_some(ReplanCause::Blocked),
+                )
             }
-            Conduct::Look(look) => (look.next(&report, instruments), false),
+            Conduct::Look(look) => {
+                let before = look.has_searched();
+                let next = look.next(&report, instruments);
+                (
+                    next,
+                    (look.has_searched() != before).then_some(ReplanCause::Late),
+                )
+            }
             Conduct::Single => match &report.end {
-                CommandEnd::Done => (Next::Over(Ok(())), false),
-                end => (Next::Over(Err(lack(end))), false),
+                CommandEnd::Done => (Next::Over(Ok(())), None),
+                end => (Next::Over(Err(lack(end))), None),
             },
         };
-        if is_blocked {
-            self.plan_anew(ReplanCause::Blocked);
+        if let (Some(cause), Next::Command(_)) = (more, &next) {
+            self.expect_longer(Self::now_ms(ctx), cause);
         }
         self.step(ctx, next)?;
         self.settle_goals(ctx)
@@ -545,6 +612,30 @@ impl Handler<EndDue> for Explorer {
 }
 
 impl Explorer {
+    /// What runs has something before it that was not planned: something is in the way, or a rock was missed.
+    fn expect_longer(&mut self, now_ms: i64, cause: ReplanCause) {
+        let more_ms = match cause {
+            ReplanCause::Blocked => self.outlook.means().drive_ms([0.0; 2], [DETOUR_M, 0.0]),
+            _ => {
+                let search = self.search_cost();
+                search.map_or(0, |cost| (cost.duration.as_nanos() / 1_000_000) as i64)
+            }
+        };
+        let tolerance_ms = (self.shared.execution.late_tolerance.as_nanos() / 1_000_000) as i64;
+        let Some(under) = &mut self.log.under else {
+            return;
+        };
+        // A search is part of what was planned only in the mean.
+        under.expected_ms = match cause {
+            ReplanCause::Blocked => under.expected_ms + more_ms,
+            _ => under.expected_ms.max(now_ms + more_ms),
+        };
+        let is_late = under.expected_ms - under.piece.ends_ms > tolerance_ms;
+        if is_late || cause == ReplanCause::Blocked {
+            self.plan_anew(cause);
+        }
+    }
+
     /// Where the rover believes to be, as a report has it.
     fn note_pose(&mut self, pose: &PoseEstimate) {
         if let Some((_, state)) = &mut self.state {

@@ -6,13 +6,18 @@ use std::sync::Arc;
 use farside::prelude::*;
 
 use super::{Explorer, millis};
-use crate::analysis::goals::Observation;
+use crate::analysis::goals::{GoalId, Observation};
 use crate::shac::{GoalKey, Holding, Owner, OwnerError, Reason};
 use crate::sharing::{RoverMind, RoverMove};
 use crate::survey::costs::Cost;
 use crate::survey::messages::{Activity, ListedGoal, ReplanCause};
 use crate::survey::outlook::{OwnGoal, Worth};
 use crate::survey::shared::Shared;
+
+/// The share of rocks for which a rover expects to look round before it has seen any, and how fast it learns
+/// better.
+const SEARCHES: f64 = 0.5;
+const LEARNS: f64 = 0.25;
 
 /// What a rover answers to offers, and what it has decided to give back.
 pub(super) struct Desk {
@@ -212,7 +217,11 @@ impl Explorer {
     fn own_goal(&self, holding: &Holding) -> Option<OwnGoal> {
         let (key, parameters) = (holding.goal.key, &holding.goal.parameters);
         let listed = self.listed(key);
-        let cost = self.cost(key)?;
+        let position_m = listed.map_or(parameters.target_m, |listed| listed.position_m);
+        let mut cost = self.cost(key)?;
+        if self.there_m != Some(position_m) {
+            self.add_search(key, &mut cost);
+        }
         let means = self.outlook.means();
         let tried = self.log.tried.get(&key);
         let mut window_ms = [millis(parameters.start), i64::MAX];
@@ -223,7 +232,7 @@ impl Explorer {
         window_ms[0] = window_ms[0].max(tried.map_or(0, |(_, from_ms)| *from_ms));
         Some(OwnGoal {
             key,
-            position_m: listed.map_or(parameters.target_m, |listed| listed.position_m),
+            position_m,
             duration_ms: (cost.duration.as_nanos() / 1_000_000) as i64,
             power_w: means.beyond_body_w(&cost),
             memory_bits: cost.memory_bits,
@@ -245,6 +254,48 @@ impl Explorer {
             cost.memory_bits += image.memory_bits;
         }
         Some(cost)
+    }
+
+    /// What looking round for a rock takes.
+    pub(super) fn search_cost(&self) -> Option<Cost> {
+        self.shared.site.instruments.panorama.as_ref()?;
+        let [mut cost, image] = [Observation::PanoramicImage, Observation::PointImage]
+            .map(|one| Cost::of(one, &self.shared.rover));
+        if let (Some(cost), Some(image)) = (&mut cost, image) {
+            cost.duration = cost.duration + image.duration;
+            cost.memory_bits += image.memory_bits;
+        }
+        cost
+    }
+
+    /// Adds what it takes in the mean to look round for a rock that is missed at first, to the first
+    /// observation that is made of it.
+    fn add_search(&self, goal: GoalKey, cost: &mut Cost) {
+        let GoalKey::Observation(id) = goal else {
+            return;
+        };
+        let image = GoalKey::Observation(GoalId {
+            observation: Observation::PointImage,
+            ..id
+        });
+        let is_first = match id.observation {
+            Observation::PointImage => true,
+            Observation::PointSpectrum => !self.holds(image),
+            Observation::PanoramicImage | Observation::PanoramicSpectrum => false,
+        };
+        if let Some(search) = self.search_cost().filter(|_| is_first) {
+            let share = self.log.searches.unwrap_or(SEARCHES);
+            let lasts_s = share * search.duration.as_secs_f64();
+            cost.duration = cost.duration + SimDuration::from_secs_f64(lasts_s);
+            cost.memory_bits += (share * search.memory_bits as f64) as i64;
+        }
+    }
+
+    /// Counts whether a rock was seen at once.
+    pub(super) fn note_search(&mut self, has_searched: bool) {
+        let before = self.log.searches.unwrap_or(SEARCHES);
+        let now = f64::from(u8::from(has_searched));
+        self.log.searches = Some(before + LEARNS * (now - before));
     }
 
     /// What called goals would add to the score of the plan.

@@ -37,6 +37,8 @@ pub(super) struct Logbook {
     pub(super) communicated: BTreeSet<u32>,
     /// How often the present sol's communication has failed.
     pub(super) communication_tries: u32,
+    /// The share of rocks for which it has to look round once it is there, as of late.
+    pub(super) searches: Option<f64>,
     /// The sol that it last planned in.
     pub(super) sol: u32,
 }

@@ -104,7 +104,7 @@ impl Explorer {
                 false => piece.starts_ms.max(ready_ms),
             };
             let ends_ms = starts_ms + lasts_ms;
-            if !self.is_in_time(piece, ends_ms) {
+            if !self.is_in_time(piece, ends_ms) || self.endangers_duty(&fixed, piece, ends_ms) {
                 break;
             }
             ready_ms = ends_ms;
@@ -115,6 +115,20 @@ impl Explorer {
             });
         }
         fixed
+    }
+
+    /// Whether the sol's communication would fail after something else that ends then.
+    fn endangers_duty(&mut self, fixed: &[Piece], piece: &Piece, ends_ms: i64) -> bool {
+        let sol = self.outlook.forecast().sol_at(piece.starts_ms);
+        let duty = Activity::Communication(sol);
+        let mut before = fixed.iter().chain([piece]);
+        let duty_ms = self.outlook.means().communication_ms;
+        let [_, closes_ms] = self.communicates_ms(sol);
+        duty_ms > 0
+            && !self.log.communicated.contains(&sol)
+            && !before.any(|at| at.activity == duty)
+            && ends_ms + duty_ms > closes_ms
+            && piece.starts_ms < closes_ms
     }
 
     /// Whether an observation is next and the rover has driven to where it is made.
@@ -138,8 +152,8 @@ impl Explorer {
         match piece.activity {
             Activity::Sleep => true,
             Activity::Communication(sol) => {
-                let until_s = self.outlook.means().communicates_s[1];
-                ends_ms <= self.outlook.forecast().time_ms(sol, until_s)
+                let [_, closes_ms] = self.communicates_ms(sol);
+                ends_ms <= closes_ms
             }
             Activity::Drive(goal) | Activity::Goal(goal) => {
                 let forecast = self.outlook.forecast();
@@ -249,12 +263,11 @@ impl Explorer {
         if is_none || !self.log.communicated.insert(sol) {
             return;
         }
+        let [starts_ms, ends_ms] = self.communicates_ms(sol);
         let Some((_, state)) = &self.state else {
             return;
         };
         let memory_bits = bits(state.memory_used_bytes);
-        let window_ms = self.outlook.means().communicates_s;
-        let [starts_ms, ends_ms] = window_ms.map(|at_s| self.outlook.forecast().time_ms(sol, at_s));
         let piece = Piece {
             activity: Activity::Communication(sol),
             position_m: [state.pose.east_m, state.pose.north_m],

@@ -61,8 +61,10 @@ impl Outlook {
         };
         let mut optimises = before.is_none_or(gains);
         let mut order = before.map_or(Vec::new(), |plan| order_of(&mut self.forecast, plan));
-        let reserve_j = self.reserve_j(known);
-        let (mut cut, mut operations, mut shed) = (Cut::default(), 0, Vec::new());
+        let bare = self.bare(known, number)?;
+        let reserve_j = bare.reserve_j;
+        let (mut cut, mut operations, mut shed) =
+            (Cut::default(), bare.found.operations, Vec::new());
         for _ in 0..CUTS {
             let mut found = self.search(known, &cut, &order, optimises, number)?;
             operations += found.operations;
@@ -85,37 +87,36 @@ impl Outlook {
             // What fits is kept; what does not any more is repaired away.
             (order, optimises) = (found.order, false);
         }
-        // Nothing but what has to be done.
-        let bare = Known {
-            goals: Vec::new(),
-            ..known.clone()
-        };
-        let mut found = self.search(&bare, &Cut::default(), &[], false, number)?;
-        operations += found.operations;
         let goals = known.goals.iter();
+        let mut found = bare.found;
         found.left_out = goals.map(|goal| (goal.key, Reason::Power)).collect();
-        let pieces = self.pieces(known, &found.free);
-        let (pieces, profile) = self.predict(known, pieces);
         let end = End {
             basis,
             operations,
             shed: Vec::new(),
             reserve_j,
-            profile,
+            profile: bare.profile,
         };
-        Ok(self.conclude(known, pieces, found, end))
+        Ok(self.conclude(known, bare.pieces, found, end))
     }
 
-    /// The charge below which plans from here do not go: the reserve, or where the rover comes to below it
-    /// with nothing but what has to be done.
-    fn reserve_j(&mut self, known: &Known) -> f64 {
-        let (_, idle) = self.predict(known, known.fixed.clone());
-        let until_ms = self.until_ms(known);
-        let least_j = idle.least_j(known.now_ms, until_ms);
+    /// The plan of nothing but what has to be done.
+    fn bare(&mut self, known: &Known, number: u32) -> Result<Bare, ProblemError> {
+        let bare = Known {
+            goals: Vec::new(),
+            ..known.clone()
+        };
+        let found = self.search(&bare, &Cut::default(), &[], false, number)?;
+        let pieces = self.pieces(known, &found.free);
+        let (pieces, profile) = self.predict(known, pieces);
+        let least_j = profile.least_j(known.now_ms, self.until_ms(known));
         let least_j = least_j.map_or(known.battery_j, |(_, least_j)| least_j);
-        let each_j = self.means.radio_power_w * self.means.communication_ms as f64 * 1e-3;
-        let duties_j = f64::from(self.means.horizon) * each_j;
-        self.means.reserve_j.min(least_j - duties_j).max(0.0)
+        Ok(Bare {
+            found,
+            pieces,
+            profile,
+            reserve_j: self.means.reserve_j.min(least_j),
+        })
     }
 
     /// Until when the charge is followed: the dawn after the last sol that is planned.
@@ -333,6 +334,15 @@ impl Outlook {
     }
 }
 
+/// A plan of nothing but what has to be done.
+struct Bare {
+    found: Found,
+    pieces: Vec<Piece>,
+    profile: Profile,
+    /// The charge below which no plan goes \[J\]: the reserve, or what this comes down to below it.
+    reserve_j: f64,
+}
+
 /// What a plan is concluded with.
 struct End {
     basis: Basis,
@@ -387,13 +397,16 @@ fn order_of(forecast: &mut Forecast, plan: &Plan) -> Vec<(u32, Activity)> {
 /// An order as visits of a problem, as far as it is still to be done.
 fn visits(instance: &Instance, posed: &Posed, order: &[(u32, Activity)]) -> Vec<(usize, Visit)> {
     let visit = |&(sol, activity): &(u32, Activity)| {
-        let sol = posed.sols.iter().position(|at| *at == sol)?;
-        let Activity::Goal(key) = activity else {
-            return None;
+        let number = posed.sols.iter().position(|at| *at == sol)?;
+        let task = match activity {
+            Activity::Goal(key) => posed.keys[..posed.own].iter().position(|at| *at == key)?,
+            Activity::Communication(_) => {
+                let duty = posed.duties.iter().position(|at| *at == sol)?;
+                instance.goals() + duty
+            }
+            Activity::Drive(_) | Activity::Sleep => return None,
         };
-        let own = &posed.keys[..posed.own];
-        let goal = own.iter().position(|at| *at == key)?;
-        Some((sol, Visit::new(instance, goal)))
+        Some((number, Visit::new(instance, task)))
     };
     order.iter().filter_map(visit).collect()
 }

@@ -202,16 +202,21 @@ fn add_duties(
         }
         let window_ms = means.communicates_s.map(|at_s| forecast.time_ms(sol, at_s));
         let day = days.iter().position(|(number, _)| *number == sol);
-        let fits = day.filter(|&day| {
-            let Sol {
-                opens_ms,
-                closes_ms,
-                ..
-            } = days[day].1;
-            let opens_ms = window_ms[0].max(opens_ms);
-            window_ms[1].min(closes_ms) - opens_ms >= means.communication_ms
+        let fits = |day: usize, closes_ms: i64| {
+            let (opens_ms, day_ms) = (
+                window_ms[0].max(days[day].1.opens_ms),
+                days[day].1.closes_ms,
+            );
+            closes_ms.min(day_ms) - opens_ms >= means.communication_ms
+        };
+        // In the first half of its window, if it can be: what is late then does not make it fail.
+        let middle_ms = window_ms[0] + (window_ms[1] - window_ms[0]) / 2;
+        let mut closings_ms = [middle_ms, window_ms[1]].into_iter();
+        let found = day.and_then(|day| {
+            let closes_ms = closings_ms.find(|closes_ms| fits(day, *closes_ms))?;
+            Some((day, [window_ms[0], closes_ms]))
         });
-        let Some(day) = fits else {
+        let Some((day, window_ms)) = found else {
             // That of a sol to come is planned when it has come, if its day has light enough.
             if sol == first && window_ms[1] >= 0 {
                 posed.missed.push(sol);
