@@ -59,7 +59,7 @@ impl Run<'_> {
         let links: LinksConfig = take("links").try_into().expect("they are links");
         let until = take("until").as_str().map(parse_duration);
         let until = until.and_then(Result::ok).expect("it is a duration");
-        ["system", "description", "seed"].map(&mut take);
+        let _ = ["system", "description", "seed"].map(&mut take);
         let text = table.to_string();
         let sections = toml::Deserializer::parse(&text).expect("it is TOML");
         let settings: Box<dyn Settings> = SurveySystem

@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex};
 
 use farside::random::RandomKey;
-use farside::{HostId, SimDuration, SimTime, Simulation};
+use farside::{HostId, SimDuration, Simulation};
 use farside_actors::field::Place;
 use farside_actors::rover::{RoverSpec, add_hardware};
 use farside_actors::system::{Files, SetupError};
@@ -84,7 +84,6 @@ fn shared(parts: &Parts<'_>) -> Result<Shared, SetupError> {
         names: scenario.parties(&parts.settings),
         settings: parts.settings.clone(),
         key: RandomKey::new(parts.seed),
-        until: SimTime::ZERO + parts.until,
     })
 }
 

@@ -13,14 +13,14 @@ use super::messages::{GoalList, GoalsShared, ListedGoal};
 use super::shared::Shared;
 use crate::planner::central::{Open, share};
 use crate::planner::instance::Instance;
-use crate::planner::problem::{FORMAT, Goal, Problem, Rover, Sol};
+use crate::planner::problem::{FORMAT, Goal, Problem, ProblemError, Rover, Sol};
 use crate::shac::{
     Centre, Chooser, GoalKey, Parameters, Reason, SharedGoal, Standing, Term, Vacancy,
 };
 use crate::sharing::{TeamMind, TeamMove};
 
-/// The longest time that a problem has for a sol \[ms\]: the centre knows of no night.
-const LONG_MS: i64 = 100_000_000;
+/// A day \[ms\]. Tours have no end, so that it does not matter how long it is.
+const DAY_MS: i64 = 86_400_000;
 
 /// What the centre decides.
 pub(super) struct TeamPlanner {
@@ -37,6 +37,7 @@ pub(super) struct TeamPlanner {
     ready: SimTime,
     wake: SimTime,
     told: Option<GoalsShared>,
+    fault: Option<ProblemError>,
 }
 
 impl TeamPlanner {
@@ -52,6 +53,7 @@ impl TeamPlanner {
             ready: SimTime::ZERO,
             wake: SimTime::MAX,
             told: None,
+            fault: None,
         }
     }
 
@@ -68,8 +70,14 @@ impl TeamPlanner {
     }
 
     /// What was shared out since it was asked last.
-    pub(super) fn told(&mut self) -> Option<GoalsShared> {
-        self.told.take()
+    ///
+    /// # Errors
+    /// When the abstract plan has no sense, which only a bug can cause.
+    pub(super) fn told(&mut self) -> Result<Option<GoalsShared>, ProblemError> {
+        match self.fault.take() {
+            None => Ok(self.told.take()),
+            Some(fault) => Err(fault),
+        }
     }
 
     fn listed(&self, goal: GoalKey) -> Option<&ListedGoal> {
@@ -172,9 +180,12 @@ impl TeamPlanner {
         else {
             return;
         };
-        // Names are numbers and places are finite, so there is no error but a bug's, and that shares nothing.
-        let Ok(instance) = Instance::new(&problem) else {
-            return;
+        let instance = match Instance::new(&problem) {
+            Ok(instance) => instance,
+            Err(error) => {
+                self.fault = Some(error);
+                return;
+            }
         };
         let shares = share(&instance, &owned, &open, self.shared.planner.imbalance);
         let given = shares.given.iter();
@@ -373,7 +384,7 @@ impl TeamPlanner {
             stored_bits: 0,
             sols: vec![Sol {
                 opens_ms: 0,
-                closes_ms: LONG_MS,
+                closes_ms: DAY_MS,
                 energy_uj: 0,
             }],
         }

@@ -47,7 +47,8 @@ impl SurveyCentre {
 
     fn think(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         self.seat.think(&mut self.mind, ctx)?;
-        if let Some(shared) = self.mind.told() {
+        let told = self.mind.told();
+        if let Some(shared) = told.map_err(|fault| HandlerError::new(fault.to_string()))? {
             ctx.sample(&shared);
         }
         if self.shared.is_at_site(Party::Centre(self.site)) {

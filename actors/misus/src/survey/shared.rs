@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use farside::SimTime;
 use farside::random::RandomKey;
 use farside_actors::rover::RoverConfig;
 
@@ -42,8 +41,6 @@ pub(crate) struct Shared {
     pub(crate) names: Names,
     /// Where chances of planning come from.
     pub(crate) key: RandomKey,
-    /// When the run ends.
-    pub(crate) until: SimTime,
 }
 
 impl Shared {

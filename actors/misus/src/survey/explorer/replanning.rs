@@ -42,7 +42,7 @@ impl Explorer {
 
     /// What is known now.
     fn known(&mut self, now_ms: i64, state: &RoverState, cause: ReplanCause) -> Known {
-        let fixed = self.fixed(now_ms);
+        let fixed = self.fixed(now_ms, state);
         let is_fixed = |goal: &GoalKey| {
             let mut fixed = fixed.iter();
             fixed.any(|piece| goal_of(piece.activity) == Some(*goal))
@@ -71,8 +71,11 @@ impl Explorer {
     }
 
     /// What runs and what is committed: what begins within the commit window, or before a plan can be
-    /// ready. A drive brings what it is for with it.
-    fn fixed(&mut self, now_ms: i64) -> Vec<Piece> {
+    /// ready. A drive brings what it is for with it. What memory has no room for any more is not committed,
+    /// and of what runs it takes what it has room for.
+    fn fixed(&mut self, now_ms: i64, state: &RoverState) -> Vec<Piece> {
+        let size_bits = bits(state.memory_size_bytes);
+        let mut used_bits = bits(state.memory_used_bytes);
         let window = self.shared.execution.commit_window.as_nanos() / 1_000_000;
         let until_ms = now_ms + (window as i64).max(self.took_ms);
         let mut fixed: Vec<Piece> = Vec::new();
@@ -81,6 +84,9 @@ impl Explorer {
             let mut piece = under.piece;
             piece.starts_ms = millis(under.began);
             piece.ends_ms = under.expected_ms.max(now_ms + 1);
+            piece.adds_bits = piece.adds_bits.min((size_bits - used_bits).max(0));
+            used_bits += piece.adds_bits;
+            used_bits -= piece.sends_bits.min(used_bits);
             ready_ms = piece.ends_ms;
             fixed.push(piece);
         }
@@ -104,9 +110,13 @@ impl Explorer {
                 false => piece.starts_ms.max(ready_ms),
             };
             let ends_ms = starts_ms + lasts_ms;
-            if !self.is_in_time(piece, ends_ms) || self.endangers_duty(&fixed, piece, ends_ms) {
+            let has_room = used_bits + piece.adds_bits <= size_bits;
+            let is_in_time = self.is_in_time(piece, ends_ms);
+            if !is_in_time || !has_room || self.endangers_duty(&fixed, piece, ends_ms) {
                 break;
             }
+            used_bits += piece.adds_bits;
+            used_bits -= piece.sends_bits.min(used_bits);
             ready_ms = ends_ms;
             fixed.push(Piece {
                 starts_ms,
