@@ -635,9 +635,14 @@ impl Handler<EndDue> for Explorer {
         if under.command != due.command || under.expected_ms + tolerance_ms > now_ms {
             return Ok(());
         }
-        if now_ms >= Self::overdue_ms(under) {
+        let is_overdue = now_ms >= Self::overdue_ms(under);
+        let activity = under.piece.activity;
+        if is_overdue || now_ms >= self.closes_ms(activity) {
             return self.break_off(ctx, Reason::Time);
         }
+        let Some(under) = &mut self.log.under else {
+            return Ok(());
+        };
         // The longer it lasts, the longer it is expected to last.
         let lasts_ms = now_ms - millis(under.began);
         under.expected_ms = now_ms + (lasts_ms / 4).max(tolerance_ms);
@@ -653,8 +658,12 @@ impl Explorer {
         let more_ms = match cause {
             ReplanCause::Blocked => self.outlook.means().drive_ms([0.0; 2], [DETOUR_M, 0.0]),
             _ => {
-                let search = self.search_cost();
-                search.map_or(0, |cost| (cost.duration.as_nanos() / 1_000_000) as i64)
+                let under = self.log.under.as_ref();
+                let goal = under.and_then(|under| goal_of(under.piece.activity));
+                let own = goal.and_then(|goal| self.cost(goal));
+                let costs = [self.search_cost(), own].into_iter().flatten();
+                let costs_ms = costs.map(|cost| (cost.duration.as_nanos() / 1_000_000) as i64);
+                costs_ms.sum()
             }
         };
         let tolerance_ms = (self.shared.execution.late_tolerance.as_nanos() / 1_000_000) as i64;
@@ -666,10 +675,20 @@ impl Explorer {
             ReplanCause::Blocked => under.expected_ms + more_ms,
             _ => under.expected_ms.max(now_ms + more_ms),
         };
-        let is_late = under.expected_ms - under.piece.ends_ms > tolerance_ms;
+        let expected_ms = under.expected_ms;
+        let is_late = expected_ms - under.piece.ends_ms > tolerance_ms;
         if is_late || cause == ReplanCause::Blocked {
             self.plan_anew(cause);
         }
+    }
+
+    /// When an activity has to have ended \[ms\]: a goal at the end of its window.
+    pub(super) fn closes_ms(&self, activity: Activity) -> i64 {
+        let Activity::Goal(goal) = activity else {
+            return i64::MAX;
+        };
+        let own = self.own_goals().into_iter().find(|own| own.key == goal);
+        own.map_or(i64::MAX, |own| own.window_ms[1])
     }
 
     /// Where the rover believes to be, as a report has it.

@@ -83,7 +83,9 @@ impl Explorer {
         if let Some(under) = &self.log.under {
             let mut piece = under.piece;
             piece.starts_ms = millis(under.began);
-            piece.ends_ms = under.expected_ms.max(now_ms + 1);
+            // What is not done by the end of its window is broken off then.
+            let closes_ms = self.closes_ms(piece.activity);
+            piece.ends_ms = under.expected_ms.max(now_ms + 1).min(closes_ms.max(now_ms));
             piece.adds_bits = piece.adds_bits.min((size_bits - used_bits).max(0));
             used_bits += piece.adds_bits;
             used_bits -= piece.sends_bits.min(used_bits);
