@@ -347,7 +347,8 @@ impl Handler<PlanReady> for Explorer {
             return Ok(());
         };
         if in_hand.is_stale {
-            self.plan_anew(ReplanCause::Stale);
+            // Whatever made it stale is among what the next one is made of.
+            self.cause = Some(ReplanCause::Stale);
         } else {
             self.adopt(ctx, in_hand)?;
         }
