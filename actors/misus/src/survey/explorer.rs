@@ -9,6 +9,7 @@
 //! hardware is asked how it is; the answer begins the planning.
 
 mod conduct;
+mod ending;
 mod execution;
 mod goals;
 mod logbook;
@@ -25,8 +26,8 @@ use farside_actors::rover::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::messages::{GoalList, GoalListHeld, ReplanCause};
-use super::outlook::{Forecast, Known, Means, Outlook, Plan};
+use super::messages::{GoalList, GoalListHeld, PlannedActivity, ReplanCause};
+use super::outlook::{Forecast, Known, Means, Outlook, Piece, Plan};
 use super::shared::{SCIENTIST, Shared};
 use crate::shac::{
     GoalAck, GoalAssign, GoalCancel, GoalDigest, GoalOutcome, GoalRelease, GoalStatus, Message,
@@ -215,6 +216,25 @@ fn millis(at: SimTime) -> i64 {
 /// Whole milliseconds as a time.
 fn time(at_ms: i64) -> SimTime {
     SimTime::from_nanos((at_ms.max(0) as u64).saturating_mul(1_000_000))
+}
+
+/// A piece as it is told.
+fn planned(piece: &Piece) -> PlannedActivity {
+    PlannedActivity {
+        activity: piece.activity,
+        position_m: piece.position_m,
+        starts: time(piece.starts_ms),
+        ends: time(piece.ends_ms),
+        battery_j: piece.battery_j,
+        memory_bits: piece.memory_bits,
+    }
+}
+
+/// Bytes as bits.
+fn bits(bytes: u64) -> i64 {
+    i64::try_from(bytes)
+        .unwrap_or(i64::MAX / 8)
+        .saturating_mul(8)
 }
 
 impl Actor for Explorer {

@@ -3,9 +3,8 @@
 use farside::prelude::*;
 use farside_actors::rover::RoverState;
 
-use super::execution::{bits, planned};
 use super::goals::goal_of;
-use super::{Explorer, InHand, PlanReady, millis};
+use super::{Explorer, InHand, PlanReady, bits, millis, planned};
 use crate::shac::{GoalKey, Parameter, Parameters, Reason};
 use crate::sharing::RoverMove;
 use crate::survey::messages::{Activity, ActivityEnd, ActivityEnded, PlanMade, ReplanCause};

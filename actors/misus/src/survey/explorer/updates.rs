@@ -3,8 +3,7 @@
 use farside::prelude::*;
 use farside_actors::rover::RoverState;
 
-use super::execution::bits;
-use super::{Explorer, UpdateDue};
+use super::{Explorer, UpdateDue, bits};
 use crate::shac::Reason;
 use crate::sharing::RoverMove;
 use crate::survey::messages::{Activity, ReplanCause};
