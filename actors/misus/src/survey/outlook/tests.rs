@@ -168,6 +168,44 @@ fn wrong(outlook: &mut Outlook, known: &Known, plan: &Plan) -> Vec<PlanViolation
     violations(&posed.problem, &team)
 }
 
+/// What is wrong with a plan's goals and memory by what is known, whatever problem was made of it.
+fn contradicts(known: &Known, plan: &Plan) -> Option<String> {
+    let mut stored_bits = known.memory_bits;
+    let mut done = known.achieved.clone();
+    for (number, piece) in plan.pieces.iter().enumerate() {
+        let wrong = |what: &str| Some(format!("{what}: {piece:?}"));
+        let goal = match piece.activity {
+            Activity::Goal(key) => known.goals.iter().find(|goal| goal.key == key),
+            _ => None,
+        };
+        if number < known.fixed.len() {
+            done.extend(posing::fixed_goals(known));
+        } else if let Some(goal) = goal {
+            let [opens_ms, closes_ms] = goal.window_ms;
+            stored_bits += goal.memory_bits;
+            if piece.ends_ms - piece.starts_ms != goal.duration_ms {
+                return wrong("duration");
+            }
+            if piece.starts_ms < opens_ms || piece.ends_ms > closes_ms {
+                return wrong("window");
+            }
+            if piece.position_m != goal.position_m {
+                return wrong("place");
+            }
+            if !goal.requires.iter().all(|key| done.contains(key)) || !done.insert(goal.key) {
+                return wrong("order");
+            }
+        }
+        if let Activity::Communication(_) = piece.activity {
+            stored_bits -= piece.sends_bits.min(stored_bits);
+        }
+        if stored_bits > known.memory_size_bits || stored_bits != piece.memory_bits {
+            return wrong("memory");
+        }
+    }
+    None
+}
+
 /// The least charge by a plan, minute by minute, with the sunlight that it counts on.
 fn least_j(outlook: &mut Outlook, known: &Known, plan: &Plan) -> f64 {
     let rover = RoverConfig::default();
@@ -231,6 +269,7 @@ proptest! {
                 && !plan.missed.is_empty();
             prop_assert!(is_missed, "{violation}");
         }
+        prop_assert_eq!(contradicts(&known, &plan), None);
         for pair in plan.pieces.windows(2) {
             prop_assert!(pair[0].ends_ms <= pair[1].starts_ms, "{pair:?}");
         }
