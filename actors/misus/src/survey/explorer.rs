@@ -44,6 +44,10 @@ pub(crate) struct PlanReady {
     pub(crate) number: u32,
 }
 
+/// A timer: the next plan may be begun.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct PlanDue;
+
 /// A timer: the next activity is due.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct ActivityDue;
@@ -92,8 +96,12 @@ pub(crate) struct Explorer {
     memory_size_bits: Option<i64>,
     /// Whether there may be room for more goals than when the last plan was made.
     has_gained: bool,
-    /// How long the last plan took to be made \[ms\].
+    /// When the last plan was begun.
+    planned: SimTime,
+    /// How long it took to be made \[ms\].
     took_ms: i64,
+    /// Whether the next plan waits until it may be begun.
+    is_waiting: bool,
     /// Why what runs is broken off.
     broken_off: Option<Reason>,
 }
@@ -145,7 +153,9 @@ impl Explorer {
             clean: 1.0,
             memory_size_bits: None,
             has_gained: false,
+            planned: SimTime::ZERO,
             took_ms: 0,
+            is_waiting: false,
             broken_off: None,
             shared,
             number,
@@ -251,6 +261,7 @@ impl Actor for Explorer {
         CommandReport,
         RoverState,
         PlanReady,
+        PlanDue,
         ActivityDue,
         EndDue,
         UpdateDue,

@@ -183,10 +183,14 @@ impl Plan {
         })
     }
 
-    /// The goals that it was made for, planned or not.
+    /// The goals that it was made for, planned or not, and those that something was done for then.
     pub fn for_goals(&self) -> BTreeSet<GoalKey> {
         let own = self.basis.goals.iter().map(|goal| goal.key);
-        own.chain(self.goals()).collect()
+        let fixed = self.pieces.iter().filter_map(|piece| match piece.activity {
+            Activity::Goal(key) | Activity::Drive(key) => Some(key),
+            Activity::Communication(_) | Activity::Sleep => None,
+        });
+        own.chain(fixed).collect()
     }
 
     /// What others held when it was made.

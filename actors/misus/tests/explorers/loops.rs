@@ -39,6 +39,12 @@ fn run(more: &str, hours: u64, crashes: &[(&str, u64, u64)]) -> crate::diary::Ra
         ran.results.violations
     );
     check_order(&ran.diary);
+    let plans = causes(&ran.diary).len();
+    assert!(
+        plans as u64 <= 20 * hours,
+        "{plans} plans\n{}",
+        told(&ran.diary, "")
+    );
     ran
 }
 
@@ -269,4 +275,20 @@ fn plans_from_nothing_look_at_more_than_plans_that_go_on() {
     };
     let [batch, continuous] = ["batch", "continuous"].map(operations);
     assert!(batch > 1.2 * continuous, "{batch} {continuous}");
+}
+
+#[test]
+fn what_a_drive_comes_too_late_for_is_no_reason_to_plan_without_end() {
+    let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 6\nopens = '4h30min'\n\
+        closes = '5h'\n[[rover.fault]]\nat = '4h'\nkind = 'never-ends'\npart = 'wheels'\nduration = '3h'\n";
+    let ran = run(more, 7, &[]);
+    let drive = ends(&ran.diary)
+        .into_iter()
+        .rfind(|(activity, _)| matches!(activity, Activity::Drive(_)));
+    let (_, end) = drive.expect("it drives");
+    assert!(
+        matches!(end, ActivityEnd::Interrupted(_)),
+        "{}",
+        told(&ran.diary, "")
+    );
 }

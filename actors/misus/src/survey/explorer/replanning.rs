@@ -4,11 +4,14 @@ use farside::prelude::*;
 use farside_actors::rover::RoverState;
 
 use super::goals::goal_of;
-use super::{Explorer, InHand, PlanReady, bits, millis, planned};
+use super::{Explorer, InHand, PlanDue, PlanReady, bits, millis, planned};
 use crate::shac::{GoalKey, Parameter, Parameters, Reason};
 use crate::sharing::RoverMove;
 use crate::survey::messages::{Activity, ActivityEnd, ActivityEnded, PlanMade, ReplanCause};
 use crate::survey::outlook::{Known, Piece, Plan};
+
+/// The least time from the beginning of a plan to that of the next.
+const LEAST_BETWEEN: SimDuration = SimDuration::from_secs(1);
 
 impl Explorer {
     /// Begins a plan, if there is a reason and none is in hand.
@@ -16,9 +19,18 @@ impl Explorer {
         if self.in_hand.is_some() || state.brown_out {
             return Ok(());
         }
+        // Whatever goes wrong, a rover does not do nothing but plan.
+        let earliest = self.planned + LEAST_BETWEEN;
+        if self.cause.is_some() && self.log.plans > 0 && ctx.now() < earliest {
+            if !std::mem::replace(&mut self.is_waiting, true) {
+                ctx.timer(earliest.since(ctx.now()), PlanDue);
+            }
+            return Ok(());
+        }
         let Some(cause) = self.cause.take() else {
             return Ok(());
         };
+        self.planned = ctx.now();
         let now_ms = Self::now_ms(ctx);
         let known = self.known(now_ms, state, cause);
         self.log.plans += 1;
@@ -44,7 +56,7 @@ impl Explorer {
         let fixed = self.fixed(now_ms, state);
         let is_fixed = |goal: &GoalKey| {
             let mut fixed = fixed.iter();
-            fixed.any(|piece| goal_of(piece.activity) == Some(*goal))
+            fixed.any(|piece| piece.activity == Activity::Goal(*goal))
         };
         let mut goals = self.own_goals();
         goals.retain(|goal| !is_fixed(&goal.key));
@@ -337,6 +349,13 @@ impl Explorer {
             return Ok(());
         }
         self.end(ctx, Err(Reason::Hardware))
+    }
+}
+
+impl Handler<PlanDue> for Explorer {
+    fn handle(&mut self, _: PlanDue, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.is_waiting = false;
+        self.go_on(ctx)
     }
 }
 
