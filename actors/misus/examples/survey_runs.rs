@@ -1,7 +1,7 @@
 //! Runs of the closed loop with and without trouble, as a table: what was achieved, learnt and planned, and
 //! whether anything happened that must never happen.
 //!
-//!     cargo run --release -p farside-misus --example survey_runs -- [SEEDS]
+//!     cargo run --release -p farside-misus --example survey_runs -- [SEEDS] [PART OF A NAME]
 
 #[path = "support/survey.rs"]
 #[allow(dead_code, reason = "tests use the rest")]
@@ -14,6 +14,7 @@ const ROVER_1_SILENT: &str = "links.\"rover_01-*\".outage = true";
 fn main() {
     let seeds = std::env::args().nth(1).and_then(|word| word.parse().ok());
     let seeds: u64 = seeds.unwrap_or(1);
+    let part = std::env::args().nth(2).unwrap_or_default();
     println!(
         "{:<26} {:>4} {:>6} {:>6} {:>5} {:>5} {:>5} {:>9} {:>4} {:>5} {:>5} {:>4} {:>4} {:>4} {:>4}",
         "run",
@@ -60,7 +61,7 @@ fn main() {
             &[],
         ),
     ];
-    for (name, text, crashes) in &runs {
+    for (name, text, crashes) in runs.iter().filter(|run| run.0.contains(&part)) {
         for seed in 1..=seeds {
             let run = Run {
                 text,
@@ -87,6 +88,7 @@ fn main() {
                 of("missed_comm"),
                 of("plan_violations") + of("sharing_violations") + of("lost_goals"),
             );
+            println!("    plans for: {:?}", ran.causes);
             for violation in ran.results.violations.iter().take(5) {
                 println!("    {violation}");
             }

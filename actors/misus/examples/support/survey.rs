@@ -1,12 +1,17 @@
 //! Runs the built-in survey without the command, with whatever is to be otherwise.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
 use farside::prelude::*;
+use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::{End, Report};
 use farside_actors::link::LinksConfig;
 use farside_actors::system::{Files, Results, Seeds, Settings, Setup, System};
 use farside_actors::units::parse_duration;
 use farside_actors::wiring::LinkBuilder;
 use farside_misus::SurveySystem;
+use farside_misus::survey::PlanMade;
 
 /// A run.
 pub(crate) struct Run<'a> {
@@ -33,6 +38,32 @@ impl Default for Run<'_> {
 pub(crate) struct Ran {
     pub(crate) results: Results,
     pub(crate) report: Report,
+    /// How many plans there were for each cause.
+    pub(crate) causes: BTreeMap<String, u32>,
+}
+
+/// Counts plans by their causes.
+struct Causes(Arc<Mutex<BTreeMap<String, u32>>>);
+
+impl Observer for Causes {
+    fn wants(&self) -> Wants {
+        Wants {
+            bodies: false,
+            samples: true,
+            checkpoints: false,
+        }
+    }
+
+    fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        if let (RecordClass::Sample, Some(kind)) = (record.class, record.kind)
+            && kind.name() == "PlanMade"
+        {
+            let plan: PlanMade = kind.schema().decode(record.body).expect("it is one");
+            let mut causes = self.0.lock().expect("nobody panics");
+            *causes.entry(format!("{:?}", plan.cause)).or_default() += 1;
+        }
+        Ok(Flow::Continue)
+    }
 }
 
 /// Puts what is given over what there is, table by table.
@@ -88,10 +119,17 @@ impl Run<'_> {
             }
         }
         sim.stop_at(SimTime::ZERO + until, "until");
+        let causes = Arc::new(Mutex::new(BTreeMap::new()));
+        sim.observe(Causes(causes.clone()));
         let report = sim.run(self.executor).expect("it runs");
         assert!(!matches!(report.end, End::Fault(_)), "{:?}", report.end);
         let results = (assembly.conclude)(&report);
-        Ok(Ran { results, report })
+        let causes = causes.lock().expect("nobody panics").clone();
+        Ok(Ran {
+            results,
+            report,
+            causes,
+        })
     }
 }
 

@@ -2,22 +2,25 @@
 
 use crate::survey::Run;
 
-/// Nothing but goals of one's own, two of them cheap and near, worth less together.
+/// Nothing but goals of one's own, two of them worth a little more than others, and less together.
 const PAIR: &str = r#"
 until = "0.4sol"
 survey = { rocks = 0, squares = 0 }
+team.rovers = 1
 goal = [
-    { name = "a", observation = "panoramic-image", east = "3m", weight = 10.0 },
-    { name = "b", observation = "panoramic-image", north = "3m", weight = 10.0 },
+    { name = "a", observation = "panoramic-image", east = "3m", weight = 12.0 },
+    { name = "b", observation = "panoramic-image", north = "3m", weight = 12.0 },
+    { name = "c", observation = "panoramic-image", east = "-3m", weight = 10.0 },
+    { name = "d", observation = "panoramic-image", north = "-3m", weight = 10.0 },
+    { name = "e", observation = "panoramic-image", east = "4m", north = "4m", weight = 10.0 },
 ]
 combination = [{ goals = ["a", "b"], weight = -30.0 }]
 "#;
 
 #[test]
-fn of_two_goals_that_are_worth_less_together_idgs_takes_one() {
+fn of_two_goals_that_are_worth_less_together_idgs_takes_one_and_simple_reward_both() {
     let ran = |choice: &str| {
-        let text =
-            format!("{PAIR}\nplanner = {{ choice = {choice:?}, epsilon = 0.0 }}\nteam.rovers = 1");
+        let text = format!("{PAIR}\nplanner = {{ choice = {choice:?}, epsilon = 0.0 }}");
         let run = Run {
             text: &text,
             ..Run::default()
@@ -26,8 +29,8 @@ fn of_two_goals_that_are_worth_less_together_idgs_takes_one() {
         ran.assert_sound(choice);
         (ran.figure("goals_achieved"), ran.figure("score"))
     };
-    assert_eq!(ran("idgs"), (1.0, 10.0));
-    assert_eq!(ran("simple-reward"), (2.0, -10.0));
+    assert_eq!(ran("idgs"), (4.0, 42.0));
+    assert_eq!(ran("simple-reward"), (5.0, 24.0));
 }
 
 #[test]

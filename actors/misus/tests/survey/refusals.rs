@@ -36,11 +36,11 @@ fn goals_that_cannot_be_are_named() {
     );
     check(
         "goal = [{ name = 'a', opens = '3h', closes = '2h' }]",
-        "goal.0.closes: 2h: the window never opens",
+        "goal.0.closes: 7200s: the window never opens",
     );
     check(
         "goal = [{ name = 'a', opens = '3h', closes = '3h1min' }]",
-        "goal.0.closes: 3h1min: the observation takes",
+        "goal.0.closes: 10860s: the observation takes",
     );
     check(
         "goal = [{ name = 'a', observation = 'smell' }]",
@@ -48,7 +48,7 @@ fn goals_that_cannot_be_are_named() {
     );
     check(
         "goal = [{ name = 'a', added = '2h', withdrawn = '1h' }]",
-        "goal.0.withdrawn: 1h: expected after 2h",
+        "goal.0.withdrawn: 3600s: expected after 7200s",
     );
 }
 
@@ -85,8 +85,8 @@ fn mandatory_goals_that_do_not_fit_are_explained() {
     let goals: Vec<String> = (0..5).map(|rock| goal(&format!("g{rock}"), rock)).collect();
     check(
         &format!("goal = [{}]", goals.join(", ")),
-        "mandatory goals cannot all be met: g0, g1, g2, g3, g4 take 1h50min between 0s and 30min, where 3 \
-         rovers have 1h30min of light",
+        "mandatory goals cannot all be met: g0, g1, g2, g3, g4 take 6600s between 0s and 1800s, where 3 \
+         rovers have 5400s of light",
     );
 }
 
@@ -110,7 +110,7 @@ fn a_centre_windows_and_protocols_that_cannot_be_are_named() {
     );
     check(
         "survey.lease = '1h'",
-        "survey.lease: 1h: expected over 2h10s, an observation takes 2h",
+        "survey.lease: 3600s: expected over 7210s, an observation takes 7200s",
     );
     check(
         "survey.election = '1s'",
