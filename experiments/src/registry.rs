@@ -14,7 +14,7 @@
 use farside::suggest::nearest;
 use farside_actors::system::{Builtin, Metric, System};
 use farside_idea::IdeaSystem;
-use farside_misus::{MisusSystem, PlanningSystem};
+use farside_misus::{MisusSystem, PlanningSystem, SurveySystem};
 use farside_network::NetworkSystem;
 use farside_traffic::TrafficSystem;
 use thiserror::Error;
@@ -106,6 +106,7 @@ impl Registry {
             .with(IdeaSystem)
             .with(MisusSystem)
             .with(PlanningSystem)
+            .with(SurveySystem)
             .with(TrafficSystem)
     }
 

@@ -58,7 +58,7 @@ pub(crate) fn start(number: u32, rovers: u32) -> RoverStart {
 }
 
 /// Which key of the scenario a rover that cannot be is of.
-fn blame(error: RoverError) -> SetupError {
+pub(crate) fn blame(error: RoverError) -> SetupError {
     match error {
         RoverError::Settings(error) => error,
         RoverError::OutsideTerrain { .. } => SetupError::value("team.rovers", error),

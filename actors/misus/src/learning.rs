@@ -48,7 +48,7 @@ impl Lesson {
         };
         // Settings are in their ranges: the one error left is that there are no rocks.
         let read = Learned::from_rows(rows.clone(), &settings).ok()?;
-        let unread = unread(site, &read);
+        let unread = unread(site, |rock| read.rocks.index_of(rock).is_some());
         let known: Vec<&Row> = rows.collect();
         let rocks = Rocks::pool(known.into_iter().chain(&unread));
         let responsibilities = read.fit.mixture.responsibilities(rocks.table()).ok()?;
@@ -61,7 +61,13 @@ impl Lesson {
         Some(Lesson { read, whole, story })
     }
 
-    fn objective<'a>(&'a self, site: &'a Site) -> Analysed<'a> {
+    /// What is thought of all rocks of the catalogue.
+    pub(crate) fn learned(&self) -> &Learned {
+        &self.whole
+    }
+
+    /// What the team wants to find out.
+    pub(crate) fn objective<'a>(&'a self, site: &'a Site) -> Analysed<'a> {
         match (site.config.objective, &site.tools.gauge) {
             (Objective::Mineral, Some(gauge)) => Analysed::Mineral(gauge),
             (Objective::Process, _) => Analysed::Process(&self.story),
@@ -136,10 +142,20 @@ fn probabilities(story: &StoryBelief) -> Vec<StoryProbability> {
     all.map(one).collect()
 }
 
+/// What is thought of all rocks before anybody has read one: nothing but where they lie. None if there are no
+/// rocks.
+pub(crate) fn first_guess(site: &Site) -> Option<Learned> {
+    let settings = FitSettings {
+        max_classes: 1,
+        ..FitSettings::default()
+    };
+    Learned::from_rows(&unread(site, |_| false), &settings).ok()
+}
+
 /// What the catalogue alone says of rocks that nobody has read.
-fn unread(site: &Site, read: &Learned) -> Vec<Row> {
+fn unread(site: &Site, is_read: impl Fn(u32) -> bool) -> Vec<Row> {
     let rocks = (0..).zip(&site.catalogue);
-    let unread = rocks.filter(|(number, _)| read.rocks.index_of(*number).is_none());
+    let unread = rocks.filter(|(number, _)| !is_read(*number));
     let row = |(number, rock): (u32, &farside_worlds::rock_field::FieldRock)| Row {
         id: ReadingId {
             // Nobody's: these rows are never exchanged.

@@ -3,7 +3,7 @@
 mod catalogue;
 
 use std::collections::BTreeMap;
-use std::sync::{OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use farside::SimTime;
 use farside_actors::rover::{RoverEnergy, RoverPose};
@@ -14,7 +14,6 @@ use serde::Serialize;
 
 use crate::analysis::objective::regret;
 use crate::analysis::scores::{adjusted_rand_index, distribution_error};
-use crate::assemble::Team;
 use crate::config::LearnConfig;
 use crate::messages::FieldModel;
 use crate::monitor::{RoverHistory, Tally};
@@ -110,8 +109,13 @@ pub(crate) struct Figures {
 }
 
 /// What came of a run that ended at `end`.
-pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> Figures {
-    let tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
+pub(crate) fn of(
+    tally: &Mutex<Tally>,
+    learn: &LearnConfig,
+    field: &RockField,
+    end: SimTime,
+) -> Figures {
+    let tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
     let mut counts = BTreeMap::<&str, u32>::new();
     for name in tally.rovers.iter().flat_map(|rover| &rover.faults) {
         *counts.entry(name).or_default() += 1;
@@ -121,7 +125,7 @@ pub(crate) fn of(team: &Team, field: &RockField, end: SimTime) -> Figures {
         _ => format!("{name} ({count})"),
     });
     Figures {
-        metrics: figures(&tally, field, &team.site.config),
+        metrics: figures(&tally, field, learn),
         over_sols: over_sols(&tally, field, end),
         faults: faults.collect(),
     }

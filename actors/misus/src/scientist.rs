@@ -5,10 +5,7 @@
 //! What it has read lies in its memory, which a crash empties; then it begins a new incarnation, and
 //! the others give back what they had heard. Which rocks it has been to is durable.
 
-mod exchanging;
 mod touring;
-
-use std::collections::BTreeMap;
 
 use farside::prelude::*;
 use farside_actors::rover::{
@@ -16,10 +13,9 @@ use farside_actors::rover::{
     hardware_name,
 };
 
-use crate::analysis::exchange::{Exchange, Statistics};
-use crate::analysis::objective::Stories;
-use crate::analysis::reading::{Origin, ReadingId};
-use crate::learning::{Lesson, stories};
+use crate::analysis::exchange::Statistics;
+use crate::learner::Learner;
+use crate::learning::Lesson;
 use crate::messages::{ExchangeDue, GoOn, LeaseDue, LessonDue, Overdue};
 use crate::site::SharedSite;
 use touring::{Doing, Logbook};
@@ -32,45 +28,27 @@ const OVERDUE: SimDuration = SimDuration::from_secs(4 * 3600);
 pub(crate) struct Scientist {
     site: SharedSite,
     number: u32,
-    exchange: Exchange,
-    /// The reading that stands for a rock and an instrument, with its noise: a better one replaces it.
-    kept: BTreeMap<(u32, Instrument), (ReadingId, f64)>,
+    learner: Learner,
     doing: Doing,
     /// The command that is waited for, and the timer that ends the wait.
     waits_for: Option<(u32, TimerId)>,
     /// Rocks since the last panoramic image; none before the first.
     since_panorama: Option<u32>,
-    /// Whether something was read or heard since the last lesson.
-    is_to_learn: bool,
-    lesson: Option<Lesson>,
-    stories: Stories,
-}
-
-/// Which kind of instrument a reading is from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Instrument {
-    Camera,
-    Spectrometer,
 }
 
 impl Scientist {
     /// The scientist of the rover of this number.
     pub(crate) fn new(site: SharedSite, number: u32) -> Scientist {
-        let stories = stories(site.side_m);
+        let peers = site.peers(number);
+        let peers = peers.map(|(peer, name)| (peer, name.to_owned()));
+        let learner = Learner::new(site.clone(), number, peers.collect());
         Scientist {
             site,
             number,
-            exchange: Exchange::new(Origin {
-                rover: number,
-                incarnation: 0,
-            }),
-            kept: BTreeMap::new(),
+            learner,
             doing: Doing::Asking,
             waits_for: None,
             since_panorama: None,
-            is_to_learn: false,
-            lesson: None,
-            stories,
         }
     }
 
@@ -121,14 +99,11 @@ impl Actor for Scientist {
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.exchange = Exchange::new(Origin {
-            rover: self.number,
-            incarnation: ctx.incarnation(),
-        });
+        self.learner.begin(ctx.incarnation());
         if let Some(every) = self.site.renew_every {
             ctx.timer(every, LeaseDue);
         }
-        self.schedule_exchange(ctx);
+        self.learner.schedule_exchange(ctx);
         ctx.timer(self.site.config.learn_every, LessonDue);
         let logbook = ctx.durable::<Logbook>();
         logbook.visited.resize(self.site.catalogue.len(), false);
@@ -169,5 +144,48 @@ impl Handler<Overdue> for Scientist {
             ctx.send(hardware, RoverCommand { id: 0, command });
         }
         Ok(())
+    }
+}
+
+impl Handler<ExchangeDue> for Scientist {
+    fn handle(&mut self, _: ExchangeDue, ctx: &mut Context<'_, Self>) -> Outcome {
+        if self.site.is_in_contact(ctx.now()) {
+            self.learner.exchange(ctx)?;
+        }
+        self.learner.schedule_exchange(ctx);
+        Ok(())
+    }
+}
+
+impl Handler<LessonDue> for Scientist {
+    fn handle(&mut self, _: LessonDue, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.learn(ctx);
+        ctx.timer(self.site.config.learn_every, LessonDue);
+        Ok(())
+    }
+}
+
+impl Handler<Statistics> for Scientist {
+    fn handle(&mut self, statistics: Statistics, _: &mut Context<'_, Self>) -> Outcome {
+        self.learner.hear(&statistics);
+        Ok(())
+    }
+}
+
+impl Scientist {
+    /// Learns from all readings, if there are new ones, and records what it thinks then.
+    fn learn(&mut self, ctx: &mut Context<'_, Self>) {
+        let stops = ctx.durable::<Logbook>().stops;
+        if let Some(model) = self.learner.learn(stops) {
+            ctx.sample(&model);
+        }
+    }
+
+    /// Of some rocks the one that the prioritiser values most, by all that is known now. Before
+    /// anything is known there is nothing to choose by.
+    fn most_wanted(&mut self, ctx: &mut Context<'_, Self>, left: &[u32]) -> Option<u32> {
+        self.learn(ctx);
+        let wanted = |lesson: &Lesson| lesson.most_wanted(&self.site, left);
+        self.learner.lesson().and_then(wanted)
     }
 }

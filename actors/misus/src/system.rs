@@ -97,7 +97,7 @@ impl Settings for MisusScenario {
         let field = place.field.clone();
         let team_names = team.site.rovers.clone();
         let assembly = Assembly::new(move |report: &Report| {
-            let metrics = metrics::of(&team, &field, report.end_time);
+            let metrics = metrics::of(&team.tally, &team.site.config, &field, report.end_time);
             metrics::results(metrics)
         });
         let scene = MisusScene::new(place.field.clone(), team_names);

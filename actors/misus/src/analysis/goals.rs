@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 /// What a rover can be asked to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Observation {
     /// An image of all rocks round a place: their textures, from afar.
     PanoramicImage,
@@ -14,6 +17,7 @@ pub enum Observation {
     /// An image of one rock, at the rock.
     PointImage,
     /// A spectrum of one rock, at the rock.
+    #[default]
     PointSpectrum,
 }
 

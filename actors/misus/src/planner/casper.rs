@@ -201,8 +201,8 @@ impl Casper {
     }
 
     /// Takes a plan over, as `(sol, visit)`, from before something changed: continuous planning. Goals that
-    /// are not assigned, and those that lack what they require, are left out; activities need not be named;
-    /// what is in conflict then is repaired. Returns what was looked at.
+    /// are not assigned, and those that lack what they require, are left out; activities need not be named,
+    /// but what follows one that is named comes after it; what is in conflict then is repaired. Returns what was looked at.
     ///
     /// # Errors
     /// When what is mandatory in it cannot be done; the plan is as it was.
@@ -212,6 +212,14 @@ impl Casper {
         // Each comes after the one before; activities stand where they violate least.
         let (mut sol_before, mut next) = (0, 0);
         for &(sol, visit) in plan {
+            if let Some(at) = chain.position(visit.task)
+                && visit.task >= instance.goals()
+                && chain.nodes()[at].sol == sol
+            {
+                let from = if sol == sol_before { next } else { 0 };
+                (sol_before, next) = (sol, from.max(at + 1));
+                continue;
+            }
             let known = sol < instance.vehicles()[chain.rover()].sols.len()
                 && visit.task < instance.goals()
                 && chain.position(visit.task).is_none()

@@ -7,14 +7,19 @@
 //! A goal that is shed goes to the nearest rover that has not refused it. When all have, it is pooled, and
 //! offered again to all. One that has been offered too often, or that nobody can do, is deleted with a
 //! [`Reason`].
+//!
+//! [`Central`] keeps the whole of a problem's goals. Where a protocol keeps who has what, [`share`] shares out
+//! what is open.
 
 mod joint;
+mod share;
 mod tours;
 
 use thiserror::Error;
 
 use super::casper::PlannerConfig;
 use super::instance::Instance;
+pub use share::{Open, Shares, share};
 use tours::Tours;
 
 /// Why a goal has been given up.
@@ -144,7 +149,8 @@ impl Central {
         let (joint, single): (Vec<usize>, Vec<usize>) = goals
             .into_iter()
             .partition(|goal| instance.task(*goal).rovers > 1);
-        self.operations += self.tours.build(instance, &single, self.config.imbalance);
+        let imbalance = self.config.imbalance;
+        self.operations += self.tours.build(instance, &single, imbalance, |_, _| true);
         let mut assigned = Vec::new();
         for goal in single {
             if let Some(rover) = self.tours.owner(goal) {

@@ -119,7 +119,7 @@ impl Handler<CommandReport> for Scientist {
             return Ok(());
         };
         ctx.cancel(timer);
-        self.keep(&report)?;
+        self.learner.keep(&report)?;
         match self.doing {
             Doing::Asking | Doing::Resting | Doing::Panorama => self.later(ctx, &report.end),
             Doing::Driving {

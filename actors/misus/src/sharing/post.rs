@@ -78,4 +78,4 @@ macro_rules! receives {
         })+
     };
 }
-pub(super) use receives;
+pub(crate) use receives;

@@ -41,11 +41,23 @@ impl Tours {
         away.min().unwrap_or(u64::MAX)
     }
 
-    /// Lays tours over these goals: the farthest first, each goal (with those that it requires or that
-    /// require it) where the tour becomes least longer, among rovers whose work stays within the even share
-    /// and `imbalance` of it; then goals are moved from tour to tour, and stretches of tours turned round, while
-    /// that makes them shorter. Returns what was looked at.
-    pub(super) fn build(&mut self, instance: &Instance, goals: &[usize], imbalance: f64) -> u64 {
+    /// Puts a goal where a rover's tour becomes least longer.
+    pub(super) fn insert(&mut self, instance: &Instance, goal: usize, rover: usize) {
+        self.put(instance, &[goal], rover);
+    }
+
+    /// Lays tours over these goals, beside those that tours have: the farthest first, each goal (with those
+    /// that it requires or that require it) where the tour becomes least longer, among rovers that may have
+    /// it and whose work stays within the even share and `imbalance` of it; then goals are moved from tour to
+    /// tour, and stretches of tours turned round, while that makes them shorter. Goals that nobody may have
+    /// are in no tour. Returns what was looked at.
+    pub(super) fn build(
+        &mut self,
+        instance: &Instance,
+        goals: &[usize],
+        imbalance: f64,
+        may_have: impl Fn(usize, usize) -> bool,
+    ) -> u64 {
         let mut operations = 0;
         let work_ms = |group: &[usize]| -> i64 {
             group
@@ -53,7 +65,10 @@ impl Tours {
                 .map(|&goal| instance.task(goal).duration_ms)
                 .sum()
         };
-        let share = work_ms(goals) as f64 / self.goals.len() as f64;
+        let may = |group: &[usize], rover: usize| group.iter().all(|&goal| may_have(goal, rover));
+        let mut loads_ms: Vec<i64> = self.goals.iter().map(|tour| work_ms(tour)).collect();
+        let all_ms = work_ms(goals) + loads_ms.iter().sum::<i64>();
+        let share = all_ms as f64 / self.goals.len() as f64;
         let most_ms = (share * (1.0 + imbalance)) as i64;
         let mut groups = groups(instance, goals);
         groups.sort_by_key(|group| {
@@ -61,16 +76,19 @@ impl Tours {
             let away = away.map(|(rover, _)| self.away_mm(instance, group[0], rover));
             (std::cmp::Reverse(away.min()), group[0])
         });
-        let mut loads_ms = vec![0; self.goals.len()];
         for group in &groups {
             let work_ms = work_ms(group);
             let rover = self.cheapest(instance, group, &mut operations, |rover| {
-                loads_ms[rover] + work_ms <= most_ms
+                may(group, rover) && loads_ms[rover] + work_ms <= most_ms
             });
             // Nobody has room: whoever has least to do.
-            let least = || (0..loads_ms.len()).min_by_key(|rover| loads_ms[*rover]);
+            let all = 0..loads_ms.len();
+            let least = || {
+                all.filter(|rover| may(group, *rover))
+                    .min_by_key(|rover| loads_ms[*rover])
+            };
             let Some(rover) = rover.or_else(least) else {
-                return operations;
+                continue;
             };
             loads_ms[rover] += work_ms;
             self.put(instance, group, rover);
@@ -85,7 +103,7 @@ impl Tours {
                 group.iter().for_each(|goal| self.remove(*goal));
                 loads_ms[from] -= work_ms;
                 let rover = self.cheapest(instance, group, &mut operations, |rover| {
-                    rover == from || loads_ms[rover] + work_ms <= most_ms
+                    rover == from || may(group, rover) && loads_ms[rover] + work_ms <= most_ms
                 });
                 let rover = rover.unwrap_or(from);
                 loads_ms[rover] += work_ms;

@@ -1,0 +1,260 @@
+//! Whether goals and combinations of one's own can be: what is wrong with which, and what was expected.
+
+use std::collections::BTreeMap;
+
+use farside::{SimDuration, SimTime, suggest};
+use farside_actors::system::SetupError;
+use farside_worlds::Sky;
+use farside_worlds::sky::SOL_S;
+
+use super::costs::Cost;
+use super::scenario::SurveyScenario;
+use super::wishes::{ChangeConfig, GoalConfig, key_of};
+use crate::shac::GoalKey;
+
+/// Checks all of them, one by one and together.
+pub(super) fn check(scenario: &SurveyScenario) -> Result<(), SetupError> {
+    let goals = &scenario.goals;
+    let mut keys: BTreeMap<GoalKey, &str> = BTreeMap::new();
+    for (at, goal) in goals.iter().enumerate() {
+        check_goal(scenario, at, goal)?;
+        if goals[..at].iter().any(|other| other.name == goal.name) {
+            let message = format!("{:?}: expected each name once", goal.name);
+            return Err(wrong(at, "name", message));
+        }
+        if let Some(other) = keys.insert(key_of(at, goal), &goal.name) {
+            let message = format!("{other:?} is the same observation of the same rock");
+            return Err(wrong(at, "rock", message));
+        }
+    }
+    check_requirements(goals)?;
+    for (at, one) in scenario.combinations.iter().enumerate() {
+        let key = |key: &str| format!("combination.{at}.{key}");
+        for name in &one.goals {
+            known(goals, name).map_err(|message| SetupError::value(&key("goals"), message))?;
+        }
+        let mut different = one.goals.clone();
+        different.sort_unstable();
+        different.dedup();
+        if different.len() < 2 || different.len() < one.goals.len() {
+            let message = format!("{:?}: expected two different goals or more", one.goals);
+            return Err(SetupError::value(&key("goals"), message));
+        }
+        finite(&key("weight"), one.weight)?;
+        let times = (one.added, one.withdrawn, one.changes.as_slice());
+        check_times(&format!("combination.{at}"), times)?;
+    }
+    check_mandatory(scenario)
+}
+
+fn wrong(goal: usize, key: &str, message: impl ToString) -> SetupError {
+    SetupError::value(&format!("goal.{goal}.{key}"), message)
+}
+
+/// The place of a goal by its name, or what is said if there is none.
+fn known(goals: &[GoalConfig], name: &str) -> Result<usize, String> {
+    let at = goals.iter().position(|goal| goal.name == name);
+    at.ok_or_else(|| {
+        let names = goals.iter().map(|goal| goal.name.as_str());
+        let hint = suggest::did_you_mean(suggest::nearest(name, names).as_deref());
+        format!("no goal {name:?}{hint}")
+    })
+}
+
+fn finite(key: &str, weight: f64) -> Result<(), SetupError> {
+    match weight.is_finite() {
+        true => Ok(()),
+        false => Err(SetupError::value(
+            key,
+            format!("{weight}: expected a finite number"),
+        )),
+    }
+}
+
+fn check_goal(scenario: &SurveyScenario, at: usize, goal: &GoalConfig) -> Result<(), SetupError> {
+    let Some(cost) = Cost::of(goal.observation, &scenario.rover) else {
+        let message = format!(
+            "no instrument of the rovers can do it for goal {:?}",
+            goal.name
+        );
+        return Err(wrong(at, "observation", message));
+    };
+    finite(&format!("goal.{at}.weight"), goal.weight)?;
+    let rocks = scenario.world.rocks;
+    if let Some(rock) = goal.rock.filter(|rock| *rock >= rocks) {
+        let message = format!(
+            "{rock} of goal {:?}: the field has {rocks} rocks, from 0",
+            goal.name
+        );
+        return Err(wrong(at, "rock", message));
+    }
+    let half_m = 0.5 * scenario.world.side_m;
+    for (key, place_m) in [("east", goal.east_m), ("north", goal.north_m)] {
+        if place_m.is_nan() || place_m.abs() > half_m {
+            let message = format!(
+                "{place_m} m of goal {:?}: outside the terrain, expected within {half_m} m of the middle",
+                goal.name
+            );
+            return Err(wrong(at, key, message));
+        }
+    }
+    let times = (goal.added, goal.withdrawn, goal.changes.as_slice());
+    check_times(&format!("goal.{at}"), times)?;
+    let opens = goal.opens.unwrap_or_default();
+    match goal.closes {
+        Some(closes) if closes <= opens => {
+            let message = format!("{closes}: the window never opens, expected over {opens}");
+            Err(wrong(at, "closes", message))
+        }
+        Some(closes) if closes < opens + cost.duration => {
+            let duration = cost.duration;
+            let message = format!("{closes}: the observation takes {duration} from {opens}");
+            Err(wrong(at, "closes", message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Changes come in order, after the goal and before it goes.
+fn check_times(
+    table: &str,
+    (added, withdrawn, changes): (SimDuration, Option<SimDuration>, &[ChangeConfig]),
+) -> Result<(), SetupError> {
+    let mut before = added;
+    for (at, change) in changes.iter().enumerate() {
+        let key = format!("{table}.change.{at}");
+        finite(&format!("{key}.weight"), change.weight)?;
+        if change.at <= before {
+            let message = format!("{}: expected after {before}", change.at);
+            return Err(SetupError::value(&format!("{key}.at"), message));
+        }
+        before = change.at;
+    }
+    match withdrawn {
+        Some(withdrawn) if withdrawn <= before => {
+            let message = format!("{withdrawn}: expected after {before}");
+            Err(SetupError::value(&format!("{table}.withdrawn"), message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Every name is known, and no goal requires itself, over however many others.
+fn check_requirements(goals: &[GoalConfig]) -> Result<(), SetupError> {
+    let mut requires: Vec<Vec<usize>> = Vec::new();
+    for (at, goal) in goals.iter().enumerate() {
+        let others = goal.requires.iter().map(|name| known(goals, name));
+        let others: Result<Vec<usize>, String> = others.collect();
+        requires.push(others.map_err(|message| wrong(at, "requires", message))?);
+    }
+    for at in 0..goals.len() {
+        let mut path = vec![at];
+        if leads_back(&requires, &mut path, &mut vec![false; goals.len()]) {
+            let names: Vec<&str> = path.iter().map(|at| goals[*at].name.as_str()).collect();
+            let message = format!(
+                "goals that require each other in a circle: {}",
+                names.join(", ")
+            );
+            return Err(wrong(at, "requires", message));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a way leads from the first goal of a path, beyond its last, back to the first; the path is that way
+/// then.
+fn leads_back(requires: &[Vec<usize>], path: &mut Vec<usize>, seen: &mut [bool]) -> bool {
+    let last = path[path.len() - 1];
+    for &next in &requires[last] {
+        if next == path[0] {
+            return true;
+        }
+        if std::mem::replace(&mut seen[next], true) {
+            continue;
+        }
+        path.push(next);
+        if leads_back(requires, path, seen) {
+            return true;
+        }
+        path.pop();
+    }
+    false
+}
+
+/// Mandatory goals whose windows lie within a stretch of time have to fit into what all rovers have of it in
+/// the light.
+fn check_mandatory(scenario: &SurveyScenario) -> Result<(), SetupError> {
+    let mandatory = scenario.goals.iter().enumerate();
+    let mandatory = mandatory.filter(|(_, goal)| goal.mandatory && goal.closes.is_some());
+    let windows: Vec<(usize, [SimDuration; 3])> = mandatory
+        .filter_map(|(at, goal)| {
+            let cost = Cost::of(goal.observation, &scenario.rover)?;
+            let opens = goal.opens.unwrap_or_default().max(goal.added);
+            Some((at, [opens, goal.closes?, cost.duration]))
+        })
+        .collect();
+    let rovers = u64::from(scenario.team.rovers);
+    for (_, [from, ..]) in &windows {
+        for (_, [_, until, _]) in &windows {
+            let within = windows.iter();
+            let within = within.filter(|(_, [opens, closes, _])| opens >= from && closes <= until);
+            let within: Vec<_> = within.collect();
+            let needed = within.iter().map(|(_, [.., takes])| *takes);
+            let needed = needed.fold(SimDuration::ZERO, |sum, takes| sum + takes);
+            let Some((at, _)) = within.last() else {
+                continue;
+            };
+            let light = light(scenario, SimTime::ZERO + *from, SimTime::ZERO + *until)?;
+            if needed > light * rovers {
+                let names = within
+                    .iter()
+                    .map(|(at, _)| scenario.goals[*at].name.as_str());
+                let names: Vec<&str> = names.collect();
+                let message = format!(
+                    "mandatory goals cannot all be met: {} take {needed} between {from} and {until}, where \
+                     {rovers} rovers have {} of light",
+                    names.join(", "),
+                    light * rovers
+                );
+                return Err(wrong(*at, "mandatory", message));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// For how long it is light enough to work within a stretch of time.
+fn light(
+    scenario: &SurveyScenario,
+    from: SimTime,
+    until: SimTime,
+) -> Result<SimDuration, SetupError> {
+    const STEP: SimDuration = SimDuration::from_secs(300);
+    let world = &scenario.world;
+    let sky = Sky::new(
+        world.latitude_rad.to_degrees(),
+        world.season_rad.to_degrees(),
+        world.dust,
+    );
+    let sky = sky.map_err(|error| SetupError::value("world", error))?;
+    let least_deg = scenario.learn.sun_least_rad.to_degrees();
+    // Days are alike: what is beyond some sols is as it is within them.
+    let length = until.since(from);
+    let sols = (length.as_secs_f64() / SOL_S) as u64;
+    let sol = SimDuration::from_nanos((SOL_S * 1e9) as u64);
+    let lit = |length: SimDuration| {
+        let steps = length.as_nanos().div_ceil(STEP.as_nanos());
+        let lit = (0..steps).filter(|step| {
+            let at_s = world.starts.as_secs_f64() + (from + STEP * *step).as_secs_f64();
+            sky.elevation_deg(at_s) >= least_deg
+        });
+        STEP * lit.count() as u64
+    };
+    let rest = SimDuration::from_nanos(length.as_nanos().saturating_sub((sol * sols).as_nanos()));
+    let whole = if sols == 0 {
+        SimDuration::ZERO
+    } else {
+        lit(sol) * sols
+    };
+    Ok(whole + lit(rest).min(rest))
+}

@@ -1,0 +1,110 @@
+//! The closed loop as scenarios see it.
+
+use farside::Report;
+use farside_actors::field::{FieldConfig, Place};
+use farside_actors::rover::RoverConfig;
+use farside_actors::system::settings::Table;
+use farside_actors::system::{
+    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+};
+use serde::Deserialize;
+
+use super::assemble::{Parts, assemble, settings};
+use super::config::SurveyConfig;
+use super::execution::ExecutionConfig;
+use super::scenario::SurveyScenario;
+use super::wishes::{CombinationConfig, GoalConfig};
+use super::{builtin, metrics};
+use crate::config::{LearnConfig, TeamConfig};
+use crate::planner::casper::PlannerConfig;
+use crate::scene::MisusScene;
+
+/// MISUS as a whole: rovers that plan, execute, learn and plan again.
+///
+/// ```
+/// use farside_actors::system::System;
+/// use farside_misus::SurveySystem;
+/// assert_eq!(SurveySystem.name(), "misus-survey");
+/// let tables: Vec<String> = SurveySystem.sections().into_iter().map(|one| one.name).collect();
+/// assert!(["survey", "execution", "goal"].iter().all(|name| tables.contains(&name.to_string())));
+/// ```
+pub struct SurveySystem;
+
+impl System for SurveySystem {
+    fn name(&self) -> &str {
+        "misus-survey"
+    }
+
+    fn about(&self) -> &str {
+        "rovers learn which rocks there are, and plan, share out and carry out what to look at next"
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        [
+            FieldConfig::sections("world"),
+            TeamConfig::sections("team"),
+            RoverConfig::sections("rover"),
+            LearnConfig::sections("learn"),
+            PlannerConfig::sections("planner"),
+            ExecutionConfig::sections("execution"),
+            SurveyConfig::sections("survey"),
+            GoalConfig::sections("goal"),
+            CombinationConfig::sections("combination"),
+        ]
+        .concat()
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        metrics::all()
+    }
+
+    fn scenarios(&self) -> &[Builtin] {
+        &builtin::SCENARIOS
+    }
+
+    fn studies(&self) -> &[Builtin] {
+        &builtin::STUDIES
+    }
+
+    fn parse(
+        &self,
+        sections: toml::Deserializer<'_>,
+    ) -> Result<Box<dyn Settings>, toml::de::Error> {
+        Ok(Box::new(SurveyScenario::deserialize(sections)?))
+    }
+}
+
+impl Settings for SurveyScenario {
+    fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
+        toml::Table::try_from(self)
+    }
+
+    fn check(&self) -> Result<(), SetupError> {
+        self.check_all()
+    }
+
+    fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
+        let Some(until) = setup.until else {
+            let message = "missing: rovers go on sol after sol, so a run needs an end";
+            return Err(SetupError::value("until", message));
+        };
+        let place = Place::of(&self.world, setup)?;
+        let parts = Parts {
+            scenario: self,
+            place: &place,
+            settings: settings(self, setup.files)?,
+            seed: setup.run_seed,
+            until,
+        };
+        let survey = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
+        let (field, rovers) = (place.field.clone(), survey.shared.site.rovers.clone());
+        let assembly = Assembly::new(move |report: &Report| {
+            metrics::results(&survey, &field, report.end_time)
+        });
+        let assembly = assembly.with_scene(MisusScene::new(place.field.clone(), rovers));
+        let faults = self.rover.faults.iter().enumerate();
+        Ok(faults.fold(assembly, |assembly, (index, fault)| {
+            assembly.with_planned(format!("rover.fault.{index}"), fault.at)
+        }))
+    }
+}
