@@ -42,6 +42,9 @@ pub enum RegisterValue {
     Symbol(Arc<str>),
 }
 
+/// A contract of a register: its epoch, and its number within it.
+pub type ContractKey = (u32, u32);
+
 /// A register says this procedure from now on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RegisterLoad {

@@ -262,11 +262,6 @@ impl Runner {
         self.service.model()
     }
 
-    /// The plan database.
-    pub fn service(&self) -> &dyn PlanService {
-        &*self.service
-    }
-
     /// Keeps what was delivered at an instant.
     pub fn arrive(&mut self, at: SimTime, peer: usize, what: Arrival) {
         if let Some(heard) = self.heard.get_mut(peer) {

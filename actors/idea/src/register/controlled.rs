@@ -23,9 +23,10 @@ pub struct Controlled {
     said: Option<RegisterStatus>,
     /// Until it is acknowledged: how often it was said, and when it is to be said again.
     unheard: Option<(u32, SimTime)>,
-    /// How the last contract of an earlier life of the controlling side ended, until that is
-    /// acknowledged: that life may not have heard of it.
-    owed: Option<(RegisterStatus, u32, SimTime)>,
+    /// How the last contract of each earlier life of the controlling side ended, how often that was
+    /// said and when it is to be said again, until it is acknowledged: that life may not have heard of
+    /// it.
+    owed: Vec<(RegisterStatus, u32, SimTime)>,
 }
 
 /// What a load is to the controlled side.
@@ -52,7 +53,7 @@ impl Controlled {
             is_open: false,
             said: None,
             unheard: None,
-            owed: None,
+            owed: Vec::new(),
         }
     }
 
@@ -97,7 +98,7 @@ impl Controlled {
                 self.say(Vec::new(), ContractEnd::Fault, now);
             }
             let unheard = self.unheard.and(self.said.take());
-            self.owed = unheard.map(|status| (status, 0, now));
+            self.owed.extend(unheard.map(|status| (status, 0, now)));
         }
         self.epoch = load.epoch;
         self.number = load.number;
@@ -155,7 +156,7 @@ impl Controlled {
 
     /// When something is to be said again.
     pub fn due(&self) -> Option<SimTime> {
-        let owed = self.owed.as_ref().map(|(_, _, again)| *again);
+        let owed = self.owed.iter().map(|(_, _, again)| *again);
         self.unheard
             .map(|(_, again)| again)
             .into_iter()
@@ -166,7 +167,7 @@ impl Controlled {
     /// What is said again now, and how often it was said before; nothing if it is not time. There may
     /// be something else to say at the same time: it is to be asked until there is nothing.
     pub fn repeat(&mut self, now: SimTime) -> Option<(RegisterStatus, u32)> {
-        if let Some((status, times, again)) = self.owed.as_mut().filter(|owed| owed.2 <= now) {
+        if let Some((status, times, again)) = self.owed.iter_mut().find(|owed| owed.2 <= now) {
             let before = *times;
             *times = before.saturating_add(1);
             *again = now + self.backoff.after(*times);
@@ -184,12 +185,12 @@ impl Controlled {
         let Acknowledged::Status { revision } = ack.of else {
             return;
         };
-        let is_last = self
-            .said
-            .as_ref()
-            .is_some_and(|said| said.revision <= revision);
-        if ack.epoch == self.epoch && ack.number == self.number && is_last {
+        let is_heard = |said: &RegisterStatus| {
+            (said.epoch, said.number) == (ack.epoch, ack.number) && said.revision <= revision
+        };
+        if self.said.as_ref().is_some_and(is_heard) {
             self.unheard = None;
         }
+        self.owed.retain(|(said, ..)| !is_heard(said));
     }
 }

@@ -290,3 +290,242 @@ fn a_new_life_begins_anew_and_the_old_one_is_not_heard() {
     assert_eq!(controlled.contract(), (2, 1));
     assert_eq!(controlled.take(&old, at(0)), Taken::Old);
 }
+
+/// A new life of the controlling side is told how the last contract of the old one ended, until it has
+/// heard it: the old one may have crashed before it did.
+#[test]
+fn a_new_life_is_told_how_the_last_contract_of_the_old_one_ended() {
+    for is_over in [true, false] {
+        let mut controlled = Controlled::new(name(), BACKOFF);
+        let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
+        controlled.take(&old, at(0));
+        if is_over {
+            controlled.say(Vec::new(), ContractEnd::Ended, at(1));
+        }
+        let mut new = Controlling::new(name(), 2, BACKOFF);
+        let load = new.load("B".into(), Vec::new(), at(9));
+        assert_eq!(controlled.take(&load, at(9)), Taken::Yes);
+        assert_eq!(controlled.due(), Some(at(9)));
+        let (owed, before) = controlled.repeat(at(9)).expect("it is owed");
+        let end = match is_over {
+            true => ContractEnd::Ended,
+            false => ContractEnd::Fault,
+        };
+        assert_eq!((owed.epoch, owed.number, before), (1, 1, 0));
+        assert_eq!(owed.end, end);
+        assert_eq!(new.status(&owed), Heard::Stale);
+        // It is said again, later and later, with what there is to say of the present contract.
+        assert_eq!(controlled.repeat(at(9)), None);
+        let present = controlled.say(Vec::new(), ContractEnd::Ended, at(10));
+        let present = present.expect("it goes on");
+        assert_eq!(controlled.repeat(at(13)), Some((owed.clone(), 1)));
+        assert_eq!(controlled.repeat(at(13)), None);
+        assert_eq!(controlled.repeat(at(14)), Some((present.clone(), 1)));
+        assert_eq!(controlled.due(), Some(at(21)));
+        // Each is said until it is acknowledged, whatever becomes of the other.
+        controlled.acknowledged(&Controlling::ack(&owed));
+        assert_eq!(controlled.due(), Some(at(22)));
+        controlled.acknowledged(&Controlling::ack(&present));
+        assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+    }
+}
+
+/// Also when the life between has crashed before it heard of it.
+#[test]
+fn what_is_owed_to_a_life_is_owed_to_the_next() {
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    for epoch in 1..=3 {
+        let load = Controlling::new(name(), epoch, BACKOFF).load("A".into(), Vec::new(), at(0));
+        controlled.take(&load, at(0));
+    }
+    let owed = [controlled.repeat(at(0)), controlled.repeat(at(0))];
+    let owed = owed.map(|owed| owed.map(|(status, _)| (status.epoch, status.number)));
+    assert_eq!(owed, [Some((1, 1)), Some((2, 1))]);
+    assert_eq!(controlled.repeat(at(0)), None);
+}
+
+#[test]
+fn what_was_heard_is_not_owed() {
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
+    controlled.take(&old, at(0));
+    let said = controlled.say(Vec::new(), ContractEnd::Ended, at(1));
+    controlled.acknowledged(&Controlling::ack(&said.expect("it goes on")));
+    let new = Controlling::new(name(), 2, BACKOFF).load("B".into(), Vec::new(), at(9));
+    assert_eq!(controlled.take(&new, at(9)), Taken::Yes);
+    assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+}
+
+#[test]
+fn a_status_is_said_until_it_is_acknowledged_itself_or_a_later_load_comes() {
+    let begun = || {
+        let mut controlling = Controlling::new(name(), 1, BACKOFF);
+        let mut controlled = Controlled::new(name(), BACKOFF);
+        controlled.take(&controlling.load("A".into(), Vec::new(), at(0)), at(0));
+        let open = controlled.say(vec![None], ContractEnd::Open, at(0));
+        let end = controlled.say(vec![None], ContractEnd::Ended, at(0));
+        (
+            controlling,
+            controlled,
+            open.expect("it is open"),
+            end.expect("it goes on"),
+        )
+    };
+    // 2 s, 4 s, 8 s, 16 s, and no longer.
+    let (_, mut controlled, ..) = begun();
+    let mut said = Vec::new();
+    for tick in 0..160 {
+        if let Some((status, before)) = controlled.repeat(at(tick)) {
+            assert_eq!(status.end, ContractEnd::Ended);
+            said.push((tick, before));
+        }
+    }
+    assert_eq!(
+        said,
+        [
+            (4, 1),
+            (12, 2),
+            (28, 3),
+            (60, 4),
+            (92, 5),
+            (124, 6),
+            (156, 7)
+        ]
+    );
+    let (_, mut controlled, open, end) = begun();
+    let ack = Controlling::ack(&end);
+    for other in [
+        Controlling::ack(&open),
+        RegisterAck {
+            number: 2,
+            ..ack.clone()
+        },
+        RegisterAck {
+            epoch: 2,
+            ..ack.clone()
+        },
+        RegisterAck {
+            of: Acknowledged::Load,
+            ..ack.clone()
+        },
+    ] {
+        controlled.acknowledged(&other);
+        assert_eq!(controlled.due(), Some(at(4)), "{other:?}");
+    }
+    controlled.acknowledged(&ack);
+    assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+    let (mut controlling, mut controlled, ..) = begun();
+    let next = controlling.load("B".into(), Vec::new(), at(3));
+    assert_eq!(controlled.take(&next, at(3)), Taken::Yes);
+    assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+    // And nothing of the one before is said for it.
+    assert_eq!(controlled.take(&next, at(4)), Taken::Before(None));
+}
+
+#[test]
+fn a_load_is_said_until_it_is_acknowledged_itself_or_answered() {
+    let loaded = || {
+        let mut controlling = Controlling::new(name(), 1, BACKOFF);
+        let load = controlling.load("A".into(), Vec::new(), at(0));
+        (controlling, load)
+    };
+    let (mut controlling, load) = loaded();
+    let mut said = Vec::new();
+    for tick in 0..100 {
+        if let Some((again, before)) = controlling.repeat(at(tick)) {
+            assert_eq!(again, load);
+            said.push((tick, before));
+        }
+    }
+    assert_eq!(said, [(4, 1), (12, 2), (28, 3), (60, 4), (92, 5)]);
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    controlled.take(&load, at(0));
+    let ack = controlled.ack();
+    let (mut controlling, _) = loaded();
+    let of = Acknowledged::Status { revision: 0 };
+    for other in [
+        RegisterAck {
+            number: 2,
+            ..ack.clone()
+        },
+        RegisterAck {
+            epoch: 2,
+            ..ack.clone()
+        },
+        RegisterAck { of, ..ack.clone() },
+    ] {
+        controlling.acknowledged(&other);
+        assert_eq!(controlling.due(), Some(at(4)), "{other:?}");
+    }
+    controlling.acknowledged(&ack);
+    assert_eq!(
+        (controlling.due(), controlling.repeat(at(99))),
+        (None, None)
+    );
+    let (mut controlling, _) = loaded();
+    let open = controlled.say(vec![None], ContractEnd::Open, at(1));
+    controlling.status(&open.expect("it goes on"));
+    assert_eq!((controlling.due(), controlling.is_open()), (None, true));
+}
+
+/// What was taken need not be given up: only what lies behind it is skipped.
+#[test]
+fn only_what_was_given_up_and_never_taken_is_superseded() {
+    let mut controlling = Controlling::new(name(), 1, BACKOFF);
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    let first = controlling.load("A".into(), Vec::new(), at(0));
+    controlled.take(&first, at(0));
+    controlling.acknowledged(&controlled.ack());
+    let again = controlling.load("A".into(), Vec::new(), at(0));
+    controlled.take(&again, at(0));
+    controlling.acknowledged(&controlled.ack());
+    let superseded = |load: &RegisterLoad| (load.number, load.superseded);
+    let second = controlling.load("B".into(), Vec::new(), at(1));
+    assert_eq!(superseded(&second), (3, 1));
+    let third = controlling.load("C".into(), Vec::new(), at(2));
+    assert_eq!(superseded(&third), (4, 2));
+    let fourth = controlling.load("D".into(), Vec::new(), at(2));
+    assert_eq!(superseded(&fourth), (5, 3));
+    assert_eq!(controlled.take(&fourth, at(3)), Taken::Yes);
+    let said = controlled.say(Vec::new(), ContractEnd::Ended, at(4));
+    controlling.status(&said.expect("it goes on"));
+    let fifth = controlling.load("E".into(), Vec::new(), at(5));
+    assert_eq!(superseded(&fifth), (6, 0));
+}
+
+#[test]
+fn a_restart_faults_what_went_on_and_says_again_what_was_not_heard() {
+    let mut controlling = Controlling::new(name(), 1, BACKOFF);
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    controlled.take(&controlling.load("A".into(), Vec::new(), at(0)), at(0));
+    let fault = controlled.restarted(at(1)).expect("it went on");
+    assert_eq!((&fault.end, fault.revision), (&ContractEnd::Fault, 0));
+    assert!(!controlled.is_open());
+    assert_eq!(controlled.restarted(at(20)), Some(fault.clone()));
+    assert_eq!(controlled.due(), Some(at(24)));
+    controlled.acknowledged(&Controlling::ack(&fault));
+    assert_eq!(controlled.restarted(at(30)), None);
+}
+
+/// Statuses may overtake each other, and be made up.
+#[test]
+fn of_statuses_only_a_later_one_before_the_end_is_news() {
+    let mut controlling = Controlling::new(name(), 1, BACKOFF);
+    let mut controlled = Controlled::new(name(), BACKOFF);
+    controlled.take(&controlling.load("A".into(), Vec::new(), at(0)), at(0));
+    let mut say = |end| controlled.say(vec![None], end, at(1)).expect("it goes on");
+    let said = [
+        say(ContractEnd::Open),
+        say(ContractEnd::Open),
+        say(ContractEnd::Ended),
+    ];
+    assert!(matches!(controlling.status(&said[1]), Heard::News { .. }));
+    assert_eq!(controlling.status(&said[0]), Heard::Again);
+    assert_eq!(controlling.status(&said[1]), Heard::Again);
+    assert!(matches!(controlling.status(&said[2]), Heard::News { .. }));
+    let later = RegisterStatus {
+        revision: 7,
+        ..said[2].clone()
+    };
+    assert_eq!(controlling.status(&later), Heard::Again);
+}

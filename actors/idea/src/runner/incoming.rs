@@ -120,9 +120,9 @@ impl Runner {
             return Ok(Some(present.contract));
         }
         let inserted = self.service.insert_goal(timeline, predicate, &inputs);
-        inserted
-            .map(|()| None)
-            .map_err(|refusal| refusal.to_string())
+        inserted.map_err(|refusal| refusal.to_string())?;
+        self.tell_asked(predicate, &inputs);
+        Ok(None)
     }
 
     /// Whoever wanted what a register says is gone: it says its default, if it may.

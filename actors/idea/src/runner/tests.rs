@@ -295,6 +295,33 @@ fn who_is_not_heard_of_within_its_lease_is_faulted_and_taken_back() {
     }
 }
 
+/// Those below are heard of, and who wanted it is not.
+#[test]
+fn what_somebody_wanted_who_is_not_heard_of_is_taken_back() {
+    let mut bench = Bench::new(10_000, SimDuration::from_secs(3));
+    bench.cycle();
+    let load = bench.goal(3);
+    let mut cycles = 0;
+    let cycle = loop {
+        let ack = RegisterAck {
+            number: load.number,
+            ..Controlled::new("down".into(), BACKOFF).ack()
+        };
+        bench.arrive(BELOW, Arrival::Ack(ack));
+        let cycle = bench.cycle();
+        cycles += 1;
+        if !cycle.faults.is_empty() {
+            break cycle;
+        }
+        assert!(cycles < 12);
+    };
+    assert_eq!(
+        cycle.faults,
+        ["up: Go taken back: who wanted it was not heard of within its lease"]
+    );
+    assert_eq!(answers(&cycle)[0].outputs, [symbol("PREEMPTED")]);
+}
+
 #[test]
 fn an_agent_that_is_off_line_loses_its_contracts() {
     for (peer, is_above) in [(ABOVE, true), (BELOW, false)] {
