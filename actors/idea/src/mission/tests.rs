@@ -213,6 +213,29 @@ fn each_goal_is_sent_once_and_one_at_a_time() {
     }
 }
 
+/// A plan is there when the time has passed that deliberation takes.
+#[test]
+fn nothing_is_sent_before_deliberation_is_done() {
+    let mut bench = Bench::new();
+    bench.pace = Some(0);
+    bench.request(1..=1);
+    assert!(!bench.until_told(100));
+    bench.pace = None;
+    assert!(bench.until_told(100));
+}
+
+/// Its last goal was done when the agent crashed: there is nothing to wait for.
+#[test]
+fn a_new_life_that_had_nothing_under_way_goes_on_at_once() {
+    let mut bench = Bench::new();
+    bench.request(1..=1);
+    bench.go_on(&[]);
+    bench.crash();
+    bench.request(2..=2);
+    assert!(bench.until_told(100));
+    assert_eq!(bench.places, [100, 200]);
+}
+
 /// It is the next goal's turn, and the one that failed is tried again, so often.
 #[test]
 fn a_goal_that_fails_is_tried_again_and_given_up_in_the_end() {
