@@ -33,9 +33,14 @@ pub trait Deliberator: Send {
     /// contract of the register, which later lives of the agent may hear of.
     fn loaded(&mut self, _timeline: TimelineId, _contract: ContractKey) {}
 
-    /// How a contract ended that a former life had loaded: its first output, by name; none if the other
-    /// side could not go on with it.
-    fn late(&mut self, _timeline: TimelineId, _contract: ContractKey, _status: Option<&str>) {}
+    /// The contract that a former life had loaded of which it has to know what has become, and the
+    /// timeline of its register: it is asked for until [`Deliberator::late`] tells.
+    fn unresolved(&self) -> Option<(TimelineId, ContractKey)> {
+        None
+    }
+
+    /// How a contract ended that a former life had loaded.
+    fn late(&mut self, _timeline: TimelineId, _contract: ContractKey, _end: Late<'_>) {}
 
     /// The goals that it has given up since it was last asked.
     fn gives_up(&mut self) -> Vec<GivenUp> {
@@ -67,6 +72,17 @@ pub struct Work {
     pub reads: Vec<TimelineId>,
     /// What people may want to know: which goals are left out, and why.
     pub remarks: Vec<String>,
+}
+
+/// How a contract of a former life ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Late<'a> {
+    /// With this first output, by name.
+    Ended(&'a str),
+    /// The other side could not go on with it.
+    Faulted,
+    /// It never began, and never will.
+    NeverBegun,
 }
 
 /// A goal that is not tried any more.

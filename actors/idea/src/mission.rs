@@ -11,7 +11,7 @@ mod tests;
 use farside_planning::model::{PredicateId, TimelineId, Value};
 
 use crate::deliberate::{Begin, Settings, Target, deliberate};
-use crate::deliberator::{Deliberator, GivenUp, Work};
+use crate::deliberator::{Deliberator, GivenUp, Late, Work};
 use crate::models::Mission;
 use crate::register::ContractKey;
 use crate::service::{Ended, Snapshot, Started};
@@ -190,19 +190,30 @@ impl Deliberator for MissionPlanner {
         }
     }
 
-    fn late(&mut self, timeline: TimelineId, contract: ContractKey, status: Option<&str>) {
+    fn unresolved(&self) -> Option<(TimelineId, ContractKey)> {
+        let (contract, _) = self.unresolved.as_ref()?;
+        Some((self.mission.timelines.goal, *contract))
+    }
+
+    fn late(&mut self, timeline: TimelineId, contract: ContractKey, end: Late<'_>) {
         if timeline != self.mission.timelines.goal {
             return;
         }
-        // Statuses of goals before it, or of the lives between, may come late too.
         let resolved = self.unresolved.take_if(|(known, _)| *known == contract);
-        if let Some((_, inputs)) = resolved {
-            let symbols = &self.mission.model.symbols;
-            let at = symbols
-                .iter()
-                .position(|name| Some(name.as_str()) == status);
-            self.goal_ended(&inputs, at.map(|at| at as Value));
-        }
+        let Some((_, inputs)) = resolved else {
+            return;
+        };
+        let status = match end {
+            // That was no attempt.
+            Late::NeverBegun => return,
+            Late::Faulted => None,
+            Late::Ended(status) => Some(status),
+        };
+        let symbols = &self.mission.model.symbols;
+        let at = symbols
+            .iter()
+            .position(|name| Some(name.as_str()) == status);
+        self.goal_ended(&inputs, at.map(|at| at as Value));
     }
 
     fn gives_up(&mut self) -> Vec<GivenUp> {

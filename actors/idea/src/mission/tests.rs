@@ -1,6 +1,8 @@
 //! A mission agent's plan runner with its planner, without actors: whatever comes when, the system
 //! agent is given one goal at a time, none twice, and none that was taken back.
 
+mod crashes;
+
 use std::sync::{Arc, Mutex};
 
 use farside::{SimDuration, SimTime};
@@ -9,7 +11,8 @@ use super::*;
 use crate::deliberator::SharedDeliberator;
 use crate::models;
 use crate::register::{
-    Backoff, ContractEnd, Controlled, Controlling, RegisterLoad, RegisterStatus, RegisterValue,
+    Backoff, ContractEnd, Controlled, Controlling, Heard, RegisterLoad, RegisterStatus,
+    RegisterValue, Taken,
 };
 use crate::runner::{Arrival, Cycle, Out, RegisterSetup, Runner, RunnerSettings, Side};
 use crate::service::temporal::{Temporal, TemporalOptions};
@@ -37,7 +40,7 @@ struct Bench {
     places: Vec<i64>,
 }
 
-fn runner(life: u32, planner: &SharedDeliberator) -> Runner {
+fn runner(life: u32, planner: &SharedDeliberator, backoff: Backoff) -> Runner {
     let mission = models::mission();
     let register = |name: &str, timeline, side, peer| RegisterSetup {
         name: name.into(),
@@ -58,7 +61,7 @@ fn runner(life: u32, planner: &SharedDeliberator) -> Runner {
         budget: 100_000,
         overhead: 0,
         aborts: 0,
-        backoff: BACKOFF,
+        backoff,
         forgets: true,
     };
     let service = Temporal::new(mission.model.clone(), TemporalOptions::default());
@@ -68,12 +71,20 @@ fn runner(life: u32, planner: &SharedDeliberator) -> Runner {
     runner.with_deliberator(planner.clone())
 }
 
+/// The inputs of a request for a goal.
+fn request(goal: i64) -> Vec<RegisterValue> {
+    let numbers = [goal, 100 * goal, 0, 10, -10].map(RegisterValue::Number);
+    let camera = RegisterValue::Symbol("wide_eye".into());
+    let rest = [camera, RegisterValue::Number(0)];
+    numbers.into_iter().chain(rest).collect()
+}
+
 impl Bench {
     fn new() -> Bench {
         let mission = models::mission().clone();
         let planner = MissionPlanner::new(mission, Settings::default(), ATTEMPTS, [0, 0]);
         let planner: SharedDeliberator = Arc::new(Mutex::new(planner));
-        let runner = runner(1, &planner);
+        let runner = runner(1, &planner, BACKOFF);
         let mut bench = Bench {
             memory: runner.memory(),
             runner,
@@ -129,12 +140,9 @@ impl Bench {
 
     /// The ground asks for a goal, or takes it back.
     fn ground(&mut self, procedure: &str, goal: i64) {
-        let mut inputs: Vec<RegisterValue> = [goal, 100 * goal, 0, 10, -10]
-            .map(RegisterValue::Number)
-            .into();
-        inputs.push(RegisterValue::Symbol("wide_eye".into()));
-        if procedure == "Request" {
-            inputs.push(RegisterValue::Number(0));
+        let mut inputs = request(goal);
+        if procedure == "Recall" {
+            inputs.pop();
         }
         let load = self.ground.load(procedure.into(), inputs, self.now());
         self.arrive(GROUND, Arrival::Load(load));
@@ -193,7 +201,7 @@ impl Bench {
     fn crash(&mut self) {
         self.life += 1;
         self.planner.lock().expect("nobody panics").restarted();
-        self.runner = runner(self.life, &self.planner);
+        self.runner = runner(self.life, &self.planner, BACKOFF);
         self.told = None;
     }
 }

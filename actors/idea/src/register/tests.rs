@@ -291,69 +291,114 @@ fn a_new_life_begins_anew_and_the_old_one_is_not_heard() {
     assert_eq!(controlled.take(&old, at(0)), Taken::Old);
 }
 
-/// A new life of the controlling side is told how the last contract of the old one ended, until it has
-/// heard it: the old one may have crashed before it did.
+/// A new life may ask what has become of the last contract of any former one, though that life may have
+/// heard of it: each answer is final.
 #[test]
-fn a_new_life_is_told_how_the_last_contract_of_the_old_one_ended() {
-    for is_over in [true, false] {
+fn a_new_life_is_told_what_has_become_of_a_former_ones_contract() {
+    for (ending, heard) in [(true, false), (true, true), (false, false)] {
         let mut controlled = Controlled::new(name(), BACKOFF);
-        let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
-        controlled.take(&old, at(0));
-        if is_over {
-            controlled.say(Vec::new(), ContractEnd::Ended, at(1));
+        let mut old = Controlling::new(name(), 1, BACKOFF);
+        let skipped = old.load("A".into(), Vec::new(), at(0));
+        let first = old.load("A".into(), Vec::new(), at(0));
+        let lost = old.load("B".into(), Vec::new(), at(1));
+        assert_eq!(controlled.take(&first, at(0)), Taken::Yes);
+        let mut end = ContractEnd::Fault;
+        if ending {
+            end = ContractEnd::Ended;
+            let said = controlled.say(Vec::new(), end.clone(), at(1));
+            let said = said.expect("it goes on");
+            if heard {
+                controlled.acknowledged(&Controlling::ack(&said));
+            }
         }
-        let mut new = Controlling::new(name(), 2, BACKOFF);
-        let load = new.load("B".into(), Vec::new(), at(9));
-        assert_eq!(controlled.take(&load, at(9)), Taken::Yes);
-        assert_eq!(controlled.due(), Some(at(9)));
-        let (owed, before) = controlled.repeat(at(9)).expect("it is owed");
-        let end = match is_over {
-            true => ContractEnd::Ended,
-            false => ContractEnd::Fault,
+        let ask = |controlled: &Controlled, epoch: u32, number: u32| {
+            let mut new = Controlling::new(name(), 4, BACKOFF);
+            let load = new.load("C".into(), Vec::new(), at(9));
+            new.acknowledged(&RegisterAck {
+                register: name(),
+                epoch: load.epoch,
+                number: load.number,
+                of: Acknowledged::Load,
+            });
+            new.ask((epoch, number));
+            let (question, before) = new.repeat_question(at(9)).expect("it is asked at once");
+            assert_eq!(
+                (question.epoch, question.number, before),
+                (epoch, number, 0)
+            );
+            controlled.asked(&question).map(|answer| {
+                assert_eq!((answer.epoch, answer.number), (epoch, number));
+                answer.end
+            })
         };
-        assert_eq!((owed.epoch, owed.number, before), (1, 1, 0));
-        assert_eq!(owed.end, end);
-        assert_eq!(new.status(&owed), Heard::Stale);
-        // It is said again, later and later, with what there is to say of the present contract.
-        assert_eq!(controlled.repeat(at(9)), None);
-        let present = controlled.say(Vec::new(), ContractEnd::Ended, at(10));
-        let present = present.expect("it goes on");
-        assert_eq!(controlled.repeat(at(13)), Some((owed.clone(), 1)));
-        assert_eq!(controlled.repeat(at(13)), None);
-        assert_eq!(controlled.repeat(at(14)), Some((present.clone(), 1)));
-        assert_eq!(controlled.due(), Some(at(21)));
-        // Each is said until it is acknowledged, whatever becomes of the other.
-        controlled.acknowledged(&Controlling::ack(&owed));
-        assert_eq!(controlled.due(), Some(at(22)));
-        controlled.acknowledged(&Controlling::ack(&present));
-        assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+        // As long as the life that loaded it may go on, there is no answer.
+        assert_eq!(ask(&controlled, 1, lost.number), None);
+        let new = Controlling::new(name(), 3, BACKOFF).load("C".into(), Vec::new(), at(9));
+        assert_eq!(controlled.take(&new, at(9)), Taken::Yes);
+        assert_eq!(ask(&controlled, 3, 1), None);
+        let never = ContractEnd::Refused {
+            reason: "it never came".to_owned(),
+        };
+        assert_eq!(ask(&controlled, 1, first.number), Some(end.clone()));
+        assert_eq!(ask(&controlled, 1, lost.number), Some(never.clone()));
+        assert_eq!(ask(&controlled, 2, 1), Some(never));
+        assert_eq!(
+            ask(&controlled, 1, skipped.number),
+            Some(ContractEnd::Fault)
+        );
+        // What was said not to have come does not begin any more.
+        assert_eq!(controlled.take(&lost, at(10)), Taken::Old);
+        let newer = Controlling::new(name(), 4, BACKOFF).load("C".into(), Vec::new(), at(9));
+        assert_eq!(controlled.take(&newer, at(9)), Taken::Yes);
+        assert_eq!(ask(&controlled, 1, first.number), Some(end));
+        assert_eq!(ask(&controlled, 3, 1), Some(ContractEnd::Fault));
     }
 }
 
-/// Also when the life between has crashed before it heard of it.
 #[test]
-fn what_is_owed_to_a_life_is_owed_to_the_next() {
-    let mut controlled = Controlled::new(name(), BACKOFF);
-    for epoch in 1..=3 {
-        let load = Controlling::new(name(), epoch, BACKOFF).load("A".into(), Vec::new(), at(0));
-        controlled.take(&load, at(0));
+fn a_question_is_asked_until_the_end_of_its_contract_is_heard() {
+    let mut new = Controlling::new(name(), 2, BACKOFF);
+    new.ask((1, 7));
+    assert_eq!(new.repeat_question(at(0)), None);
+    new.load("A".into(), Vec::new(), at(0));
+    assert_eq!(new.repeat_question(at(1)), None);
+    new.acknowledged(&RegisterAck {
+        register: name(),
+        epoch: 2,
+        number: 1,
+        of: Acknowledged::Load,
+    });
+    let mut asked = Vec::new();
+    for tick in 2..50 {
+        asked.extend(
+            new.repeat_question(at(tick))
+                .map(|(_, before)| (tick, before)),
+        );
     }
-    let owed = [controlled.repeat(at(0)), controlled.repeat(at(0))];
-    let owed = owed.map(|owed| owed.map(|(status, _)| (status.epoch, status.number)));
-    assert_eq!(owed, [Some((1, 1)), Some((2, 1))]);
-    assert_eq!(controlled.repeat(at(0)), None);
-}
-
-#[test]
-fn what_was_heard_is_not_owed() {
-    let mut controlled = Controlled::new(name(), BACKOFF);
-    let old = Controlling::new(name(), 1, BACKOFF).load("A".into(), Vec::new(), at(0));
-    controlled.take(&old, at(0));
-    let said = controlled.say(Vec::new(), ContractEnd::Ended, at(1));
-    controlled.acknowledged(&Controlling::ack(&said.expect("it goes on")));
-    let new = Controlling::new(name(), 2, BACKOFF).load("B".into(), Vec::new(), at(9));
-    assert_eq!(controlled.take(&new, at(9)), Taken::Yes);
-    assert_eq!((controlled.due(), controlled.repeat(at(99))), (None, None));
+    assert_eq!(asked, [(2, 0), (6, 1), (14, 2), (30, 3)]);
+    let answer = RegisterStatus {
+        register: name(),
+        epoch: 1,
+        number: 7,
+        revision: 3,
+        outputs: Vec::new(),
+        end: ContractEnd::Ended,
+    };
+    let open = RegisterStatus {
+        end: ContractEnd::Open,
+        ..answer.clone()
+    };
+    let other = RegisterStatus {
+        number: 6,
+        ..answer.clone()
+    };
+    assert_eq!(
+        [new.status(&open), new.status(&other)],
+        [Heard::Stale, Heard::Stale]
+    );
+    assert!(matches!(new.status(&answer), Heard::Answer { .. }));
+    assert_eq!(new.status(&answer), Heard::Stale);
+    assert_eq!(new.repeat_question(at(99)), None);
 }
 
 #[test]

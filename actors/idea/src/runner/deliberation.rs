@@ -6,8 +6,8 @@ use std::sync::{MutexGuard, PoisonError};
 use farside_planning::model::{PredicateId, TimelineId, Value};
 
 use super::{Cycle, Runner};
-use crate::deliberator::{Deliberator, SharedDeliberator, Work};
-use crate::register::{RegisterLoad, RegisterStatus, RegisterValue};
+use crate::deliberator::{Deliberator, Late, SharedDeliberator, Work};
+use crate::register::{ContractEnd, ContractKey, RegisterLoad, RegisterValue};
 use crate::service::{Contract, Snapshot};
 use crate::wording;
 
@@ -35,6 +35,11 @@ impl Deliberation {
 
     pub(super) fn new(planner: SharedDeliberator) -> Self {
         Deliberation { planner, job: None }
+    }
+
+    /// The contract of a former life that is to be asked for, and its timeline.
+    pub(super) fn unresolved(&self) -> Option<(TimelineId, ContractKey)> {
+        self.planner().unresolved()
     }
 }
 
@@ -98,16 +103,22 @@ impl Runner {
     }
 
     /// What has become of a contract that a former life of the agent had loaded.
-    pub(super) fn hear_late(&self, timeline: TimelineId, status: &RegisterStatus) {
+    pub(super) fn hear_late(
+        &self,
+        timeline: TimelineId,
+        contract: ContractKey,
+        outputs: &[Option<RegisterValue>],
+        end: &ContractEnd,
+    ) {
         let Some(deliberation) = self.deliberation.as_ref() else {
             return;
         };
-        let said = match status.outputs.first() {
-            Some(Some(RegisterValue::Symbol(name))) => Some(&**name),
-            _ => None,
+        let late = match (end, outputs.first()) {
+            (ContractEnd::Refused { .. }, _) => Late::NeverBegun,
+            (_, Some(Some(RegisterValue::Symbol(name)))) => Late::Ended(name),
+            _ => Late::Faulted,
         };
-        let contract = (status.epoch, status.number);
-        deliberation.planner().late(timeline, contract, said);
+        deliberation.planner().late(timeline, contract, late);
     }
 
     /// Lets deliberation go on for so many operations, any number with none; how many it took.

@@ -56,11 +56,12 @@ impl Runner {
         match heard {
             Heard::Stale => {
                 cycle.stale += 1;
-                if status.epoch < one.controlling.epoch() {
-                    let timeline = one.setup.timeline;
-                    self.hear_late(timeline, status);
-                }
                 false
+            }
+            Heard::Answer { outputs, end } => {
+                let (timeline, contract) = (one.setup.timeline, (status.epoch, status.number));
+                self.hear_late(timeline, contract, &outputs, &end);
+                true
             }
             Heard::Again => false,
             Heard::News { outputs, end } => match end {
