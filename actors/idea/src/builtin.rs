@@ -23,7 +23,7 @@ pub(crate) const SCENARIOS: [Builtin; 4] = [
 ];
 
 /// Sorted by name.
-pub(crate) const STUDIES: [Builtin; 7] = [
+pub(crate) const STUDIES: [Builtin; 9] = [
     Builtin {
         name: "idea/deliberation",
         text: include_str!("../studies/deliberation.toml"),
@@ -37,6 +37,10 @@ pub(crate) const STUDIES: [Builtin; 7] = [
         text: include_str!("../studies/horizon.toml"),
     },
     Builtin {
+        name: "idea/jitter",
+        text: include_str!("../studies/jitter.toml"),
+    },
+    Builtin {
         name: "idea/latency",
         text: include_str!("../studies/latency.toml"),
     },
@@ -47,6 +51,10 @@ pub(crate) const STUDIES: [Builtin; 7] = [
     Builtin {
         name: "idea/link-degradation",
         text: include_str!("../studies/link-degradation.toml"),
+    },
+    Builtin {
+        name: "idea/outages",
+        text: include_str!("../studies/outages.toml"),
     },
     Builtin {
         name: "idea/thorough-or-light",

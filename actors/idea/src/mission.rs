@@ -5,11 +5,15 @@
 //! Goal timeline end. Where the rover is it knows from the goals that were done: what the rover
 //! measures does not come so far up.
 
-use farside_planning::model::{TimelineId, Value};
+#[cfg(test)]
+mod tests;
+
+use farside_planning::model::{PredicateId, TimelineId, Value};
 
 use crate::deliberate::{Begin, Settings, Target, deliberate};
-use crate::deliberator::{Deliberator, GivenUp, Work};
+use crate::deliberator::{Deliberator, GivenUp, Late, Work};
 use crate::models::Mission;
+use crate::register::ContractKey;
 use crate::service::{Ended, Snapshot, Started};
 
 /// A goal that the ground has asked for.
@@ -32,11 +36,13 @@ pub struct MissionPlanner {
     /// How many plans there were.
     plans: Value,
     given_up: Vec<GivenUp>,
-    /// The inputs of the goal that is being done.
-    doing: Option<Vec<Value>>,
-    /// Those of a goal that was being done when the agent's former life ended, until it is known what
-    /// came of it.
-    unresolved: Option<Vec<Value>>,
+    /// The contract of the Goal register that was loaded last.
+    loaded: ContractKey,
+    /// The inputs of the goal that is being done, and its contract.
+    doing: Option<(ContractKey, Vec<Value>)>,
+    /// Those of a goal that was being done when a former life of the agent ended, until it is known
+    /// what came of it.
+    unresolved: Option<(ContractKey, Vec<Value>)>,
     /// Whether what is left of the plan is not wanted any more.
     drops: bool,
 }
@@ -55,14 +61,15 @@ impl MissionPlanner {
             at_dm,
             plans: 0,
             given_up: Vec::new(),
+            loaded: (0, 0),
             doing: None,
             unresolved: None,
             drops: false,
         }
     }
 
-    /// The goal of a request or a recall: all of its inputs.
-    fn asked(&mut self, inputs: &[Value]) {
+    /// The goal of a request: all of its inputs.
+    fn want(&mut self, inputs: &[Value]) {
         let [number, x_dm, y_dm, pan_deg, tilt_deg, camera, weight] = *inputs else {
             return;
         };
@@ -143,20 +150,24 @@ impl Deliberator for MissionPlanner {
         self.mission.timelines.planner
     }
 
+    fn asked(&mut self, predicate: PredicateId, inputs: &[Value]) {
+        if predicate != self.mission.predicates.recall {
+            return;
+        }
+        let mut wanted = self.wanted.iter_mut();
+        if let Some(goal) = wanted.find(|one| Some(&one.target.number) == inputs.first()) {
+            goal.is_settled = true;
+            self.drops = true;
+        }
+    }
+
     fn begun(&mut self, token: &Started) {
         let predicates = &self.mission.predicates;
         let count = self.mission.model.predicates[token.predicate].inputs;
         if token.predicate == predicates.image_at {
-            self.doing = Some(inputs(&token.parameters, count));
+            self.doing = Some((self.loaded, inputs(&token.parameters, count)));
         } else if token.predicate == predicates.request {
-            self.asked(&inputs(&token.parameters, count));
-        } else if token.predicate == predicates.recall {
-            let number = token.parameters.first().copied().flatten();
-            let mut wanted = self.wanted.iter_mut();
-            if let Some(goal) = wanted.find(|one| Some(one.target.number) == number) {
-                goal.is_settled = true;
-                self.drops = true;
-            }
+            self.want(&inputs(&token.parameters, count));
         }
     }
 
@@ -173,17 +184,36 @@ impl Deliberator for MissionPlanner {
         self.unresolved = self.doing.take().or(self.unresolved.take());
     }
 
-    fn late(&mut self, timeline: TimelineId, status: Option<&str>) {
+    fn loaded(&mut self, timeline: TimelineId, contract: ContractKey) {
+        if timeline == self.mission.timelines.goal {
+            self.loaded = contract;
+        }
+    }
+
+    fn unresolved(&self) -> Option<(TimelineId, ContractKey)> {
+        let (contract, _) = self.unresolved.as_ref()?;
+        Some((self.mission.timelines.goal, *contract))
+    }
+
+    fn late(&mut self, timeline: TimelineId, contract: ContractKey, end: Late<'_>) {
         if timeline != self.mission.timelines.goal {
             return;
         }
-        if let Some(inputs) = self.unresolved.take() {
-            let symbols = &self.mission.model.symbols;
-            let at = symbols
-                .iter()
-                .position(|name| Some(name.as_str()) == status);
-            self.goal_ended(&inputs, at.map(|at| at as Value));
-        }
+        let resolved = self.unresolved.take_if(|(known, _)| *known == contract);
+        let Some((_, inputs)) = resolved else {
+            return;
+        };
+        let status = match end {
+            // That was no attempt.
+            Late::NeverBegun => return,
+            Late::Faulted => None,
+            Late::Ended(status) => Some(status),
+        };
+        let symbols = &self.mission.model.symbols;
+        let at = symbols
+            .iter()
+            .position(|name| Some(name.as_str()) == status);
+        self.goal_ended(&inputs, at.map(|at| at as Value));
     }
 
     fn gives_up(&mut self) -> Vec<GivenUp> {

@@ -14,6 +14,10 @@
 //! | a status is repeated until it is acknowledged, or a later procedure is loaded | loss |
 //! | the first status that ends a contract counts; others are *stale* | repetition, reordering |
 //! | what the controlled side has taken and said is durable; after a restart it says `FAULT` of what it was at | each begins at most once, and done is said of what was done |
+//! | a new life of the controlling side asks what has become of a contract that a former life has loaded, until it is answered; the first load of the new life ends the former one, so that what never came by then never begins | the former life may have crashed before its load arrived, or before it heard of the end |
+//!
+//! A question is a status of the contract, still open, that the *controlling* side sends. The answer is
+//! how the contract ended, or that it is refused since it never came.
 //!
 //! Time-outs are durations from acceptance, counted by the controlled side. Neither side ends a
 //! contract because a link is silent, unless the register has a lease.
@@ -42,6 +46,9 @@ pub enum RegisterValue {
     Symbol(Arc<str>),
 }
 
+/// A contract of a register: its epoch, and its number within it.
+pub type ContractKey = (u32, u32);
+
 /// A register says this procedure from now on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RegisterLoad {
@@ -60,7 +67,7 @@ pub struct RegisterLoad {
     pub inputs: Vec<RegisterValue>,
 }
 
-/// What has become of a procedure.
+/// What has become of a procedure; from the controlling side, the question what has.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RegisterStatus {
     /// The register's name.
@@ -88,7 +95,8 @@ pub enum ContractEnd {
     Fault,
     /// It never began.
     Refused {
-        /// Why: the procedure or a value is unknown there, or what goes on may not end.
+        /// Why: the procedure or a value is unknown there, what goes on may not end, or the load never
+        /// came before the next life of the controlling side.
         reason: String,
     },
 }

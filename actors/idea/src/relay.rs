@@ -65,15 +65,12 @@ use farside_actors::rover::{
 };
 use farside_planning::model::{PredicateId, Value};
 
-use crate::register::{ContractEnd, RegisterValue};
+use crate::register::{ContractEnd, ContractKey, RegisterValue};
 use crate::wording;
 use table::Entry;
 
 pub use actor::{RelayActor, RelaySetup, RelayStopped, RelayWakes};
 pub use table::{RelayError, RelayProblem, RelayRegister, RelayTable};
-
-/// A contract of a register: its epoch, and its number within it.
-pub type ContractKey = (u32, u32);
 
 /// The number of commands whose reports nobody waits for.
 const UNANSWERED: u32 = 0;

@@ -243,10 +243,17 @@ impl Runner {
         Ok(runner)
     }
 
-    /// With a deliberative planner beside the cycles.
+    /// With a deliberative planner beside the cycles. What it has to know of a former life is asked for.
     #[must_use]
     pub fn with_deliberator(mut self, deliberator: SharedDeliberator) -> Self {
-        self.deliberation = Some(Deliberation::new(deliberator));
+        let deliberation = Deliberation::new(deliberator);
+        if let Some((timeline, contract)) = deliberation.unresolved() {
+            let mut registers = self.outgoing.iter_mut();
+            if let Some(one) = registers.find(|one| one.setup.timeline == timeline) {
+                one.controlling.ask(contract);
+            }
+        }
+        self.deliberation = Some(deliberation);
         self
     }
 
@@ -260,11 +267,6 @@ impl Runner {
     /// The model.
     pub fn model(&self) -> &Arc<Model> {
         self.service.model()
-    }
-
-    /// The plan database.
-    pub fn service(&self) -> &dyn PlanService {
-        &*self.service
     }
 
     /// Keeps what was delivered at an instant.
@@ -370,7 +372,10 @@ impl Runner {
                 }
                 false
             }
-            Arrival::Status(status) => self.post_status(peer, &status, cycle),
+            Arrival::Status(status) => {
+                !self.answer_question(peer, &status, memory, cycle)
+                    && self.post_status(peer, &status, cycle)
+            }
             Arrival::Load(load) => self.take(peer, load, memory, now, cycle),
             Arrival::Offline(offline) => {
                 let why = format!("is off-line: {}", offline.reason);
@@ -429,9 +434,13 @@ impl Runner {
                 self.told[peer] = now;
                 cycle.out.push(Out::Load(peer, load, before));
             }
+            if let Some((question, before)) = one.controlling.repeat_question(now) {
+                self.told[peer] = now;
+                cycle.out.push(Out::Status(peer, question, before));
+            }
         }
         for (one, controlled) in self.incoming.iter().zip(memory) {
-            while let Some((status, before)) = controlled.repeat(now) {
+            if let Some((status, before)) = controlled.repeat(now) {
                 cycle.out.push(Out::Status(one.setup.peer, status, before));
             }
         }

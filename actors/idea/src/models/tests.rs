@@ -1,22 +1,25 @@
 //! The K9's models: proved, driven at random, and case by case.
 
-/// Makes a test of each case with the thorough model and with the light one.
+/// Makes a test of each case with each model and each technology.
 macro_rules! cases {
     ($($name:ident,)*) => {
         /// All of them.
-        pub(super) const CASES: &[(&str, fn(&System))] = &[$((stringify!($name), $name),)*];
+        pub(super) const CASES: &[(&str, fn(&Planned))] = &[$((stringify!($name), $name),)*];
 
-        mod thorough {
+        cases!(thorough, system, Temporal, $($name)*);
+        cases!(thorough_propositional, system, Propositional, $($name)*);
+        cases!(thorough_compiled, system, Compiled, $($name)*);
+        cases!(light, light, Temporal, $($name)*);
+        cases!(light_propositional, light, Propositional, $($name)*);
+        cases!(light_compiled, light, Compiled, $($name)*);
+    };
+    ($of:ident, $model:ident, $technology:ident, $($name:ident)*) => {
+        mod $of {
             $(#[test]
             fn $name() {
-                super::$name(crate::models::system());
-            })*
-        }
-
-        mod light {
-            $(#[test]
-            fn $name() {
-                super::$name(crate::models::light());
+                let system = crate::models::$model().clone();
+                let technology = crate::config::Technology::$technology;
+                super::$name(&crate::models::tests::Planned { system, technology });
             })*
         }
     };
@@ -33,12 +36,41 @@ mod rover;
 use farside_planning::language::{Options, format, read_model};
 
 use super::*;
+use crate::config::Technology;
+use crate::service::PlanService;
+use crate::service::compiled::Compiled;
+use crate::service::propositional::Propositional;
 use crate::service::temporal::{Temporal, TemporalOptions};
 
 /// The temporal technology with a model.
 fn temporal(system: &System) -> Temporal {
     let service = Temporal::new(system.model.clone(), TemporalOptions::default());
     service.expect("all timelines are states")
+}
+
+/// A model, and what plans with it.
+struct Planned {
+    system: System,
+    technology: Technology,
+}
+
+impl std::ops::Deref for Planned {
+    type Target = System;
+
+    fn deref(&self) -> &System {
+        &self.system
+    }
+}
+
+impl Planned {
+    fn service(&self) -> Box<dyn PlanService> {
+        let model = self.model.clone();
+        match self.technology {
+            Technology::Temporal => Box::new(temporal(self)),
+            Technology::Propositional => Box::new(Propositional::new(model).expect("it fits")),
+            Technology::Compiled => Box::new(Compiled::new(model).expect("it fits")),
+        }
+    }
 }
 
 #[test]

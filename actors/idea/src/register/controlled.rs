@@ -1,6 +1,7 @@
 //! The controlled side: takes procedures, each at most once and in order, and says what becomes of
 //! them. All of it is durable.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use farside::SimTime;
@@ -23,9 +24,9 @@ pub struct Controlled {
     said: Option<RegisterStatus>,
     /// Until it is acknowledged: how often it was said, and when it is to be said again.
     unheard: Option<(u32, SimTime)>,
-    /// How the last contract of an earlier life of the controlling side ended, until that is
-    /// acknowledged: that life may not have heard of it.
-    owed: Option<(RegisterStatus, u32, SimTime)>,
+    /// How the last contract of each former life of the controlling side ended, of those lives that
+    /// loaded any: a later life may ask.
+    former: Vec<RegisterStatus>,
 }
 
 /// What a load is to the controlled side.
@@ -52,7 +53,7 @@ impl Controlled {
             is_open: false,
             said: None,
             unheard: None,
-            owed: None,
+            former: Vec::new(),
         }
     }
 
@@ -71,9 +72,9 @@ impl Controlled {
         self.is_open
     }
 
-    /// Takes a load, if it is the next one. What went on before it is over: its status is not owed any
-    /// more, unless the controlling side has begun a new life, which is told how the last contract of
-    /// its former life ended.
+    /// Takes a load, if it is the next one. What went on before it is over: its status is not said any
+    /// more, but if the load is the first of a new life of the controlling side, that life may
+    /// [ask](Controlled::asked) for it.
     pub fn take(&mut self, load: &RegisterLoad, now: SimTime) -> Taken {
         if load.epoch < self.epoch || load.number == 0 {
             return Taken::Old;
@@ -96,8 +97,7 @@ impl Controlled {
             if self.is_open {
                 self.say(Vec::new(), ContractEnd::Fault, now);
             }
-            let unheard = self.unheard.and(self.said.take());
-            self.owed = unheard.map(|status| (status, 0, now));
+            self.former.extend(self.said.take());
         }
         self.epoch = load.epoch;
         self.number = load.number;
@@ -155,23 +155,11 @@ impl Controlled {
 
     /// When something is to be said again.
     pub fn due(&self) -> Option<SimTime> {
-        let owed = self.owed.as_ref().map(|(_, _, again)| *again);
-        self.unheard
-            .map(|(_, again)| again)
-            .into_iter()
-            .chain(owed)
-            .min()
+        self.unheard.map(|(_, again)| again)
     }
 
-    /// What is said again now, and how often it was said before; nothing if it is not time. There may
-    /// be something else to say at the same time: it is to be asked until there is nothing.
+    /// What is said again now, and how often it was said before; nothing if it is not time.
     pub fn repeat(&mut self, now: SimTime) -> Option<(RegisterStatus, u32)> {
-        if let Some((status, times, again)) = self.owed.as_mut().filter(|owed| owed.2 <= now) {
-            let before = *times;
-            *times = before.saturating_add(1);
-            *again = now + self.backoff.after(*times);
-            return Some((status.clone(), before));
-        }
         let (times, _) = self.unheard.filter(|(_, again)| *again <= now)?;
         let status = self.said.clone()?;
         let next = times.saturating_add(1);
@@ -184,12 +172,37 @@ impl Controlled {
         let Acknowledged::Status { revision } = ack.of else {
             return;
         };
-        let is_last = self
-            .said
-            .as_ref()
-            .is_some_and(|said| said.revision <= revision);
-        if ack.epoch == self.epoch && ack.number == self.number && is_last {
+        let is_heard = |said: &RegisterStatus| {
+            (said.epoch, said.number) == (ack.epoch, ack.number) && said.revision <= revision
+        };
+        if self.said.as_ref().is_some_and(is_heard) {
             self.unheard = None;
         }
+    }
+
+    /// A later life of the controlling side asks what has become of a contract. Nothing is said as long
+    /// as that contract may still begin or end: the life that loaded it is over only when a later one has
+    /// loaded something.
+    pub fn asked(&self, question: &RegisterStatus) -> Option<RegisterStatus> {
+        if question.epoch >= self.epoch {
+            return None;
+        }
+        let last = self.former.iter().find(|one| one.epoch == question.epoch);
+        let end = match last.map(|last| (last, last.number.cmp(&question.number))) {
+            Some((last, Ordering::Equal)) => return Some(last.clone()),
+            // That life itself has set another procedure in its place.
+            Some((_, Ordering::Greater)) => ContractEnd::Fault,
+            Some((_, Ordering::Less)) | None => ContractEnd::Refused {
+                reason: "it never came".to_owned(),
+            },
+        };
+        Some(RegisterStatus {
+            register: self.register.clone(),
+            epoch: question.epoch,
+            number: question.number,
+            revision: 0,
+            outputs: Vec::new(),
+            end,
+        })
     }
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use farside::SimTime;
 
 use super::{
-    Acknowledged, Backoff, ContractEnd, RegisterAck, RegisterLoad, RegisterStatus, RegisterValue,
+    Acknowledged, Backoff, ContractEnd, ContractKey, RegisterAck, RegisterLoad, RegisterStatus,
+    RegisterValue,
 };
 
 /// The controlling side of a register.
@@ -28,6 +29,16 @@ pub struct Controlling {
     times: u32,
     /// Until it is acknowledged: when it is to be said again.
     again: Option<SimTime>,
+    question: Option<Question>,
+}
+
+/// What a new life asks until it is answered.
+#[derive(Clone, Copy, Debug)]
+struct Question {
+    contract: ContractKey,
+    /// How often it was asked.
+    times: u32,
+    again: SimTime,
 }
 
 /// What a status is to the controlling side.
@@ -42,6 +53,13 @@ pub enum Heard {
     },
     /// Nothing new of the present contract.
     Again,
+    /// The end of a contract of a former life, which was asked for.
+    Answer {
+        /// Its outputs.
+        outputs: Vec<Option<RegisterValue>>,
+        /// How it is over.
+        end: ContractEnd,
+    },
     /// Of a contract that is over here, or of another epoch.
     Stale,
 }
@@ -60,6 +78,7 @@ impl Controlling {
             present: None,
             times: 0,
             again: None,
+            question: None,
         }
     }
 
@@ -148,6 +167,16 @@ impl Controlling {
     /// What a status is. News is to be acknowledged once it was acted upon, and so is what is heard
     /// again or is stale ([`Controlling::ack`]).
     pub fn status(&mut self, status: &RegisterStatus) -> Heard {
+        let contract = (status.epoch, status.number);
+        let is_asked = |question: &mut Question| {
+            question.contract == contract && status.end != ContractEnd::Open
+        };
+        if self.question.take_if(is_asked).is_some() {
+            return Heard::Answer {
+                outputs: status.outputs.clone(),
+                end: status.end.clone(),
+            };
+        }
         if !self.is_mine(status.epoch, status.number) {
             return Heard::Stale;
         }
@@ -161,6 +190,37 @@ impl Controlling {
             outputs: status.outputs.clone(),
             end: status.end.clone(),
         }
+    }
+
+    /// Asks what has become of a contract that a former life has loaded, again and again until it is
+    /// answered ([`Heard::Answer`]).
+    pub fn ask(&mut self, contract: ContractKey) {
+        self.question = Some(Question {
+            contract,
+            times: 0,
+            again: SimTime::ZERO,
+        });
+    }
+
+    /// What is asked now, and how often it was asked before; nothing if it is not time. Nothing is asked
+    /// before the other side has taken a load of this life: it would not be answered.
+    pub fn repeat_question(&mut self, now: SimTime) -> Option<(RegisterStatus, u32)> {
+        let is_taken = self.number > 0 && self.again.is_none();
+        let question = self.question.as_mut();
+        let question = question.filter(|question| is_taken && question.again <= now)?;
+        let before = question.times;
+        question.times = before.saturating_add(1);
+        question.again = now + self.backoff.after(question.times);
+        let (epoch, number) = question.contract;
+        let asked = RegisterStatus {
+            register: self.register.clone(),
+            epoch,
+            number,
+            revision: 0,
+            outputs: Vec::new(),
+            end: ContractEnd::Open,
+        };
+        Some((asked, before))
     }
 
     /// Whether the present contract is open: no status has ended it.

@@ -267,10 +267,18 @@ impl Handler<RegisterAck> for RelayActor {
     }
 }
 
-/// Relays control nobody.
+/// Relays control nobody: this is a question of a new life of the agent.
 impl Handler<RegisterStatus> for RelayActor {
-    fn handle(&mut self, _: RegisterStatus, _: &mut Context<'_, Self>) -> Outcome {
-        Ok(())
+    fn handle(&mut self, question: RegisterStatus, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.hear(ctx);
+        self.set_timer(ctx);
+        let Some(register) = self.place(&question.register) else {
+            return Ok(());
+        };
+        match ctx.durable::<Memory>().0[register].asked(&question) {
+            Some(answer) => self.say(register, answer, 0, ctx),
+            None => Ok(()),
+        }
     }
 }
 
@@ -312,7 +320,7 @@ impl Handler<RelayWakes> for RelayActor {
             self.abandon(&reason, ctx)?;
         }
         for register in 0..self.setup.registers.len() {
-            while let Some((status, before)) = ctx.durable::<Memory>().0[register].repeat(now) {
+            if let Some((status, before)) = ctx.durable::<Memory>().0[register].repeat(now) {
                 self.say(register, status, before, ctx)?;
             }
         }

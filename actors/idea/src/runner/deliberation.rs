@@ -3,11 +3,11 @@
 
 use std::sync::{MutexGuard, PoisonError};
 
-use farside_planning::model::TimelineId;
+use farside_planning::model::{PredicateId, TimelineId, Value};
 
 use super::{Cycle, Runner};
-use crate::deliberator::{Deliberator, SharedDeliberator, Work};
-use crate::register::{RegisterStatus, RegisterValue};
+use crate::deliberator::{Deliberator, Late, SharedDeliberator, Work};
+use crate::register::{ContractEnd, ContractKey, RegisterLoad, RegisterValue};
 use crate::service::{Contract, Snapshot};
 use crate::wording;
 
@@ -36,6 +36,11 @@ impl Deliberation {
     pub(super) fn new(planner: SharedDeliberator) -> Self {
         Deliberation { planner, job: None }
     }
+
+    /// The contract of a former life that is to be asked for, and its timeline.
+    pub(super) fn unresolved(&self) -> Option<(TimelineId, ContractKey)> {
+        self.planner().unresolved()
+    }
 }
 
 impl Runner {
@@ -57,10 +62,6 @@ impl Runner {
         }
         cycle.begun.iter().for_each(|token| planner.begun(token));
         cycle.given_up.extend(planner.gives_up());
-        if let Some(timeline) = planner.drops() {
-            self.service.drop_plan(timeline);
-            deliberation.job = None;
-        }
         let timeline = planner.timeline();
         let mut asked = cycle.begun.iter().rev();
         let asked = asked.find(|token| usize::from(token.contract.timeline) == timeline);
@@ -76,16 +77,48 @@ impl Runner {
         });
     }
 
+    /// Somebody has asked for this: a plan that it takes something back of does not go on, not even in
+    /// this cycle.
+    pub(super) fn tell_asked(&mut self, predicate: PredicateId, inputs: &[Value]) {
+        let Some(deliberation) = &mut self.deliberation else {
+            return;
+        };
+        let dropped = {
+            let mut planner = deliberation.planner();
+            planner.asked(predicate, inputs);
+            planner.drops()
+        };
+        if let Some(timeline) = dropped {
+            self.service.drop_plan(timeline);
+            deliberation.job = None;
+        }
+    }
+
+    /// A register was loaded with what begins on its timeline.
+    pub(super) fn tell_loaded(&self, timeline: TimelineId, load: &RegisterLoad) {
+        if let Some(deliberation) = self.deliberation.as_ref() {
+            let contract = (load.epoch, load.number);
+            deliberation.planner().loaded(timeline, contract);
+        }
+    }
+
     /// What has become of a contract that a former life of the agent had loaded.
-    pub(super) fn hear_late(&self, timeline: TimelineId, status: &RegisterStatus) {
+    pub(super) fn hear_late(
+        &self,
+        timeline: TimelineId,
+        contract: ContractKey,
+        outputs: &[Option<RegisterValue>],
+        end: &ContractEnd,
+    ) {
         let Some(deliberation) = self.deliberation.as_ref() else {
             return;
         };
-        let said = match status.outputs.first() {
-            Some(Some(RegisterValue::Symbol(name))) => Some(&**name),
-            _ => None,
+        let late = match (end, outputs.first()) {
+            (ContractEnd::Refused { .. }, _) => Late::NeverBegun,
+            (_, Some(Some(RegisterValue::Symbol(name)))) => Late::Ended(name),
+            _ => Late::Faulted,
         };
-        deliberation.planner().late(timeline, said);
+        deliberation.planner().late(timeline, contract, late);
     }
 
     /// Lets deliberation go on for so many operations, any number with none; how many it took.

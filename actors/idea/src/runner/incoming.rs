@@ -3,7 +3,7 @@
 use farside::SimTime;
 
 use super::{Cycle, Out, RegisterSetup, Runner};
-use crate::register::{ContractEnd, Controlled, RegisterLoad, Taken};
+use crate::register::{ContractEnd, Controlled, RegisterLoad, RegisterStatus, Taken};
 use crate::service::Contract;
 use crate::wording;
 
@@ -60,6 +60,25 @@ impl Runner {
             }
             Taken::Old | Taken::Early => false,
         }
+    }
+
+    /// Answers what a new life of who controls a register asks; whether a status is such a question.
+    pub(super) fn answer_question(
+        &self,
+        peer: usize,
+        question: &RegisterStatus,
+        memory: &[Controlled],
+        cycle: &mut Cycle,
+    ) -> bool {
+        let mine = |one: &Incoming| one.setup.peer == peer && one.setup.name == question.register;
+        let Some(at) = self.incoming.iter().position(mine) else {
+            return false;
+        };
+        let answer = memory[at].asked(question);
+        cycle
+            .out
+            .extend(answer.map(|answer| Out::Status(peer, answer, 0)));
+        true
     }
 
     /// Puts what was taken on its timeline.
@@ -120,9 +139,9 @@ impl Runner {
             return Ok(Some(present.contract));
         }
         let inserted = self.service.insert_goal(timeline, predicate, &inputs);
-        inserted
-            .map(|()| None)
-            .map_err(|refusal| refusal.to_string())
+        inserted.map_err(|refusal| refusal.to_string())?;
+        self.tell_asked(predicate, &inputs);
+        Ok(None)
     }
 
     /// Whoever wanted what a register says is gone: it says its default, if it may.

@@ -56,11 +56,12 @@ impl Runner {
         match heard {
             Heard::Stale => {
                 cycle.stale += 1;
-                if status.epoch < one.controlling.epoch() {
-                    let timeline = one.setup.timeline;
-                    self.hear_late(timeline, status);
-                }
                 false
+            }
+            Heard::Answer { outputs, end } => {
+                let (timeline, contract) = (one.setup.timeline, (status.epoch, status.number));
+                self.hear_late(timeline, contract, &outputs, &end);
+                true
             }
             Heard::Again => false,
             Heard::News { outputs, end } => match end {
@@ -140,7 +141,8 @@ impl Runner {
     /// Loads what has begun into registers.
     pub(super) fn load(&mut self, now: SimTime, cycle: &mut Cycle) {
         let model = self.service.model().clone();
-        for one in &mut self.outgoing {
+        for at in 0..self.outgoing.len() {
+            let one = &mut self.outgoing[at];
             // Of several that began within the cycle the last one is what it says now.
             let mine = |token: &&crate::service::Started| {
                 usize::from(token.contract.timeline) == one.setup.timeline
@@ -161,7 +163,9 @@ impl Runner {
             let load = one
                 .controlling
                 .load(predicate.name.as_str().into(), inputs, now);
-            cycle.out.push(Out::Load(one.setup.peer, load, 0));
+            let (peer, timeline) = (one.setup.peer, one.setup.timeline);
+            self.tell_loaded(timeline, &load);
+            cycle.out.push(Out::Load(peer, load, 0));
         }
     }
 

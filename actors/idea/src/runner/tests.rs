@@ -50,6 +50,10 @@ struct Bench {
 
 impl Bench {
     fn new(budget: u64, lease: SimDuration) -> Self {
+        Bench::begun_at(0, budget, lease)
+    }
+
+    fn begun_at(tick: u64, budget: u64, lease: SimDuration) -> Self {
         let model = read_model("agent.ddl", TEXT, &Options::default()).ok();
         let model = Arc::new(model.unwrap_or_else(|findings| panic!("{findings}")));
         let timeline = |name: &str| {
@@ -78,12 +82,13 @@ impl Bench {
             forgets: true,
         };
         let service = Temporal::new(model, TemporalOptions::default()).expect("it fits");
-        let runner = Runner::new(settings, Box::new(service), &registers, 1, SimTime::ZERO);
+        let begun = SimTime::ZERO + settings.latency * tick;
+        let runner = Runner::new(settings, Box::new(service), &registers, 1, begun);
         let runner = runner.expect("they are right");
         Bench {
             memory: runner.memory(),
             runner,
-            tick: 0,
+            tick,
             above: Controlling::new("up".into(), 1, BACKOFF),
         }
     }
@@ -292,6 +297,119 @@ fn who_is_not_heard_of_within_its_lease_is_faulted_and_taken_back() {
             false => silent + 1,
         };
         assert!(silent < 3, "silent for {silent} ticks");
+    }
+}
+
+/// Those below are heard of, and who wanted it is not.
+#[test]
+fn what_somebody_wanted_who_is_not_heard_of_is_taken_back() {
+    let mut bench = Bench::new(10_000, SimDuration::from_secs(3));
+    bench.cycle();
+    let load = bench.goal(3);
+    let mut cycles = 0;
+    let cycle = loop {
+        let ack = RegisterAck {
+            number: load.number,
+            ..Controlled::new("down".into(), BACKOFF).ack()
+        };
+        bench.arrive(BELOW, Arrival::Ack(ack));
+        let cycle = bench.cycle();
+        cycles += 1;
+        if !cycle.faults.is_empty() {
+            break cycle;
+        }
+        assert!(cycles < 12);
+    };
+    assert_eq!(
+        cycle.faults,
+        ["up: Go taken back: who wanted it was not heard of within its lease"]
+    );
+    assert_eq!(answers(&cycle)[0].outputs, [symbol("PREEMPTED")]);
+}
+
+#[test]
+fn leases_begin_with_a_life() {
+    let mut bench = Bench::begun_at(1_000, 10_000, SimDuration::from_secs(3));
+    bench.cycle();
+    bench.goal(3);
+    assert_eq!(bench.cycle().faults, [""; 0]);
+}
+
+/// A load is acknowledged as often as it comes, and begins once; what came of it is said until who
+/// wanted it has heard it.
+#[test]
+fn each_repetition_of_a_load_is_answered() {
+    let mut bench = Bench::new(10_000, FOR_EVER);
+    bench.cycle();
+    let go = vec![RegisterValue::Number(3)];
+    let load = bench.above.load("Go".into(), go, bench.now());
+    let acks = |cycle: &Cycle| {
+        let is_ack = |out: &&Out| matches!(out, Out::Ack(ABOVE, ack) if ack.number == 1);
+        cycle.out.iter().filter(is_ack).count()
+    };
+    bench.arrive(ABOVE, Arrival::Load(load.clone()));
+    let begun = bench.cycle();
+    assert_eq!((acks(&begun), begun.goals), (1, 1));
+    bench.arrive(ABOVE, Arrival::Load(load.clone()));
+    let again = bench.cycle();
+    assert_eq!((acks(&again), again.goals, again.begun.len()), (1, 0, 0));
+    bench.arrive(BELOW, Arrival::Load(load.clone()));
+    let strange = bench.cycle();
+    assert!(strange.faults[0].contains("no register of mine"));
+    assert_eq!(acks(&strange), 0);
+    let mut down = begun.out.iter().filter_map(|out| match out {
+        Out::Load(BELOW, load, 0) => Some(load),
+        _ => None,
+    });
+    let down = down.next().expect("it is handed on").clone();
+    let ended = bench.status(&down, vec![symbol("ok")]);
+    let status = answers(&ended)[0].clone();
+    bench.arrive(ABOVE, Arrival::Load(load));
+    assert_eq!(answers(&bench.cycle()), [&status]);
+    let said = |bench: &mut Bench, cycles: usize| {
+        (0..cycles)
+            .map(|_| answers(&bench.cycle()).len())
+            .sum::<usize>()
+    };
+    // After 4 s, and after another 8 s.
+    assert_eq!(said(&mut bench, 8), 1);
+    let ack = Controlling::ack(&status);
+    bench.arrive(BELOW, Arrival::Ack(ack.clone()));
+    assert_eq!(said(&mut bench, 20), 1);
+    bench.arrive(ABOVE, Arrival::Ack(ack));
+    assert_eq!(said(&mut bench, 100), 0);
+}
+
+/// What is asked for is what it says by itself: that goes on.
+#[test]
+fn a_default_that_is_asked_for_goes_on() {
+    let mut bench = Bench::new(10_000, FOR_EVER);
+    bench.cycle();
+    let load = bench.above.load("Idle".into(), Vec::new(), bench.now());
+    bench.arrive(ABOVE, Arrival::Load(load));
+    let cycle = bench.cycle();
+    assert_eq!(
+        (cycle.goals, cycle.begun.len(), cycle.ended.len()),
+        (1, 0, 0)
+    );
+    assert!(matches!(cycle.out[..], [Out::Ack(ABOVE, _)]));
+}
+
+#[test]
+fn only_aborts_in_a_row_are_a_fault() {
+    let mut bench = Bench::new(10_000, FOR_EVER);
+    bench.cycle();
+    for _ in 0..3 {
+        for budget in [1, 1, 10_000] {
+            bench.runner.settings.budget = budget;
+            // What it is told has to be decided.
+            let go = vec![RegisterValue::Number(3)];
+            let load = bench.above.load("Go".into(), go, bench.now());
+            bench.arrive(ABOVE, Arrival::Load(load));
+            let is_aborted = bench.cycle().verdict == Verdict::Aborted;
+            assert_eq!(is_aborted, budget == 1);
+            assert!(!bench.runner.is_overrun());
+        }
     }
 }
 

@@ -77,6 +77,7 @@ pub(crate) fn model(node: &Node) -> Arc<Model> {
             })
             .collect();
         let first = hands_on[0];
+        // A goal ends with its first part, if it has not been replaced in the same cycle.
         let _ = writeln!(
             text,
             "(Define_Compatibility
@@ -86,7 +87,8 @@ pub(crate) fn model(node: &Node) -> Arc<Model> {
 (Define_Compatibility
  (SINGLE ((Agent Down{first}_SV) ((Go (?x -> ?status)))))
  :when (!= ?status PREEMPTED)
- :compatibility_spec (ends :condition (SINGLE ((Agent Up{up}_SV) ((Go (?x -> ?status)))))))"
+ :compatibility_spec
+ (OR (ends :condition (SINGLE ((Agent Up{up}_SV) ((Go (?x -> ?status)))))) (AND)))"
         );
     }
     for down in 0..downs {

@@ -9,6 +9,7 @@ mod mission;
 mod mistakes;
 mod pictures;
 mod plant;
+mod relay;
 mod remote;
 mod response;
 mod scenario;

@@ -35,6 +35,7 @@ fn a_goal_that_is_taken_back_is_not_done() {
             .replace("1M/s", "3k/s");
         let run = Run::of(&slow, 1, |_| ());
         assert_eq!(run.figure("goals_total"), 5.0);
+        assert_eq!(run.figure("goals_achieved"), 5.0, "recalled at {recalled}");
         assert_eq!(run.figure("goals_repeated"), 0.0);
         let goals = run.of_timeline("system", "Goal_SV");
         let recalled_s: u64 = recalled

@@ -116,7 +116,11 @@ fn answers(graph: &Graph, times: &Times) -> Vec<f64> {
                     continue;
                 }
                 for ((_, goal), sent) in times.answered.iter().filter(|one| one.0.0 == up) {
-                    note(at, sent.since(times.told[&(down.clone(), *goal)]));
+                    let told = times.told.get(&(down.clone(), *goal));
+                    let told = told.unwrap_or_else(|| {
+                        panic!("{up} was answered for {goal} at {sent}, before {down}")
+                    });
+                    note(at, sent.since(*told));
                 }
             }
         }

@@ -2,7 +2,6 @@
 
 use super::rover::Rover;
 use super::*;
-use crate::service::PlanService;
 use farside_planning::model::Value;
 
 cases! {
@@ -27,7 +26,7 @@ const ROLL: Value = 30;
 const HARD: Value = 46;
 
 /// A rover in a step of the recovery from an alarm, after `n` resumptions, whose alarm is over.
-fn in_recovery(system: &System, alarm: &str, n: usize, step: usize) -> Rover {
+fn in_recovery(system: &Planned, alarm: &str, n: usize, step: usize) -> Rover {
     let mut rover = if n == 0 {
         Rover::new(system)
     } else {
@@ -50,14 +49,14 @@ fn in_recovery(system: &System, alarm: &str, n: usize, step: usize) -> Rover {
     rover
 }
 
-fn resuming(system: &System, n: usize) -> Rover {
+fn resuming(system: &Planned, n: usize) -> Rover {
     let mut rover = in_recovery(system, "roll", n, 2);
     rover.ok();
     assert_eq!(rover.monitor(), format!("Resuming {n}"));
     rover
 }
 
-fn safe(system: &System) -> Rover {
+fn safe(system: &Planned) -> Rover {
     let mut rover = Rover::new(system);
     rover.pitch = Some(HARD);
     rover.cycle();
@@ -73,7 +72,7 @@ fn after(mut rover: Rover, pitch: Value, roll: Value) -> String {
     rover.monitor()
 }
 
-fn an_alarm_stops_a_nominal_rover_and_the_graver_one_counts(system: &System) {
+fn an_alarm_stops_a_nominal_rover_and_the_graver_one_counts(system: &Planned) {
     let new = || Rover::new(system);
     assert_eq!(after(new(), TILT, 0), "Recovery stop tilt 0 0");
     assert_eq!(after(new(), -TILT, 0), "Recovery stop tilt 0 0");
@@ -84,7 +83,7 @@ fn an_alarm_stops_a_nominal_rover_and_the_graver_one_counts(system: &System) {
     assert_eq!(after(new(), 25, 21), "Recovery stop roll 0 0");
 }
 
-fn a_recovery_goes_on_through_lesser_alarms_and_begins_anew_at_graver_ones(system: &System) {
+fn a_recovery_goes_on_through_lesser_alarms_and_begins_anew_at_graver_ones(system: &Planned) {
     for n in 0..=3 {
         for (at, step) in STEPS.iter().enumerate() {
             let tilted = || in_recovery(system, "tilt", n, at);
@@ -113,7 +112,7 @@ fn a_recovery_goes_on_through_lesser_alarms_and_begins_anew_at_graver_ones(syste
     }
 }
 
-fn each_alarm_has_a_sequence_of_its_own(system: &System) {
+fn each_alarm_has_a_sequence_of_its_own(system: &Planned) {
     for (alarm, commands) in [
         ("tilt", ["Stop", "BackUp 10", "TurnInPlace 30"]),
         ("roll", ["Stop", "BackUp 5", "TurnInPlace -45"]),
@@ -133,7 +132,7 @@ fn each_alarm_has_a_sequence_of_its_own(system: &System) {
     }
 }
 
-fn a_step_is_tried_twice_and_then_the_rover_is_safe(system: &System) {
+fn a_step_is_tried_twice_and_then_the_rover_is_safe(system: &Planned) {
     let limits = [6, 60, 60];
     for alarm in ["tilt", "roll"] {
         for (at, step) in STEPS.iter().enumerate() {
@@ -157,7 +156,7 @@ fn a_step_is_tried_twice_and_then_the_rover_is_safe(system: &System) {
     }
 }
 
-fn a_rover_resumes_three_times_and_then_is_safe(system: &System) {
+fn a_rover_resumes_three_times_and_then_is_safe(system: &Planned) {
     for n in 0..=3 {
         for (pitch, roll, alarm) in [(TILT, 0, "tilt"), (0, ROLL, "roll"), (TILT, ROLL, "roll")] {
             let expected = match n {
@@ -176,7 +175,7 @@ fn a_rover_resumes_three_times_and_then_is_safe(system: &System) {
     }
 }
 
-fn a_safe_rover_stays_so_until_an_operator_lets_it_go(system: &System) {
+fn a_safe_rover_stays_so_until_an_operator_lets_it_go(system: &Planned) {
     assert_eq!(after(safe(system), TILT, ROLL), "Safe");
     assert_eq!(after(safe(system), 0, HARD), "Safe");
     let mut rover = safe(system);
@@ -192,7 +191,7 @@ fn a_safe_rover_stays_so_until_an_operator_lets_it_go(system: &System) {
     assert_eq!(rover.monitor(), "Nominal");
 }
 
-fn a_hard_limit_makes_a_rover_safe_from_any_state(system: &System) {
+fn a_hard_limit_makes_a_rover_safe_from_any_state(system: &Planned) {
     for (pitch, roll) in [
         (HARD, 0),
         (-HARD, 0),
@@ -219,7 +218,7 @@ fn a_hard_limit_makes_a_rover_safe_from_any_state(system: &System) {
     }
 }
 
-fn a_step_that_is_done_in_an_alarms_cycle_proceeds(system: &System) {
+fn a_step_that_is_done_in_an_alarms_cycle_proceeds(system: &Planned) {
     for alarm in ["tilt", "roll"] {
         for step in 0..3 {
             for (pitch, roll) in [(TILT, 0), (0, ROLL), (TILT, ROLL)] {
@@ -235,7 +234,7 @@ fn a_step_that_is_done_in_an_alarms_cycle_proceeds(system: &System) {
     }
 }
 
-fn polls_without_answers_make_a_rover_blind_and_it_waits(system: &System) {
+fn polls_without_answers_make_a_rover_blind_and_it_waits(system: &Planned) {
     // Three polls of two ticks each.
     for pitch in [true, false] {
         let mut rover = Rover::new(system);
@@ -266,7 +265,7 @@ fn polls_without_answers_make_a_rover_blind_and_it_waits(system: &System) {
     }
 }
 
-fn two_polls_without_answers_are_no_alarm_if_the_third_has_one(system: &System) {
+fn two_polls_without_answers_are_no_alarm_if_the_third_has_one(system: &Planned) {
     let mut rover = Rover::new(system);
     for _ in 0..20 {
         rover.pitch = None;
@@ -277,7 +276,7 @@ fn two_polls_without_answers_are_no_alarm_if_the_third_has_one(system: &System) 
     }
 }
 
-fn graver_alarms_end_the_wait_of_a_blind_rover_and_of_one_without_power(system: &System) {
+fn graver_alarms_end_the_wait_of_a_blind_rover_and_of_one_without_power(system: &Planned) {
     let waiting = |alarm: &str| {
         let mut rover = Rover::new(system);
         match alarm {
@@ -328,7 +327,7 @@ fn graver_alarms_end_the_wait_of_a_blind_rover_and_of_one_without_power(system: 
     assert_eq!(said, expected);
 }
 
-fn a_rover_that_stays_blind_is_safe_after_three_resumptions(system: &System) {
+fn a_rover_that_stays_blind_is_safe_after_three_resumptions(system: &Planned) {
     let mut rover = Rover::new(system);
     rover.roll = None;
     let mut said = Vec::new();
@@ -346,7 +345,7 @@ fn a_rover_that_stays_blind_is_safe_after_three_resumptions(system: &System) {
 }
 
 /// A poll of temperature or power that nobody answers ends, and another one asks again.
-fn what_is_not_measured_is_asked_again(system: &System) {
+fn what_is_not_measured_is_asked_again(system: &Planned) {
     let mut rover = Rover::new(system);
     (rover.temperature, rover.power) = (None, None);
     rover.cycles(25);

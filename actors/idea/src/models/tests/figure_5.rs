@@ -1,7 +1,7 @@
 //! Figure 5 of the paper, as printed, within a model.
 
 use super::*;
-use crate::service::{Outcome, PlanService};
+use crate::service::Outcome;
 use farside_planning::language::Functions;
 
 /// As printed, without the parenthesis that it lacks.

@@ -2,7 +2,6 @@
 
 use super::rover::Rover;
 use super::*;
-use crate::service::PlanService;
 
 cases! {
     a_goal_is_a_drive_then_the_mast_then_an_image,
@@ -17,7 +16,7 @@ cases! {
 }
 
 /// A rover that drives to a goal.
-fn driving(system: &System) -> Rover {
+fn driving(system: &Planned) -> Rover {
     let mut rover = Rover::new(system);
     rover.goal();
     rover.cycle();
@@ -34,7 +33,7 @@ fn recover(rover: &mut Rover) {
     assert_eq!(rover.monitor(), "Nominal");
 }
 
-fn a_goal_is_a_drive_then_the_mast_then_an_image(system: &System) {
+fn a_goal_is_a_drive_then_the_mast_then_an_image(system: &Planned) {
     let (at, ok) = (system.timelines, system.statuses.ok);
     let mut rover = driving(system);
     rover.ok();
@@ -50,7 +49,7 @@ fn a_goal_is_a_drive_then_the_mast_then_an_image(system: &System) {
     assert_eq!(rover.goal_status(), Some(ok));
 }
 
-fn a_command_that_fails_or_times_out_ends_the_goal(system: &System) {
+fn a_command_that_fails_or_times_out_ends_the_goal(system: &Planned) {
     let (at, ok) = (system.timelines, system.statuses.ok);
     let of = [(at.location, 1_200), (at.pan_tilt, 40), (at.camera, 40)];
     for (done, (timeline, limit)) in of.into_iter().enumerate() {
@@ -75,7 +74,7 @@ fn a_command_that_fails_or_times_out_ends_the_goal(system: &System) {
     }
 }
 
-fn an_alarm_suspends_the_goal_and_it_is_driven_again_once(system: &System) {
+fn an_alarm_suspends_the_goal_and_it_is_driven_again_once(system: &Planned) {
     let at = system.timelines;
     let mut rover = driving(system);
     rover.pitch = Some(30);
@@ -95,7 +94,7 @@ fn an_alarm_suspends_the_goal_and_it_is_driven_again_once(system: &System) {
 
 /// The wheels, the mast and the camera: what each was told to do is told again after the recovery,
 /// from the drive on.
-fn a_step_of_a_goal_that_is_done_as_an_alarm_comes_is_done_again(system: &System) {
+fn a_step_of_a_goal_that_is_done_as_an_alarm_comes_is_done_again(system: &Planned) {
     let (at, ok) = (system.timelines, system.statuses.ok);
     for steps in 0..2 {
         let mut rover = driving(system);
@@ -124,7 +123,7 @@ fn a_step_of_a_goal_that_is_done_as_an_alarm_comes_is_done_again(system: &System
     assert_eq!(rover.says(at.location), "Still");
 }
 
-fn a_goal_that_comes_while_a_rover_recovers_waits_for_the_nominal_state(system: &System) {
+fn a_goal_that_comes_while_a_rover_recovers_waits_for_the_nominal_state(system: &Planned) {
     let at = system.timelines;
     for early in 0..16 {
         let mut rover = Rover::new(system);
@@ -149,7 +148,7 @@ fn a_goal_that_comes_while_a_rover_recovers_waits_for_the_nominal_state(system: 
     }
 }
 
-fn a_safe_rover_ends_its_goal_and_refuses_others(system: &System) {
+fn a_safe_rover_ends_its_goal_and_refuses_others(system: &Planned) {
     let (at, failed) = (system.timelines, Some(system.statuses.failed));
     let mut rover = driving(system);
     rover.pitch = Some(50);
@@ -178,7 +177,7 @@ fn a_safe_rover_ends_its_goal_and_refuses_others(system: &System) {
     );
 }
 
-fn a_goal_that_is_taken_back_or_replaced_stops_what_it_did(system: &System) {
+fn a_goal_that_is_taken_back_or_replaced_stops_what_it_did(system: &Planned) {
     let at = system.timelines;
     let mut rover = driving(system);
     rover.service.advance(rover.tick + 1);
@@ -199,7 +198,7 @@ fn a_goal_that_is_taken_back_or_replaced_stops_what_it_did(system: &System) {
     assert_eq!(rover.says(at.location), "DriveTo 7 8");
 }
 
-fn camera(system: &System) -> i64 {
+fn camera(system: &Planned) -> i64 {
     let symbols = &system.model.symbols;
     symbols
         .iter()
@@ -208,7 +207,7 @@ fn camera(system: &System) -> i64 {
 }
 
 /// A goal's own time counts on while a rover recovers, and its commands end with it.
-fn a_goal_whose_time_is_over_ends_with_what_it_did(system: &System) {
+fn a_goal_whose_time_is_over_ends_with_what_it_did(system: &Planned) {
     let at = system.timelines;
     let mut rover = Rover::new(system);
     rover.goal();
@@ -229,7 +228,7 @@ fn a_goal_whose_time_is_over_ends_with_what_it_did(system: &System) {
     assert_eq!(rover.says(at.location), "Still");
 }
 
-fn the_fan_is_set_in_the_cycle_of_the_reading(system: &System) {
+fn the_fan_is_set_in_the_cycle_of_the_reading(system: &Planned) {
     let mut rover = Rover::new(system);
     rover.temperature = Some(46);
     rover.cycle();

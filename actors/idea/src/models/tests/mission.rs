@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::deliberate::{Begin, Settings, Target, deliberate};
-use crate::service::{Contract, Outcome, PlanService, Present};
+use crate::service::{Contract, Outcome, Present};
 use farside_planning::model::{TimelineId, Value};
 
 /// The mission agent's planner, whose deliberation takes three ticks.

@@ -32,7 +32,10 @@ fn noticed(text: &str) -> Option<&'static str> {
     if !read.findings.is_empty() {
         return Some("a proof");
     }
-    let mutant = System::of(Arc::new(read.value.expect("there are no findings")));
+    let mutant = Planned {
+        system: System::of(Arc::new(read.value.expect("there are no findings"))),
+        technology: Technology::Temporal,
+    };
     let cases = alarms::CASES.iter().chain(goals::CASES);
     for &(name, case) in cases {
         if catch_unwind(AssertUnwindSafe(|| case(&mutant))).is_err() {

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::models::plant::{Chances, Plant};
-use crate::service::PlanService;
 
 /// Runs a plant for so many ticks.
 pub(super) fn run(system: &System, chances: Chances, seed: u64, ticks: i64) -> Plant<Temporal> {

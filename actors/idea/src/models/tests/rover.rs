@@ -1,7 +1,7 @@
 //! A rover whose polls and statuses a test gives tick by tick.
 
 use super::*;
-use crate::service::{Outcome, PlanService, Present};
+use crate::service::{Outcome, Present};
 use farside_planning::model::{TimelineId, Value};
 
 /// No case takes longer.
@@ -9,7 +9,7 @@ const MOST_TICKS: i64 = 5_000;
 
 /// The system agent's planner, and what its polls are answered.
 pub(super) struct Rover {
-    pub(super) service: Temporal,
+    pub(super) service: Box<dyn PlanService>,
     pub(super) system: System,
     pub(super) tick: i64,
     /// \[degrees\]; none, if the answer is lost.
@@ -24,10 +24,10 @@ pub(super) struct Rover {
 
 impl Rover {
     /// After the first cycle.
-    pub(super) fn new(system: &System) -> Rover {
+    pub(super) fn new(system: &Planned) -> Rover {
         let mut rover = Rover {
-            service: temporal(system),
-            system: system.clone(),
+            service: system.service(),
+            system: system.system.clone(),
             tick: -1,
             pitch: Some(0),
             roll: Some(0),

@@ -126,23 +126,65 @@ fn technologies_decide_alike_on_a_rovers_models() {
     }
 }
 
-/// What the table has met it decides alone, and as the plan database does.
+/// What a plant's service decides at a tick.
+fn step<S: PlanService>(plant: &mut Plant<S>, tick: Ticks) -> (Vec<Started>, Vec<Ended>) {
+    plant.step(tick).expect("there always is a plan");
+    let service = &plant.service;
+    (service.started().to_vec(), service.ended().to_vec())
+}
+
+/// Alarms, time-outs, polls and statuses that are late or lost, goals that are taken back.
 #[test]
-fn a_table_decides_as_the_database_does_whatever_happens() {
+fn technologies_decide_alike_on_the_k9_whatever_happens() {
     let system = models::system();
+    let model = || system.model.clone();
     for seed in 0..3 {
-        let temporal = Temporal::new(system.model.clone(), TemporalOptions::default());
+        let temporal = Temporal::new(model(), TemporalOptions::default());
         let temporal = temporal.expect("the model fits");
-        let compiled = Compiled::new(system.model.clone()).expect("the model fits");
-        let mut one = Plant::new(temporal, system, Chances::WILD, seed);
-        let mut other = Plant::new(compiled, system, Chances::WILD, seed);
+        let propositional = Propositional::new(model()).expect("the model fits");
+        let compiled = Compiled::new(model()).expect("the model fits");
+        let mut temporal = Plant::new(temporal, system, Chances::WILD, seed);
+        let mut propositional = Plant::new(propositional, system, Chances::WILD, seed);
+        let mut compiled = Plant::new(compiled, system, Chances::WILD, seed);
         for tick in 0..3_000 {
-            one.step(tick).expect("there always is a plan");
-            other.step(tick).expect("there always is a plan");
-            assert_eq!(one.service.started(), other.service.started(), "at {tick}");
-            assert_eq!(one.service.ended(), other.service.ended(), "at {tick}");
+            let decided = step(&mut temporal, tick);
+            assert_eq!(
+                step(&mut propositional, tick),
+                decided,
+                "seed {seed}, tick {tick}"
+            );
+            assert_eq!(
+                step(&mut compiled, tick),
+                decided,
+                "seed {seed}, tick {tick}"
+            );
         }
-        assert!(other.service.size().transitions > 100);
+        assert!(temporal.stale > 0, "seed {seed}: no status was late");
+        assert!(compiled.service.size().transitions > 100);
+    }
+}
+
+/// What ties times or numbers together only the temporal technology holds; the others say where it is.
+#[test]
+fn what_a_model_has_that_is_no_proposition_is_named() {
+    let model = models::mission().model.clone();
+    assert!(Temporal::new(model.clone(), TemporalOptions::default()).is_ok());
+    let named = "k9-mission.ddl:";
+    let refused = Propositional::new(model.clone()).err();
+    let refused = refused.expect("a plan's horizon is reckoned from its start");
+    let compiled = Compiled::new(model)
+        .err()
+        .expect("nor the table")
+        .to_string();
+    for said in [refused.to_string(), compiled] {
+        assert!(
+            said.contains(named) && said.contains("(Planning)"),
+            "{said}"
+        );
+        assert!(
+            said.contains("only the temporal technology holds this"),
+            "{said}"
+        );
     }
 }
 
