@@ -160,7 +160,7 @@ fn change() -> impl Strategy<Value = Change> {
 
 /// The text of a fork, and from when on it is another run.
 fn fork(base: &Everything, at_ms: u64, changes: &[Change]) -> (String, SimTime) {
-    let at = SimTime::from_millis(at_ms);
+    let at = SimTime::from_nanos(at_ms * 1_000_000);
     let (mut sets, mut tables) = (Vec::new(), String::new());
     for change in changes {
         match change {
@@ -219,7 +219,7 @@ fn from_a_fork_on_links_are_as_set() {
         let records = all.records.lock().unwrap();
         let later = records
             .iter()
-            .filter(|(time, _)| *time >= SimTime::from_millis(from));
+            .filter(|(time, _)| *time >= SimTime::from_nanos(from * 1_000_000));
         let lost = later.clone().filter(|(_, text)| text.starts_with("lost"));
         (
             lost.count(),
