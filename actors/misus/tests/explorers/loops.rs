@@ -292,3 +292,22 @@ fn what_a_drive_comes_too_late_for_is_no_reason_to_plan_without_end() {
         told(&ran.diary, "")
     );
 }
+
+#[test]
+fn on_a_market_rovers_bid_what_a_goal_adds_to_their_plans() {
+    let text = alone("survey.protocol = 'market'\n").replace("team.rovers = 1", "team.rovers = 2");
+    let ran = Run {
+        text: &text,
+        hours: 8,
+        ..Run::default()
+    }
+    .run();
+    assert!(
+        ran.results.violations.is_empty(),
+        "{:?}",
+        ran.results.violations
+    );
+    check_order(&ran.diary);
+    let done = count(&ran.diary, |_, end| end == ActivityEnd::Done);
+    assert!(done >= 6, "{}", told(&ran.diary, ""));
+}
