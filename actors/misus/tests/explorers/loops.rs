@@ -279,8 +279,8 @@ fn plans_from_nothing_look_at_more_than_plans_that_go_on() {
 
 #[test]
 fn what_a_drive_comes_too_late_for_is_no_reason_to_plan_without_end() {
-    let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 6\nopens = '4h30min'\n\
-        closes = '5h'\n[[rover.fault]]\nat = '4h'\nkind = 'never-ends'\npart = 'wheels'\nduration = '3h'\n";
+    let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 6\nadded = '4h1min'\n\
+        closes = '4h40min'\n[[rover.fault]]\nat = '4h'\nkind = 'never-ends'\npart = 'wheels'\nduration = '3h'\n";
     let ran = run(more, 7, &[]);
     let drive = ends(&ran.diary)
         .into_iter()
