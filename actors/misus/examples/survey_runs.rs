@@ -11,6 +11,9 @@ use survey::Run;
 
 const ROVER_1_SILENT: &str = "links.\"rover_01-*\".outage = true";
 
+/// Hosts that crash: when, and when they start again if they do \[h\].
+type Crashes = &'static [(&'static str, f64, Option<f64>)];
+
 fn main() {
     let seeds = std::env::args().nth(1).and_then(|word| word.parse().ok());
     let seeds: u64 = seeds.unwrap_or(1);
@@ -35,9 +38,9 @@ fn main() {
     );
     let election = "survey.election = \"30min\"";
     let loss = |loss: &str| format!("links.default.loss = {loss}");
-    let central_out: &[(&str, f64, Option<f64>)] = &[("lander", 5.0, Some(29.66))];
-    let rover_2_lost: &[(&str, f64, Option<f64>)] = &[("rover_02", 5.0, None)];
-    let runs: Vec<(&str, String, &[(&str, f64, Option<f64>)])> = vec![
+    let central_out: Crashes = &[("lander", 5.0, Some(29.66))];
+    let rover_2_lost: Crashes = &[("rover_02", 5.0, None)];
+    let runs: Vec<(&str, String, Crashes)> = vec![
         ("healthy", String::new(), &[]),
         ("batch", "execution.mode = \"batch\"".to_owned(), &[]),
         ("rover_02 lost at noon", String::new(), rover_2_lost),

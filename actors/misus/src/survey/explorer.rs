@@ -100,6 +100,8 @@ pub(crate) struct Explorer {
     planned: SimTime,
     /// How long it took to be made \[ms\].
     took_ms: i64,
+    /// What was looked at for bids since the last plan.
+    bid_operations: u64,
     /// Whether the next plan waits until it may be begun.
     is_waiting: bool,
     /// Why what runs is broken off.
@@ -111,6 +113,8 @@ struct InHand {
     plan: Plan,
     cause: ReplanCause,
     number: u32,
+    /// The edition of the list that it is for.
+    edition: u64,
     known: Known,
     /// Whether something has happened that it does not reckon with.
     is_stale: bool,
@@ -155,6 +159,7 @@ impl Explorer {
             has_gained: false,
             planned: SimTime::ZERO,
             took_ms: 0,
+            bid_operations: 0,
             is_waiting: false,
             broken_off: None,
             shared,

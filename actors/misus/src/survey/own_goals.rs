@@ -89,7 +89,7 @@ fn check_goal(scenario: &SurveyScenario, at: usize, goal: &GoalConfig) -> Result
         return Err(wrong(at, "rock", message));
     }
     let half_m = 0.5 * scenario.world.side_m;
-    for (key, place_m) in [("east", goal.east_m), ("north", goal.north_m)] {
+    for (key, place_m) in [("east_m", goal.east_m), ("north_m", goal.north_m)] {
         if place_m.is_nan() || place_m.abs() > half_m {
             let message = format!(
                 "{place_m} m of goal {:?}: outside the terrain, expected within {half_m} m of the middle",

@@ -17,12 +17,12 @@ settings! {
         /// What is done.
         pub observation: Observation = Observation::PointSpectrum,
             one_of(&["panoramic-image", "panoramic-spectrum", "point-image", "point-spectrum"]);
-        /// The rock, by its number from 0; or `east` and `north` are given.
+        /// The rock, by its number from 0; or `east_m` and `north_m` are given.
         pub rock: Option<u32> [skip_serializing_if = "Option::is_none"];
-        /// Where, east of the middle of the field.
-        pub east_m as "east": f64 [with = "units::length_m"] = 0.0, in_unit("m", -1e6..=1e6);
-        /// Where, north of the middle of the field.
-        pub north_m as "north": f64 [with = "units::length_m"] = 0.0, in_unit("m", -1e6..=1e6);
+        /// Where, east of the middle of the field \[m\].
+        pub east_m: f64 = 0.0, in_unit("m", -1e6..=1e6);
+        /// Where, north of the middle of the field \[m\].
+        pub north_m: f64 = 0.0, in_unit("m", -1e6..=1e6);
         /// What it is worth by itself; may be negative.
         pub weight: f64 = 1.0, -1e9..=1e9;
         /// Whether it is planned first and never shed.

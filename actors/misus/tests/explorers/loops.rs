@@ -279,8 +279,8 @@ fn plans_from_nothing_look_at_more_than_plans_that_go_on() {
 
 #[test]
 fn what_a_drive_comes_too_late_for_is_no_reason_to_plan_without_end() {
-    let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 6\nopens = '4h30min'\n\
-        closes = '5h'\n[[rover.fault]]\nat = '4h'\nkind = 'never-ends'\npart = 'wheels'\nduration = '3h'\n";
+    let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 6\nadded = '4h1min'\n\
+        closes = '4h40min'\n[[rover.fault]]\nat = '4h'\nkind = 'never-ends'\npart = 'wheels'\nduration = '3h'\n";
     let ran = run(more, 7, &[]);
     let drive = ends(&ran.diary)
         .into_iter()
@@ -291,4 +291,63 @@ fn what_a_drive_comes_too_late_for_is_no_reason_to_plan_without_end() {
         "{}",
         told(&ran.diary, "")
     );
+}
+
+#[test]
+fn on_a_market_rovers_bid_what_a_goal_adds_to_their_plans() {
+    let text = alone("survey.protocol = 'market'\n").replace("team.rovers = 1", "team.rovers = 2");
+    let ran = Run {
+        text: &text,
+        hours: 8,
+        ..Run::default()
+    }
+    .run();
+    assert!(
+        ran.results.violations.is_empty(),
+        "{:?}",
+        ran.results.violations
+    );
+    check_order(&ran.diary);
+    let done = count(&ran.diary, |_, end| end == ActivityEnd::Done);
+    assert!(done >= 6, "{}", told(&ran.diary, ""));
+}
+
+/// The faults of the scenario that has one of every kind.
+fn every_fault() -> &'static str {
+    let text = include_str!("../../scenarios/faults.toml");
+    let (first, last) = (text.find("[[rover.fault]]"), text.find("[links.default]"));
+    &text[first.expect("it has faults")..last.expect("it has links")]
+}
+
+#[test]
+#[ignore = "two sols of three rovers take minutes in a debug build"]
+fn with_every_kind_of_fault_nothing_is_violated() {
+    for seed in 1..=2 {
+        let run = Run {
+            text: every_fault(),
+            seed,
+            hours: 49,
+            ..Run::default()
+        };
+        let ran = run.run();
+        assert!(
+            ran.results.violations.is_empty(),
+            "{:?}",
+            ran.results.violations
+        );
+        check_order(&ran.diary);
+        for metric in ["plan_violations", "sharing_violations", "lost_goals"] {
+            assert_eq!(ran.results.metrics[metric].as_f64(), Some(0.0), "{metric}");
+        }
+        println!("{}", told(&ran.diary, ""));
+        for metric in [
+            "goals_achieved",
+            "replans",
+            "missed_comm",
+            "brown_outs",
+            "score",
+        ] {
+            println!("{metric} {:?}", ran.results.metrics[metric]);
+        }
+    }
 }

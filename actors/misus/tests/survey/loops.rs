@@ -25,6 +25,7 @@ fn the_loop_turns_and_executors_agree() {
 #[test]
 fn goals_of_a_lost_rover_are_assigned_again_or_given_up() {
     let crash = Run {
+        text: "until = \"1sol\"",
         crashes: &[("rover_02", NOON_H, None)],
         ..Run::default()
     };
@@ -48,8 +49,11 @@ fn a_rover_that_nobody_hears_goes_on_with_its_own_goals() {
 #[test]
 fn loss_and_a_centre_that_is_out_cost_no_goal() {
     for (text, crashes) in [
-        ("links.default.loss = 0.6", &[][..]),
-        ("links.default.loss = 0.9\nsurvey.contact = 0.3", &[]),
+        ("links.default.loss = 0.6\nuntil = \"1sol\"", &[][..]),
+        (
+            "links.default.loss = 0.9\nsurvey.contact = 0.3\nuntil = \"1sol\"",
+            &[],
+        ),
         ("", &[("lander", NOON_H, Some(NOON_H + 20.0))]),
         (
             "survey.election = \"30min\"",

@@ -2,6 +2,7 @@
 //! and what cannot be is said by key.
 
 #[path = "../../examples/support/survey.rs"]
+#[allow(dead_code, reason = "examples use the rest")]
 mod survey;
 
 mod loops;

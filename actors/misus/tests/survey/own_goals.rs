@@ -8,11 +8,11 @@ until = "0.4sol"
 survey = { rocks = 0, squares = 0 }
 team.rovers = 1
 goal = [
-    { name = "a", observation = "panoramic-image", east = "3m", weight = 12.0 },
-    { name = "b", observation = "panoramic-image", north = "3m", weight = 12.0 },
-    { name = "c", observation = "panoramic-image", east = "-3m", weight = 10.0 },
-    { name = "d", observation = "panoramic-image", north = "-3m", weight = 10.0 },
-    { name = "e", observation = "panoramic-image", east = "4m", north = "4m", weight = 10.0 },
+    { name = "a", observation = "panoramic-image", east_m = 3.0, weight = 12.0 },
+    { name = "b", observation = "panoramic-image", north_m = 3.0, weight = 12.0 },
+    { name = "c", observation = "panoramic-image", east_m = -3.0, weight = 10.0 },
+    { name = "d", observation = "panoramic-image", north_m = -3.0, weight = 10.0 },
+    { name = "e", observation = "panoramic-image", east_m = 4.0, north_m = 4.0, weight = 10.0 },
 ]
 combination = [{ goals = ["a", "b"], weight = -30.0 }]
 "#;
@@ -39,8 +39,8 @@ fn goals_are_added_changed_and_withdrawn() {
         until = "0.4sol"
         survey = { rocks = 0, squares = 0 }
         goal = [
-            { name = "first", observation = "panoramic-image", east = "3m", withdrawn = "1min" },
-            { name = "late", observation = "panoramic-image", north = "3m", added = "2h", weight = 1.0,
+            { name = "first", observation = "panoramic-image", east_m = 3.0, withdrawn = "1min" },
+            { name = "late", observation = "panoramic-image", north_m = 3.0, added = "2h", weight = 1.0,
               change = [{ at = "2h1min", weight = 4.0 }] },
         ]
     "#;

@@ -14,8 +14,8 @@ fn check(text: &str, expected: &str) {
 #[test]
 fn goals_that_cannot_be_are_named() {
     check(
-        "goal = [{ name = 'far', east = '41m' }]",
-        "goal.0.east: 41 m of goal \"far\": outside the terrain, expected within 40 m",
+        "goal = [{ name = 'far', east_m = 41.0 }]",
+        "goal.0.east_m: 41 m of goal \"far\": outside the terrain, expected within 40 m",
     );
     check(
         "goal = [{ name = 'a', rock = 90 }]",
@@ -31,7 +31,7 @@ fn goals_that_cannot_be_are_named() {
     );
     check("goal = [{ weight = 1.0 }]", "goal.0.name: missing");
     check(
-        "goal = [{ name = 'a' }, { name = 'a', east = '1m' }]",
+        "goal = [{ name = 'a' }, { name = 'a', east_m = 1.0 }]",
         "goal.1.name: \"a\": expected each name once",
     );
     check(
@@ -119,7 +119,7 @@ fn a_centre_windows_and_protocols_that_cannot_be_are_named() {
     check("survey.loop_every = '0s'", "survey.loop_every: 0s");
     check(
         "survey.protocol_file = 'none.toml'",
-        "survey.protocol_file: none.toml",
+        "survey.protocol_file: ./none.toml: cannot read it",
     );
     check("team.rover = 3", "unknown field `rover`");
 }

@@ -7,7 +7,8 @@ use farside::prelude::*;
 
 use super::{Explorer, millis};
 use crate::analysis::goals::{GoalId, Observation};
-use crate::shac::{GoalKey, Holding, Owner, OwnerError, Reason};
+use crate::planner::problem::ProblemError;
+use crate::shac::{GoalKey, Holding, Owner, OwnerError, Parameters, Reason, SharedGoal};
 use crate::sharing::{RoverMind, RoverMove};
 use crate::survey::costs::Cost;
 use crate::survey::messages::{Activity, ListedGoal, ReplanCause};
@@ -107,7 +108,7 @@ impl Explorer {
 
     /// Says what is to be said to the others, and looks at what has changed by what they say.
     pub(super) fn settle_goals(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
-        self.bid_for_calls();
+        self.bid_for_calls(Self::now_ms(ctx))?;
         self.seat.think(&mut self.desk, ctx)?;
         let now = self.held_keys();
         let lost: Vec<GoalKey> = self.planned_goals().difference(&now).copied().collect();
@@ -210,12 +211,12 @@ impl Explorer {
 
     /// The goals that may be planned.
     pub(super) fn own_goals(&self) -> Vec<OwnGoal> {
-        let goals = self.holdings().filter_map(|holding| self.own_goal(holding));
+        let goals = self.holdings().map(|holding| &holding.goal);
+        let goals = goals.filter_map(|goal| self.own_goal(goal.key, &goal.parameters));
         goals.collect()
     }
 
-    fn own_goal(&self, holding: &Holding) -> Option<OwnGoal> {
-        let (key, parameters) = (holding.goal.key, &holding.goal.parameters);
+    fn own_goal(&self, key: GoalKey, parameters: &Parameters) -> Option<OwnGoal> {
         let listed = self.listed(key);
         let position_m = listed.map_or(parameters.target_m, |listed| listed.position_m);
         let mut cost = self.cost(key)?;
@@ -298,25 +299,40 @@ impl Explorer {
         self.log.searches = Some(before + LEARNS * (now - before));
     }
 
-    /// What called goals would add to the score of the plan.
-    fn bid_for_calls(&mut self) {
-        let Some(owner) = self.seat.owner() else {
-            return;
+    /// What goals that bids are called for would add to the score: by how much a plan that is made with one is
+    /// better than one made without, whatever it displaces.
+    fn bid_for_calls(&mut self, now_ms: i64) -> Outcome {
+        let owner = self.seat.owner().into_iter();
+        let calls: Vec<SharedGoal> = owner.flat_map(Owner::calls).map(|call| call.goal).collect();
+        let Some((_, state)) = self.state.clone().filter(|_| !calls.is_empty()) else {
+            return Ok(());
         };
-        let calls: Vec<GoalKey> = owner.calls().map(|call| call.goal.key).collect();
-        let worth = self.worth();
-        let planned = self.planned_goals();
-        let mut held = self.held_by_others();
-        held.extend(self.achieved());
-        held.extend(&planned);
-        for key in calls {
-            let able = Cost::of(observation(key), &self.shared.rover).is_some();
-            let mut with = held.clone();
-            with.insert(key);
-            let gain = worth.of(&with) - worth.of(&held);
-            let wants = able && gain > 0.0 && !self.desk.refuses.contains_key(&key);
-            self.desk.bids.insert(key, wants.then_some(gain));
+        let has_gained = self.has_gained;
+        let known = self.known(now_ms, &state, ReplanCause::Goals);
+        self.has_gained = has_gained;
+        let (number, before) = (self.log.plans, self.log.plan.as_ref());
+        let failed = |error: ProblemError| HandlerError::new(error.to_string());
+        let without = self.outlook.plan(&known, before, number).map_err(failed)?;
+        self.bid_operations += without.operations;
+        for goal in calls {
+            let own = self.own_goal(goal.key, &goal.parameters);
+            let own = own.filter(|_| self.desk.refuses(goal.key, goal.partner).is_none());
+            let Some(own) = own else {
+                self.desk.bids.insert(goal.key, None);
+                continue;
+            };
+            let mut known = known.clone();
+            let weight = goal.parameters.weight;
+            known.worth.weights.entry(goal.key).or_insert(weight);
+            known.goals.push(own);
+            let with = self.outlook.plan(&known, Some(&without), number);
+            let with = with.map_err(failed)?;
+            self.bid_operations += with.operations;
+            let is_planned = with.goals().any(|planned| planned == goal.key);
+            let bid = is_planned.then_some(with.score - without.score);
+            self.desk.bids.insert(goal.key, bid);
         }
+        Ok(())
     }
 
     /// Drops what is planned for goals that are not held any more. What has begun for one goes on, but for a

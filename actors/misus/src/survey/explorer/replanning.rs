@@ -37,13 +37,16 @@ impl Explorer {
         let number = self.log.plans;
         let before = self.log.plan.as_ref();
         let plan = self.outlook.plan(&known, before, number);
-        let plan = plan.map_err(|error| HandlerError::new(error.to_string()))?;
+        let mut plan = plan.map_err(|error| HandlerError::new(error.to_string()))?;
+        // Bids are worked out on the same processor.
+        plan.operations += std::mem::take(&mut self.bid_operations);
         let takes = self.processor.time_for(ctx.now(), plan.operations);
         self.took_ms = (takes.as_nanos() / 1_000_000) as i64;
         self.in_hand = Some(InHand {
             plan,
             cause,
             number,
+            edition: self.log.list.edition,
             known,
             is_stale: false,
         });
@@ -52,7 +55,7 @@ impl Explorer {
     }
 
     /// What is known now.
-    fn known(&mut self, now_ms: i64, state: &RoverState, cause: ReplanCause) -> Known {
+    pub(super) fn known(&mut self, now_ms: i64, state: &RoverState, cause: ReplanCause) -> Known {
         let fixed = self.fixed(now_ms, state);
         let is_fixed = |goal: &GoalKey| {
             let mut fixed = fixed.iter();
@@ -194,6 +197,7 @@ impl Explorer {
             plan,
             cause,
             number,
+            edition,
             known,
             ..
         } = in_hand;
@@ -210,7 +214,7 @@ impl Explorer {
             number,
             cause,
             mode: self.shared.execution.mode,
-            edition: self.log.list.edition,
+            edition,
             operations: plan.operations,
             moved,
             shed: self.sheds(&plan).iter().map(|(goal, _)| *goal).collect(),
