@@ -104,7 +104,7 @@ fn agents_that_crash_behind_links_that_lose_settle_all_goals() {
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes half a minute"]
 fn agents_that_crash_behind_links_that_lose_settle_all_goals_for_many_seeds() {
     for seed in 10..70 {
         all_goals_are_settled(seed, [0.0, 0.2, 0.4, 0.6][seed as usize % 4]);
