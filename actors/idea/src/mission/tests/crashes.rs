@@ -199,11 +199,8 @@ impl World {
     }
 
     fn mission_cycles(&mut self) {
-        let crash = self.weather.mission.iter();
-        let crash = crash
-            .filter(|crash| crash.tick == self.tick)
-            .next_back()
-            .cloned();
+        let mut crashes = self.weather.mission.iter();
+        let crash = crashes.rfind(|crash| crash.tick == self.tick).cloned();
         if self.mission.is_none() && self.tick >= self.rises {
             self.rise();
         }
