@@ -343,3 +343,31 @@ fn a_new_life_asks_what_became_of_the_last_goal() {
         assert_eq!(sorted[0], sorted[1], "{status}: {found:?}");
     }
 }
+
+/// Its load was lost, and the agent crashed before it could say it again: the goal is sent anew, and is
+/// not given up for that.
+#[test]
+fn a_goal_that_never_began_was_not_tried() {
+    let mut bench = Bench::new();
+    bench.request(1..=1);
+    for _ in 0..=ATTEMPTS {
+        assert!(bench.until_told(600));
+        let (epoch, number) = bench.contract();
+        bench.crash();
+        assert!(!bench.until_told(30));
+        let answer = RegisterStatus {
+            register: "goal".into(),
+            epoch,
+            number,
+            revision: 0,
+            outputs: Vec::new(),
+            end: ContractEnd::Refused {
+                reason: "it never came".to_owned(),
+            },
+        };
+        bench.arrive(SYSTEM, Arrival::Status(answer));
+        assert!(bench.cycle().given_up.is_empty());
+    }
+    bench.go_on(&[]);
+    assert_eq!(bench.places.len() as u32, ATTEMPTS + 2);
+}

@@ -380,6 +380,31 @@ fn each_repetition_of_a_load_is_answered() {
     assert_eq!(said(&mut bench, 100), 0);
 }
 
+/// Whichever of two that come at one instant is handled first; what comes with a tick waits.
+#[test]
+fn a_cycle_reads_what_came_before_it_in_the_order_of_numbers() {
+    for is_swapped in [false, true] {
+        let mut bench = Bench::new(10_000, FOR_EVER);
+        bench.cycle();
+        let mut loads = [3, 4].map(|x| {
+            let go = vec![RegisterValue::Number(x)];
+            bench.above.load("Go".into(), go, bench.now())
+        });
+        if is_swapped {
+            loads.reverse();
+        }
+        for load in loads {
+            bench.arrive(ABOVE, Arrival::Load(load));
+        }
+        let go = vec![RegisterValue::Number(5)];
+        let third = bench.above.load("Go".into(), go, bench.now());
+        let now = bench.now();
+        bench.runner.arrive(now, ABOVE, Arrival::Load(third));
+        assert_eq!(bench.cycle().goals, 2, "{is_swapped}");
+        assert_eq!(bench.cycle().goals, 1, "{is_swapped}");
+    }
+}
+
 /// What is asked for is what it says by itself: that goes on.
 #[test]
 fn a_default_that_is_asked_for_goes_on() {

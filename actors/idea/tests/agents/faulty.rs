@@ -1,6 +1,7 @@
 //! Agents that are too slow, that crash, and relays that do.
 
 use farside::prelude::*;
+use farside::random::RandomKey;
 
 use crate::mission::K9;
 use crate::scenario::{Run, What};
@@ -66,5 +67,46 @@ fn relays_and_mission_agents_that_come_again_go_on() {
         }
         assert_eq!(run.figure("driving_without_lease_s"), 0.0, "{name}");
         assert_eq!(run.figure("goals_achieved"), 6.0, "{name}");
+    }
+}
+
+/// Mission and system agents that crash at any time while links lose much: nothing is lost, and nothing is
+/// done twice. Its load may be under way when the mission agent crashes, or the end of its goal.
+fn all_goals_are_settled(seed: u64, loss: f64) {
+    let links = format!("[links.default]\nloss = {loss}");
+    let text = K9.replace("[links.default]", &links);
+    let text = text.replace("until = \"1h\"", "until = \"6h\"");
+    let mut random = RandomKey::new(seed).text("crashes").stream();
+    let run = Run::of(&text, seed, |sim| {
+        for name in ["mission", "system"] {
+            let mut at_ms = 0;
+            for _ in 0..4 {
+                at_ms += 1000 + random.below(150_000);
+                let at = SimTime::ZERO + SimDuration::from_millis(at_ms);
+                sim.crash_named_at(at, name).expect("there is one");
+                at_ms += random.below(20_000);
+                let at = SimTime::ZERO + SimDuration::from_millis(at_ms);
+                sim.restart_named_at(at, name).expect("there is one");
+            }
+        }
+    });
+    let what = format!("seed {seed}, loss {loss}: {:?}", run.results.summary);
+    let ends = run.figure("goals_achieved") + run.figure("goals_given_up");
+    assert_eq!(ends, run.figure("goals_total"), "{what}");
+    assert_eq!(run.figure("goals_repeated"), 0.0, "{what}");
+}
+
+#[test]
+fn agents_that_crash_behind_links_that_lose_settle_all_goals() {
+    for (seed, loss) in [(1, 0.0), (2, 0.3), (3, 0.6)] {
+        all_goals_are_settled(seed, loss);
+    }
+}
+
+#[test]
+#[ignore = "takes half a minute"]
+fn agents_that_crash_behind_links_that_lose_settle_all_goals_for_many_seeds() {
+    for seed in 10..70 {
+        all_goals_are_settled(seed, [0.0, 0.2, 0.4, 0.6][seed as usize % 4]);
     }
 }
