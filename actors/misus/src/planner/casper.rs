@@ -200,6 +200,35 @@ impl Casper {
         Ok(())
     }
 
+    /// After the last step: of the goals for two rovers only those stay in the plan that the other rover has,
+    /// too. What cannot be reached in time without having been at the others goes, but never a goal for two as
+    /// long as anything else can go: the other rover would be left alone.
+    ///
+    /// # Errors
+    /// When something mandatory cannot be done then; the plan is as it was.
+    pub fn part(
+        &mut self,
+        instance: &Instance,
+        stays: impl Fn(usize) -> bool,
+    ) -> Result<(), Unmet> {
+        let goes = |goal: usize| instance.is_joint(goal) && !stays(goal);
+        let mut chain = self.best.clone();
+        let gone: Vec<usize> = chain.goals(instance).filter(|goal| goes(*goal)).collect();
+        for goal in gone {
+            repair::delete(instance, &mut chain, goal);
+        }
+        while !chain.violation().is_none() {
+            let Some(least) = repair::least_without(instance, &chain) else {
+                break;
+            };
+            chain = least;
+        }
+        self.best = self.settled(instance, chain, &mut 0)?;
+        self.reset(instance);
+        self.assigned.retain(|visit| !goes(visit.task));
+        Ok(())
+    }
+
     /// Takes a plan over, as `(sol, visit)`, from before something changed: continuous planning. Goals that
     /// are not assigned, and those that lack what they require, are left out; activities need not be named,
     /// but what follows one that is named comes after it; what is in conflict then is repaired. Returns what was looked at.

@@ -82,8 +82,8 @@ pub fn run(
         deleted: Vec::new(),
         central_operations: 0,
     };
-    for _ in 0..config.steps {
-        team.round(instance, &mut rounds)?;
+    for step in 1..=config.steps {
+        team.round(instance, &mut rounds, step == config.steps)?;
     }
     team.part(instance)?;
     // What goals for two rovers leave behind counts in the last round.
@@ -171,7 +171,12 @@ impl Team {
         })
     }
 
-    fn round(&mut self, instance: &Instance, rounds: &mut Rounds) -> Result<(), Unmet> {
+    fn round(
+        &mut self,
+        instance: &Instance,
+        rounds: &mut Rounds,
+        is_last: bool,
+    ) -> Result<(), Unmet> {
         let (mut iterations, mut operations, mut shed) = (0, 0, Vec::new());
         for (number, rover) in self.rovers.iter_mut().enumerate() {
             let step = rover.step(instance);
@@ -183,23 +188,30 @@ impl Team {
         // Links carry what is held after a step, and only then what comes of it.
         self.tell(instance);
         self.enter(instance).push(rounds);
+        rounds.iterations.push(f64::from(iterations));
+        rounds.operations.push(operations as f64);
+        let shed_goals = by_goal(&shed);
+        let joint = shed_goals.iter().map(|(goal, _)| *goal);
+        let mut joint: Vec<usize> = joint.filter(|goal| instance.is_joint(*goal)).collect();
+        joint.sort_unstable();
+        // Nobody waits for who does not come; after the last round all part at once.
+        for goal in joint.into_iter().filter(|_| !is_last) {
+            let mut rovers = self.rovers.iter_mut();
+            rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
+        }
         let mut assigned = Vec::new();
-        for (goal, rovers) in by_goal(&shed) {
-            if instance.task(goal).rovers > 1 {
-                // Nobody waits for who does not come.
-                let mut rovers = self.rovers.iter_mut();
-                rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
-            }
-            assigned.extend(self.central.shed_by(instance, goal, &rovers));
+        for (goal, rovers) in &shed_goals {
+            assigned.extend(self.central.shed_by(instance, *goal, rovers));
         }
         if shed.is_empty() {
             assigned.extend(self.central.offer_pool(instance));
         }
         rounds.reassigned += assigned.len() as u64;
-        self.deliver(instance, assigned)?;
-        rounds.iterations.push(f64::from(iterations));
-        rounds.operations.push(operations as f64);
-        Ok(())
+        if is_last {
+            // Nobody plans any more.
+            return Ok(());
+        }
+        self.deliver(instance, assigned)
     }
 
     /// All tell all what they hold.
@@ -220,15 +232,17 @@ impl Team {
 
     /// Takes goals out of plans for which too few rovers have found room.
     fn part(&mut self, instance: &Instance) -> Result<(), Unmet> {
-        let joint = (0..instance.goals()).filter(|goal| instance.task(*goal).rovers > 1);
-        for goal in joint {
-            let holders = self.rovers.iter().filter(|rover| rover.score().holds(goal));
-            if holders.count() < instance.task(goal).rovers as usize {
-                let mut rovers = self.rovers.iter_mut();
-                rovers.try_for_each(|rover| rover.withdraw(instance, goal))?;
-            }
+        let mut holders = vec![0; instance.goals()];
+        for rover in &self.rovers {
+            rover
+                .plan()
+                .goals(instance)
+                .for_each(|goal| holders[goal] += 1);
         }
-        Ok(())
+        let mut rovers = self.rovers.iter_mut();
+        rovers.try_for_each(|rover| {
+            rover.part(instance, |goal| holders[goal] >= instance.task(goal).rovers)
+        })
     }
 
     /// What the plans of all are worth.

@@ -213,7 +213,7 @@ impl RoverPlanner {
         if !memory.assigned.settled || memory.steps < is_last || !instance.has_joint() {
             return Ok(());
         }
-        let parted = memory.part(instance);
+        let parted = memory.part_for_good(instance);
         parted.map_err(|unmet| HandlerError::new(unmet.to_string()))?;
         let plan = memory.casper.plan();
         let sample = PlanSettled {
@@ -280,6 +280,17 @@ impl Memory {
             start_ms: None,
         };
         goals.into_iter().map(half).collect()
+    }
+
+    /// Takes all halves out of the plan that the centre does not name in its last word.
+    fn part_for_good(&mut self, instance: &Instance) -> Result<(), Unmet> {
+        let named: BTreeSet<(u32, u32)> = self.assigned.goals.iter().map(pair).collect();
+        let before = self.halves(instance).len();
+        let assignments = &self.assignments;
+        let stays = |goal: usize| named.contains(&(goal as u32, assignments[goal]));
+        self.casper.part(instance, stays)?;
+        self.withdrawn += (before - self.halves(instance).len()) as u32;
+        Ok(())
     }
 
     /// Gives up the goals for two rovers that the centre has withdrawn: nobody waits for who does not come.

@@ -56,6 +56,26 @@ pub(super) fn delete(instance: &Instance, chain: &mut Chain, goal: usize) -> Vec
     deleted
 }
 
+/// The chain without one of the goals for one rover, the one without which it violates least; None if there is
+/// none that may go.
+pub(super) fn least_without(instance: &Instance, chain: &Chain) -> Option<Chain> {
+    let vehicle = &instance.vehicles()[chain.rover()];
+    let goals = chain.goals(instance);
+    let mut best: Option<(f64, Chain)> = None;
+    for goal in goals.filter(|goal| !instance.is_joint(*goal)) {
+        if !may_be_deleted(instance, chain, goal) {
+            continue;
+        }
+        let mut without = chain.clone();
+        delete(instance, &mut without, goal);
+        let size = without.violation().size(vehicle);
+        if best.as_ref().is_none_or(|(least, _)| size < *least) {
+            best = Some((size, without));
+        }
+    }
+    best.map(|(_, chain)| chain)
+}
+
 /// Whether nothing mandatory would go with a goal.
 fn may_be_deleted(instance: &Instance, chain: &Chain, goal: usize) -> bool {
     !instance.task(goal).mandatory

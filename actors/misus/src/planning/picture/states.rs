@@ -15,7 +15,7 @@ const HEIGHT: f64 = 340.0;
 const LEFT: f64 = 64.0;
 const TOP: f64 = 112.0;
 /// Right of the plot: the legend.
-const LEGEND: f64 = 190.0;
+const LEGEND: f64 = 230.0;
 
 /// What can become of a goal, from below in the picture.
 const STATES: [(&str, &str); 5] = [

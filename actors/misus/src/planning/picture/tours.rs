@@ -2,7 +2,7 @@
 
 use farside_actors::figure::Figure;
 use farside_actors::figure::ground::arrow;
-use farside_actors::figure::svg::{Px, over_lines, path};
+use farside_actors::figure::svg::{Px, path};
 use maud::{Markup, html};
 
 use super::history::History;
@@ -19,7 +19,7 @@ const TOP: f64 = 68.0;
 /// Right of the field: the legend.
 const LEGEND: f64 = 280.0;
 /// How many colours there are for rovers.
-const COLOURS: usize = 8;
+const COLOURS: usize = 7;
 /// How the drives of a sol are dashed.
 const SOLS: [&str; 3] = ["none", "7 4", "2 3"];
 
@@ -109,7 +109,7 @@ impl Map<'_> {
             at = to;
         }
         html! {
-            g class={ "n" (rover % COLOURS) } {
+            g class={ "s" (rover % COLOURS) } {
                 @for (sol, points) in drives {
                     path class="tour" stroke-dasharray=(SOLS[sol % SOLS.len()]) d=(path(points)) {
                         title { (problem.rovers[rover].name) ", sol " (sol + 1) }
@@ -133,7 +133,7 @@ impl Map<'_> {
                     Some(rover) => ("spot", problem.rovers[rover].name.as_str()),
                     None => ("spot open", "nobody"),
                 };
-                g class={ "n" (rover.unwrap_or(0) % COLOURS) } {
+                g class={ "s" (rover.unwrap_or(0) % COLOURS) } {
                     path class=(class) d=(shape(goal.kind, at)) {
                         title { (goal.name) ", worth " (goal.weight) ": " (who) }
                     }
@@ -148,11 +148,12 @@ impl Map<'_> {
     }
 
     fn start(&self, rover: usize) -> Markup {
-        let rover = &self.shared.problem.rovers[rover];
-        let at = self.px(rover.position_m);
+        let of = &self.shared.problem.rovers[rover];
+        let heads = arrow(self.px(of.position_m), 0.5 * std::f64::consts::PI);
         html! {
-            path class="rover" d=(arrow(at, 0.5 * std::f64::consts::PI)) { title { (rover.name) } }
-            (over_lines("who", (at.0 + 11.0, at.1 + 4.0), "start", &rover.name))
+            g class={ "s" (rover % COLOURS) } {
+                path class="spot" d=(heads) { title { (of.name) } }
+            }
         }
     }
 
@@ -174,7 +175,7 @@ impl Map<'_> {
         let mut rows: Vec<(Markup, String)> = Vec::new();
         for (number, rover) in problem.rovers.iter().enumerate() {
             let goals = self.goals(number).count();
-            let class = format!("n{}", number % COLOURS);
+            let class = format!("s{}", number % COLOURS);
             rows.push((
                 line(&class, SOLS[0]),
                 format!("{}: {goals} goals", rover.name),
