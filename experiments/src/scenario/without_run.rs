@@ -56,12 +56,6 @@ impl Scenario {
     ) -> Result<T, E> {
         let links = self.links(files)?.links;
         let mut sim = Simulation::new(seeds.run);
-        work(&mut Setup::new(
-            seeds,
-            self.until(),
-            &mut sim,
-            files,
-            links,
-        ))
+        work(&mut Setup::new(seeds, self.until(), &mut sim, files, links))
     }
 }
