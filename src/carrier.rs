@@ -1,6 +1,8 @@
 //! Links as the kernel sees them: a carrier is shown each message that one host sends to another,
 //! and decides its fate. What makes a radio a radio lives elsewhere; here is the contract.
 
+mod ruled;
+
 use std::any::Any;
 use std::cell::Cell;
 use std::fmt;
@@ -146,7 +148,7 @@ impl Parcel<'_> {
     pub fn is_spared(&self, copy: u32) -> bool {
         match &self.topology.rulings {
             None => false,
-            Some(rulings) => rulings.spares(self, copy),
+            Some(rulings) => ruled::spares(rulings, self, copy),
         }
     }
 

@@ -5,13 +5,12 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use hashbrown::HashMap;
+use rustc_hash::FxBuildHasher;
 use thiserror::Error;
 
-use crate::carrier::{Carriage, Parcel, Verdict, Verdicts};
-use crate::fault::LookupError;
 use crate::ids::{EntityId, KindIndex, MatchKey};
 use crate::time::SimDuration;
-use crate::topology::{EntityRole, FixedMap, RunInfo};
 
 /// Why a message is lost that a ruling loses.
 pub const RULED: &str = "ruled";
@@ -158,55 +157,49 @@ pub enum RulingEnd {
 }
 
 /// The rulings of a run.
+#[derive(Default)]
 pub(crate) struct Rulings {
-    /// Places in `rules` by the flow and the number in it.
-    by_message: FixedMap<Flow, Vec<u32>>,
+    /// Places in `rules` by the message.
+    by_message: HashMap<MessageOf, Vec<u32>, FxBuildHasher>,
     rules: Vec<Rule>,
 }
 
+/// A message of a run, its names resolved.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-struct Flow {
-    sender: EntityId,
-    receiver: EntityId,
-    kind: KindIndex,
-    number: MessageNumber,
+pub(crate) struct MessageOf {
+    pub(crate) sender: EntityId,
+    pub(crate) receiver: EntityId,
+    pub(crate) kind: KindIndex,
+    pub(crate) number: MessageNumber,
 }
 
-struct Rule {
-    copy: u32,
-    ruling: Ruling,
+/// A ruling on one copy of a message, and what came of it.
+pub(crate) struct Rule {
+    pub(crate) copy: u32,
+    pub(crate) ruling: Ruling,
     end: AtomicU8,
 }
 
+impl Rule {
+    /// It met its message.
+    pub(crate) fn met(&self, end: RulingEnd) {
+        self.end.fetch_max(end as u8, Ordering::Relaxed);
+    }
+}
+
 impl Rulings {
-    /// Finds what the names of messages stand for.
-    pub(crate) fn new(
-        declared: &[(MessageId, Ruling)],
-        info: &RunInfo,
-    ) -> Result<Rulings, LookupError> {
-        let mut rulings = Rulings {
-            by_message: FixedMap::default(),
-            rules: Vec::new(),
-        };
-        for (id, ruling) in declared {
-            let flow = Flow {
-                sender: actor(info, &id.sender)?,
-                receiver: actor(info, &id.receiver)?,
-                kind: kind(info, &id.kind)?,
-                number: id.number,
-            };
-            let place = rulings.rules.len() as u32;
-            rulings.by_message.entry(flow).or_default().push(place);
-            rulings.rules.push(Rule {
-                copy: id.copy,
-                ruling: *ruling,
-                end: AtomicU8::new(RulingEnd::NeverMet as u8),
-            });
-        }
-        Ok(rulings)
+    /// Adds one, behind those that are there.
+    pub(crate) fn add(&mut self, message: MessageOf, copy: u32, ruling: Ruling) {
+        let place = self.rules.len() as u32;
+        self.by_message.entry(message).or_default().push(place);
+        self.rules.push(Rule {
+            copy,
+            ruling,
+            end: AtomicU8::new(RulingEnd::NeverMet as u8),
+        });
     }
 
-    /// What came of each, in the order in which they were declared.
+    /// What came of each, in the order in which they were added.
     pub(crate) fn ends(&self) -> Vec<RulingEnd> {
         let end = |rule: &Rule| match rule.end.load(Ordering::Relaxed) {
             0 => RulingEnd::NeverMet,
@@ -216,118 +209,14 @@ impl Rulings {
         self.rules.iter().map(end).collect()
     }
 
-    fn of(&self, parcel: &Parcel<'_>) -> impl Iterator<Item = &Rule> {
-        let flow = |number| Flow {
-            sender: parcel.sender,
-            receiver: parcel.receiver,
-            kind: parcel.kind_index,
-            number,
-        };
-        let by_ordinal = Some(flow(MessageNumber::Ordinal(parcel.ordinal)));
-        let repeat = parcel.repeat;
-        let by_key = parcel
-            .match_key
-            .map(|key| flow(MessageNumber::Key { key, repeat }));
-        let flows = by_ordinal.into_iter().chain(by_key);
-        let places = flows.flat_map(|flow| self.by_message.get(&flow).into_iter().flatten());
-        places.map(|place| &self.rules[*place as usize])
+    /// Those on a message.
+    pub(crate) fn on(&self, message: &MessageOf) -> impl Iterator<Item = &Rule> {
+        let places = self.by_message.get(message);
+        places
+            .into_iter()
+            .flatten()
+            .map(|place| &self.rules[*place as usize])
     }
-
-    /// Whether a copy of the message is to arrive that its link would lose.
-    #[cold]
-    pub(crate) fn spares(&self, parcel: &Parcel<'_>, copy: u32) -> bool {
-        let is_to =
-            |rule: &&Rule| rule.copy == copy && matches!(rule.ruling, Ruling::Deliver { .. });
-        let rule = self.of(parcel).find(is_to);
-        if let Some(rule) = rule {
-            let applied = RulingEnd::Applied as u8;
-            rule.end.fetch_max(applied, Ordering::Relaxed);
-        }
-        rule.is_some()
-    }
-
-    /// Changes what a link has decided of a message.
-    #[cold]
-    pub(crate) fn apply(
-        &self,
-        parcel: &Parcel<'_>,
-        verdicts: &mut Verdicts,
-        min_delay: SimDuration,
-    ) {
-        for rule in self.of(parcel) {
-            let Some(place) = rule.copy.checked_sub(parcel.copy) else {
-                continue;
-            };
-            let Some(verdict) = verdicts.list.get_mut(place as usize) else {
-                continue;
-            };
-            let Some(ruled) = rule.ruling.over(*verdict, min_delay) else {
-                continue;
-            };
-            let end = match ruled == *verdict {
-                true => RulingEnd::WithoutEffect,
-                false => RulingEnd::Applied,
-            };
-            rule.end.fetch_max(end as u8, Ordering::Relaxed);
-            *verdict = ruled;
-        }
-    }
-}
-
-impl Ruling {
-    /// What the ruling makes of a verdict; none of one that is not the last.
-    fn over(self, verdict: Verdict, min_delay: SimDuration) -> Option<Verdict> {
-        let late = |carriage: Option<Carriage>, by: SimDuration| {
-            carriage.map(|carriage| Carriage {
-                queue: carriage.queue + by,
-                ..carriage
-            })
-        };
-        match (self, verdict) {
-            (_, Verdict::Hold { .. } | Verdict::Park { .. }) => None,
-            (Ruling::Lose, Verdict::Deliver { after, carriage }) => Some(Verdict::Lose {
-                after,
-                reason: RULED,
-                carriage,
-            }),
-            (
-                Ruling::Deliver { after: wait },
-                Verdict::Lose {
-                    after, carriage, ..
-                },
-            ) => {
-                let arrives = (after + wait).max(min_delay);
-                Some(Verdict::Deliver {
-                    after: arrives,
-                    carriage: late(carriage, arrives - after),
-                })
-            }
-            (Ruling::Delay(by), Verdict::Deliver { after, carriage }) => Some(Verdict::Deliver {
-                after: after + by,
-                carriage: late(carriage, by),
-            }),
-            (Ruling::Lose | Ruling::Delay(_), lost @ Verdict::Lose { .. }) => Some(lost),
-            (Ruling::Deliver { .. }, arrives @ Verdict::Deliver { .. }) => Some(arrives),
-        }
-    }
-}
-
-fn actor(info: &RunInfo, name: &str) -> Result<EntityId, LookupError> {
-    let entity = info.entity(name);
-    let is_actor = |entity: &EntityId| info.entities[entity.index()].role == EntityRole::Actor;
-    entity.filter(is_actor).ok_or_else(|| {
-        let actors = info.entities.iter();
-        let actors = actors.filter(|entity| entity.role == EntityRole::Actor);
-        LookupError::unknown(name, actors.map(|entity| entity.name.as_str()))
-    })
-}
-
-fn kind(info: &RunInfo, name: &str) -> Result<KindIndex, LookupError> {
-    let names = || info.kinds.iter().map(|kind| kind.name());
-    let found = names().position(|known| known == name);
-    found
-        .map(|at| at as KindIndex)
-        .ok_or_else(|| LookupError::unknown_kind(name, names()))
 }
 
 #[cfg(test)]

@@ -224,7 +224,7 @@ fn from_a_fork_on_links_are_as_set() {
         (
             lost.count(),
             later
-                .filter(|(_, text)| text.starts_with("delivered node"))
+                .filter(|(_, text)| text.starts_with("delivered"))
                 .count(),
         )
     };

@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex};
 use super::{LinkDecl, Planned, Simulation, Target};
 use crate::engine::{Action, ActorCell, CellState, Engine, LinkCell};
 use crate::executor::Ready;
-use crate::fault::{BuildError, Fault, FaultCause, ObserverError};
+use crate::fault::{BuildError, Fault, FaultCause, LookupError, ObserverError};
 use crate::guard::guarded;
 use crate::ids::{EntityId, HostId, KindIndex};
 use crate::random::name_hash;
 use crate::record::{NamedObserver, RESERVED, Wants};
-use crate::ruling::Rulings;
+use crate::ruling::{MessageId, MessageOf, Ruling, Rulings};
 use crate::schedule::{Control, ControlAction, Schedule};
 use crate::time::SimTime;
 use crate::topology::{
@@ -89,7 +89,7 @@ impl Simulation {
         });
         let rulings = match &self.rulings[..] {
             [] => None,
-            declared => Some(Rulings::new(declared, &info)?),
+            declared => Some(resolved(declared, &info)?),
         };
         let topology = Arc::new(Topology {
             owner: self.owner,
@@ -488,4 +488,37 @@ fn check_name(name: &str, extra: &str) -> Result<(), BuildError> {
             name: name.to_owned(),
         })
     }
+}
+
+/// The rulings of a run, what they name resolved.
+fn resolved(declared: &[(MessageId, Ruling)], info: &RunInfo) -> Result<Rulings, LookupError> {
+    let mut rulings = Rulings::default();
+    for (id, ruling) in declared {
+        let message = MessageOf {
+            sender: actor(info, &id.sender)?,
+            receiver: actor(info, &id.receiver)?,
+            kind: kind(info, &id.kind)?,
+            number: id.number,
+        };
+        rulings.add(message, id.copy, *ruling);
+    }
+    Ok(rulings)
+}
+
+fn actor(info: &RunInfo, name: &str) -> Result<EntityId, LookupError> {
+    let entity = info.entity(name);
+    let is_actor = |entity: &EntityId| info.entities[entity.index()].role == EntityRole::Actor;
+    entity.filter(is_actor).ok_or_else(|| {
+        let actors = info.entities.iter();
+        let actors = actors.filter(|entity| entity.role == EntityRole::Actor);
+        LookupError::unknown(name, actors.map(|entity| entity.name.as_str()))
+    })
+}
+
+fn kind(info: &RunInfo, name: &str) -> Result<KindIndex, LookupError> {
+    let names = || info.kinds.iter().map(|kind| kind.name());
+    let found = names().position(|known| known == name);
+    found
+        .map(|at| at as KindIndex)
+        .ok_or_else(|| LookupError::unknown_kind(name, names()))
 }

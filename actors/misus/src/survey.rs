@@ -20,7 +20,6 @@ mod messages;
 mod metrics;
 mod monitor;
 pub mod outlook;
-mod own_goals;
 mod scenario;
 mod science;
 mod shared;

@@ -247,6 +247,7 @@ mod tests {
                 by: "@control".to_owned(),
                 reason: "all rovers have arrived".to_owned(),
             },
+            rulings: Vec::new(),
         }
     }
 

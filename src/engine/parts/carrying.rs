@@ -59,7 +59,8 @@ impl Parts {
         cell.carrier.carry(&parcel, &mut self.verdicts);
         if let Some(rulings) = &topology.rulings {
             let min_delay = topology.links.get(link).map(|link| link.min_delay);
-            rulings.apply(&parcel, &mut self.verdicts, min_delay.unwrap_or_default());
+            let min_delay = min_delay.unwrap_or_default();
+            self.verdicts.rule(rulings, &parcel, min_delay);
         }
         let mut count = cell.count;
         self.execute(link, &mut count, head, letter);

@@ -1,5 +1,7 @@
 //! What a scenario says of a survey, and whether it can be so.
 
+mod own_goals;
+
 use std::sync::Arc;
 
 use farside::suggest;
@@ -12,7 +14,6 @@ use serde::{Deserialize, Serialize};
 use super::config::SurveyConfig;
 use super::costs::Cost;
 use super::execution::ExecutionConfig;
-use super::own_goals;
 use super::wishes::{CombinationConfig, GoalConfig};
 use crate::analysis::goals::Observation;
 use crate::assemble::names;

@@ -71,12 +71,12 @@ fn counts(history: &History, shared: &Shared, at_ns: u64) -> Counts {
     let planned = achieved(&shared.instance, &recorded(&tally));
     let round = history.round(at_ns);
     let mut counts = Counts::default();
-    for goal in 0..shared.instance.goals() {
+    for (goal, &is_planned) in planned.iter().enumerate() {
         let is_in = |list: &[u32]| list.contains(&(goal as u32));
         let state = match round {
             None => 3,
             Some(round) if is_in(&round.deleted) => 4,
-            Some(_) if planned[goal] => 0,
+            Some(_) if is_planned => 0,
             Some(round) if is_in(&round.pooled) => 3,
             Some(round) => {
                 let last = tally.steps.iter().filter_map(|steps| steps.last());

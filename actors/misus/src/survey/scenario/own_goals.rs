@@ -7,10 +7,10 @@ use farside_actors::system::SetupError;
 use farside_worlds::Sky;
 use farside_worlds::sky::SOL_S;
 
-use super::costs::Cost;
-use super::scenario::SurveyScenario;
-use super::wishes::{ChangeConfig, GoalConfig, key_of};
+use super::SurveyScenario;
 use crate::shac::GoalKey;
+use crate::survey::costs::Cost;
+use crate::survey::wishes::{ChangeConfig, GoalConfig, key_of};
 
 /// Checks all of them, one by one and together.
 pub(super) fn check(scenario: &SurveyScenario) -> Result<(), SetupError> {
