@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::*;
-use crate::carrier::{Carrier, NoChange};
+use crate::carrier::{Carrier, NoChange, Parcel, Verdicts};
 use crate::prelude::*;
 use crate::record::{Record, RecordClass};
 
