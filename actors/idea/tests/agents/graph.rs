@@ -242,35 +242,43 @@ impl Graph {
         Graph::register(&controller, down)
     }
 
-    /// The agent whose plant is behind a register; none if there is another agent.
-    pub(crate) fn plant_behind(&self, register: &str) -> Option<usize> {
-        (0..self.nodes.len()).find(|&at| {
-            let leads = self.leads[at].iter().enumerate();
-            let mut plants = leads.filter(|(_, to)| matches!(to, To::Plant));
-            plants.any(|(down, _)| Graph::register(&self.agent_name(at), down) == register)
+    /// The agents that a goal passes on its way from the first one to the plant behind a register; none
+    /// if there is no plant behind it. Agents beside each other have rows of their own: what one of them
+    /// hands on does not wait for the others, and may not be measured by them.
+    pub(crate) fn row_to(&self, register: &str) -> Option<Vec<usize>> {
+        let (mut at, mut down) = self.plant_behind(register)?;
+        let mut row = vec![at];
+        while at != 0 {
+            let mut ups = self.nodes[at].hands_on.iter();
+            let up = ups.position(|hands_on| hands_on.contains(&down));
+            (at, down) = self.leads_to(at, up.expect("a goal is handed on to it"));
+            row.push(at);
+        }
+        row.reverse();
+        Some(row)
+    }
+
+    /// The agent and its outgoing register of a name, if it leads to a plant.
+    fn plant_behind(&self, register: &str) -> Option<(usize, usize)> {
+        let mut all = (0..self.nodes.len())
+            .flat_map(|at| (0..self.leads[at].len()).map(move |down| (at, down)));
+        all.find(|&(at, down)| {
+            matches!(self.leads[at][down], To::Plant)
+                && Graph::register(&self.agent_name(at), down) == register
         })
     }
 
-    /// The agents from the first one to another, by the longest way.
-    pub(crate) fn row_to(&self, last: usize) -> Vec<usize> {
-        let from = |other: usize| {
-            let mut leads = self.leads[other].iter();
-            leads.any(|to| matches!(to, To::Agent(at, _) if *at == last))
-        };
-        let rows = (0..self.nodes.len())
-            .filter(|at| from(*at))
-            .map(|at| self.row_to(at));
-        let latency = |row: &Vec<usize>| row.iter().map(|at| self.nodes[*at].latency).max();
-        let mut row = rows.max_by_key(latency).unwrap_or_default();
-        row.push(last);
-        row
+    fn controller_of(&self, at: usize, up: usize) -> (String, usize) {
+        let (other, down) = self.leads_to(at, up);
+        (self.agent_name(other), down)
     }
 
-    fn controller_of(&self, at: usize, up: usize) -> (String, usize) {
+    /// The agent and its outgoing register that lead to an incoming register of an agent.
+    fn leads_to(&self, at: usize, up: usize) -> (usize, usize) {
         for (other, leads) in self.leads.iter().enumerate() {
             for (down, to) in leads.iter().enumerate() {
                 if matches!(to, To::Agent(a, u) if (*a, *u) == (at, up)) {
-                    return (self.agent_name(other), down);
+                    return (other, down);
                 }
             }
         }
