@@ -1,6 +1,5 @@
 //! Goals that two rovers have to make at one time, over links that lose, repeat and delay: whole or not at all.
 
-use farside::prelude::*;
 use farside::random::RandomKey;
 use farside_misus::planner::instance::Instance;
 use farside_misus::planner::lns::{self, LnsConfig};

@@ -46,8 +46,11 @@ pub(crate) struct Ran {
     pub(crate) plans: Vec<Vec<(usize, usize, i64)>>,
 }
 
+/// The plans that were recorded, each with its rover's name.
+type Plans = Arc<Mutex<Vec<(String, Vec<PlannedStop>)>>>;
+
 /// Keeps the plans of each rover.
-struct Listen(Arc<Mutex<Vec<(String, Vec<PlannedStop>)>>>, Vec<String>);
+struct Listen(Plans, Vec<String>);
 
 impl Observer for Listen {
     fn wants(&self) -> Wants {
