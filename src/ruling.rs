@@ -134,7 +134,7 @@ impl fmt::Display for MessageId {
 pub enum Ruling {
     /// It is lost when it would have arrived, for the reason [`RULED`].
     Lose,
-    /// It arrives. Its link is asked to lose it to no chance ([`Parcel::is_spared`]); if it loses it all the same,
+    /// It arrives. Its link is asked to lose it to no chance ([`Parcel::is_spared`](crate::carrier::Parcel::is_spared)); if it loses it all the same,
     /// it arrives so long after it was lost, and no sooner than its link ever delivers.
     Deliver {
         /// How long after the loss.
