@@ -136,11 +136,27 @@ pub struct FirstDifference {
     pub causes_omitted: u64,
 }
 
+/// When a difference first showed in what an actor says or does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Reached {
+    /// The actor.
+    pub actor: String,
+    /// When, in seconds: the earlier one of the two logs.
+    pub time_s: f64,
+    /// When, in nanoseconds.
+    pub time_ns: u64,
+    /// On which topic.
+    pub topic: String,
+}
+
 /// How one topic differs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TopicDiff {
     /// The topic.
     pub topic: String,
+    /// When the first of its differences is, in nanoseconds; none if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_ns: Option<u64>,
     /// Messages compared in the first log.
     pub a: u64,
     /// Messages compared in the second log.
@@ -192,6 +208,9 @@ pub struct DiffReport {
     /// What else is to be known: a log that is cut, seeds or schemas that differ, what could be
     /// compared by its bytes only.
     pub notes: Vec<String>,
+    /// Whom the difference reached, and when: by actor, the first thing that it says or does otherwise, in order
+    /// of time.
+    pub spread: Vec<Reached>,
     /// The topics that differ, most differences first.
     pub topics: Vec<TopicDiff>,
 }

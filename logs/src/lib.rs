@@ -76,7 +76,9 @@ mod verify;
 mod wire;
 mod writer;
 
-pub use diff::{Carried, Cause, DiffOptions, DiffReport, FirstDifference, TopicDiff, diff};
+pub use diff::{
+    Carried, Cause, DiffOptions, DiffReport, FirstDifference, Reached, TopicDiff, diff,
+};
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;
 pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info};

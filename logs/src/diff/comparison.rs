@@ -7,7 +7,7 @@ use super::entry::{Entry, Mode, Names};
 use super::index::{self, Index};
 use super::matching::{self, Matching, Sequence};
 use super::spill::{BUCKETS, Buckets, Fixed};
-use super::{DiffOptions, DiffReport, FirstDifference, Limits, TopicDiff, Usage};
+use super::{DiffOptions, DiffReport, FirstDifference, Limits, Reached, TopicDiff, Usage};
 use super::{agree, beside, detail, scenario, text};
 use crate::LogError;
 use crate::envelope::seconds;
@@ -286,6 +286,14 @@ impl<'a> Comparison<'a> {
     }
 
     fn found(&mut self, found: Found) {
+        let time_ns = self.when(&found).0;
+        let entry = match &found {
+            Found::Changed(entry, _) | Found::Reordered(entry, _) => entry,
+            Found::OnlyInA(entry) | Found::OnlyInB(entry) => entry,
+        };
+        let topic = entry.topic;
+        let first_ns = &mut self.topic(topic).first_ns;
+        *first_ns = Some(first_ns.map_or(time_ns, |known| known.min(time_ns)));
         let place = (self.when(&found), found.rank());
         let is_earlier = |known: &Option<Found>| match known {
             Some(known) => place < (self.when(known), known.rank()),
@@ -527,6 +535,9 @@ impl<'a> Comparison<'a> {
                 self.report.notes.push(note);
             }
         }
+        if self.mode == Mode::Farside {
+            self.report.spread = spread(self.topics.values());
+        }
         let differing = |topic: &TopicDiff| topic.differences() > 0;
         self.report.topics = self.topics.into_values().filter(differing).collect();
         self.report.topics.sort_by(|a, b| {
@@ -581,4 +592,38 @@ impl<'a> Comparison<'a> {
         first.time_ns = time_ns;
         Ok(first)
     }
+}
+
+/// By actor, when it first says or does something else, in the order in which that was. What links and
+/// control events do is no work of an actor.
+fn spread<'a>(topics: impl Iterator<Item = &'a TopicDiff>) -> Vec<Reached> {
+    let mut reached: BTreeMap<&str, (u64, &str)> = BTreeMap::new();
+    for topic in topics {
+        let Some(time_ns) = topic.first_ns.filter(|_| topic.differences() > 0) else {
+            continue;
+        };
+        let inner = topic.topic.strip_prefix("/timer").unwrap_or(&topic.topic);
+        let of_links = ["/lost/", "/in_flight/", "/hand_over/", "/event/"];
+        let actor = inner
+            .strip_prefix('/')
+            .and_then(|rest| rest.rsplit_once('/'));
+        let Some((actor, _)) = actor.filter(|_| of_links.iter().all(|of| !inner.starts_with(of)))
+        else {
+            continue;
+        };
+        let first = (time_ns, topic.topic.as_str());
+        let known = reached.entry(actor).or_insert(first);
+        *known = first.min(*known);
+    }
+    let mut reached: Vec<Reached> = reached
+        .into_iter()
+        .map(|(actor, (time_ns, topic))| Reached {
+            actor: actor.to_owned(),
+            time_s: seconds(time_ns),
+            time_ns,
+            topic: topic.to_owned(),
+        })
+        .collect();
+    reached.sort_by(|a, b| (a.time_ns, &a.actor).cmp(&(b.time_ns, &b.actor)));
+    reached
 }

@@ -10,6 +10,9 @@ use crate::shown::{Seconds, Shown};
 /// Rows of the table that people are shown, unless they ask for all.
 const ROWS_SHOWN: usize = 15;
 
+/// Actors that a difference has reached, as people are shown.
+const ACTORS_SHOWN: usize = 8;
+
 /// Causes that people are shown.
 const CAUSES_SHOWN: usize = 12;
 
@@ -39,6 +42,7 @@ impl fmt::Display for DiffReport {
             write_first(f, consequence, &names)?;
             write_causes(f, consequence)?;
         }
+        self.write_spread(f)?;
         self.write_table(f)?;
         self.write_not_compared(f)
     }
@@ -85,6 +89,30 @@ pub(super) fn short<'a>(a: &'a Path, b: &'a Path) -> (String, String) {
 }
 
 impl DiffReport {
+    /// Whom it reached when.
+    fn write_spread(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shown = match f.alternate() {
+            true => self.spread.len(),
+            false => ACTORS_SHOWN,
+        };
+        if self.spread.len() < 2 {
+            return Ok(());
+        }
+        writeln!(
+            f,
+            "\nit reached {} actors, in this order",
+            self.spread.len()
+        )?;
+        for reached in self.spread.iter().take(shown) {
+            let (time, actor) = (Seconds(reached.time_ns), Shown(&reached.actor));
+            writeln!(f, "  {time} s  {actor}  on {}", Shown(&reached.topic))?;
+        }
+        match self.spread.len().saturating_sub(shown) {
+            0 => Ok(()),
+            more => writeln!(f, "  and {more} more (--topics lists all)"),
+        }
+    }
+
     fn write_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (a, b) = short(Path::new(&self.file_a), Path::new(&self.file_b));
         writeln!(
@@ -143,7 +171,10 @@ fn write_row(f: &mut fmt::Formatter<'_>, row: &TopicDiff, topics: usize) -> fmt:
     if topics > 1 {
         write!(f, "  ({topics} topics)")?;
     }
-    writeln!(f)
+    match row.first_ns {
+        Some(first_ns) => writeln!(f, "  from {} s", Seconds(first_ns)),
+        None => writeln!(f),
+    }
 }
 
 impl TopicDiff {
@@ -153,6 +184,7 @@ impl TopicDiff {
             ..TopicDiff::default()
         };
         for topic in topics {
+            sum.first_ns = [sum.first_ns, topic.first_ns].into_iter().flatten().min();
             sum.a += topic.a;
             sum.b += topic.b;
             sum.changed += topic.changed;
