@@ -48,6 +48,9 @@
 //! and at the end `farside.end` (digest, counts, why the run ended); a log without it is a prefix.
 //! Attachments: the resolved scenario as `scenario.toml`, and the files that it read.
 //!
+//! MCAP numbers channels in 16 bits: in a run of very many actors those that come last share a topic for each
+//! kind, with `others` in place of their name. Their state samples say what, and not whose.
+//!
 //! 1.2 added `/event/told` and a carriage's `receive_j` and `fragments`. Before 1.3 each actor and each
 //! link had a topic of its own for its events (`/event/crash/node_07`), thousands in one log. A minor
 //! version adds fields, roles or metadata, or says otherwise which topic a record is on: readers go by

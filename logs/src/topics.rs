@@ -34,6 +34,22 @@ pub(crate) fn topic_of(class: RecordClass, sender: &str, receiver: &str, kind: &
     }
 }
 
+/// The topic that records of a topic go to where there can be no more topics: one of all actors for each
+/// kind. The record itself says whose it is.
+pub(crate) fn of_all_actors(topic: &str) -> String {
+    let kind = topic.rsplit('/').next().unwrap_or_default();
+    let classes = ["/timer", "/lost", "/in_flight", "/hand_over", "/state"];
+    let is_of = |class: &&&str| {
+        let rest = topic.strip_prefix(**class);
+        rest.is_some_and(|rest| rest.starts_with('/'))
+    };
+    let class = classes.iter().find(is_of).copied().unwrap_or_default();
+    format!("{class}/{OTHERS}/{kind}")
+}
+
+/// Stands for an actor in topics of all actors that have none of their own.
+const OTHERS: &str = "others";
+
 /// The same in logs before format 1.3, by which their `exclude` is to be read.
 pub(crate) fn topic_before_1_3(
     class: RecordClass,
@@ -97,6 +113,20 @@ impl Topics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn actors_share_topics_by_class_and_kind() {
+        for (own, shared) in [
+            ("/node_01/grant", "/others/grant"),
+            ("/rover_01/hardware/rover_state", "/others/rover_state"),
+            ("/lost/node_01/grant", "/lost/others/grant"),
+            ("/timer/a/b/due", "/timer/others/due"),
+            ("/state/a/pose", "/state/others/pose"),
+            ("/lostling/pose", "/others/pose"),
+        ] {
+            assert_eq!(of_all_actors(own), shared);
+        }
+    }
 
     #[test]
     fn kinds_become_snake_case() {

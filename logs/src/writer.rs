@@ -166,11 +166,26 @@ struct Live {
     checkpoints: u32,
 }
 
+/// The most channels of single actors. MCAP numbers channels in 16 bits; the rest is for those that all other
+/// actors share, and for what is drawn.
+const OWN_CHANNELS: usize = u16::MAX as usize - 8192;
+
 /// Channels and schemas declared so far, by content.
-#[derive(Default)]
 struct Channels {
     schemas: BTreeMap<String, u16>,
     channels: BTreeMap<(String, &'static str, u16), u16>,
+    /// From how many on actors share theirs.
+    own: usize,
+}
+
+impl Default for Channels {
+    fn default() -> Channels {
+        Channels {
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            own: OWN_CHANNELS,
+        }
+    }
 }
 
 impl LogWriter {
@@ -282,6 +297,18 @@ fn put_attachment(file: &mut File, attachment: Attachment, epoch_ns: u64) -> std
 }
 
 impl Channels {
+    /// The topic that takes the records of `topic` once there can be no more channels of single actors; none
+    /// while there can, and for a topic that has its channel.
+    fn topic_of_all(&self, topic: &str) -> Option<String> {
+        if self.channels.len() < self.own {
+            return None;
+        }
+        let first = (topic.to_owned(), "", 0);
+        let mut known = self.channels.range(first..);
+        let is_known = known.next().is_some_and(|((known, ..), _)| known == topic);
+        (!is_known).then(|| topics::of_all_actors(topic))
+    }
+
     /// The channel of `topic` in this role, declared if it is new.
     fn get(
         &mut self,
@@ -355,12 +382,12 @@ impl Live {
                 let kind = flow.kind.as_ref();
                 let name = kind.map_or("", |kind| kind.name());
                 let role = topics::role(flow.class);
+                let shared = self.channels.topic_of_all(&flow.topic);
+                let topic = shared.as_ref().unwrap_or(&flow.topic);
                 // Declarations precede everything that is still to be written.
-                let channel =
-                    self.channels
-                        .get(&mut self.chunk, &flow.topic, role, name, || {
-                            schema_of(flow.class, kind)
-                        })?;
+                let channel = self.channels.get(&mut self.chunk, topic, role, name, || {
+                    schema_of(flow.class, kind)
+                })?;
                 flow.channel = Some(channel);
                 channel
             }
@@ -525,5 +552,48 @@ impl Observer for LogWriter {
                 ))),
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever a run has of actors, it is logged: beyond what MCAP can number, topics are shared by kind.
+    #[test]
+    fn actors_beyond_the_last_channel_share_topics() {
+        let mut channels = Channels {
+            own: 3,
+            ..Channels::default()
+        };
+        let mut chunk = Chunk::default();
+        let mut declare = |topic: &str| {
+            let shared = channels.topic_of_all(topic);
+            let topic = shared.unwrap_or_else(|| topic.to_owned());
+            channels
+                .get(&mut chunk, &topic, "message", "", descriptors::event)
+                .map(|id| (topic, id))
+                .unwrap()
+        };
+        let topics = [
+            "/a/ping",
+            "/b/ping",
+            "/c/ping",
+            "/d/ping",
+            "/lost/d/ping",
+            "/e/ping",
+            "/b/ping",
+        ];
+        let declared: Vec<(String, u16)> = topics.map(&mut declare).into();
+        let expected = [
+            ("/a/ping", 0),
+            ("/b/ping", 1),
+            ("/c/ping", 2),
+            ("/others/ping", 3),
+            ("/lost/others/ping", 4),
+            ("/others/ping", 3),
+            ("/b/ping", 1),
+        ];
+        assert_eq!(declared, expected.map(|(topic, id)| (topic.to_owned(), id)));
     }
 }

@@ -11,7 +11,7 @@ use crate::shown::{Seconds, Shown};
 const ROWS_SHOWN: usize = 15;
 
 /// Actors that a difference has reached, as people are shown.
-const ACTORS_SHOWN: usize = 8;
+const ACTORS_SHOWN: usize = 5;
 
 /// Causes that people are shown.
 const CAUSES_SHOWN: usize = 12;
