@@ -239,7 +239,9 @@ impl Pipeline {
 
     /// Does what there is to do for one message, and says what becomes of it.
     fn look(&mut self, tx: &mut Transmitter, mut look: Look<'_, '_>) {
-        let mut stays = !self.let_out_if_ready(&mut look) && !self.expire(&mut look);
+        // What is kept of a message that was let out expires in a look of its own, as the copy that it is.
+        let mut stays = !self.let_out_if_ready(&mut look)
+            && (self.messages[look.at].is_another() || !self.expire(&mut look));
         // What is kept of a message that was let out is looked at for itself.
         while stays && tx.free_at() <= look.now && !self.messages[look.at].is_another() {
             match self.turn(tx, look.now) {
