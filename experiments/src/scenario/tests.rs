@@ -449,6 +449,6 @@ fn keys_that_moved_to_tables_of_their_policies_are_read_where_they_were() {
     );
     let zero = open(&format!("{bare}network.routes = 0"), &[]);
     let zero = zero.err().expect("it is refused").to_string();
-    let expected = "x.toml:2:18: network.complete.routes: 0: expected at least 1";
+    let expected = "x.toml:2:18: network.complete.routes: 0: expected 1 to 100";
     assert!(zero.contains(expected), "{zero}");
 }
