@@ -177,7 +177,8 @@ fn fork(base: &Everything, at_ms: u64, changes: &[Change]) -> (String, SimTime) 
                     continue;
                 }
                 let (_, id) = later[which.index(later.len())];
-                let (table, by) = [("lose", ""), ("deliver", ""), ("delay", "by = '70ms'")][*what];
+                let (table, by) =
+                    [("lose", ""), ("deliver", ""), ("postpone", "by = '70ms'")][*what];
                 write!(tables, "[[{table}]]\nmessage = {id:?}\n{by}\n").unwrap();
             }
         }
@@ -324,7 +325,7 @@ fn what_cannot_change_in_mid_run_is_refused() {
             "names no message",
         ),
         (
-            "at = '5s'\nset = ['links.default.loss=0.1']\n[[delay]]\nmessage = 'a,b,C,1'",
+            "at = '5s'\nset = ['links.default.loss=0.1']\n[[postpone]]\nmessage = 'a,b,C,1'",
             "over zero",
         ),
     ];

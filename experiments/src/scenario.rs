@@ -44,7 +44,7 @@ pub use fork::Fork;
 pub use location::SourceLocation;
 pub use planned::{Never, Planned};
 pub use reference::shared_sections;
-pub use rulings::{Delay, Deliver, Lose};
+pub use rulings::{Deliver, Lose, Postpone};
 pub(crate) use source::Source;
 
 /// The most bytes of a scenario or study that are read.
@@ -87,7 +87,7 @@ settings! {
         /// Messages that arrive, whatever their links decide.
         pub deliver: Vec<Deliver> [skip_serializing_if = "Vec::is_empty"];
         /// Messages that arrive later than their links decide.
-        pub delay: Vec<Delay> [skip_serializing_if = "Vec::is_empty"];
+        pub postpone: Vec<Postpone> [skip_serializing_if = "Vec::is_empty"];
         /// Other settings from an instant on.
         pub fork: Vec<Fork> [skip_serializing_if = "Vec::is_empty"];
         /// What the log holds.

@@ -297,7 +297,7 @@ fn changed(
     let delay = args.delay.iter();
     add(
         &mut table,
-        "delay",
+        "postpone",
         delay.map(|(id, by)| entry([named(id), ("by", text(*by))])),
     );
     let mut sets = args.sets.clone();

@@ -125,7 +125,7 @@ fn refusal(key: &str) -> &'static str {
         "contacts" => "a contact plan is known from the start, and cannot change in mid-run",
         "radios" => "radios are shared by links from the start, and cannot change in mid-run",
         "places" => "where hosts stand at first cannot change in mid-run",
-        "lose" | "deliver" | "delay" => {
+        "lose" | "deliver" | "postpone" => {
             "this is about single messages whenever they are sent: it goes to the top of the scenario"
         }
         "fork" => "a fork within a fork: expected an entry of its own",

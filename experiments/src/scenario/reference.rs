@@ -7,7 +7,7 @@ use farside_actors::system::{Key, Section};
 
 use super::contacts::ContactsConfig;
 use super::crash::Crash;
-use super::{Delay, Deliver, Fork, LogSettings, Lose, Shared};
+use super::{Deliver, Fork, LogSettings, Lose, Postpone, Shared};
 
 /// The tables that every scenario may have, each with its keys. The first, without a name, holds
 /// those at the top of the file.
@@ -43,7 +43,7 @@ pub fn shared_sections() -> Vec<Section> {
     all.extend(Crash::sections("crash"));
     all.extend(Lose::sections("lose"));
     all.extend(Deliver::sections("deliver"));
-    all.extend(Delay::sections("delay"));
+    all.extend(Postpone::sections("postpone"));
     all.extend(Fork::sections("fork"));
     all.extend(LogSettings::sections("log"));
     all

@@ -1,4 +1,4 @@
-//! The `[[lose]]`, `[[deliver]]` and `[[delay]]` entries of a scenario: what becomes of single messages,
+//! The `[[lose]]`, `[[deliver]]` and `[[postpone]]` entries of a scenario: what becomes of single messages,
 //! whatever links decide.
 
 use farside::ruling::{MessageId, Ruling, RulingEnd};
@@ -28,8 +28,8 @@ settings! {
 }
 
 settings! {
-    /// A `[[delay]]` entry: a message that arrives later than its link decides.
-    pub struct Delay {
+    /// A `[[postpone]]` entry: a message that arrives later than its link decides.
+    pub struct Postpone {
         /// The message, as in `node_03,rover_07,Grant,12`.
         pub message: String;
         /// How much later.
@@ -57,9 +57,10 @@ fn entries(shared: &Shared) -> Vec<Entry<'_>> {
         let after = one.after;
         entry("deliver", at, &one.message, Ruling::Deliver { after })
     });
-    let delay = shared.delay.iter().enumerate();
-    let delay = delay.map(|(at, one)| entry("delay", at, &one.message, Ruling::Delay(one.by)));
-    lose.chain(deliver).chain(delay).collect()
+    let postpone = shared.postpone.iter().enumerate();
+    let postpone =
+        postpone.map(|(at, one)| entry("postpone", at, &one.message, Ruling::Delay(one.by)));
+    lose.chain(deliver).chain(postpone).collect()
 }
 
 /// What is wrong with an entry: the keys from the top, and what was found and expected.

@@ -81,7 +81,9 @@ fn two_runs_are_compared_and_a_cut_log_is_saved() {
     }
     assert!(told.lines().count() < 45, "{told}");
     let all = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--topics"]);
-    assert!(text(&all.stdout).contains("/assignments  from ") && !text(&all.stdout).contains("/node_*"));
+    assert!(
+        text(&all.stdout).contains("/assignments  from ") && !text(&all.stdout).contains("/node_*")
+    );
     let trouble = farside(folder.path(), &["diff", "a.mcap", "missing.mcap"]);
     assert_eq!(trouble.status.code(), Some(2));
 
