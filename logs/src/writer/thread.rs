@@ -7,6 +7,7 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use super::Compression;
 use super::chunk::Chunk;
@@ -30,7 +31,7 @@ pub(super) fn create(
     let file = file.map_err(failed)?;
     // Devices and pipes take what comes, whoever it is from.
     if file.metadata().is_ok_and(|found| found.is_file()) {
-        match file.try_lock() {
+        match locked(&file) {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
                 return Err(LogError::Busy {
@@ -47,6 +48,21 @@ pub(super) fn create(
     McapFile::create(BufWriter::new(file), compression, library(code_version))
         .map_err(|error| LogError::io(path, "write", error))
 }
+
+/// Locks a file. A process that starts another one shares its open files with it for a moment, and with them
+/// the lock of a file that it has closed: what is locked then is free soon.
+fn locked(file: &std::fs::File) -> Result<(), TryLockError> {
+    for _ in 0..PATIENCE {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+            other => return other,
+        }
+    }
+    file.try_lock()
+}
+
+/// How often a lock is tried again.
+const PATIENCE: u32 = 50;
 
 /// What a log says wrote it: this library, or the binary of somebody else's whose version names it.
 fn library(code_version: &str) -> String {
