@@ -162,7 +162,20 @@ fn change() -> impl Strategy<Value = Change> {
 fn fork(base: &Everything, at_ms: u64, changes: &[Change]) -> (String, SimTime) {
     let at = SimTime::from_nanos(at_ms * 1_000_000);
     let (mut sets, mut tables) = (Vec::new(), String::new());
+    // Entries that one change takes away cannot be set by another.
+    let mut tables_set: Vec<&str> = Vec::new();
     for change in changes {
+        let table = match change {
+            Change::Set(set) => ["crash", "degrade"]
+                .into_iter()
+                .find(|root| set.starts_with(root)),
+            Change::Crash(_) => Some("crash"),
+            Change::Message { .. } => None,
+        };
+        if table.is_some_and(|table| tables_set.contains(&table)) {
+            continue;
+        }
+        tables_set.extend(table);
         match change {
             Change::Set("crash.0.at=10s") if at_ms >= 9_000 => {}
             Change::Set(set) => sets.push(format!("{set:?}")),
