@@ -24,6 +24,7 @@ pub mod export;
 pub mod registry;
 pub mod report;
 pub mod scenario;
+mod sequence;
 pub mod stats;
 pub mod study;
 mod version;

@@ -2,6 +2,7 @@
 
 mod agree;
 mod beside;
+mod chain;
 mod comparison;
 mod detail;
 mod entry;
@@ -19,6 +20,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::LogError;
+pub use chain::{CauseChain, CausedBy, causes};
 
 /// How two logs are compared.
 ///

@@ -80,7 +80,8 @@ mod wire;
 mod writer;
 
 pub use diff::{
-    Carried, Cause, DiffOptions, DiffReport, FirstDifference, Reached, TopicDiff, diff,
+    Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FirstDifference, Reached,
+    TopicDiff, causes, diff,
 };
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;

@@ -459,6 +459,24 @@ pub struct LoggedRecord {
 }
 
 impl LoggedRecord {
+    /// The record without its body, for those who want to know what happened and not what was said.
+    ///
+    /// ```no_run
+    /// let mut records = farside_logs::Log::open("run.mcap")?.records()?;
+    /// while let Some((record, channel)) = records.next_ref()? {
+    ///     let kept = farside_logs::LoggedRecord::bodiless(&record, channel);
+    ///     assert!(kept.body.is_empty());
+    /// }
+    /// # Ok::<(), farside_logs::LogError>(())
+    /// ```
+    pub fn bodiless(record: &RecordRef<'_>, channel: &ChannelInfo) -> Self {
+        let record = RecordRef {
+            body: &[],
+            ..*record
+        };
+        LoggedRecord::of(&record, channel)
+    }
+
     fn of(record: &RecordRef<'_>, channel: &ChannelInfo) -> Self {
         LoggedRecord {
             class: record.class,

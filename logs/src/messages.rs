@@ -14,6 +14,8 @@ use crate::log::Log;
 /// A message as a log has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundMessage {
+    /// Its place in its flow.
+    pub ordinal: u64,
     /// When it was sent.
     pub sent: SimTime,
     /// The link that carried it; none within a host.
@@ -70,6 +72,7 @@ pub fn find_messages(
                 copy: record.copy,
                 key: record.match_key.map(MatchKey::from_bits),
                 found: FoundMessage {
+                    ordinal: record.ordinal,
                     sent: SimTime::from_nanos(record.sent_ns),
                     link: (!record.link.is_empty()).then(|| record.link.to_owned()),
                     class: record.class,

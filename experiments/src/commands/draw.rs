@@ -1,10 +1,13 @@
 //! `farside draw`: pictures of a run, from its log. Which there are is for the scenario's system to
-//! say.
+//! say. Of any run: who sent what to whom, as text that other programs draw (`charts`).
+
+mod charts;
 
 use std::path::PathBuf;
 
 use clap::ValueEnum;
 use farside::SimDuration;
+use farside::ruling::MessageId;
 use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
 use farside_actors::system::{
@@ -24,6 +27,7 @@ use super::{CommandError, print, print_json};
 use crate::export::{self, FigureFormat};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
+use crate::sequence::{Actors, Language};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -48,6 +52,18 @@ pub(crate) struct Args {
     /// What it shows besides, as --list says
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     with: Vec<String>,
+    /// Instead of a picture who sent what to whom from --from to --at, as text for Mermaid or PlantUML
+    #[arg(long, value_name = "LANGUAGE", value_enum, conflicts_with_all = ["picture", "list", "along", "with", "format"])]
+    sequence: Option<Language>,
+    /// Instead of a picture which event caused which, as text for Graphviz (dot)
+    #[arg(long, conflicts_with_all = ["picture", "list", "sequence", "along", "with", "format"])]
+    causes: bool,
+    /// With --sequence or --causes: only what these actors send or receive, as a glob; may be repeated
+    #[arg(long = "actor", value_name = "GLOB", conflicts_with_all = ["picture", "list"])]
+    actors: Vec<Actors>,
+    /// With --sequence or --causes: only what led to this message, called as `diff` prints it
+    #[arg(long = "of", value_name = "MESSAGE", conflicts_with_all = ["picture", "list", "from", "at"])]
+    of: Option<MessageId>,
     /// Where to write the picture; beside the log unless given. It is SVG, or what the ending says
     #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
@@ -94,7 +110,7 @@ pub(crate) fn with_pictures(command: clap::Command, registry: &Registry) -> clap
             let option = clap::Arg::new(picture.name)
                 .long(picture.name)
                 .help(format!("The picture {}: {}", picture.name, picture.about))
-                .conflicts_with_all(["picture", "list"])
+                .conflicts_with_all(["picture", "list", "sequence", "causes", "actors", "of"])
                 .help_heading("Pictures");
             command.arg(match picture.takes.contains(&PictureOption::Along) {
                 true => option
@@ -134,6 +150,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let path = &args.log;
     kinds::expect(kinds::FileKind::Log, path, registry)?;
     let log = Log::open(path)?;
+    if charts::are_asked_for(args)? {
+        return charts::run(args, &log);
+    }
     let summary = farside_logs::info(path)?.run.unwrap_or_default();
     let scenario = scenario_of(path, &summary, registry)?;
     // A scenario is read only if its system is known.

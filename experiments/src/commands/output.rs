@@ -30,6 +30,12 @@ pub(super) enum Format {
     Plan,
     /// What there is to plan: all are alike up to the first point, in the version of their format.
     Problem,
+    /// A sequence chart for Mermaid.
+    Mermaid,
+    /// A sequence chart for PlantUML.
+    Plantuml,
+    /// A graph for Graphviz.
+    Dot,
 }
 
 impl Format {
@@ -42,6 +48,9 @@ impl Format {
             Format::Junit => b"name=",
             Format::Plan => b"/",
             Format::Problem => b".",
+            Format::Mermaid => b":",
+            Format::Plantuml => b"title",
+            Format::Dot => b"{",
             Format::Pdf => return &bytes[..bytes.len().min(5)],
             Format::Png => return &bytes[..bytes.len().min(8)],
         };
@@ -58,6 +67,7 @@ impl Format {
             Format::Junit => "JUnit file",
             Format::Plan => "plan",
             Format::Problem => "problem of this kind",
+            Format::Mermaid | Format::Plantuml | Format::Dot => "chart of this kind",
         }
     }
 }

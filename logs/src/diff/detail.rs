@@ -7,6 +7,7 @@ use farside::record::RecordClass;
 use farside::ruling::{MessageId, MessageNumber};
 use mcap::records::MessageHeader;
 
+use super::chain::{self, Step};
 use super::entry::{Entry, Mode, Names};
 use super::index::Index;
 use super::{Carried, Cause, FirstDifference};
@@ -19,9 +20,6 @@ use crate::shown::Seconds;
 
 /// Causes that are listed; beyond them only the last one is.
 const CAUSES_LISTED: usize = 50;
-
-/// Steps back along a chain before it is given up: a bound on damage, far above any real chain.
-const CHAIN_LIMIT: u64 = 10_000_000;
 
 /// A message that is kept while others are read.
 pub(super) struct Held {
@@ -190,45 +188,35 @@ fn is_same_timer(later: &Cause, cause: &Cause) -> bool {
 fn trace(
     index: &mut Index<'_>,
     names: &mut Names,
-    mut next: Option<LoggedKey>,
+    next: Option<LoggedKey>,
     first: &mut FirstDifference,
 ) -> Result<(), LogError> {
-    let mut steps = 0;
-    let mut before = u32::MAX;
     let mut omitted = 0;
     let mut origin: Option<Cause> = None;
-    while let Some(key) = next.take() {
-        // A cause comes before its effect: a log that says otherwise is damaged.
-        let found = index.event(&key.to_ref(), names)?;
-        let found = found.filter(|entry| entry.at < before && steps < CHAIN_LIMIT);
-        let Some(entry) = found else {
-            let unknown = Cause {
-                time_s: seconds(key.time_ns),
-                time_ns: key.time_ns,
-                sender: key.source,
-                fate: "not in the log".to_owned(),
+    chain::walk(index, names, next, |step| {
+        let cause = match step {
+            Step::Event(record, channel) => Cause {
+                time_s: seconds(record.key.time_ns),
+                time_ns: record.key.time_ns,
+                topic: channel.topic.clone(),
+                sender: record.sender.to_owned(),
+                receiver: record.receiver.to_owned(),
+                ordinal: record.ordinal,
+                fate: record.class.name().to_owned(),
                 ..Cause::default()
-            };
-            omitted += origin.replace(unknown).map_or(0, |left| 1 + left.repeats);
-            break;
+            },
+            Step::Unknown(key) => {
+                let unknown = Cause {
+                    time_s: seconds(key.time_ns),
+                    time_ns: key.time_ns,
+                    sender: key.source,
+                    fate: "not in the log".to_owned(),
+                    ..Cause::default()
+                };
+                omitted += origin.replace(unknown).map_or(0, |left| 1 + left.repeats);
+                return;
+            }
         };
-        before = entry.at;
-        let message = index.scanner.message_at(entry.position, entry.channel)?;
-        let Some(record) = RecordRef::read(message.data) else {
-            break;
-        };
-        let cause = Cause {
-            time_s: seconds(record.key.time_ns),
-            time_ns: record.key.time_ns,
-            topic: message.channel.topic.clone(),
-            sender: record.sender.to_owned(),
-            receiver: record.receiver.to_owned(),
-            ordinal: record.ordinal,
-            fate: record.class.name().to_owned(),
-            ..Cause::default()
-        };
-        next = record.cause.map(|key| LoggedKey::of(&key));
-        steps += 1;
         let last = origin.as_mut().or(first.causes.last_mut());
         if let Some(last) = last.filter(|last| is_same_timer(last, &cause)) {
             last.repeats += 1;
@@ -238,7 +226,7 @@ fn trace(
         } else {
             omitted += origin.replace(cause).map_or(0, |left| 1 + left.repeats);
         }
-    }
+    })?;
     first.causes.extend(origin);
     first.causes_omitted = omitted;
     Ok(())
