@@ -322,6 +322,23 @@ impl Simulation {
         self.actors.iter().map(|actor| actor.name.as_str())
     }
 
+    /// The name of the host that an actor declared so far is on.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// # struct Idle;
+    /// # impl Actor for Idle { type Accepts = (); }
+    /// let mut sim = Simulation::new(1);
+    /// let host = sim.host("rover_01");
+    /// sim.actor(host, "arm_01", |_| Idle);
+    /// assert_eq!(sim.host_of_named("arm_01"), Some("rover_01"));
+    /// assert_eq!(sim.host_of_named("arm_02"), None);
+    /// ```
+    pub fn host_of_named(&self, actor: &str) -> Option<&str> {
+        let actor = &self.actors[*self.actor_numbers.get(actor)? as usize];
+        Some(&self.hosts[actor.host.index()].name)
+    }
+
     /// The names of all hosts declared so far, in order of declaration.
     pub fn host_names(&self) -> impl Iterator<Item = &str> {
         self.hosts.iter().map(|host| host.name.as_str())

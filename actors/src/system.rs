@@ -4,6 +4,7 @@
 //!
 //! What this is not: the list of systems that a program knows, which is the program's.
 
+mod account;
 mod builtin;
 mod documented;
 mod error;
@@ -26,6 +27,7 @@ use serde_json::{Map, Value};
 use crate::link::{Degrade, LinkConfigError};
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
+pub use account::{Account, Doing, Phase};
 pub use builtin::Builtin;
 pub use documented::{parted, with_about};
 pub use error::SetupError;
@@ -138,6 +140,21 @@ pub trait Settings: Send + Sync {
     /// # Errors
     /// When the settings cannot be; the error names the key.
     fn problem(&self, _setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
+        Ok(None)
+    }
+
+    /// What an actor did in a recorded run and what it waited for, up to a time or the run's end; none, the
+    /// default, if the system has nothing to tell of this actor. `setup` is what the run was built from.
+    ///
+    /// # Errors
+    /// When the recording has not what it is told from.
+    fn account(
+        &self,
+        _actor: &str,
+        _run: &dyn Recording,
+        _until_ns: Option<u64>,
+        _setup: &mut Setup<'_>,
+    ) -> Result<Option<Account>, PictureError> {
         Ok(None)
     }
 

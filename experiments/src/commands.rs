@@ -21,6 +21,7 @@ pub(crate) mod run;
 pub(crate) mod study;
 mod table;
 pub(crate) mod verify;
+pub(crate) mod why;
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -21,6 +21,7 @@
 pub mod cli;
 mod commands;
 pub mod export;
+mod recorded;
 pub mod registry;
 pub mod report;
 pub mod scenario;

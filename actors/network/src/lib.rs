@@ -97,6 +97,7 @@
 //! (who waits for whom, who was where), `picture` and `scene`; `system`, `scenario`, `config` and
 //! `world` (what scenarios say).
 
+mod account;
 mod assemble;
 mod baseline;
 mod builtin;

@@ -62,14 +62,7 @@ pub(crate) fn draw(
     request: &PictureRequest,
     setup: &mut Setup<'_>,
 ) -> Result<Figure, Failure> {
-    let site = ground::site(scenario, setup)?;
-    let drawn = Drawn {
-        site,
-        tracks: Tracks::read(run).map_err(PictureError::from)?,
-        scenario: run.scenario().to_owned(),
-        seed: run.seeds().run,
-        degrades: setup.degrades.clone(),
-    };
+    let drawn = drawn(scenario, run, setup)?;
     let figure = match picture {
         "map" => {
             let coordination = request.with.iter().any(|extra| extra == COORDINATION);
@@ -89,6 +82,21 @@ pub(crate) fn draw(
         }
     };
     Ok(figure?)
+}
+
+/// What pictures are drawn from.
+pub(crate) fn drawn(
+    scenario: &NetworkScenario,
+    run: &dyn Recording,
+    setup: &mut Setup<'_>,
+) -> Result<Drawn, Failure> {
+    Ok(Drawn {
+        site: ground::site(scenario, setup)?,
+        tracks: Tracks::read(run).map_err(PictureError::from)?,
+        scenario: run.scenario().to_owned(),
+        seed: run.seeds().run,
+        degrades: setup.degrades.clone(),
+    })
 }
 
 impl From<PictureError> for Failure {
@@ -168,7 +176,7 @@ impl Drawn {
     }
 
     /// Who waits for whom, of rovers at an instant.
-    fn waits(&self, rovers: &[Sighting]) -> Waits {
+    pub(crate) fn waits(&self, rovers: &[Sighting]) -> Waits {
         let rovers: Vec<Standing> = rovers.iter().map(Sighting::standing).collect();
         Waits::of(&self.site.roadmap, self.site.wait_rule, &rovers)
     }

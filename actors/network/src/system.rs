@@ -6,13 +6,14 @@ use farside::{Pattern, Report};
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording, Renamed,
-    Results, Section, Settings, Setup, SetupError, System,
+    Account, Assembly, Builtin, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
+    Renamed, Results, Section, Settings, Setup, SetupError, System,
 };
 use farside_worlds::SensorNetwork;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::account;
 use crate::error::blame;
 use crate::place::Place;
 use crate::scenario::NetworkScenario;
@@ -152,6 +153,16 @@ impl Settings for NetworkScenario {
             .with_goal(goal)
             .with_scene(scene)
             .with_notes(notes))
+    }
+
+    fn account(
+        &self,
+        actor: &str,
+        run: &dyn Recording,
+        until_ns: Option<u64>,
+        setup: &mut Setup<'_>,
+    ) -> Result<Option<Account>, PictureError> {
+        account::account(self, actor, run, until_ns, setup)
     }
 
     fn draw(

@@ -10,12 +10,9 @@ use farside::SimDuration;
 use farside::ruling::MessageId;
 use farside::suggest::{did_you_mean, nearest};
 use farside_actors::figure::Figure;
-use farside_actors::system::{
-    PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
-    Seeds,
-};
+use farside_actors::system::{PictureError, PictureInfo, PictureOption, PictureRequest};
 use farside_actors::units;
-use farside_logs::{Log, LogError};
+use farside_logs::Log;
 use serde::Serialize;
 use serde_json::json;
 
@@ -25,6 +22,7 @@ use super::output;
 use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
 use crate::export::{self, FigureFormat};
+use crate::recorded::Logged;
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 use crate::sequence::{Actors, Language};
@@ -312,47 +310,4 @@ fn draw(
     };
     let seeds = scenario.seeds_of(log.seed(), None);
     scenario.draw(picture.name, &Logged { log, seeds }, &request)
-}
-
-/// A log as pictures read it.
-struct Logged<'a> {
-    log: &'a Log,
-    seeds: Seeds,
-}
-
-impl Recording for Logged<'_> {
-    fn seeds(&self) -> Seeds {
-        self.seeds
-    }
-
-    fn scenario(&self) -> &str {
-        self.log.scenario_name()
-    }
-
-    fn excluded(&self) -> &[String] {
-        self.log.exclude()
-    }
-
-    fn for_each(
-        &self,
-        visit: &mut dyn FnMut(&Recorded<'_>) -> Result<(), PictureError>,
-    ) -> Result<RecordingEnd, PictureError> {
-        let unreadable = |error: LogError| PictureError::Unreadable(error.to_string());
-        let mut records = self.log.records().map_err(unreadable)?;
-        while let Some((record, _)) = records.next_ref().map_err(unreadable)? {
-            visit(&Recorded {
-                time_ns: record.key.time_ns,
-                class: record.class,
-                actor: record.receiver,
-                kind: record.kind,
-                body: record.body,
-            })?;
-        }
-        let ending = records.ending().end.as_ref();
-        let text = |key: &str| ending.and_then(|end| end.get(key));
-        Ok(RecordingEnd {
-            time_ns: text("end_time_ns").and_then(|text| text.parse().ok()),
-            detail: text("end_detail").cloned().unwrap_or_default(),
-        })
-    }
 }

@@ -4,7 +4,7 @@
 use farside::Simulation;
 use farside_actors::figure::Figure;
 use farside_actors::system::{
-    Files, PictureError, PictureRequest, Recording, Seeds, Setup, SetupError,
+    Account, Files, PictureError, PictureRequest, Recording, Seeds, Setup, SetupError,
 };
 
 use super::{Scenario, ScenarioError};
@@ -44,6 +44,21 @@ impl Scenario {
     ) -> Result<Figure, PictureError> {
         self.with_setup(run.seeds(), &mut self.files.clone(), |setup| {
             self.settings.draw(picture, run, request, setup)
+        })
+    }
+
+    /// What an actor did in a recorded run up to a time, as its system tells it.
+    ///
+    /// # Errors
+    /// When the recording has not what it is told from.
+    pub(crate) fn account(
+        &self,
+        actor: &str,
+        run: &dyn Recording,
+        until_ns: u64,
+    ) -> Result<Option<Account>, PictureError> {
+        self.with_setup(run.seeds(), &mut self.files.clone(), |setup| {
+            self.settings.account(actor, run, Some(until_ns), setup)
         })
     }
 
