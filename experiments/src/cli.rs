@@ -11,8 +11,8 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, problem,
-    recover, report, reproduce, run, shown, study, verify, why,
+    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, plot,
+    problem, recover, report, reproduce, run, shown, study, verify, why,
 };
 use crate::registry::Registry;
 
@@ -69,6 +69,8 @@ enum Command {
     Why(why::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
+    /// Plot fields of messages over time, of any MCAP file
+    Plot(plot::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
     Study(study::Args),
     /// List the studies that are built in
@@ -218,6 +220,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Fork(args) => fork::run(&args, registry),
         Command::Why(args) => why::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
+        Command::Plot(args) => plot::run(&args),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),
         Command::Reproduce(args) => reproduce::run(&args, registry),

@@ -12,6 +12,7 @@ mod interrupt;
 mod kinds;
 mod output;
 pub(crate) mod plan;
+pub(crate) mod plot;
 pub(crate) mod problem;
 mod progress;
 pub(crate) mod recover;

@@ -25,7 +25,11 @@ fuzz_target!(|bytes: &[u8]| {
     if bytes.len() < 7 {
         assert!(there.is_ok_and(|report| report.identical));
     }
-    let tolerant = DiffOptions { tolerance: 1e-3, ignore: vec!["/state/**".to_owned()] };
+    let tolerant = DiffOptions {
+        tolerance: 1e-3,
+        ignore: vec!["/state/**".to_owned()],
+        ..DiffOptions::default()
+    };
     let _ = diff(&a, &b, &tolerant);
     // And as somebody else's files, by topic: the same messages without what Farside's logs begin
     // with.

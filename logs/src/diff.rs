@@ -20,6 +20,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::fields::{Rules, Tolerance};
 pub use chain::{CauseChain, CausedBy, causes};
 
 /// How two logs are compared.
@@ -33,8 +34,34 @@ pub struct DiffOptions {
     /// Floating-point numbers are the same if they differ by at most this, or by at most this
     /// times the larger one; times, if they differ by at most this many seconds.
     pub tolerance: f64,
-    /// Topics that are not compared, as globs; `*` does not match `/`, `**` does.
+    /// Times are the same if they differ by at most this, in nanoseconds, whatever holds for numbers.
+    pub time_tolerance_ns: Option<u64>,
+    /// What single fields may differ by, and all within them: `header.stamp`, `ranges`, `log_time`.
+    pub field_tolerances: Vec<(String, Tolerance)>,
+    /// What is not compared: topics, as globs, where `*` does not match `/`, and `**` does; and, without
+    /// any of these letters, fields: `header.stamp`.
     pub ignore: Vec<String>,
+    /// The only topics that are compared, as globs; all, if there is none.
+    pub topics: Vec<String>,
+}
+
+impl DiffOptions {
+    /// Whether something that is left out may be a field.
+    pub(crate) fn names_field(name: &str) -> bool {
+        !name.contains(['/', '*', '?', '[', '{'])
+    }
+
+    /// What is said about fields.
+    pub(crate) fn rules(&self) -> Rules {
+        let mut rules = Rules::new(self.tolerance, self.time_tolerance_ns);
+        for (field, tolerance) in &self.field_tolerances {
+            rules.within(field, *tolerance);
+        }
+        for name in self.ignore.iter().filter(|name| Self::names_field(name)) {
+            rules.ignore(name);
+        }
+        rules
+    }
 }
 
 /// One event of a chain of causes.

@@ -122,6 +122,24 @@ pub enum LogError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A topic that a file does not have.
+    #[error("{path}: has no topic {topic:?}{hint}")]
+    NoSuchTopic {
+        /// The file.
+        path: PathBuf,
+        /// The topic that was asked for.
+        topic: String,
+        /// The nearest that there is, as a question; empty if none is near.
+        hint: String,
+    },
+    /// A name that is no field of any message that was compared, and no topic.
+    #[error("no message that is compared has a field {field:?}{hint}")]
+    NoSuchField {
+        /// The field that was named.
+        field: String,
+        /// The nearest that there is, as a question; empty if none is near.
+        hint: String,
+    },
     /// More topics than an MCAP file can have channels.
     #[error("no channel is left for topic {topic}: a log has at most {limit}")]
     TooManyTopics {

@@ -2,6 +2,8 @@
 
 mod json;
 mod protobuf;
+mod rules;
+mod values;
 
 use std::fmt;
 
@@ -9,8 +11,11 @@ use crate::envelope::RecordRef;
 use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::shown::{Seconds, apart, hex};
 
-pub(crate) use json::json;
-pub(crate) use protobuf::{Encoded, protobuf};
+pub(crate) use json::json_value;
+pub(crate) use protobuf::{Encoded, protobuf, protobuf_value};
+pub use rules::Tolerance;
+pub(crate) use rules::{Bound, Rules};
+pub(crate) use values::{Differs, each, first, show};
 
 /// The first field in which two things differ, with both values.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +58,19 @@ pub(crate) enum Path<'a> {
     Entry(&'a Path<'a>, &'a dyn fmt::Display),
 }
 
+impl Path<'_> {
+    /// Whether it leads to this field; elements of lists and entries of maps are all the same field.
+    pub(crate) fn is(&self, steps: &[String]) -> bool {
+        match (self, steps.split_last()) {
+            (Path::Root(""), last) => last.is_none(),
+            (Path::Root(name), Some((last, []))) => name == last,
+            (Path::Field(path, name), Some((last, rest))) => name == last && path.is(rest),
+            (Path::Entry(path, _), _) => path.is(steps),
+            _ => false,
+        }
+    }
+}
+
 impl fmt::Display for Path<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -64,17 +82,16 @@ impl fmt::Display for Path<'_> {
     }
 }
 
-/// How deep messages within messages are compared by field; from there on, by bytes.
-pub(crate) const DEPTH: usize = 100;
+pub(crate) use crate::decode::DEPTH;
 
 /// The first field in which two envelopes' bodies differ, read with the schemas of the envelopes.
 pub(crate) fn bodies(
     a: (&[u8], Option<&SchemaInfo>),
     b: (&[u8], Option<&SchemaInfo>),
-    tolerance: f64,
+    rules: &Rules,
 ) -> Option<FieldDiff> {
     let encoded = |(bytes, schema): (_, Option<_>)| Encoded::body(bytes, schema);
-    protobuf("body", &encoded(a), &encoded(b), tolerance)
+    protobuf("body", &encoded(a), &encoded(b), rules)
 }
 
 /// The schema of a channel, as a reference.

@@ -56,6 +56,8 @@
 //! version adds fields, roles or metadata, or says otherwise which topic a record is on: readers go by
 //! the record. A major version changes or removes them.
 
+mod any;
+mod decode;
 mod descriptors;
 mod diff;
 mod envelope;
@@ -75,16 +77,20 @@ mod schema;
 mod shown;
 mod source;
 mod topics;
+mod value;
 mod verify;
 mod wire;
 mod writer;
 
+pub use any::{AnyMessage, AnyMessages};
+pub use decode::Unreadable;
 pub use diff::{
     Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FirstDifference, Reached,
     TopicDiff, causes, diff,
 };
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;
+pub use fields::Tolerance;
 pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info};
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use messages::{FoundMessage, find_messages};
@@ -92,5 +98,6 @@ pub use output::{may_hold_log, refuse_input};
 pub use recover::{RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
 pub use shown::{escaped, is_hidden};
+pub use value::{NumberKind, Numbers, Value};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

@@ -169,6 +169,11 @@ impl Log {
         std::str::from_utf8(&found.bytes).ok()
     }
 
+    /// When the run's time zero is by the log's times, in nanoseconds.
+    pub fn epoch_ns(&self) -> u64 {
+        self.head.epoch_ns
+    }
+
     /// The topics that were not written, as globs.
     pub fn exclude(&self) -> &[String] {
         &self.head.exclude

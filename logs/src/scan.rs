@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 use mcap::records::{MessageHeader, op};
 
 use crate::LogError;
+use crate::decode::{Layout, Unreadable};
 use crate::frames::{Care, Frame, Frames, LIMIT_BYTES, describe};
 use crate::parse::{
     ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord, message_header,
@@ -26,6 +27,7 @@ pub struct SchemaInfo {
     /// The schema itself.
     pub data: Vec<u8>,
     types: OnceLock<Result<Types, String>>,
+    layout: OnceLock<Result<Layout, Unreadable>>,
 }
 
 impl SchemaInfo {
@@ -39,6 +41,12 @@ impl SchemaInfo {
         };
         let types = self.types.get_or_init(read);
         types.as_ref().map_err(String::as_str)
+    }
+
+    /// How messages are laid out by a schema that is no protobuf.
+    pub(crate) fn layout(&self) -> Result<&Layout, Unreadable> {
+        let layout = self.layout.get_or_init(|| Layout::read(self));
+        layout.as_ref().map_err(Clone::clone)
     }
 
     fn says_the_same(&self, other: &SchemaRecord<'_>) -> bool {
@@ -554,6 +562,7 @@ impl Declared {
             encoding: schema.encoding.to_owned(),
             data: schema.data.to_owned(),
             types: OnceLock::new(),
+            layout: OnceLock::new(),
         });
         self.schemas.insert(schema.id, info.clone());
         // Channels that came in front of their schema.

@@ -10,12 +10,18 @@ use std::collections::BTreeMap;
 
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
+    FileDescriptorSet,
+};
 
 /// The messages of a schema, and which of them the schema is for.
 #[derive(Debug)]
 pub(crate) struct Types {
     messages: Vec<MessageType>,
+    by_name: BTreeMap<String, usize>,
+    /// The names of each enumeration's numbers.
+    enums: Vec<BTreeMap<i32, String>>,
     root: usize,
 }
 
@@ -39,6 +45,8 @@ pub(crate) struct Field {
     pub(crate) presence: bool,
     /// Which oneof of its message it belongs to.
     pub(crate) oneof: Option<i32>,
+    /// The enumeration that it is of, by its place in the schema.
+    names: Option<usize>,
 }
 
 /// The type of a field.
@@ -97,12 +105,26 @@ impl Types {
         }
         Ok(Types {
             messages: reader.messages,
+            by_name: reader.by_name,
+            enums: reader.enums,
             root,
         })
     }
 
     pub(crate) fn root(&self) -> usize {
         self.root
+    }
+
+    /// The place of a message by its whole name.
+    pub(crate) fn find(&self, name: &str) -> Option<usize> {
+        self.by_name.get(name).copied()
+    }
+
+    /// The name of a number of a field that is an enumeration.
+    pub(crate) fn name_of(&self, field: &Field, number: i128) -> Option<&str> {
+        let names = self.enums.get(field.names?)?;
+        let name = names.get(&i32::try_from(number).ok()?);
+        name.map(String::as_str)
     }
 
     pub(crate) fn message(&self, at: usize) -> &MessageType {
@@ -158,6 +180,8 @@ impl Field {
 struct Reader {
     messages: Vec<MessageType>,
     by_name: BTreeMap<String, usize>,
+    enums: Vec<BTreeMap<i32, String>>,
+    enums_by_name: BTreeMap<String, usize>,
     /// Messages whose fields are known: a file that is there twice is read once.
     done: std::collections::BTreeSet<usize>,
 }
@@ -174,6 +198,21 @@ impl Reader {
         for message in &file.message_type {
             self.declare(file.package(), message);
         }
+        self.declare_enums(file.package(), &file.enum_type);
+    }
+
+    fn declare_enums(&mut self, scope: &str, enums: &[EnumDescriptorProto]) {
+        for declared in enums {
+            let name = joined(scope, declared.name());
+            if self.enums_by_name.contains_key(&name) {
+                continue;
+            }
+            self.enums_by_name.insert(name, self.enums.len());
+            let values = declared.value.iter().rev();
+            let named = values.map(|value| (value.number(), value.name().to_owned()));
+            // Of several names for a number, the first.
+            self.enums.push(named.collect());
+        }
     }
 
     fn declare(&mut self, scope: &str, message: &DescriptorProto) {
@@ -181,6 +220,7 @@ impl Reader {
         for nested in &message.nested_type {
             self.declare(&name, nested);
         }
+        self.declare_enums(&name, &message.enum_type);
         if self.by_name.contains_key(&name) {
             return;
         }
@@ -251,6 +291,10 @@ impl Reader {
             }),
         };
         let optional = from.proto3_optional();
+        let names = match kind {
+            FieldType::Scalar(Type::Enum) => resolve(&self.enums_by_name, scope, from.type_name()),
+            _ => None,
+        };
         Field {
             name,
             number: from.number() as u32,
@@ -261,23 +305,28 @@ impl Reader {
                 || from.oneof_index.is_some()
                 || matches!(kind, FieldType::Message(_)),
             oneof: from.oneof_index.filter(|_| !optional),
+            names,
         }
     }
 
-    /// A message by its name, seen from `scope`: with a leading dot the name is whole.
     fn resolve(&self, scope: &str, name: &str) -> Option<usize> {
-        if let Some(whole) = name.strip_prefix('.') {
-            return self.by_name.get(whole).copied();
+        resolve(&self.by_name, scope, name)
+    }
+}
+
+/// A type by its name, seen from `scope`: with a leading dot the name is whole.
+fn resolve(by_name: &BTreeMap<String, usize>, scope: &str, name: &str) -> Option<usize> {
+    if let Some(whole) = name.strip_prefix('.') {
+        return by_name.get(whole).copied();
+    }
+    let mut scope = scope;
+    loop {
+        if let Some(at) = by_name.get(&joined(scope, name)) {
+            return Some(*at);
         }
-        let mut scope = scope;
-        loop {
-            if let Some(at) = self.by_name.get(&joined(scope, name)) {
-                return Some(*at);
-            }
-            if scope.is_empty() {
-                return None;
-            }
-            scope = scope.rsplit_once('.').map_or("", |(outer, _)| outer);
+        if scope.is_empty() {
+            return None;
         }
+        scope = scope.rsplit_once('.').map_or("", |(outer, _)| outer);
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::envelope::{CheckpointRef, Encoder, RecordRef};
-use crate::fields::{self, Encoded, FieldDiff};
+use crate::fields::{self, Encoded, FieldDiff, Rules};
 use crate::log::{Log, Records, Step};
 use crate::schema::Types;
 use crate::topics::Topics;
@@ -351,7 +351,7 @@ impl Verifier {
             let bodies = || {
                 let a = Encoded::body(logged.body, fields::schema(message.channel));
                 let b = Encoded::of(rerun.body, &types);
-                fields::protobuf("body", &a, &b, 0.0)
+                fields::protobuf("body", &a, &b, &Rules::default())
             };
             fields::envelopes(&logged, &rerun)
                 .or_else(bodies)

@@ -45,6 +45,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let options = DiffOptions {
         tolerance: args.tolerance,
         ignore: args.ignore.clone(),
+        ..DiffOptions::default()
     };
     let report = farside_logs::diff(&args.a, &args.b, &options)?;
     if args.json {

@@ -43,7 +43,12 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE.svg|.pdf|.png")]
     out: Option<PathBuf>,
     /// What else it is written as, beside that: svg, pdf for papers, png for slides
-    #[arg(long, value_name = "KIND", value_delimiter = ',', hide_possible_values = true)]
+    #[arg(
+        long,
+        value_name = "KIND",
+        value_delimiter = ',',
+        hide_possible_values = true
+    )]
     format: Vec<FigureFormat>,
     /// Print JSON
     #[arg(long)]
@@ -122,7 +127,11 @@ fn wanted(path: &Path, texts: &[String]) -> Result<Vec<Wanted>, CommandError> {
     // Said of what is no MCAP file before anything of topics.
     drop(AnyMessages::open(path, &[])?);
     let info = farside_logs::info(path)?;
-    let topics: Vec<&str> = info.topics.iter().map(|topic| topic.topic.as_str()).collect();
+    let topics: Vec<&str> = info
+        .topics
+        .iter()
+        .map(|topic| topic.topic.as_str())
+        .collect();
     texts.iter().map(|text| part(text, &topics)).collect()
 }
 
@@ -147,7 +156,9 @@ fn part(text: &str, topics: &[&str]) -> Result<Wanted, CommandError> {
         return wrong(format!("{text}: the field is missing, as in {text}.x"));
     }
     let start = text.rfind('/').unwrap_or(0);
-    let topic = text[start..].find('.').map_or(text, |dot| &text[..start + dot]);
+    let topic = text[start..]
+        .find('.')
+        .map_or(text, |dot| &text[..start + dot]);
     let hint = did_you_mean(nearest(topic, topics.iter().copied()).as_deref());
     wrong(format!("{text}: the log has no such topic{hint}"))
 }

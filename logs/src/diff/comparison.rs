@@ -11,7 +11,7 @@ use super::{DiffOptions, DiffReport, FirstDifference, Limits, Reached, TopicDiff
 use super::{agree, beside, detail, scenario, text};
 use crate::LogError;
 use crate::envelope::seconds;
-use crate::fields::FieldDiff;
+use crate::fields::{FieldDiff, Rules};
 use crate::log::Log;
 use crate::parse::Parser;
 use crate::topics::Topics;
@@ -35,7 +35,7 @@ pub(super) fn compare(
     let filtered = heads.iter().flatten().flat_map(|head| &head.exclude);
     let ignore: Vec<String> = options.ignore.iter().chain(filtered).cloned().collect();
     let ignore = Topics::new(&ignore)?;
-    let read = |limits| Comparison::read((a, b), mode, &ignore, options.tolerance, limits);
+    let read = |limits| Comparison::read((a, b), mode, &ignore, options.rules(), limits);
     let mut comparison = read(limits)?;
     if !comparison.may_pass_front()? {
         let all = Limits {
@@ -125,7 +125,7 @@ struct Comparison<'a> {
     a: Index<'a>,
     b: Index<'a>,
     mode: Mode,
-    tolerance: f64,
+    rules: Rules,
     limits: Limits,
     names: Names,
     /// Topics in the order in which they are told of; some more than once.
@@ -170,7 +170,7 @@ impl<'a> Comparison<'a> {
         (a, b): (&Path, &Path),
         mode: Mode,
         ignore: &'a Topics,
-        tolerance: f64,
+        rules: Rules,
         limits: Limits,
     ) -> Result<Comparison<'a>, LogError> {
         let mut names = Names::default();
@@ -201,7 +201,7 @@ impl<'a> Comparison<'a> {
             a,
             b,
             mode,
-            tolerance,
+            rules,
             limits,
             names,
             order,
@@ -399,7 +399,7 @@ impl<'a> Comparison<'a> {
             Mode::Any => matching::aligned(&a, &b),
         };
         // The bytes of two messages may differ and their fields not, or the other way round.
-        let by_field = self.tolerance > 0.0 || self.mode == Mode::Any;
+        let by_field = !self.rules.are_exact() || self.mode == Mode::Any;
         for (x, y) in pairs {
             let (a, b) = (a[x as usize], b[y as usize]);
             self.renumbered += u64::from(a.sequence != b.sequence);
@@ -452,8 +452,8 @@ impl<'a> Comparison<'a> {
             pairs = &pairs[held.len()..];
             held.sort_by_key(|(_, b, _)| b.position);
             for (a, b, message) in held {
-                let (mode, tolerance) = (self.mode, self.tolerance);
-                if let Some(diff) = message.against(&mut self.b, &b, mode, tolerance)? {
+                let given = (self.a.scanner.channels(), &self.rules);
+                if let Some(diff) = message.against(&mut self.b, &b, self.mode, given)? {
                     self.changed(a, b);
                     self.reasons.extend(diff.why.map(|why| (a.topic, why)));
                 }
@@ -571,7 +571,8 @@ impl<'a> Comparison<'a> {
             }
             Found::Changed(a, b) => {
                 let held = detail::Held::fetch(&mut self.a, &a)?;
-                let diff = held.against(&mut self.b, &b, mode, self.tolerance)?;
+                let given = (self.a.scanner.channels(), &self.rules);
+                let diff = held.against(&mut self.b, &b, mode, given)?;
                 let reason = diff.as_ref().and_then(|diff| diff.why.clone());
                 self.reasons.extend(reason.map(|why| (a.topic, why)));
                 let diff = diff.unwrap_or_else(|| FieldDiff::new("body", "one", "another"));

@@ -12,11 +12,13 @@ use super::entry::{Entry, Mode, Names};
 use super::index::Index;
 use super::{Carried, Cause, FirstDifference};
 use crate::LogError;
+use crate::decode::{self, Unreadable};
 use crate::envelope::{RecordRef, seconds};
-use crate::fields::{self, Encoded, FieldDiff, bodies, protobuf};
+use crate::fields::{self, Encoded, FieldDiff, Rules, bodies, protobuf};
 use crate::log::LoggedKey;
 use crate::scan::{ChannelInfo, ScannedMessage};
 use crate::shown::Seconds;
+use crate::value::Value;
 
 /// Causes that are listed; beyond them only the last one is.
 const CAUSES_LISTED: usize = 50;
@@ -49,8 +51,9 @@ impl Held {
         index: &mut Index<'_>,
         entry: &Entry,
         mode: Mode,
-        tolerance: f64,
+        (others, rules): (&[Arc<ChannelInfo>], &Rules),
     ) -> Result<Option<FieldDiff>, LogError> {
+        let channels = index.scanner.channels().to_vec();
         let message = index.scanner.message_at(entry.position, entry.channel)?;
         let held = ScannedMessage {
             channel: &self.channel,
@@ -59,8 +62,8 @@ impl Held {
             position: message.position,
         };
         Ok(match mode {
-            Mode::Any => any(&held, &message, tolerance),
-            Mode::Farside => farside(&held, &message, tolerance),
+            Mode::Any => any(&held, &message, [others, &channels], rules),
+            Mode::Farside => farside(&held, &message, rules),
         })
     }
 }
@@ -68,7 +71,7 @@ impl Held {
 fn farside(
     message_a: &ScannedMessage<'_>,
     message_b: &ScannedMessage<'_>,
-    tolerance: f64,
+    rules: &Rules,
 ) -> Option<FieldDiff> {
     let (Some(a), Some(b)) = (
         RecordRef::read(message_a.data),
@@ -82,42 +85,65 @@ fn farside(
         ("reason", a.reason, b.reason),
         ("note", a.note, b.note),
     ];
-    let text = text.into_iter().find(|(_, a, b)| a != b);
+    let differ = |(field, a, b): &(&str, &str, &str)| a != b && rules.enter_root(field).is_some();
+    let text = text.into_iter().find(differ);
     let body_a = (a.body, fields::schema(message_a.channel));
     let body_b = (b.body, fields::schema(message_b.channel));
     text.map(|(field, a, b)| FieldDiff::texts(field, a, b))
-        .or_else(|| bodies(body_a, body_b, tolerance))
-        .or_else(|| times("sent", a.sent_ns, b.sent_ns, tolerance))
-        .or_else(|| times("log_time", a.key.time_ns, b.key.time_ns, tolerance))
+        .or_else(|| bodies(body_a, body_b, rules))
+        .or_else(|| log_times("sent", a.sent_ns, b.sent_ns, rules))
+        .or_else(|| log_times("log_time", a.key.time_ns, b.key.time_ns, rules))
 }
 
-fn any(a: &ScannedMessage<'_>, b: &ScannedMessage<'_>, tolerance: f64) -> Option<FieldDiff> {
+/// The messages of both logs as values, if they can be read; else why not.
+pub(super) fn values<'a>(
+    a: &'a ScannedMessage<'_>,
+    b: &'a ScannedMessage<'_>,
+    others: [&'a [Arc<ChannelInfo>]; 2],
+) -> Result<[Value<'a>; 2], Unreadable> {
+    let value = |message: &'a ScannedMessage<'_>, others| {
+        decode::value(message.channel, message.data, others)
+    };
+    Ok([value(a, others[0])?, value(b, others[1])?])
+}
+
+fn any(
+    a: &ScannedMessage<'_>,
+    b: &ScannedMessage<'_>,
+    others: [&[Arc<ChannelInfo>]; 2],
+    rules: &Rules,
+) -> Option<FieldDiff> {
     let (x, y) = (a.channel.encoding.as_str(), b.channel.encoding.as_str());
     let data = match (x, y) {
         (x, y) if x != y => Some(FieldDiff::texts("encoding", x, y)),
         ("protobuf", _) => {
-            let x = Encoded::new(a.data, fields::schema(a.channel));
-            let y = Encoded::new(b.data, fields::schema(b.channel));
-            protobuf("", &x, &y, tolerance)
+            let x = Encoded::new(a.data, fields::schema(a.channel)).among(others[0]);
+            let y = Encoded::new(b.data, fields::schema(b.channel)).among(others[1]);
+            protobuf("", &x, &y, rules)
         }
-        ("json", _) => fields::json(a.data, b.data, tolerance),
-        _ => (a.data != b.data).then(|| fields::raw("data", a.data, b.data)),
+        _ if a.data == b.data && same_schema(a.channel, b.channel) => None,
+        _ => match values(a, b, others) {
+            Ok([x, y]) => fields::first(&x, &y, rules),
+            Err(_) if a.data == b.data => None,
+            Err(why) => Some(fields::raw("data", a.data, b.data).because(why.to_string())),
+        },
     };
     let (one, other) = (&a.head, &b.head);
-    data.or_else(|| times("log_time", one.log_time, other.log_time, tolerance))
-        .or_else(|| {
-            times(
-                "publish_time",
-                one.publish_time,
-                other.publish_time,
-                tolerance,
-            )
-        })
+    data.or_else(|| log_times("log_time", one.log_time, other.log_time, rules))
+        .or_else(|| log_times("publish_time", one.publish_time, other.publish_time, rules))
 }
 
-fn times(field: &str, a_ns: u64, b_ns: u64, tolerance: f64) -> Option<FieldDiff> {
-    let apart = seconds(a_ns.abs_diff(b_ns));
-    let same = a_ns == b_ns || (tolerance > 0.0 && apart <= tolerance);
+fn same_schema(a: &ChannelInfo, b: &ChannelInfo) -> bool {
+    match (&a.schema, &b.schema) {
+        (Some(x), Some(y)) => x.encoding == y.encoding && x.name == y.name && x.data == y.data,
+        (x, y) => x.is_none() && y.is_none(),
+    }
+}
+
+/// Two times of messages, if they differ by more than they may.
+fn log_times(field: &str, a_ns: u64, b_ns: u64, rules: &Rules) -> Option<FieldDiff> {
+    let bound = rules.enter_root(field)?;
+    let same = rules.log_times_agree(a_ns, b_ns, bound);
     let exact = |ns| format!("{} s", Seconds(ns));
     (!same).then(|| FieldDiff::new(field, exact(a_ns), exact(b_ns)))
 }

@@ -272,7 +272,11 @@ proptest! {
         let b = edited(&a, &edits);
         let logs = Logs::write(&a, &b, chunks, farside);
         let ignore = if ignored { vec!["/rover_1/*".to_owned()] } else { Vec::new() };
-        let options = DiffOptions { tolerance, ignore };
+        let options = DiffOptions {
+            tolerance,
+            ignore,
+            ..DiffOptions::default()
+        };
         let ways = ways();
         let (expected, _) = logs.compare(&options, ways[0]);
         for way in &ways[1..] {

@@ -4,16 +4,20 @@
 //! their schemas allow. Fields are paired by name; a field that is set and that the other schema
 //! does not declare alike differs, also where its bytes are the same.
 
+mod any;
 mod scalar;
+mod value;
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::sync::Arc;
 
 use prost_types::field_descriptor_proto::Type;
 
-use super::{DEPTH, FieldDiff, Path, near, raw};
-use crate::scan::SchemaInfo;
+use super::{Bound, DEPTH, FieldDiff, Path, Rules, near, raw};
+use crate::decode::Unreadable;
+use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::schema::{Field, FieldType, MessageType, Types};
 use crate::shown::{SHOWN, shorten};
 use crate::wire::{Fields, Value};
@@ -24,6 +28,8 @@ pub(crate) struct Encoded<'a> {
     bytes: &'a [u8],
     /// Which message of which schema it is; else why that cannot be said.
     read_as: Result<Side<'a>, &'a str>,
+    /// The channels of its log.
+    others: &'a [Arc<ChannelInfo>],
 }
 
 /// A message type of a schema; `None` for one that the schema does not declare.
@@ -44,7 +50,17 @@ impl<'a> Encoded<'a> {
             types,
             message: message(types),
         });
-        Encoded { bytes, read_as }
+        let others = &[];
+        Encoded {
+            bytes,
+            read_as,
+            others,
+        }
+    }
+
+    /// The same, where also the types that other channels of its log declare are known.
+    pub(crate) fn among(self, others: &'a [Arc<ChannelInfo>]) -> Self {
+        Encoded { others, ..self }
     }
 
     /// The body of an envelope: a message of the type of the schema's field `body`.
@@ -60,6 +76,7 @@ impl<'a> Encoded<'a> {
         Encoded {
             bytes,
             read_as: read_as.and_then(body),
+            others: &[],
         }
     }
 
@@ -72,6 +89,7 @@ impl<'a> Encoded<'a> {
         Encoded {
             bytes,
             read_as: types.as_ref().map(side).map_err(String::as_str),
+            others: &[],
         }
     }
 }
@@ -92,19 +110,35 @@ pub(crate) fn protobuf(
     prefix: &str,
     a: &Encoded<'_>,
     b: &Encoded<'_>,
-    tolerance: f64,
+    rules: &Rules,
 ) -> Option<FieldDiff> {
     let field = || if prefix.is_empty() { "data" } else { prefix };
     match (&a.read_as, &b.read_as) {
         (Ok(x), Ok(y)) => {
-            let comparison = Comparison { tolerance };
-            comparison.messages(&Path::Root(prefix), (a.bytes, *x), (b.bytes, *y), 0)
+            let bound = rules.enter_root(prefix)?;
+            let within = Within { bound, depth: 0 };
+            let others = [a.others, b.others];
+            let comparison = Comparison { rules, others };
+            comparison.messages(&Path::Root(prefix), (a.bytes, *x), (b.bytes, *y), within)
         }
         _ if a.bytes == b.bytes => None,
         (Err(why), _) | (_, Err(why)) => {
             Some(raw(field(), a.bytes, b.bytes).because(why.to_string()))
         }
     }
+}
+
+/// What a message says, of the type that its schema is for.
+///
+/// # Errors
+/// If the schema or the message cannot be read.
+pub(crate) fn protobuf_value<'a>(
+    bytes: &'a [u8],
+    schema: &'a SchemaInfo,
+    others: &'a [Arc<ChannelInfo>],
+) -> Result<crate::value::Value<'a>, Unreadable> {
+    let types = schema.types().map_err(Unreadable::new)?;
+    value::message(bytes, side(types, Some(types.root())), others)
 }
 
 /// What a message holds, by field number.
@@ -127,8 +161,26 @@ fn held<'a>(bytes: &'a [u8], of: &MessageType) -> Option<Held<'a>> {
     Some(held)
 }
 
-struct Comparison {
-    tolerance: f64,
+struct Comparison<'r> {
+    rules: &'r Rules,
+    /// What else each log declares: what is packed in an `Any` may be of any of its types.
+    others: [&'r [Arc<ChannelInfo>]; 2],
+}
+
+/// Where in a message a part is, and what holds there.
+#[derive(Clone, Copy)]
+struct Within {
+    bound: Bound,
+    depth: usize,
+}
+
+impl Within {
+    fn deeper(self) -> Within {
+        Within {
+            depth: self.depth + 1,
+            ..self
+        }
+    }
 }
 
 /// One side of a field: how it is declared, what the message holds of it, and the schema.
@@ -139,13 +191,13 @@ struct Half<'a> {
     types: &'a Types,
 }
 
-impl Comparison {
+impl Comparison<'_> {
     fn messages(
         &self,
         path: &Path<'_>,
         a: (&[u8], Side<'_>),
         b: (&[u8], Side<'_>),
-        depth: usize,
+        within: Within,
     ) -> Option<FieldDiff> {
         let same_schema = std::ptr::eq(a.1.types, b.1.types);
         if same_schema && a.0 == b.0 {
@@ -163,10 +215,18 @@ impl Comparison {
         let (Some(one), Some(other)) = (a.1.message, b.1.message) else {
             return by_bytes("a type that the schema does not declare");
         };
-        if depth > DEPTH {
+        if within.depth > DEPTH {
             return by_bytes("messages nested too deep");
         }
         let (one, other) = (a.1.types.message(one), b.1.types.message(other));
+        let inner_a = any::packed(a.0, one, (a.1.types, self.others[0]));
+        let inner_b = any::packed(b.0, other, (b.1.types, self.others[1]));
+        if let (Some(x), Some(y)) = (&inner_a, &inner_b)
+            && x.url == y.url
+        {
+            let within = within.deeper();
+            return self.messages(path, (&x.bytes, x.side), (&y.bytes, y.side), within);
+        }
         let (Some(x), Some(y)) = (held(a.0, one), held(b.0, other)) else {
             return by_bytes("bytes that are no protobuf message");
         };
@@ -176,11 +236,15 @@ impl Comparison {
         let numbers: BTreeSet<u32> = numbers.chain(y.keys().filter_map(named)).collect();
         for field in numbers.iter().filter_map(|number| one.fields.get(number)) {
             let path = Path::Field(path, &field.name);
+            let Some(bound) = self.rules.enter(&path, within.bound) else {
+                continue;
+            };
+            let within = Within { bound, ..within };
             let half_a = Half::of(field, &x, a.1.types);
             let found = match other.named(&field.name) {
                 Some(field) => {
                     let half_b = Half::of(field, &y, b.1.types);
-                    self.fields(&path, half_a, half_b, depth)
+                    self.fields(&path, half_a, half_b, within)
                 }
                 None if !half_a.is_set() => None,
                 None => {
@@ -192,11 +256,17 @@ impl Comparison {
                 return found;
             }
         }
-        only_in_b(path, one, (other, &y), b.1.types)
+        self.only_in_b(path, one, (other, &y), b.1.types)
             .or_else(|| unknown(path, (&x, one), (&y, other)))
     }
 
-    fn fields(&self, path: &Path<'_>, a: Half<'_>, b: Half<'_>, depth: usize) -> Option<FieldDiff> {
+    fn fields(
+        &self,
+        path: &Path<'_>,
+        a: Half<'_>,
+        b: Half<'_>,
+        within: Within,
+    ) -> Option<FieldDiff> {
         if !a.is_set() && !b.is_set() {
             return None;
         }
@@ -212,8 +282,8 @@ impl Comparison {
             return None;
         }
         match (a.map_entry(), b.map_entry()) {
-            (Some(x), Some(y)) => return self.maps(path, (a, x), (b, y), depth),
-            _ if a.field.repeated => return self.lists(path, a, b, depth),
+            (Some(x), Some(y)) => return self.maps(path, (a, x), (b, y), within),
+            _ if a.field.repeated => return self.lists(path, a, b, within),
             _ => {}
         }
         // Where absent is something else than zero.
@@ -222,12 +292,14 @@ impl Comparison {
         }
         if let (FieldType::Message(one), FieldType::Message(other)) = (a.field.kind, b.field.kind) {
             let (x, y) = (merged(a.values), merged(b.values));
-            let a = side(a.types, one);
-            let b = side(b.types, other);
-            return self.messages(path, (&x, a), (&y, b), depth + 1);
+            let (a, b) = ((&*x, side(a.types, one)), (&*y, side(b.types, other)));
+            return match self.times_agree(a, b, within.bound) {
+                true => None,
+                false => self.messages(path, a, b, within.deeper()),
+            };
         }
         let last = (a.values.last().copied(), b.values.last().copied());
-        self.scalars(path, a.field.kind, last)
+        self.scalars(path, a.field.kind, last, within.bound)
     }
 
     fn scalars(
@@ -235,19 +307,29 @@ impl Comparison {
         path: &dyn fmt::Display,
         kind: FieldType,
         (a, b): (Option<Value<'_>>, Option<Value<'_>>),
+        bound: Bound,
     ) -> Option<FieldDiff> {
         let (a, b) = (Scalar::read(kind, a), Scalar::read(kind, b));
         let same = match (&a, &b) {
-            (Scalar::Double(x), Scalar::Double(y)) => near(*x, *y, self.tolerance),
+            (Scalar::Double(x), Scalar::Double(y)) => near(*x, *y, bound.number),
             (Scalar::Float(x), Scalar::Float(y)) => {
-                near(f64::from(*x), f64::from(*y), self.tolerance)
+                near(f64::from(*x), f64::from(*y), bound.number)
+            }
+            (Scalar::Int(x), Scalar::Int(y)) => {
+                x == y || bound.own && near(*x as f64, *y as f64, bound.number)
             }
             (a, b) => a == b,
         };
         (!same).then(|| a.differs(path, &b))
     }
 
-    fn lists(&self, path: &Path<'_>, a: Half<'_>, b: Half<'_>, depth: usize) -> Option<FieldDiff> {
+    fn lists(
+        &self,
+        path: &Path<'_>,
+        a: Half<'_>,
+        b: Half<'_>,
+        within: Within,
+    ) -> Option<FieldDiff> {
         let (x, y) = (a.elements(), b.elements());
         let (Some(x), Some(y)) = (x, y) else {
             let (x, y) = (merged(a.values), merged(b.values));
@@ -260,11 +342,11 @@ impl Comparison {
                 (FieldType::Message(one), FieldType::Message(other)) => {
                     let (x, y) = (content(x), content(y));
                     let (one, other) = (side(a.types, one), side(b.types, other));
-                    self.messages(&path, (x, one), (y, other), depth + 1)
+                    self.messages(&path, (x, one), (y, other), within.deeper())
                 }
                 // Most elements are the same.
                 _ if x == y => None,
-                (kind, _) => self.scalars(&path, kind, (Some(*x), Some(*y))),
+                (kind, _) => self.scalars(&path, kind, (Some(*x), Some(*y)), within.bound),
             };
             if found.is_some() {
                 return found;
@@ -274,14 +356,49 @@ impl Comparison {
         differ.then(|| FieldDiff::new(format!("{path}.length"), x.len(), y.len()))
     }
 
+    /// Fields that are set in the second message and that only its schema declares.
+    fn only_in_b(
+        &self,
+        path: &Path<'_>,
+        one: &MessageType,
+        (other, held): (&MessageType, &Held<'_>),
+        types: &Types,
+    ) -> Option<FieldDiff> {
+        held.iter().find_map(|(number, values)| {
+            let field = other.fields.get(number)?;
+            let half = Half {
+                field,
+                values,
+                types,
+            };
+            if one.named(&field.name).is_some() || !half.is_set() {
+                return None;
+            }
+            let path = Path::Field(path, &field.name);
+            self.rules.enter(&path, self.rules.bound())?;
+            Some(FieldDiff::new(
+                path.to_string(),
+                "no such field",
+                half.show(),
+            ))
+        })
+    }
+
+    /// Whether two messages are times that agree within what their field allows.
+    fn times_agree(&self, a: (&[u8], Side<'_>), b: (&[u8], Side<'_>), bound: Bound) -> bool {
+        let time = |(bytes, side)| value::message(bytes, side, &[]).ok()?.as_time_ns();
+        bound.time_ns > 0
+            && matches!((time(a), time(b)), (Some(x), Some(y)) if self.rules.times_agree(x, y, bound))
+    }
+
     fn maps(
         &self,
         path: &Path<'_>,
         (a, entry_a): (Half<'_>, &MessageType),
         (b, entry_b): (Half<'_>, &MessageType),
-        depth: usize,
+        within: Within,
     ) -> Option<FieldDiff> {
-        let (x, y) = (entries(a, entry_a), entries(b, entry_b));
+        let (x, y) = (entries(a.values, entry_a), entries(b.values, entry_b));
         let (Some(x), Some(y)) = (x, y) else {
             let (x, y) = (merged(a.values), merged(b.values));
             let why = "a map that is malformed";
@@ -302,7 +419,7 @@ impl Comparison {
                         types,
                     };
                     let one = half(one, x, a.types);
-                    self.fields(&path, one, half(other, y, b.types), depth + 1)
+                    self.fields(&path, one, half(other, y, b.types), within.deeper())
                 }
                 (x, _) => {
                     let word = |has: bool| if has { "present" } else { "absent" };
@@ -316,32 +433,6 @@ impl Comparison {
         }
         None
     }
-}
-
-/// Fields that are set in the second message and that only its schema declares.
-fn only_in_b(
-    path: &Path<'_>,
-    one: &MessageType,
-    (other, held): (&MessageType, &Held<'_>),
-    types: &Types,
-) -> Option<FieldDiff> {
-    held.iter().find_map(|(number, values)| {
-        let field = other.fields.get(number)?;
-        let half = Half {
-            field,
-            values,
-            types,
-        };
-        if one.named(&field.name).is_some() || !half.is_set() {
-            return None;
-        }
-        let path = Path::Field(path, &field.name);
-        Some(FieldDiff::new(
-            path.to_string(),
-            "no such field",
-            half.show(),
-        ))
-    })
 }
 
 /// Fields that neither schema declares.
@@ -400,10 +491,13 @@ fn merged<'a>(values: &[Value<'a>]) -> Cow<'a, [u8]> {
 }
 
 /// The entries of a map, by key as shown: the values of each.
-fn entries<'a>(half: Half<'a>, entry: &MessageType) -> Option<BTreeMap<String, Vec<Value<'a>>>> {
+fn entries<'a>(
+    values: &[Value<'a>],
+    entry: &MessageType,
+) -> Option<BTreeMap<String, Vec<Value<'a>>>> {
     let kind = entry.fields.get(&1).map(|field| field.kind);
     let mut entries = BTreeMap::new();
-    for value in half.values {
+    for value in values {
         let mut held = held(content(value), entry)?;
         let key = held.remove(&1).and_then(|keys| keys.last().copied());
         let kind = kind.unwrap_or(FieldType::Scalar(Type::Bytes));
@@ -411,6 +505,24 @@ fn entries<'a>(half: Half<'a>, entry: &MessageType) -> Option<BTreeMap<String, V
         entries.insert(key, held.remove(&2).unwrap_or_default());
     }
     Some(entries)
+}
+
+/// The elements of a list, packed or not.
+fn elements<'a>(kind: FieldType, values: &[Value<'a>]) -> Option<Vec<Value<'a>>> {
+    let FieldType::Scalar(kind) = kind else {
+        return Some(values.to_vec());
+    };
+    if matches!(kind, Type::String | Type::Bytes) {
+        return Some(values.to_vec());
+    }
+    let mut elements = Vec::new();
+    for value in values {
+        match value {
+            Value::Bytes(packed) => unpack(kind, packed, &mut elements)?,
+            value => elements.push(*value),
+        }
+    }
+    Some(elements)
 }
 
 impl<'a> Half<'a> {
@@ -441,20 +553,7 @@ impl<'a> Half<'a> {
 
     /// The elements of a list, packed or not.
     fn elements(&self) -> Option<Vec<Value<'a>>> {
-        let FieldType::Scalar(kind) = self.field.kind else {
-            return Some(self.values.to_vec());
-        };
-        if matches!(kind, Type::String | Type::Bytes) {
-            return Some(self.values.to_vec());
-        }
-        let mut elements = Vec::new();
-        for value in self.values {
-            match value {
-                Value::Bytes(packed) => unpack(kind, packed, &mut elements)?,
-                value => elements.push(*value),
-            }
-        }
-        Some(elements)
+        elements(self.field.kind, self.values)
     }
 
     /// What is there, in a few words.

@@ -252,7 +252,7 @@ fn strangers_files_are_compared_by_topic_and_place() {
     let first = report.first.unwrap();
     assert_eq!(
         (first.field.as_str(), first.a.as_str(), first.b.as_str()),
-        ("data.p.q", "1", "3")
+        ("p.q", "1", "3")
     );
     assert_eq!(
         (report.changed, report.only_in_a, report.only_in_b),

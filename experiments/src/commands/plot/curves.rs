@@ -46,7 +46,11 @@ pub(super) struct Curves {
 }
 
 impl Curves {
-    pub(super) fn read(path: &Path, wanted: &[Wanted], part: &Part) -> Result<Curves, CommandError> {
+    pub(super) fn read(
+        path: &Path,
+        wanted: &[Wanted],
+        part: &Part,
+    ) -> Result<Curves, CommandError> {
         let globs: Vec<String> = wanted.iter().map(|one| one.glob.clone()).collect();
         let mut messages = AnyMessages::open(path, &globs)?;
         // Runs begin at a time of their own, whichever message is the first.
@@ -88,10 +92,20 @@ impl Curves {
             }
         }
         for curve in curves.iter().filter(|curve| curve.no_number > 0) {
-            let Curve { topic, field, no_number, .. } = curve;
-            remarks.push(format!("{topic}.{field}: {no_number} messages have no number there"));
+            let Curve {
+                topic,
+                field,
+                no_number,
+                ..
+            } = curve;
+            remarks.push(format!(
+                "{topic}.{field}: {no_number} messages have no number there"
+            ));
         }
-        let curves = curves.into_iter().filter(|curve| curve.values > 0).collect();
+        let curves = curves
+            .into_iter()
+            .filter(|curve| curve.values > 0)
+            .collect();
         Ok(Curves { curves, remarks })
     }
 }
@@ -117,7 +131,9 @@ fn add(
         ..Curve::default()
     });
     let field = &wanted.field;
-    let found = value.at(field).or_else(|| value.at(&format!("body.{field}")));
+    let found = value
+        .at(field)
+        .or_else(|| value.at(&format!("body.{field}")));
     match found.and_then(|found| found.as_f64()) {
         Some(number) => curve.push(time_ns, number),
         None => curve.no_number += 1,
@@ -160,11 +176,19 @@ impl Curve {
         self.width_ns = ((until - from) / (POINTS as u64 / 4) + 1).max(self.width_ns);
         let width_ns = self.width_ns;
         let mut kept: Vec<(u64, f64)> = Vec::new();
-        for group in self.points.chunk_by(|a, b| a.0 / width_ns == b.0 / width_ns) {
+        for group in self
+            .points
+            .chunk_by(|a, b| a.0 / width_ns == b.0 / width_ns)
+        {
             let order = |a: &&(u64, f64), b: &&(u64, f64)| a.1.total_cmp(&b.1);
             let ends = [group.first(), group.last()];
             let extremes = [group.iter().min_by(order), group.iter().max_by(order)];
-            let mut some: Vec<(u64, f64)> = ends.into_iter().chain(extremes).flatten().copied().collect();
+            let mut some: Vec<(u64, f64)> = ends
+                .into_iter()
+                .chain(extremes)
+                .flatten()
+                .copied()
+                .collect();
             some.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
             some.dedup_by(|a, b| a.0 == b.0 && a.1.to_bits() == b.1.to_bits());
             kept.append(&mut some);

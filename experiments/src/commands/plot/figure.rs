@@ -52,16 +52,26 @@ pub(super) fn figure(curves: &Curves, file: &str) -> Figure {
         left = left.max(widest(ticks.iter().map(|tick| tick.text.as_str())) + 20.0);
     }
     for (at, (field, y)) in scaled.iter().enumerate() {
-        let area = Area { left, top, width: WIDTH, height: HEIGHT };
+        let area = Area {
+            left,
+            top,
+            width: WIDTH,
+            height: HEIGHT,
+        };
         let is_last = at + 1 == scaled.len();
-        let its: Vec<&Curve> = curves.curves.iter().filter(|curve| curve.field == *field).collect();
+        let its: Vec<&Curve> = curves
+            .curves
+            .iter()
+            .filter(|curve| curve.field == *field)
+            .collect();
         let (panel, height) = panel(&its, &area, (&x, y), field, is_last);
         panels.push(panel);
         top += HEIGHT + height + APART;
     }
     let values: u64 = curves.curves.iter().map(|curve| curve.values).sum();
     let count = curves.curves.len();
-    let description = format!("{values} values of {count} curves, by the times at which they were logged");
+    let description =
+        format!("{values} values of {count} curves, by the times at which they were logged");
     let body = html! {
         text class="title" x="8" y="28" { (shortened(file, 90)) }
         @for panel in &panels { (panel) }
@@ -88,7 +98,11 @@ fn panel(
 ) -> (Markup, f64) {
     let frame = Frame {
         area: *area,
-        x_label: if is_last { "seconds since the start" } else { "" },
+        x_label: if is_last {
+            "seconds since the start"
+        } else {
+            ""
+        },
         x_ticks: x.ticks(10.0),
         y_label: field.to_owned(),
         y_ticks: y.ticks(5.0),
@@ -96,7 +110,7 @@ fn panel(
     let names = curves.iter().enumerate().map(|(series, curve)| CurveName {
         series: series % DASHES.len(),
         y: 0.0,
-        rank: series,
+        rank: series as f64,
         text: shortened(&curve.topic, 60),
     });
     let below = area.y(0.0) + if is_last { 58.0 } else { 36.0 };

@@ -55,7 +55,12 @@ fn message(name: &str, field: Vec<FieldDescriptorProto>) -> DescriptorProto {
 }
 
 fn found(a: &[u8], b: &[u8], types: &Result<Types, String>) -> Option<FieldDiff> {
-    protobuf("", &Encoded::of(a, types), &Encoded::of(b, types), 0.0)
+    protobuf(
+        "",
+        &Encoded::of(a, types),
+        &Encoded::of(b, types),
+        &Rules::default(),
+    )
 }
 
 fn words(diff: &FieldDiff) -> (&str, &str, &str) {
@@ -103,7 +108,13 @@ fn values_that_look_alike_are_shown_with_their_types() {
     a.extend(2.5f32.to_le_bytes());
     let mut b = vec![0x09];
     b.extend(2.5f64.to_le_bytes());
-    let diff = protobuf("", &Encoded::of(&a, &float), &Encoded::of(&b, &double), 1.0).unwrap();
+    let diff = protobuf(
+        "",
+        &Encoded::of(&a, &float),
+        &Encoded::of(&b, &double),
+        &Rules::new(1.0, None),
+    )
+    .unwrap();
     assert_eq!(words(&diff), ("x", "2.5 (float)", "2.5 (double)"));
     let text = with(Type::String);
     let long = "x".repeat(1000);
@@ -118,7 +129,7 @@ fn values_that_look_alike_are_shown_with_their_types() {
         "",
         &Encoded::of(&one, &unsigned),
         &Encoded::of(&one, &signed),
-        0.0,
+        &Rules::default(),
     );
     assert_eq!(words(&diff.unwrap()), ("x", "1 (uint64)", "-1 (sint64)"));
 }
