@@ -41,7 +41,7 @@ pub(crate) struct Args {
     /// Up to when it is told; the end of the run unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
     at: Option<SimDuration>,
-    /// Waits shorter than this stand together in a line; a fiftieth of the time that is told unless given
+    /// Waits shorter than this stand together in a line; a twentieth of the time that is told unless given
     #[arg(long, value_name = "DUR", value_parser = units::parse_duration)]
     least: Option<SimDuration>,
     /// Run again without each degradation, crash and loss that touched it, and say how it fares then
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let story = Story::read(&log, &scenario, &args.actor, args.at)?;
     let least_ns = args
         .least
-        .map_or(story.until_ns / 50, SimDuration::as_nanos);
+        .map_or(story.until_ns / 20, SimDuration::as_nanos);
     let tried = match args.tries {
         true => Some(escape::escapes(
             &story, &log, &scenario, registry, least_ns,
