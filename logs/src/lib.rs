@@ -85,7 +85,8 @@ mod writer;
 pub use any::{AnyMessage, AnyMessages};
 pub use decode::Unreadable;
 pub use diff::{
-    Carried, Cause, DiffOptions, DiffReport, FirstDifference, Reached, TopicDiff, diff,
+    Carried, Cause, DiffOptions, DiffReport, FieldChange, FirstDifference, Rate, Reached,
+    TopicDiff, diff,
 };
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;
