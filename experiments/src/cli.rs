@@ -11,7 +11,7 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, plot,
+    CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, plot,
     problem, recover, report, reproduce, run, shown, study, verify, why,
 };
 use crate::registry::Registry;
@@ -59,6 +59,8 @@ enum Command {
     Explain(explain::Args),
     /// Say what is in a log
     Info(info::Args),
+    /// Print the messages of any MCAP file as JSON lines or as a table
+    Cat(cat::Args),
     /// Run a log's scenario again and compare every message
     Verify(verify::Args),
     /// Compare two logs: which messages differ, which one first, and what caused it
@@ -215,6 +217,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Scenarios(args) => builtin::scenarios(&args, registry),
         Command::Explain(args) => explain::run(&args, registry),
         Command::Info(args) => info::run(&args, registry),
+        Command::Cat(args) => cat::run(&args, registry),
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args, registry),
         Command::Fork(args) => fork::run(&args, registry),

@@ -6,12 +6,14 @@
 //! that go with the bytes of the message and [`VALUES`].
 
 pub(crate) mod cdr;
+pub(crate) mod flat;
 pub(crate) mod idl;
 pub(crate) mod rosmsg;
 pub(crate) mod structs;
 
 use std::sync::Arc;
 
+use flat::FlatSchema;
 use structs::Structs;
 
 use crate::scan::{ChannelInfo, SchemaInfo};
@@ -48,9 +50,19 @@ impl Unreadable {
 pub(crate) enum Layout {
     /// Structs whose fields follow each other.
     Structs(Structs),
+    /// Tables that say where their fields are.
+    Flat(FlatSchema),
 }
 
 impl Layout {
+    /// Calls `each` with every field that messages may have, as long as it says so.
+    pub(crate) fn fields(&self, each: &mut dyn FnMut(&str) -> bool, depth: usize) {
+        match self {
+            Layout::Structs(structs) => structs.fields(each, depth),
+            Layout::Flat(schema) => schema.fields(each, depth),
+        }
+    }
+
     /// Reads a schema.
     pub(crate) fn read(schema: &SchemaInfo) -> Result<Layout, Unreadable> {
         let text = || {
@@ -61,6 +73,9 @@ impl Layout {
             "ros2msg" => rosmsg::read(&schema.name, text()?, rosmsg::Version::Two),
             "ros1msg" => rosmsg::read(&schema.name, text()?, rosmsg::Version::One),
             "ros2idl" | "omgidl" => idl::read(&schema.name, text()?),
+            "flatbuffer" => {
+                return FlatSchema::read(&schema.data, &schema.name).map(Layout::Flat);
+            }
             "" => return Err(Unreadable::new("the channel has no schema")),
             other => {
                 let what = format!("a schema that is written as {other:?} is not read");
@@ -85,11 +100,14 @@ pub(crate) fn value<'a>(
         channel.schema.as_deref().ok_or_else(missing)
     };
     match channel.encoding.as_str() {
-        "cdr" => match schema()?.layout()? {
-            Layout::Structs(structs) => cdr::cdr(structs, data),
-        },
-        "ros1" => match schema()?.layout()? {
-            Layout::Structs(structs) => cdr::ros1(structs, data),
+        encoding @ ("cdr" | "ros1" | "flatbuffer") => match (encoding, schema()?.layout()?) {
+            ("cdr", Layout::Structs(structs)) => cdr::cdr(structs, data),
+            ("ros1", Layout::Structs(structs)) => cdr::ros1(structs, data),
+            ("flatbuffer", Layout::Flat(schema)) => schema.value(data),
+            _ => {
+                let what = format!("a schema that is not for messages encoded as {encoding:?}");
+                Err(Unreadable::new(what))
+            }
         },
         "json" => crate::fields::json_value(data),
         "protobuf" => crate::fields::protobuf_value(data, schema()?, others),
@@ -98,4 +116,34 @@ pub(crate) fn value<'a>(
             Err(Unreadable::new(what))
         }
     }
+}
+
+/// Calls `each` with every field that a value has; elements of lists are all the same field.
+pub(crate) fn names(value: &Value<'_>, each: &mut dyn FnMut(&str)) {
+    fn walk(value: &Value<'_>, path: &mut String, each: &mut dyn FnMut(&str)) {
+        match value {
+            Value::Object(fields) => {
+                for (name, value) in fields {
+                    within(path, name, &mut |path| {
+                        each(path);
+                        walk(value, path, each);
+                    });
+                }
+            }
+            Value::List(values) => values.iter().for_each(|value| walk(value, path, each)),
+            _ => {}
+        }
+    }
+    walk(value, &mut String::new(), each);
+}
+
+/// Calls `inner` with a name added to a path.
+pub(crate) fn within(path: &mut String, name: &str, inner: &mut dyn FnMut(&mut String)) {
+    let length = path.len();
+    if length > 0 {
+        path.push('.');
+    }
+    path.push_str(name);
+    inner(path);
+    path.truncate(length);
 }

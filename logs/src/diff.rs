@@ -1,13 +1,17 @@
 //! Comparing two logs: which messages differ, which one first, and what caused it.
 
 mod agree;
+mod aligning;
+mod behaviour;
 mod beside;
 mod chain;
 mod comparison;
 mod detail;
 mod entry;
 mod index;
+mod known;
 mod matching;
+mod offset;
 mod scenario;
 mod spill;
 #[cfg(test)]
@@ -16,6 +20,8 @@ mod text;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+
+pub use behaviour::{FieldChange, Rate};
 
 use serde::Serialize;
 
@@ -96,6 +102,14 @@ pub struct Cause {
 )]
 fn is_zero(count: &u64) -> bool {
     *count == 0
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_no_offset(offset_ns: &i64) -> bool {
+    *offset_ns == 0
 }
 
 /// How one of the two logs has a message.
@@ -198,6 +212,13 @@ pub struct TopicDiff {
     pub only_in_b: u64,
     /// Messages that come in another order.
     pub reordered: u64,
+    /// How often there are messages in the first log.
+    pub rate_a: Rate,
+    /// How often there are messages in the second log.
+    pub rate_b: Rate,
+    /// The fields that differ in the messages that changed, most often first; in Farside's logs of the first
+    /// few thousand such messages.
+    pub fields: Vec<FieldChange>,
 }
 
 /// How two logs differ.
@@ -222,6 +243,10 @@ pub struct DiffReport {
     pub only_in_b: u64,
     /// Messages that come in another order on their topic.
     pub reordered: u64,
+    /// By how much later the second log was recorded, in nanoseconds: times are compared after that. 0 in
+    /// Farside's logs, and where there is none that is sure.
+    #[serde(skip_serializing_if = "is_no_offset")]
+    pub offset_ns: i64,
     /// How many records were compared in the first log.
     pub records_a: u64,
     /// How many records were compared in the second log.
@@ -248,9 +273,10 @@ pub struct DiffReport {
 ///
 /// Farside's logs are aligned by the identity of each message: sender, receiver, kind, and the
 /// match key where the protocol gave one, or else the ordinal. The messages of other MCAP files are
-/// aligned on each topic: what is the same, and between these what says the same, what was at the
-/// same time, and last by place. Protobuf and JSON are compared field by field, anything else by
-/// its bytes; so is what cannot be read, and a note says why. Metadata and attachments are
+/// aligned on each topic: what is the same, and between these what says the same, what has the same
+/// number, what was at the same time or nearest to it, and last by place; if the second log was recorded
+/// later by a time that is sure, after that. CDR, ROS 1, protobuf, JSON and FlatBuffers are compared field
+/// by field, anything else by its bytes; so is what cannot be read, and a note says why. Metadata and attachments are
 /// compared, and schemas: a field that is set and that the two do not declare alike differs.
 ///
 /// In Farside's logs state samples, what is drawn and what depends on the machine are not compared,
@@ -269,7 +295,7 @@ pub struct DiffReport {
 ///
 /// # Errors
 /// If one of the files cannot be read, or is damaged before its end; a cut file is compared as
-/// far as it goes.
+/// far as it goes. If no message has a field or a topic that the options name.
 pub fn diff(
     a: impl AsRef<Path>,
     b: impl AsRef<Path>,

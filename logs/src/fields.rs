@@ -15,7 +15,7 @@ pub(crate) use json::json_value;
 pub(crate) use protobuf::{Encoded, protobuf, protobuf_value};
 pub use rules::Tolerance;
 pub(crate) use rules::{Bound, Rules};
-pub(crate) use values::{Differs, each, first, show};
+pub(crate) use values::{Differs, each, first};
 
 /// The first field in which two things differ, with both values.
 #[derive(Clone, Debug, PartialEq)]

@@ -85,8 +85,8 @@ mod writer;
 pub use any::{AnyMessage, AnyMessages};
 pub use decode::Unreadable;
 pub use diff::{
-    Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FirstDifference, Reached,
-    TopicDiff, causes, diff,
+    Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FieldChange, FirstDifference,
+    Rate, Reached, TopicDiff, causes, diff,
 };
 pub use envelope::{KeyRef, RecordRef};
 pub use error::LogError;

@@ -15,6 +15,8 @@ use prost_types::{
     FileDescriptorSet,
 };
 
+use crate::decode::within;
+
 /// The messages of a schema, and which of them the schema is for.
 #[derive(Debug)]
 pub(crate) struct Types {
@@ -125,6 +127,41 @@ impl Types {
         let names = self.enums.get(field.names?)?;
         let name = names.get(&i32::try_from(number).ok()?);
         name.map(String::as_str)
+    }
+
+    /// Calls `each` with every field that messages may have, as long as it says so.
+    pub(crate) fn fields(&self, each: &mut dyn FnMut(&str) -> bool, depth: usize) {
+        self.fields_of(self.root, &mut String::new(), each, depth);
+    }
+
+    fn fields_of(
+        &self,
+        at: usize,
+        path: &mut String,
+        each: &mut dyn FnMut(&str) -> bool,
+        depth: usize,
+    ) -> bool {
+        let mut goes_on = depth > 0;
+        for field in self.messages[at].fields.values() {
+            within(path, &field.name, &mut |path| {
+                goes_on = goes_on && each(path);
+                let FieldType::Message(Some(inner)) = field.kind else {
+                    return;
+                };
+                let entry = &self.messages[inner];
+                let inner = match entry.value_of_entry().filter(|_| entry.map_entry) {
+                    None => Some(inner),
+                    Some(value) => match value.kind {
+                        FieldType::Message(inner) => inner,
+                        FieldType::Scalar(_) => None,
+                    },
+                };
+                if let Some(inner) = inner.filter(|_| goes_on) {
+                    self.fields_of(inner, path, each, depth - 1);
+                }
+            });
+        }
+        goes_on
     }
 
     pub(crate) fn message(&self, at: usize) -> &MessageType {

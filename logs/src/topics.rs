@@ -91,6 +91,8 @@ pub(crate) fn snake_case(name: &str) -> String {
 /// A set of topic globs.
 pub(crate) struct Topics {
     globs: Vec<Pattern>,
+    /// If there are any: all topics that none of these matches are in the set, too.
+    but: Vec<Pattern>,
 }
 
 impl Topics {
@@ -102,11 +104,19 @@ impl Topics {
             })
         };
         let globs = globs.iter().map(read).collect::<Result<_, _>>()?;
-        Ok(Topics { globs })
+        let but = Vec::new();
+        Ok(Topics { globs, but })
+    }
+
+    /// The set with all topics besides, that none of these globs matches; as it is, if there are none.
+    pub(crate) fn and_all_but(self, globs: &[String]) -> Result<Self, LogError> {
+        let but = Topics::new(globs)?.globs;
+        Ok(Topics { but, ..self })
     }
 
     pub(crate) fn matches(&self, topic: &str) -> bool {
-        self.globs.iter().any(|glob| glob.matches(topic))
+        let any = |globs: &[Pattern]| globs.iter().any(|glob| glob.matches(topic));
+        any(&self.globs) || (!self.but.is_empty() && !any(&self.but))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use farside_logs::DiffOptions;
+use farside_actors::units::parse_duration;
+use farside_logs::{DiffOptions, Tolerance};
 
 use super::Exit;
 use super::kinds::{self, FileKind};
@@ -23,30 +24,61 @@ pub(crate) struct Args {
     /// Print JSON, with every topic
     #[arg(long)]
     json: bool,
-    /// Take numbers as equal that differ by at most this, absolutely or as a share
-    #[arg(long, value_name = "X", default_value = "0", value_parser = tolerance)]
-    tolerance: f64,
-    /// Leave out these topics; `*` does not match `/`, `**` does; may be repeated
-    #[arg(long, value_name = "GLOB")]
+    /// Take as equal what differs by at most this: numbers (1e-6, absolutely or as a share), times (10ms), or
+    /// a field and all within it (header.stamp=10ms, ranges=1e-6, log_time=1ms); may be repeated
+    #[arg(long, value_name = "[FIELD=]X", value_parser = given_tolerance)]
+    tolerance: Vec<Given>,
+    /// More tolerances of fields, behind the two logs
+    #[arg(value_name = "FIELD=X", value_parser = given_tolerance, hide = true)]
+    more: Vec<Given>,
+    /// Leave out these topics (globs; `*` does not match `/`, `**` does) or fields (header.stamp); may be
+    /// repeated
+    #[arg(long, value_name = "GLOB|FIELD")]
     ignore: Vec<String>,
+    /// Compare these topics only; may be repeated
+    #[arg(long, value_name = "GLOB")]
+    topic: Vec<String>,
 }
 
-fn tolerance(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
-        _ => Err("expected a number from 0 on, such as 1e-6".to_owned()),
-    }
+/// A tolerance as it was given: of one field, or of all.
+#[derive(Clone, Debug, PartialEq)]
+struct Given {
+    field: Option<String>,
+    within: Tolerance,
+}
+
+fn given_tolerance(text: &str) -> Result<Given, String> {
+    let (field, value) = match text.rsplit_once('=') {
+        Some((field, value)) if !field.is_empty() => (Some(field.to_owned()), value),
+        _ => (None, text),
+    };
+    let number = value.parse::<f64>().ok();
+    let number = number.filter(|number| *number >= 0.0 && number.is_finite());
+    let time = parse_duration(value).ok();
+    let within = match (number, time) {
+        (Some(number), _) => Tolerance::Number(number),
+        (_, Some(time)) => Tolerance::TimeNs(time.as_nanos()),
+        _ => return Err("expected a number from 0 on or a time, such as 1e-6 or 10ms".to_owned()),
+    };
+    Ok(Given { field, within })
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.a, registry)?;
     kinds::expect(FileKind::Log, &args.b, registry)?;
     output::spare(&[args.a.clone(), args.b.clone()], &[])?;
-    let options = DiffOptions {
-        tolerance: args.tolerance,
+    let mut options = DiffOptions {
         ignore: args.ignore.clone(),
+        topics: args.topic.clone(),
         ..DiffOptions::default()
     };
+    for Given { field, within } in args.tolerance.iter().chain(&args.more) {
+        match (field, *within) {
+            (Some(field), within) => options.field_tolerances.push((field.clone(), within)),
+            (None, Tolerance::Number(number)) => options.tolerance = number,
+            (None, Tolerance::TimeNs(time_ns)) => options.time_tolerance_ns = Some(time_ns),
+        }
+    }
     let report = farside_logs::diff(&args.a, &args.b, &options)?;
     if args.json {
         print_json(&report)?;

@@ -308,6 +308,21 @@ mod tests {
         }
     }
 
+    /// A message that rosbags wrote and mcap_ros2 read, in both orders of bytes: see `tests/foreign`.
+    #[test]
+    fn what_other_libraries_write_and_read_is_read() {
+        let text = include_str!("../../tests/foreign/root.msg");
+        let expected = include_str!("../../tests/foreign/root.json").trim();
+        assert_eq!(
+            shown(text, include_bytes!("../../tests/foreign/root.le.cdr")),
+            expected
+        );
+        assert_eq!(
+            shown(text, include_bytes!("../../tests/foreign/root.be.cdr")),
+            expected
+        );
+    }
+
     #[test]
     fn values_are_aligned_from_behind_the_head() {
         let text = "uint8 a\nfloat64 b\nuint8 c\nuint16 d\nstring e\nuint32 f";

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Unreadable;
+use super::{Unreadable, within};
 use crate::value::NumberKind;
 
 /// The types of a schema, and which of them its messages are.
@@ -44,6 +44,7 @@ pub(crate) enum Type {
 /// Names for numbers.
 #[derive(Debug, Default)]
 pub(crate) struct Enumeration {
+    #[cfg_attr(not(test), expect(dead_code, reason = "for tests and those who debug"))]
     pub(crate) name: String,
     pub(crate) values: BTreeMap<i64, String>,
 }
@@ -54,9 +55,34 @@ impl Structs {
         let missing = || Unreadable::new("a type that is not declared");
         self.structs.get(at).ok_or_else(missing)
     }
+
+    /// Calls `each` with every field that messages have, as long as it says so.
+    pub(crate) fn fields(&self, each: &mut dyn FnMut(&str) -> bool, depth: usize) {
+        self.fields_of(self.root, &mut String::new(), each, depth);
+    }
+
+    fn fields_of(
+        &self,
+        at: usize,
+        path: &mut String,
+        each: &mut dyn FnMut(&str) -> bool,
+        depth: usize,
+    ) -> bool {
+        let mut goes_on = depth > 0;
+        for field in self.structs.get(at).iter().flat_map(|one| &one.fields) {
+            within(path, &field.name, &mut |path| {
+                goes_on = goes_on && each(path);
+                if let Some(inner) = field.kind.inner().filter(|_| goes_on) {
+                    self.fields_of(inner, path, each, depth - 1);
+                }
+            });
+        }
+        goes_on
+    }
 }
 
 impl Type {
+    #[cfg(test)]
     /// What the type is in words, for those who read two schemas.
     pub(crate) fn says(&self, of: &Structs) -> String {
         let most = |most: &Option<u32>| most.map_or(String::new(), |most| format!("<={most}"));

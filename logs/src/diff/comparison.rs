@@ -3,17 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use super::behaviour::Changes;
 use super::entry::{Entry, Mode, Names};
 use super::index::{self, Index};
 use super::matching::{self, Matching, Sequence};
 use super::spill::{BUCKETS, Buckets, Fixed};
 use super::{DiffOptions, DiffReport, FirstDifference, Limits, Reached, TopicDiff, Usage};
-use super::{agree, beside, detail, scenario, text};
+use super::{agree, aligning, beside, detail, known, offset, scenario, text};
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::fields::{FieldDiff, Rules};
 use crate::log::Log;
 use crate::parse::Parser;
+use crate::shown::Seconds;
 use crate::topics::Topics;
 
 /// Compares two logs, and says what that took.
@@ -24,7 +26,7 @@ pub(super) fn compare(
     limits: Limits,
 ) -> Result<(DiffReport, Usage), LogError> {
     // A glob that makes no sense is told before anything is read.
-    Topics::new(&options.ignore)?;
+    Topics::new(&options.ignore)?.and_all_but(&options.topics)?;
     let starts = [index::start(a)?, index::start(b)?];
     let heads = starts.each_ref().map(|log| log.as_ref().map(Log::head));
     let mode = match heads.iter().flatten().count() {
@@ -34,7 +36,7 @@ pub(super) fn compare(
     // What one of them did not write is no difference.
     let filtered = heads.iter().flatten().flat_map(|head| &head.exclude);
     let ignore: Vec<String> = options.ignore.iter().chain(filtered).cloned().collect();
-    let ignore = Topics::new(&ignore)?;
+    let ignore = Topics::new(&ignore)?.and_all_but(&options.topics)?;
     let read = |limits| Comparison::read((a, b), mode, &ignore, options.rules(), limits);
     let mut comparison = read(limits)?;
     if !comparison.may_pass_front()? {
@@ -44,6 +46,8 @@ pub(super) fn compare(
         };
         comparison = read(all)?;
     }
+    known::check((&comparison.a, &comparison.b), mode, options)?;
+    comparison.find_offset()?;
     let strangers = heads.iter().filter(|head| head.is_none()).count();
     comparison.note_files(strangers);
     if let [Some(a), Some(b)] = &starts {
@@ -56,6 +60,10 @@ pub(super) fn compare(
     comparison.report.attachments = beside.attachments;
     comparison.compare()
 }
+
+/// How many pairs of Farside's logs that differ are read for which fields do: those at the front, of which
+/// few chunks are opened again.
+const SAMPLE: usize = 4096;
 
 /// A difference, and where it is.
 #[derive(Clone, Copy)]
@@ -137,6 +145,11 @@ struct Comparison<'a> {
     beside: DiffReport,
     usage: Usage,
     topics: BTreeMap<u32, TopicDiff>,
+    /// Which fields differ on a topic.
+    changes: BTreeMap<u32, Changes>,
+    /// Of Farside's logs, the first of the pairs that differ, by their places in the first log: their fields
+    /// are counted.
+    sample: BTreeMap<u32, Pair>,
     /// Messages with another sequence number.
     renumbered: u64,
     /// By field: in buckets by their place in the first log.
@@ -209,6 +222,8 @@ impl<'a> Comparison<'a> {
             report,
             beside,
             topics: BTreeMap::new(),
+            changes: BTreeMap::new(),
+            sample: BTreeMap::new(),
             renumbered,
             to_read: Buckets::new(limits.pairs),
             places: Buckets::new(limits.pairs),
@@ -232,6 +247,26 @@ impl<'a> Comparison<'a> {
             *least = (*least).min(ordinal);
         }
         Ok(late.is_empty() || !self.a.is_overtaken(&late, &mut self.names)?)
+    }
+
+    /// Finds by how much later the second log was recorded. Where the front agrees, it was not.
+    fn find_offset(&mut self) -> Result<(), LogError> {
+        if self.mode == Mode::Farside || self.a.agreed() > 0 {
+            return Ok(());
+        }
+        let offset_ns = offset::common_offset(&mut self.a.entries, &mut self.b.entries)?;
+        self.rules.offset_ns = offset_ns;
+        self.report.offset_ns = offset_ns;
+        if offset_ns != 0 {
+            let (short, when) = (
+                &self.short.1,
+                if offset_ns < 0 { "earlier" } else { "later" },
+            );
+            let by = Seconds(offset_ns.unsigned_abs());
+            let note = format!("{short} was recorded {by} s {when}: times are compared after that");
+            self.report.notes.push(note);
+        }
+        Ok(())
     }
 
     fn note_files(&mut self, strangers: usize) {
@@ -396,7 +431,7 @@ impl<'a> Comparison<'a> {
             only_in_b,
         } = match self.mode {
             Mode::Farside => matching::matching(&a, &b),
-            Mode::Any => matching::aligned(&a, &b),
+            Mode::Any => aligning::aligned(&a, &b, self.rules.offset_ns),
         };
         // The bytes of two messages may differ and their fields not, or the other way round.
         let by_field = !self.rules.are_exact() || self.mode == Mode::Any;
@@ -432,6 +467,14 @@ impl<'a> Comparison<'a> {
 
     fn changed(&mut self, a: Entry, b: Entry) {
         self.topic(a.topic).changed += 1;
+        let last = self.sample.last_key_value().map(|(at, _)| *at);
+        let is_full = self.sample.len() >= SAMPLE;
+        if self.mode == Mode::Farside && (!is_full || last.is_some_and(|last| a.at < last)) {
+            if is_full {
+                self.sample.pop_last();
+            }
+            self.sample.insert(a.at, Pair(a, b));
+        }
         self.found(Found::Changed(a, b));
     }
 
@@ -453,13 +496,38 @@ impl<'a> Comparison<'a> {
             held.sort_by_key(|(_, b, _)| b.position);
             for (a, b, message) in held {
                 let given = (self.a.scanner.channels(), &self.rules);
-                if let Some(diff) = message.against(&mut self.b, &b, self.mode, given)? {
+                let changes = match self.mode {
+                    Mode::Any => Some(self.changes.entry(a.topic).or_default()),
+                    Mode::Farside => None,
+                };
+                if let Some(diff) = message.against(&mut self.b, &b, self.mode, given, changes)? {
                     self.changed(a, b);
                     self.reasons.extend(diff.why.map(|why| (a.topic, why)));
                 }
             }
         }
         Ok(())
+    }
+
+    /// Counts the fields that differ in the first pairs that do, of Farside's logs.
+    fn count_sample(&mut self) -> Result<(), LogError> {
+        for (_, Pair(a, b)) in std::mem::take(&mut self.sample) {
+            let held = detail::Held::fetch(&mut self.a, &a)?;
+            let given = (self.a.scanner.channels(), &self.rules);
+            let changes = Some(self.changes.entry(a.topic).or_default());
+            held.against(&mut self.b, &b, self.mode, given, changes)?;
+        }
+        Ok(())
+    }
+
+    /// How the topics that differ behave in the two logs.
+    fn behaviour(&mut self) {
+        for (topic, told) in &mut self.topics {
+            told.rate_a = self.a.rate(*topic);
+            told.rate_b = self.b.rate(*topic);
+            let changes = self.changes.remove(topic);
+            told.fields = changes.map_or_else(Vec::new, Changes::told);
+        }
     }
 
     /// Counts the messages that come in another order on their topic.
@@ -510,6 +578,8 @@ impl<'a> Comparison<'a> {
     }
 
     fn finish(mut self) -> Result<(DiffReport, Usage), LogError> {
+        self.count_sample()?;
+        self.behaviour();
         for topic in self.topics.values() {
             self.report.changed += topic.changed;
             self.report.only_in_a += topic.only_in_a;
@@ -572,7 +642,7 @@ impl<'a> Comparison<'a> {
             Found::Changed(a, b) => {
                 let held = detail::Held::fetch(&mut self.a, &a)?;
                 let given = (self.a.scanner.channels(), &self.rules);
-                let diff = held.against(&mut self.b, &b, mode, given)?;
+                let diff = held.against(&mut self.b, &b, mode, given, None)?;
                 let reason = diff.as_ref().and_then(|diff| diff.why.clone());
                 self.reasons.extend(reason.map(|why| (a.topic, why)));
                 let diff = diff.unwrap_or_else(|| FieldDiff::new("body", "one", "another"));

@@ -7,6 +7,7 @@ use farside::record::RecordClass;
 use farside::ruling::{MessageId, MessageNumber};
 use mcap::records::MessageHeader;
 
+use super::behaviour::Changes;
 use super::chain::{self, Step};
 use super::entry::{Entry, Mode, Names};
 use super::index::Index;
@@ -52,6 +53,7 @@ impl Held {
         entry: &Entry,
         mode: Mode,
         (others, rules): (&[Arc<ChannelInfo>], &Rules),
+        changes: Option<&mut Changes>,
     ) -> Result<Option<FieldDiff>, LogError> {
         let channels = index.scanner.channels().to_vec();
         let message = index.scanner.message_at(entry.position, entry.channel)?;
@@ -61,10 +63,60 @@ impl Held {
             data: &self.data,
             position: message.position,
         };
-        Ok(match mode {
-            Mode::Any => any(&held, &message, [others, &channels], rules),
+        let others = [others, channels.as_slice()];
+        let found = match mode {
+            Mode::Any => any(&held, &message, others, rules),
             Mode::Farside => farside(&held, &message, rules),
-        })
+        };
+        if let (Some(_), Some(changes)) = (&found, changes) {
+            count_changes((&held, &message), others, mode, rules, changes);
+        }
+        Ok(found)
+    }
+}
+
+/// Counts all fields in which two messages differ, as far as they can be read.
+fn count_changes(
+    (a, b): (&ScannedMessage<'_>, &ScannedMessage<'_>),
+    others: [&[Arc<ChannelInfo>]; 2],
+    mode: Mode,
+    rules: &Rules,
+    changes: &mut Changes,
+) {
+    let times = |x: u64, y: u64| {
+        let y = i128::from(y) - i128::from(rules.offset_ns);
+        i128::from(x).abs_diff(y) as f64 / 1e9
+    };
+    let mut late = |field: &str, x, y| {
+        if log_times(field, x, y, rules).is_some() {
+            changes.add(field.to_owned(), Some(times(x, y)));
+        }
+    };
+    let records = (RecordRef::read(a.data), RecordRef::read(b.data));
+    if let (Mode::Farside, (Some(x), Some(y))) = (mode, &records) {
+        late("log_time", x.key.time_ns, y.key.time_ns);
+        late("sent", x.sent_ns, y.sent_ns);
+        let texts = [
+            ("fate", x.class.name(), y.class.name()),
+            ("link", x.link, y.link),
+            ("reason", x.reason, y.reason),
+        ];
+        for (field, _, _) in texts.iter().filter(|(_, x, y)| x != y) {
+            changes.add((*field).to_owned(), None);
+        }
+        let x = Encoded::body(x.body, fields::schema(a.channel));
+        let y = Encoded::body(y.body, fields::schema(b.channel));
+        if let (Ok(x), Ok(y)) = (x.value(), y.value()) {
+            fields::each("body", (&x, &y), rules, changes);
+        }
+        return;
+    }
+    late("log_time", a.head.log_time, b.head.log_time);
+    late("publish_time", a.head.publish_time, b.head.publish_time);
+    match values(a, b, others) {
+        Ok([x, y]) => fields::each("", (&x, &y), rules, changes),
+        Err(_) if a.data != b.data => changes.add("data".to_owned(), None),
+        Err(_) => {}
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use hashbrown::HashMap;
 use rustc_hash::FxBuildHasher;
 
+use super::behaviour::{Rate, Times};
 use super::entry::{Builder, Entry, Mode, Names};
 use super::spill::Buckets;
 use crate::LogError;
@@ -56,6 +57,8 @@ pub(super) struct Index<'a> {
     pub(super) ignored: u64,
     /// How many are to be compared, by the number of their topic.
     by_topic: Vec<u64>,
+    /// When they were, by the number of their topic.
+    times: Vec<Times>,
     /// How many messages were left out, by what their channels are for.
     pub(super) left_out: BTreeMap<String, u64>,
     /// How many records at the front agree with those of the other log.
@@ -90,6 +93,7 @@ impl<'a> Index<'a> {
             records: 0,
             ignored: 0,
             by_topic: Vec::new(),
+            times: Vec::new(),
             left_out: BTreeMap::new(),
             agreed: 0,
             agreed_by_topic: Vec::new(),
@@ -148,8 +152,10 @@ impl<'a> Index<'a> {
             let topic = channel.topic as usize;
             if self.by_topic.len() <= topic {
                 self.by_topic.resize(topic + 1, 0);
+                self.times.resize(topic + 1, Times::default());
             }
             self.by_topic[topic] += 1;
+            self.times[topic].add(message.head.log_time);
             self.topic = channel.topic;
             return Ok(true);
         }
@@ -272,6 +278,12 @@ impl<'a> Index<'a> {
         topics
             .filter(|(_, count)| **count > 0)
             .map(|(topic, count)| (topic as u32, *count))
+    }
+
+    /// How often there are records on a topic.
+    pub(super) fn rate(&self, topic: u32) -> Rate {
+        let times = self.times.get(topic as usize);
+        times.map_or_else(Rate::default, Times::rate)
     }
 
     /// Whether there are records to be compared on a topic.

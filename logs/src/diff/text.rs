@@ -44,6 +44,7 @@ impl fmt::Display for DiffReport {
         }
         self.write_spread(f)?;
         self.write_table(f)?;
+        self.write_behaviour(f)?;
         self.write_not_compared(f)
     }
 }
@@ -151,6 +152,87 @@ impl DiffReport {
             (more, _) => writeln!(f, "{:37}and {more} more (--topics lists all)", "")?,
         }
         write_row(f, &total, 1)
+    }
+}
+
+/// Topics whose behaviour people are shown, and fields of each.
+const BEHAVIOUR_SHOWN: usize = 10;
+const FIELDS_SHOWN: usize = 5;
+
+impl DiffReport {
+    /// How often there are messages, how long there is none, and what changed by how much.
+    fn write_behaviour(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (topics, fields) = match f.alternate() {
+            true => (usize::MAX, usize::MAX),
+            false => (BEHAVIOUR_SHOWN, FIELDS_SHOWN),
+        };
+        if self.topics.is_empty() {
+            return Ok(());
+        }
+        let (a, b) = short(Path::new(&self.file_a), Path::new(&self.file_b));
+        writeln!(f, "\nhow they behave, {a} | {b}\n")?;
+        let [messages, rate, gap] = ["messages", "rate, 1/s", "largest gap, s"];
+        writeln!(f, "{messages:>17} {rate:>19} {gap:>19}")?;
+        for topic in self.topics.iter().take(topics) {
+            let (x, y) = (&topic.rate_a, &topic.rate_b);
+            let counts = (topic.a, topic.b);
+            let rates = (Figure(x.rate_hz), Figure(y.rate_hz));
+            let gaps = (Figure(x.largest_gap_s), Figure(y.largest_gap_s));
+            let counts = format!("{} | {}", counts.0, counts.1);
+            let rates = format!("{} | {}", rates.0, rates.1);
+            let gaps = format!("{} | {}", gaps.0, gaps.1);
+            writeln!(
+                f,
+                "{counts:>17} {rates:>19} {gaps:>19}  {}",
+                Shown(&topic.topic)
+            )?;
+            for field in topic.fields.iter().take(fields) {
+                write!(
+                    f,
+                    "{:>21}{}: {} changed",
+                    "",
+                    Shown(&field.field),
+                    field.changed
+                )?;
+                match (field.mean, field.most) {
+                    (Some(mean), Some(most)) => {
+                        let (mean, most) = (Figure(mean), Figure(most));
+                        writeln!(f, ", by {mean} on average, {most} at most")?;
+                    }
+                    _ => writeln!(f)?,
+                }
+            }
+            let more = topic.fields.len().saturating_sub(fields);
+            if more > 0 {
+                writeln!(f, "{:>21}and {more} fields more (--topics lists all)", "")?;
+            }
+        }
+        match self.topics.len().saturating_sub(topics) {
+            0 => Ok(()),
+            more => writeln!(f, "{:>21}and {more} topics more (--topics lists all)", ""),
+        }
+    }
+}
+
+/// A number with four digits that count.
+struct Figure(f64);
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        let digits = match size {
+            _ if size == 0.0 => 0,
+            _ if size >= 1000.0 => 0,
+            _ if size >= 100.0 => 1,
+            _ if size >= 10.0 => 2,
+            _ if size >= 1.0 => 3,
+            _ if size >= 0.001 => 5,
+            _ => return write!(f, "{:.3e}", self.0),
+        };
+        match size >= 1e9 {
+            true => write!(f, "{:.3e}", self.0),
+            false => write!(f, "{:.digits$}", self.0),
+        }
     }
 }
 

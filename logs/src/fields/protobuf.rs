@@ -94,7 +94,16 @@ impl<'a> Encoded<'a> {
     }
 }
 
-impl Encoded<'_> {
+impl<'a> Encoded<'a> {
+    /// What the message says, as a value.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub(crate) fn value(&self) -> Result<crate::value::Value<'a>, Unreadable> {
+        let side = self.read_as.map_err(Unreadable::new)?;
+        value::message(self.bytes, side, self.others)
+    }
+
     /// What the message holds, in a few words; none where it cannot be read.
     pub(crate) fn shown(&self) -> Option<String> {
         let side = self.read_as.as_ref().ok()?;

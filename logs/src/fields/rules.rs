@@ -1,6 +1,6 @@
 //! By how much values may differ, and which are not compared.
 
-use super::{Path, near};
+use super::Path;
 
 /// By how much something may differ and still be the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +69,12 @@ impl Rules {
         !(self.within.is_empty() && self.ignored.is_empty())
     }
 
+    /// All fields that are named.
+    pub(crate) fn named(&self) -> impl Iterator<Item = String> {
+        let within = self.within.iter().map(|(steps, _)| steps);
+        within.chain(&self.ignored).map(|steps| steps.join("."))
+    }
+
     /// What holds where no field was named.
     pub(crate) fn bound(&self) -> Bound {
         Bound {
@@ -118,10 +124,5 @@ impl Rules {
     pub(crate) fn log_times_agree(&self, a_ns: u64, b_ns: u64, bound: Bound) -> bool {
         let b = i128::from(b_ns) - i128::from(self.offset_ns);
         i128::from(a_ns).abs_diff(b) <= u128::from(bound.time_ns)
-    }
-
-    /// Whether two numbers are the same.
-    pub(crate) fn near(&self, a: f64, b: f64, bound: Bound) -> bool {
-        near(a, b, bound.number)
     }
 }

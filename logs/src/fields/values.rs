@@ -59,20 +59,22 @@ impl Differs for First {
 /// The first part in which two values differ by more than the rules allow.
 pub(crate) fn first(a: &Value<'_>, b: &Value<'_>, rules: &Rules) -> Option<FieldDiff> {
     let mut found = First::default();
-    // Broken off or not: what was found is there.
-    let _ = Walk {
-        rules,
-        to: &mut found,
-    }
-    .values(&Path::Root(""), a, b, rules.bound());
+    each("", (a, b), rules, &mut found);
     found.0
 }
 
-/// All parts in which two values differ by more than the rules allow.
-pub(crate) fn each(a: &Value<'_>, b: &Value<'_>, rules: &Rules, to: &mut impl Differs) {
-    let walk = Walk { rules, to };
-    // Only who is told breaks off.
-    let _ = walk.all(a, b);
+/// All parts in which two values differ by more than the rules allow. `root` is what the values are called.
+pub(crate) fn each(
+    root: &str,
+    (a, b): (&Value<'_>, &Value<'_>),
+    rules: &Rules,
+    to: &mut impl Differs,
+) {
+    let Some(bound) = rules.enter_root(root) else {
+        return;
+    };
+    // Only who is told breaks off, and knows.
+    let _ = Walk { rules, to }.values(&Path::Root(root), a, b, bound);
 }
 
 struct Walk<'r, D> {
@@ -83,10 +85,6 @@ struct Walk<'r, D> {
 type Entries<'a> = [(Cow<'a, str>, Value<'a>)];
 
 impl<D: Differs> Walk<'_, D> {
-    fn all(mut self, a: &Value<'_>, b: &Value<'_>) -> ControlFlow<()> {
-        self.values(&Path::Root(""), a, b, self.rules.bound())
-    }
-
     fn values(
         &mut self,
         path: &Path<'_>,

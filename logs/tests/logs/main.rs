@@ -3,6 +3,7 @@
 mod by_hand;
 mod common;
 mod comparing;
+mod foreign;
 mod hostile;
 mod python;
 mod reading;
