@@ -10,6 +10,7 @@ pub(crate) mod fork;
 pub(crate) mod info;
 mod interrupt;
 mod kinds;
+mod logged;
 mod output;
 pub(crate) mod plan;
 pub(crate) mod problem;

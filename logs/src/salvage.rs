@@ -156,8 +156,8 @@ pub(crate) struct Hints {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Counted {
     pub(crate) by_channel: BTreeMap<u16, u64>,
-    /// When the last one was logged.
-    pub(crate) last_ns: u64,
+    /// When the first one was logged, and the last.
+    pub(crate) times_ns: (u64, u64),
 }
 
 /// Walks through a damaged file.
@@ -410,6 +410,15 @@ impl<'e> Salvage<'e> {
             return Ok(());
         };
         let content = at + HEAD_BYTES;
+        if self.in_summary && matches!(opcode, op::ATTACHMENT | op::METADATA) {
+            let (what, byte) = (describe(opcode), place.byte(at));
+            self.lose_other(
+                0,
+                format!("{what} behind the end of the data, {byte}: it is doubtful"),
+            )?;
+        }
+        // Nor does any message belong there, and no checksum of the data covers it.
+        let sure = sure && !(self.in_summary && opcode == op::MESSAGE);
         match opcode {
             op::ATTACHMENT => {
                 if let Some(mut attached) = bytes.attachment(content, length)? {

@@ -12,7 +12,7 @@ use crate::commands::kept::printed;
 use crate::scenario::Scenario;
 
 /// The commands, with a log that is broken and one that is whole.
-const COMMANDS: [&[&str]; 16] = [
+const COMMANDS: [&[&str]; 17] = [
     &["info", "BROKEN"],
     &["info", "BROKEN", "--topics"],
     &["info", "BROKEN", "--json"],
@@ -20,6 +20,14 @@ const COMMANDS: [&[&str]; 16] = [
     &["verify", "BROKEN", "--executor", "inline", "--json"],
     &["diff", "BROKEN", "WHOLE"],
     &["diff", "WHOLE", "BROKEN", "--tolerance", "1e-9", "--json"],
+    &[
+        "run",
+        "BROKEN",
+        "--executor",
+        "inline",
+        "--no-log",
+        "--json",
+    ],
     &["draw", "BROKEN", "--list"],
     &["draw", "BROKEN", "--out", "OUT.svg"],
     &[
@@ -63,15 +71,13 @@ fn log(scenario: &str, sets: &[&str], compression: Compression) -> Vec<u8> {
 }
 
 fn traffic(compression: Compression) -> Vec<u8> {
-    let sets = [
-        "traffic.hosts=['a','b']",
-        "traffic.groups=[]",
-        "traffic.flow=[{from='a',to='b',period='200ms',size='40B'}]",
-        "until=900ms",
-        "links.default.loss=0.3",
-        "crash=[{actor='b',at='500ms',restart='700ms'}]",
-    ];
-    log("traffic/open-loop", &sets, compression)
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.toml");
+    let text = "system = 'traffic'\nuntil = '900ms'\n[traffic]\nhosts = ['a', 'b']\n\
+        flow = [{ from = 'a', to = 'b', size = '40B', period = '200ms' }]\n\
+        [links.default]\nloss = 0.3\n[[crash]]\nactor = 'b'\nat = '500ms'\nrestart = '700ms'\n";
+    std::fs::write(&path, text).unwrap();
+    log(&path.display().to_string(), &[], compression)
 }
 
 fn network(compression: Compression) -> Vec<u8> {

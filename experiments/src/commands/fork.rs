@@ -14,8 +14,8 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::kinds::{self, FileKind};
+use super::logged::scenario_of;
 use super::run::{ExecutorName, duration, ending, log_options};
-use super::verify::scenario_of;
 use super::{CommandError, Exit, interrupt, output, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::Scenario;

@@ -17,8 +17,8 @@ pub struct LostMessages {
     pub by_topic: BTreeMap<String, u64>,
     /// What tells of them.
     pub told_by: LostToldBy,
-    /// Between which log times they were written, in nanoseconds; none if none is missing that is known or
-    /// suspected.
+    /// Between which log times they were written, in nanoseconds, the later open if that is unknown; none if
+    /// no message is known to be lost, or may be.
     pub between_ns: Option<(u64, Option<u64>)>,
 }
 
@@ -150,10 +150,11 @@ impl Tally {
         topic: impl Fn(u16) -> Option<String>,
     ) -> LostMessages {
         if self.gap || cut {
-            let until = self.counted.as_ref().map(|counted| counted.last_ns);
+            let until = self.counted.as_ref().map(|counted| counted.times_ns.1);
             let from = self.last_ns.unwrap_or(0);
             self.widen(from, until.map(|until| until.max(from)));
         }
+        let times_ns = self.counted.as_ref().map(|counted| counted.times_ns);
         let told_by = match self.counted {
             Some(_) => LostToldBy::Statistics,
             None => LostToldBy::Indexes,
@@ -175,12 +176,20 @@ impl Tally {
             let of_topic: &mut u64 = by_topic.entry(topic).or_default();
             *of_topic = of_topic.saturating_add(lost);
         }
-        let none = known == 0 && told_by == LostToldBy::Statistics;
+        let between_ns = match (told_by, known) {
+            (LostToldBy::Statistics, 0) => None,
+            (LostToldBy::Indexes, 0) => self.between,
+            // Where they were is kept as something that only its writer knows.
+            _ => self.between.or(Some(match times_ns {
+                Some((first, last)) => (first, Some(last)),
+                None => (0, None),
+            })),
+        };
         LostMessages {
             known,
             by_topic,
             told_by,
-            between_ns: self.between.filter(|_| !none),
+            between_ns,
         }
     }
 }

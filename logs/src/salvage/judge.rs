@@ -76,9 +76,9 @@ const STATISTICS_BYTES: u64 = 46 + 10 * (1 << 16);
 /// What statistics say of messages.
 fn counted(statistics: &[u8]) -> Option<Counted> {
     let mut parser = Parser::new(statistics);
-    // How many there are of everything, then the first log time.
-    parser.bytes(26 + 8)?;
-    let last_ns = parser.u64()?;
+    // How many there are of everything.
+    parser.bytes(26)?;
+    let times_ns = (parser.u64()?, parser.u64()?);
     let entries = parser.u32()?;
     let mut by_channel = BTreeMap::new();
     for _ in 0..entries / 10 {
@@ -86,7 +86,7 @@ fn counted(statistics: &[u8]) -> Option<Counted> {
     }
     Some(Counted {
         by_channel,
-        last_ns,
+        times_ns,
     })
 }
 

@@ -160,7 +160,9 @@ fn held_against(whole: &Messages, broken: &[u8], folder: &Path, what: &str) -> R
         }
         let times = whole.keys().filter(|key| !saved.contains_key(*key));
         for (_, time, _) in times {
-            let (from, until) = told.between_ns.expect("something is lost");
+            let (from, until) = told
+                .between_ns
+                .unwrap_or_else(|| panic!("{what}: {time} ns is missing: {report}"));
             let within = *time >= from && until.is_none_or(|until| *time <= until);
             assert!(within, "{what}: {time} ns is missing: {report}");
         }
