@@ -3,7 +3,7 @@
 
 use farside::prelude::*;
 use farside::record::{Flow, Observer, ObserverError, Record, Wants};
-use farside::{Carrier, Parcel, Verdicts};
+use farside::{Carrier, LinkId, Parcel, Verdicts};
 use farside::{End, Fault, FaultCause};
 use farside_logs::{LogOptions, LogWriter, info};
 use farside_tests::executors::agreed;
@@ -21,6 +21,9 @@ enum Fuse {
     ConstructorsOwnAtTheEnd,
     LinkAtTheEnd,
     ChangeOfLink,
+    ChangeByActor,
+    OwnLink,
+    SharedLink,
     MessageToTheCrashed,
     TimerOfTheCrashed,
     CancelledTimer,
@@ -131,8 +134,8 @@ impl Handler<Call> for Rover {
     }
 }
 
-/// Calls the rover each second.
-struct Base(Fuse);
+/// Calls the rover each second, and may ask its link to change.
+struct Base(Fuse, Option<LinkId<Retune>>);
 
 impl Actor for Base {
     type Accepts = (Call,);
@@ -161,6 +164,12 @@ impl Handler<Call> for Base {
             },
         };
         ctx.send(rover, message);
+        if let Some(link) = self.1
+            && now == SimTime::from_secs(4)
+        {
+            let spoils_encoding = false;
+            ctx.tell_link(link, Retune { spoils_encoding });
+        }
         ctx.timer(SimDuration::from_secs(1), call(false));
         Ok(())
     }
@@ -200,6 +209,8 @@ impl Carrier for Link {
     }
 
     fn carry(&mut self, _parcel: &Parcel<'_>, verdicts: &mut Verdicts) {
+        asked(Fuse::OwnLink, self.fuse);
+        asked(Fuse::SharedLink, self.fuse);
         if self.fuse == Fuse::MessageLostLate {
             verdicts.lose_after(SimDuration::from_millis(600), "faded");
         } else {
@@ -220,7 +231,6 @@ fn model(fuse: Fuse, heavy: bool) -> Simulation {
         sim.heavy(base);
         sim.heavy(rover);
     }
-    sim.actor(base, "base", move |_| Base(fuse));
     let own = Bomb {
         armed: fuse == Fuse::ConstructorsOwnAtTheEnd,
     };
@@ -249,7 +259,15 @@ fn model(fuse: Fuse, heavy: bool) -> Simulation {
             armed: fuse == Fuse::LinkAtTheEnd,
         },
     };
-    let link = sim.link(base, rover, "base-rover", link);
+    let link = if fuse == Fuse::SharedLink {
+        let link = sim.shared_link("base-rover", link);
+        sim.route(base, rover, link);
+        link
+    } else {
+        sim.link(base, rover, "base-rover", link)
+    };
+    let told = (fuse == Fuse::ChangeByActor).then_some(link);
+    sim.actor(base, "base", move |_| Base(fuse, told));
     if fuse != Fuse::StateAtRestart {
         sim.crash_at(SimTime::from_secs(5), target);
     }
@@ -338,6 +356,21 @@ fn a_panic_anywhere_is_a_fault_that_says_who_and_when() {
             Fuse::ChangeOfLink,
             2000,
             "base-rover: panicked: the change went wrong",
+        ),
+        (
+            Fuse::ChangeByActor,
+            4000,
+            "base-rover: panicked: the change went wrong",
+        ),
+        (
+            Fuse::OwnLink,
+            1000,
+            "base-rover handling Call from base: panicked: assertion `left != right` failed: asked about itself",
+        ),
+        (
+            Fuse::SharedLink,
+            1000,
+            "base-rover handling a message from base: panicked: assertion `left != right` failed: asked about itself",
         ),
         (
             Fuse::MessageToTheCrashed,

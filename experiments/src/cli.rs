@@ -18,8 +18,8 @@ use crate::registry::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done; for verify, diff and reproduce: the same
-  1  the answer is \"different\" or \"violated\"
+  0  done; for verify, diff, fork and reproduce: the same; for recover: nothing is lost
+  1  the answer is \"different\", \"violated\" or \"something is lost\"
   2  the input is wrong
   3  the run failed or was interrupted; what was logged until then is readable";
 
@@ -102,11 +102,7 @@ pub fn main(registry: Registry) -> ExitCode {
     // On wrong usage clap prints what is wrong and exits with 2, as we do.
     let matches = command_line(&registry).try_get_matches();
     let matches = matches.unwrap_or_else(|error| refuse_arguments(&error));
-    let mut cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    if let (Command::Draw(args), Some(given)) = (&mut cli.command, matches.subcommand_matches(DRAW))
-    {
-        args.name_picture(given, &registry);
-    }
+    let cli = asked_for(&matches, &registry).unwrap_or_else(|error| error.exit());
     say_on_stderr(cli.verbose);
     match dispatch(cli.command, &registry) {
         Ok(exit) => exit.into(),
@@ -125,6 +121,16 @@ pub fn main(registry: Registry) -> ExitCode {
             error.exit().into()
         }
     }
+}
+
+/// What arguments that clap has understood ask for.
+fn asked_for(matches: &clap::ArgMatches, registry: &Registry) -> Result<Cli, clap::Error> {
+    let mut cli = Cli::from_arg_matches(matches)?;
+    if let (Command::Draw(args), Some(given)) = (&mut cli.command, matches.subcommand_matches(DRAW))
+    {
+        args.name_picture(given, registry);
+    }
+    Ok(cli)
 }
 
 /// Says what is wrong with the arguments, or what they ask of the command line itself, and exits.
@@ -291,6 +297,9 @@ fn say_on_stderr(verbose: u8) {
         .with(targets)
         .init();
 }
+
+#[cfg(test)]
+mod hostile;
 
 #[cfg(test)]
 mod tests {

@@ -11,6 +11,7 @@ pub(crate) mod fork;
 pub(crate) mod info;
 mod interrupt;
 mod kinds;
+mod logged;
 mod output;
 pub(crate) mod plan;
 pub(crate) mod plot;
@@ -155,6 +156,10 @@ impl CommandError {
 }
 
 pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), CommandError> {
+    #[cfg(test)]
+    if kept::keep(bytes) {
+        return Ok(());
+    }
     let mut out = std::io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
     written.map_err(CommandError::Output)
@@ -211,4 +216,32 @@ fn obeyed_by_no_terminal(text: &str, escape: &dyn Fn(char) -> String) -> String 
         }
     }
     out
+}
+
+/// What commands print while tests keep it.
+#[cfg(test)]
+pub(crate) mod kept {
+    use std::cell::RefCell;
+
+    thread_local! {
+        static PRINTED: RefCell<Option<Vec<u8>>> = const { RefCell::new(None) };
+    }
+
+    /// Keeps what is printed on this thread, if somebody asked for it.
+    pub(super) fn keep(bytes: &[u8]) -> bool {
+        PRINTED.with_borrow_mut(|printed| match printed {
+            Some(printed) => {
+                printed.extend_from_slice(bytes);
+                true
+            }
+            None => false,
+        })
+    }
+
+    /// What `work` prints on this thread, which goes nowhere else.
+    pub(crate) fn printed<T>(work: impl FnOnce() -> T) -> (T, Vec<u8>) {
+        PRINTED.set(Some(Vec::new()));
+        let done = work();
+        (done, PRINTED.take().unwrap_or_default())
+    }
 }

@@ -6,10 +6,24 @@ use std::sync::OnceLock;
 
 use farside::Executor;
 use farside_experiments::registry::Registry;
-use farside_experiments::scenario::Scenario;
+use farside_experiments::scenario::{Assembled, Scenario};
 use farside_logs::{LogOptions, LogWriter};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader};
+
+/// The scenario that the log is of, and its run.
+pub fn assembled() -> (Scenario, Assembled) {
+    let sets = [
+        "until=1200ms",
+        "links.default.loss=0.2",
+        "crash=[{ actor = 'rover_2', at = '500ms', restart = '900ms' }]",
+    ];
+    let sets = sets.map(str::to_owned);
+    let scenario = Scenario::open("traffic/open-loop", &sets, &Registry::builtin());
+    let scenario = scenario.expect("the scenario is one");
+    let assembled = scenario.assemble().expect("it can be built");
+    (scenario, assembled)
+}
 
 /// A log of a second of traffic, with losses, timers and a crash.
 pub fn log() -> &'static [u8] {
@@ -17,15 +31,7 @@ pub fn log() -> &'static [u8] {
     LOG.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("run.mcap");
-        let sets = [
-            "until=1200ms",
-            "links.default.loss=0.2",
-            "crash=[{ actor = 'rover_2', at = '500ms', restart = '900ms' }]",
-        ];
-        let sets = sets.map(str::to_owned);
-        let scenario = Scenario::open("traffic/open-loop", &sets, &Registry::builtin());
-        let scenario = scenario.expect("the scenario is one");
-        let mut assembled = scenario.assemble().expect("it can be built");
+        let (scenario, mut assembled) = assembled();
         let options = LogOptions {
             scenario: scenario.name().to_owned(),
             resolved: scenario.resolved().expect("it can be written"),
@@ -35,6 +41,25 @@ pub fn log() -> &'static [u8] {
         assembled.sim.run(Executor::Inline).expect("a run");
         std::fs::read(&path).expect("the log is there")
     })
+}
+
+/// The log with bytes overwritten, cut out and put in, by five bytes of a target's input each.
+pub fn broken(input: &[u8]) -> Vec<u8> {
+    let mut broken = log().to_vec();
+    for edit in input.chunks_exact(5).take(32) {
+        let place = usize::from(u16::from_le_bytes([edit[1], edit[2]]));
+        // The magic bytes stay, or nothing is read at all.
+        let place = 8 + place % (broken.len() - 8).max(1);
+        let end = (place + usize::from(edit[3])).min(broken.len());
+        match edit[0] % 4 {
+            0 if place < broken.len() => broken[place] = edit[4],
+            1 => drop(broken.drain(place.min(end)..end)),
+            2 => broken.splice(place..place, (0..edit[3]).map(|_| edit[4])).for_each(drop),
+            3 if edit[4] == 0 => broken.truncate(place),
+            _ => {}
+        }
+    }
+    broken
 }
 
 /// One change of a message of the log, by seven bytes of a target's input.

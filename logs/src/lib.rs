@@ -95,7 +95,7 @@ pub use info::{AttachmentInfo, ControlInfo, LogInfo, RunSummary, TopicInfo, info
 pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use messages::{FoundMessage, find_messages};
 pub use output::{may_hold_log, refuse_input};
-pub use recover::{RecoverReport, recover};
+pub use recover::{LostMessages, LostToldBy, RecoverReport, recover};
 pub use scan::{ChannelInfo, SchemaInfo};
 pub use shown::{escaped, is_hidden};
 pub use value::{NumberKind, Numbers, Value};

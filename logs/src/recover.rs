@@ -1,6 +1,7 @@
 //! Saving what can be saved of a cut or damaged file.
 
 mod saved;
+mod tally;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -14,6 +15,7 @@ use crate::salvage::{Hints, Part, Salvage};
 use crate::shown::Shown;
 use crate::source::Source;
 use saved::{Declaration, Saved};
+pub use tally::{LostMessages, LostToldBy};
 
 /// What was saved of a damaged file, and what was lost.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -31,6 +33,10 @@ pub struct RecoverReport {
     pub attachments: u64,
     /// Metadata records written.
     pub metadata: u64,
+    /// The data has no end: the file is cut, or was never finished, and what would have come is unknown.
+    pub cut: bool,
+    /// How many messages are lost, of which topics, and from when.
+    pub lost_messages: LostMessages,
     /// Bytes of the broken file that held nothing that could be used.
     pub bytes_lost: u64,
     /// How many separate losses there were.
@@ -45,9 +51,11 @@ pub struct RecoverReport {
 const DESCRIBED: usize = 100;
 
 impl RecoverReport {
-    /// True if all that the file held is in the new one, and none of it is doubtful.
+    /// True if all that the file ever held is in the new one, and none of it is doubtful: nothing was lost,
+    /// the file is not cut, and it has as many messages as its statistics say.
     pub fn is_lossless(&self) -> bool {
-        self.losses == 0 && self.unchecked == 0 && self.bytes_lost == 0
+        let whole = self.losses == 0 && self.unchecked == 0 && self.bytes_lost == 0;
+        whole && !self.cut && self.lost_messages.known == 0
     }
 
     fn lose(&mut self, bytes: u64, what: String) {
@@ -96,10 +104,18 @@ impl fmt::Display for RecoverReport {
             let more = self.losses - self.lost.len() as u64;
             writeln!(f, "  and {more} losses more")?;
         }
-        match (self.bytes_lost, self.is_lossless()) {
-            (0, true) => writeln!(f, "nothing that was in the file is lost"),
-            (bytes, _) => writeln!(f, "{bytes} bytes held nothing that could be used"),
+        if self.is_lossless() {
+            return writeln!(f, "nothing that was in the file is lost");
         }
+        let bytes = self.bytes_lost;
+        writeln!(f, "{bytes} bytes held nothing that could be used")?;
+        if self.cut {
+            writeln!(
+                f,
+                "the file was never finished, or its end is missing: what would have come is not in it"
+            )?;
+        }
+        write!(f, "{}", self.lost_messages)
     }
 }
 
@@ -129,7 +145,7 @@ pub fn recover(broken: impl AsRef<Path>, out: impl AsRef<Path>) -> Result<Recove
         Ok(())
     })?;
     let channels: BTreeSet<u16> = known.channels.keys().copied().collect();
-    let mut saved = Saved::create(broken, out, known)?;
+    let mut saved = Saved::create(broken, out, known, hints.counted.clone())?;
     let channels = Some(channels);
     Salvage::walk(&mut source, hints, channels, &mut |part| saved.add(part))?;
     saved.finish()

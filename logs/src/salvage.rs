@@ -8,7 +8,7 @@
 mod chunk;
 mod judge;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use mcap::MAGIC;
 use mcap::records::{MessageHeader, op};
@@ -95,21 +95,33 @@ pub(crate) enum Part<'a> {
         /// No checksum was found not to match it.
         sure: bool,
     },
-    Metadata(String, std::collections::BTreeMap<String, String>),
+    Metadata(String, BTreeMap<String, String>),
     Attachment(Attached),
     /// A record of a kind that only its writer knows.
     Private {
         opcode: u8,
         data: &'a [u8],
     },
+    /// So many messages of a channel are in the chunk in front of this, by its index.
+    Index {
+        channel: u16,
+        messages: u64,
+    },
+    /// What is data ends here.
+    DataEnd,
     /// So many bytes that cannot be used.
     Lost {
         bytes: u64,
         what: String,
+        /// There may have been messages in them.
+        messages: bool,
     },
     /// Something that is not as it should be, of which all is used.
     Note(String),
 }
+
+/// A message in an index: its log time, its offset.
+const INDEX_ENTRY_BYTES: u64 = 16;
 
 /// Where the bytes are that are walked through, for words.
 #[derive(Clone, Copy)]
@@ -137,6 +149,15 @@ pub(crate) struct Hints {
     attachments: Vec<(u64, u64)>,
     /// Where chunks, attachments, metadata records and the summary start.
     starts: BTreeSet<u64>,
+    pub(crate) counted: Option<Counted>,
+}
+
+/// How many messages there were, by the statistics of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Counted {
+    pub(crate) by_channel: BTreeMap<u16, u64>,
+    /// When the first one was logged, and the last.
+    pub(crate) times_ns: (u64, u64),
 }
 
 /// Walks through a damaged file.
@@ -185,7 +206,23 @@ impl<'e> Salvage<'e> {
 
     fn lose(&mut self, bytes: u64, what: String) -> Result<(), LogError> {
         self.damaged = true;
-        (self.each)(Part::Lost { bytes, what })
+        let messages = true;
+        (self.each)(Part::Lost {
+            bytes,
+            what,
+            messages,
+        })
+    }
+
+    /// As [`Salvage::lose`], where no message can have been.
+    fn lose_other(&mut self, bytes: u64, what: String) -> Result<(), LogError> {
+        self.damaged = true;
+        let messages = false;
+        (self.each)(Part::Lost {
+            bytes,
+            what,
+            messages,
+        })
     }
 
     /// Handles what is at this place; gives the place to go on at, or none at the end.
@@ -301,7 +338,7 @@ impl<'e> Salvage<'e> {
         let next = next.unwrap_or(bytes.length());
         let name = &attached.name;
         let what = format!("attachment {name} of {length} bytes at byte {at}, which is not whole");
-        self.lose(next - at, what)?;
+        self.lose_other(next - at, what)?;
         Ok(Some(next))
     }
 
@@ -336,7 +373,7 @@ impl<'e> Salvage<'e> {
             return Ok(());
         }
         let what = "the checksum of the data does not match: something in it was changed";
-        self.lose(0, what.to_owned())
+        self.lose_other(0, what.to_owned())
     }
 
     /// What comes behind the footer.
@@ -355,7 +392,7 @@ impl<'e> Salvage<'e> {
             false => format!("something that {}", what_it_is(first)),
         };
         let lost = length - from;
-        self.lose(
+        self.lose_other(
             lost,
             format!("{lost} bytes behind the end, from byte {from} on: {what}"),
         )
@@ -373,6 +410,15 @@ impl<'e> Salvage<'e> {
             return Ok(());
         };
         let content = at + HEAD_BYTES;
+        if self.in_summary && matches!(opcode, op::ATTACHMENT | op::METADATA) {
+            let (what, byte) = (describe(opcode), place.byte(at));
+            self.lose_other(
+                0,
+                format!("{what} behind the end of the data, {byte}: it is doubtful"),
+            )?;
+        }
+        // Nor does any message belong there, and no checksum of the data covers it.
+        let sure = sure && !(self.in_summary && opcode == op::MESSAGE);
         match opcode {
             op::ATTACHMENT => {
                 if let Some(mut attached) = bytes.attachment(content, length)? {
@@ -380,12 +426,13 @@ impl<'e> Salvage<'e> {
                     return (self.each)(Part::Attachment(attached));
                 }
                 let what = format!("an attachment {}", place.byte(at));
-                return self.lose(length, what);
+                return self.lose_other(length, what);
             }
             op::CHUNK => return self.chunk(bytes, at, content, length),
             op::DATA_END => {
                 self.in_summary = true;
                 self.check_data(bytes, at)?;
+                return (self.each)(Part::DataEnd);
             }
             _ if length > LIMIT_BYTES => {
                 let byte = place.byte(at);
@@ -437,7 +484,15 @@ impl<'e> Salvage<'e> {
                 opcode,
                 data: content,
             },
+            op::MESSAGE_INDEX if !in_summary => match (parser.u16(), parser.u32()) {
+                (Some(channel), Some(bytes)) => Part::Index {
+                    channel,
+                    messages: u64::from(bytes) / INDEX_ENTRY_BYTES,
+                },
+                _ => return Ok(()),
+            },
             0x10.. => Part::Lost {
+                messages: false,
                 bytes: length,
                 what: format!(
                     "a record of opcode 0x{opcode:02x}, which MCAP does not have, {}",

@@ -18,8 +18,8 @@ use serde_json::json;
 
 use super::Exit;
 use super::kinds;
+use super::logged::scenario_of;
 use super::output;
-use super::verify::scenario_of;
 use super::{CommandError, print, print_json};
 use crate::export::{self, FigureFormat};
 use crate::recorded::Logged;

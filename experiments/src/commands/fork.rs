@@ -14,9 +14,9 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::kinds::{self, FileKind};
+use super::logged::scenario_of;
 use super::run::{ExecutorName, duration, ending, log_options};
-use super::verify::scenario_of;
-use super::{CommandError, Exit, interrupt, print, print_json, progress};
+use super::{CommandError, Exit, interrupt, output, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
 
@@ -99,6 +99,7 @@ struct Document<'a> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let path = &args.log;
     kinds::expect(FileKind::Log, path, registry)?;
+    output::spare(std::slice::from_ref(path), std::slice::from_ref(&args.out))?;
     let not_repeatable = |reason: String| CommandError::NotRepeatable {
         path: path.clone(),
         reason,

@@ -108,6 +108,11 @@ fn kind_of(given: &Path, registry: &Registry) -> Option<FileKind> {
     }
 }
 
+/// Whether a name is that of a log, and of nothing that is built in.
+pub(super) fn is_log(given: &Path, registry: &Registry) -> bool {
+    kind_of(given, registry) == Some(FileKind::Log)
+}
+
 fn starts_as_log(path: &Path) -> bool {
     let mut start = [0; MCAP_MAGIC.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));

@@ -331,3 +331,32 @@ fn is_in_the_way(path: &Path, beginning: &[u8]) -> bool {
     let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut found));
     read.is_err() || found != beginning
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whoever has the old file open, or by another name, keeps it: there is no moment at which it is
+    /// half a file.
+    #[cfg(unix)]
+    #[test]
+    fn a_file_is_replaced_at_once_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let [file, other, link] = ["file", "other", "link"].map(|name| at.join(name));
+        std::fs::write(&file, "old").unwrap();
+        std::fs::hard_link(&file, &other).unwrap();
+        std::os::unix::fs::symlink("file", &link).unwrap();
+        replace(&link, b"new").unwrap();
+        assert_eq!(std::fs::read(&file).unwrap(), b"new");
+        assert_eq!(std::fs::read(&other).unwrap(), b"old");
+        assert!(link.is_symlink());
+        let error = replace(&at.join("no/file"), b"new").unwrap_err();
+        assert!(error.to_string().contains("no/file"), "{error}");
+        // Where a folder is in the way it stays, and nothing is left beside it.
+        std::fs::create_dir(at.join("folder")).unwrap();
+        replace(&at.join("folder"), b"new").unwrap_err();
+        let names = std::fs::read_dir(at).unwrap().count();
+        assert_eq!(names, 4, "file, other, link, folder");
+    }
+}

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Exit;
 use super::kinds::{self, FileKind};
-use super::output::{Format, write};
+use super::output::{self, Format, write};
 use super::{CommandError, print, print_document};
 use crate::registry::Registry;
 use crate::scenario::Scenario;
@@ -51,15 +51,17 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
             registry,
         )));
     };
+    let mut inputs = files.paths();
+    inputs.push(PathBuf::from(&args.scenario));
     if args.out == Path::new(STDOUT) {
+        output::spare(&inputs, &[])?;
         print_document(&text)?;
         return Ok(Exit::Done);
     }
     if !text.ends_with('\n') {
         text.push('\n');
     }
-    let mut inputs = files.paths();
-    inputs.push(PathBuf::from(&args.scenario));
+    output::spare(&inputs, std::slice::from_ref(&args.out))?;
     let written = write(args.out.clone(), &text, Format::Problem, &inputs)?;
     let (name, seed) = (scenario.name(), scenario.seeds().problem);
     print(format!("{written}: the problem of {name}, seed {seed}"))?;

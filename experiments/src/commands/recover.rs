@@ -1,5 +1,5 @@
 //! `farside recover`: save what can be saved of a log. It exits with 0 if nothing is lost, with 1
-//! if something is lost or doubtful.
+//! if something is lost or doubtful, or the end is missing.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,16 @@ use super::kinds::{self, FileKind};
 use super::{CommandError, output, print, print_json};
 use crate::registry::Registry;
 
+const AFTER: &str = "\
+Exit codes:
+  0  nothing is lost: the new file has all that the broken one ever had
+  1  something is lost or doubtful, or the end is missing: what, how many messages of which
+     topics, and from when, is said as far as the file tells
+  2  the input is no log, or the output is something that is not written over
+  3  the output cannot be written";
+
 #[derive(clap::Args)]
+#[command(after_help = AFTER)]
 pub(crate) struct Args {
     /// The log that is cut or damaged
     #[arg(value_name = "BROKEN.mcap")]

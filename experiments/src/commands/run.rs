@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 
 use super::Exit;
 use super::kinds::{self, FileKind};
+use super::logged::{FILE_PREFIX, changed};
 use super::table::{self, Group};
 use super::{CommandError, complain, interrupt, output, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
@@ -20,15 +21,12 @@ use farside_actors::system::Results;
 use crate::registry::Registry;
 use crate::wall::timed;
 
-/// Attachments that are the scenario's files have names that start with this.
-pub(super) const FILE_PREFIX: &str = "files/";
-
 /// What is run unless something else is asked for, if it is built in.
 pub(crate) const DEFAULT_SCENARIO: &str = "network/crater-dense";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// A built-in scenario (see `farside scenarios`) or a TOML file
+    /// A built-in scenario (see `farside scenarios`), a TOML file, or a log, whose own scenario is run
     #[arg(default_value = DEFAULT_SCENARIO)]
     scenario: String,
     /// The seed that every random draw derives from, instead of the scenario's
@@ -136,8 +134,13 @@ impl<'a> From<&'a Counts> for Messages<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    kinds::expect(FileKind::Scenario, Path::new(&args.scenario), registry)?;
-    let mut scenario = Scenario::open(&args.scenario, &args.sets, registry)?;
+    let given = Path::new(&args.scenario);
+    let mut scenario = if kinds::is_log(given, registry) {
+        changed(given, &args.sets, registry)?
+    } else {
+        kinds::expect(FileKind::Scenario, given, registry)?;
+        Scenario::open(&args.scenario, &args.sets, registry)?
+    };
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
     }

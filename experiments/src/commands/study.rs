@@ -118,11 +118,12 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let folder = Path::new("results").join(study.name());
     let folder = args.out.clone().unwrap_or(folder);
     let plan = study.plan(&args.sets, args.seeds, registry)?;
-    if let Some(shards) = args.array {
-        return array::write(args, shards, &plan, &folder);
-    }
     let mut inputs = plan.inputs.clone();
     inputs.push(PathBuf::from(&args.study));
+    if let Some(shards) = args.array {
+        output::spare(&inputs, &[])?;
+        return array::write(args, shards, &plan, &folder);
+    }
     let mut outputs = study::outputs(&folder, args.shard.unwrap_or(Shard::WHOLE));
     outputs.extend(args.junit.clone());
     output::spare(&inputs, &outputs)?;

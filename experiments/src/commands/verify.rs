@@ -1,24 +1,18 @@
 //! `farside verify`: run a log's scenario again and compare every message.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use farside::SimDuration;
-use farside_logs::{Log, RunSummary, Verifier, VerifyOutcome, escaped};
+use farside_logs::{Verifier, VerifyOutcome, escaped};
 use serde::Serialize;
 
 use super::Exit;
 use super::kinds::{self, FileKind};
-use super::run::{ExecutorName, FILE_PREFIX};
+use super::logged::{notes, scenario_of};
+use super::run::ExecutorName;
 use super::{CommandError, interrupt, output, print, print_json, progress};
-use crate::scenario::{Scenario, ScenarioError};
-use farside_actors::system::Files;
-
 use crate::registry::Registry;
 use crate::wall::timed;
-
-/// The attachment that holds the resolved scenario.
-const SCENARIO: &str = "scenario.toml";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -103,71 +97,6 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         VerifyOutcome::Same { .. } | VerifyOutcome::Prefix { .. } => Exit::Done,
         VerifyOutcome::Different { .. } => Exit::Different,
     })
-}
-
-/// The scenario that the log holds, with the files it was run with.
-pub(super) fn scenario_of(
-    path: &Path,
-    summary: &RunSummary,
-    registry: &Registry,
-) -> Result<Scenario, CommandError> {
-    let not_repeatable = |reason: String| CommandError::NotRepeatable {
-        path: path.to_owned(),
-        reason,
-    };
-    let mut text = None;
-    let mut files = BTreeMap::new();
-    for attachment in Log::open(path)?.attachments() {
-        if attachment.name == SCENARIO {
-            text = Some(attachment.bytes.clone());
-        } else if let Some(name) = attachment.name.strip_prefix(FILE_PREFIX) {
-            files.insert(name.to_owned(), attachment.bytes.clone());
-        }
-    }
-    let text = text.ok_or_else(|| not_repeatable(format!("it holds no {SCENARIO}")))?;
-    let text = String::from_utf8(text)
-        .map_err(|_| not_repeatable(format!("its {SCENARIO} is not UTF-8")))?;
-    let label = format!("{SCENARIO} in the log");
-    let parsed = Scenario::parse(&label, text, &[], registry, Files::kept(files));
-    let parsed = parsed.map(|scenario| scenario.named(&summary.scenario));
-    parsed.map_err(|error| {
-        let mut reason = match &error {
-            ScenarioError::UnknownValue {
-                key,
-                found,
-                expected,
-                ..
-            } if key == "system" => format!(
-                "its system is {found:?}, which this binary does not know; expected {expected}. \
-                 The binary that wrote the log can run it again"
-            ),
-            error => error.to_string(),
-        };
-        for note in notes(summary, registry) {
-            reason.push_str("\n  ");
-            reason.push_str(&note);
-        }
-        not_repeatable(reason)
-    })
-}
-
-/// What the reader should know beside the outcome.
-fn notes(summary: &RunSummary, registry: &Registry) -> Vec<String> {
-    let mut notes = Vec::new();
-    let version = registry.version();
-    if summary.code_version != version {
-        notes.push(format!(
-            "the log is from version {}, this is {version}: they need not agree",
-            summary.code_version
-        ));
-    }
-    if !summary.exclude.is_empty() {
-        notes.push(format!(
-            "not in the log, and compared through its checkpoints: {}",
-            summary.exclude.join(", ")
-        ));
-    }
-    notes
 }
 
 fn text(path: &Path, outcome: &VerifyOutcome, notes: &[String]) -> String {

@@ -124,3 +124,67 @@ fn what_is_in_a_log_fits_a_screen_unless_all_of_it_is_asked_for() {
     let everything = json(&farside(folder.path(), &["info", "run.mcap", "--json"]));
     assert!(everything["topics"].as_array().unwrap().len() > 50);
 }
+
+/// A log in the place of a scenario: the same run, or a changed one, with all that it needs in the log.
+#[test]
+fn the_scenario_of_a_log_is_run_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let plan = "a contact +0 +3600 1 2 1000\na range +0 +3600 1 2 1\n";
+    std::fs::write(at.join("plan.txt"), plan).unwrap();
+    let scenario = "system = 'traffic'\nuntil = '9s'\n[traffic]\nhosts = ['a', 'b']\n\
+        flow = [{ from = 'a', to = 'b', size = '100B', period = '1s' }]\n\
+        [contacts]\nfile = 'plan.txt'\nnodes = { 1 = 'a', 2 = 'b' }\n";
+    std::fs::write(at.join("s.toml"), scenario).unwrap();
+    let digest = |arguments: &[&str]| {
+        let output = farside(at, &[arguments, &["--json"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        json(&output)["digest"].clone()
+    };
+    let set = [
+        "--set",
+        "traffic.flow=[{from='a',to='b',size='100B',period='500ms'}]",
+    ];
+    let ties = ["--tie-seed", "7"];
+    let first = digest(&[&["run", "s.toml"][..], &ties].concat());
+    let run = ["run", "s.toml", "--no-log"];
+    let other = digest(&[&run[..], &ties, &set].concat());
+    assert_ne!(first, other);
+    // The log needs neither of them any more.
+    std::fs::remove_file(at.join("plan.txt")).unwrap();
+    std::fs::remove_file(at.join("s.toml")).unwrap();
+    assert_eq!(digest(&["run", "run.mcap", "--out", "again.mcap"]), first);
+    let same = farside(at, &["diff", "run.mcap", "again.mcap"]);
+    assert_eq!(same.status.code(), Some(0), "{}", text(&same.stdout));
+    let changed = [&["run", "run.mcap", "--out", "other.mcap"][..], &set].concat();
+    assert_eq!(digest(&changed), other);
+    let differs = farside(at, &["diff", "run.mcap", "other.mcap"]);
+    assert_eq!(differs.status.code(), Some(1), "{}", text(&differs.stdout));
+    let verified = farside(at, &["verify", "other.mcap"]);
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        text(&verified.stderr)
+    );
+
+    let before = std::fs::read(at.join("run.mcap")).unwrap();
+    for (more, said) in [
+        (&["--out", "run.mcap"][..], "is read by this command"),
+        // The default is the log itself.
+        (&[], "is read by this command"),
+        (&["--no-log", "--set", "traffic.flw=[]"], "flow"),
+        (&["--no-log", "--set", "until=soon"], "until"),
+    ] {
+        let refused = farside(at, &[&["run", "run.mcap"][..], more].concat());
+        let stderr = text(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{more:?}: {stderr}");
+        assert!(stderr.contains(said), "{more:?}: {stderr}");
+    }
+    assert_eq!(std::fs::read(at.join("run.mcap")).unwrap(), before);
+    std::fs::write(at.join("cut.mcap"), &before[..40]).unwrap();
+    let refused = farside(at, &["run", "cut.mcap", "--no-log"]);
+    let stderr = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("not the log of a Farside run"), "{stderr}");
+}

@@ -227,6 +227,32 @@ fn what_is_printed_is_an_output_too() {
     refused(&["diff", "run.mcap", "hard.mcap"], "run.mcap", READ);
     refused(&["draw", "run.mcap", "--list"], "run.mcap", READ);
     refused(&["draw", "run.mcap", "--out", "map.svg"], "run.mcap", READ);
+    let fork = [
+        "fork",
+        "run.mcap",
+        "--at",
+        "1s",
+        "--set",
+        "links.default.loss=0.5",
+    ];
+    let fork = [&fork[..], &["--out", "fork.mcap"]].concat();
+    refused(&fork, "run.mcap", READ);
+    let study = "question = 'How late?'\nscenario = 's.toml'\nseeds = 1\nmetrics = ['time_ratio']\n\
+        [[factor]]\nname = 'loss'\nkey = 'links.default.loss'\nvalues = ['0%', '10%']\n";
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    let array = ["study", "study.toml", "--array", "2", "--out", "array"];
+    refused(&array, "study.toml", READ);
+    refused(&array, "s.toml", READ);
+    let planners = farside(at, &["scenarios", "misus/planners"]);
+    std::fs::write(at.join("p.toml"), planners.stdout).unwrap();
+    refused(&["problem", "p.toml"], "p.toml", READ);
+    for name in ["m.ddl", "p.ddl", "plan.json"] {
+        std::fs::write(at.join(name), "").unwrap();
+    }
+    refused(&["plan", "check", "m.ddl"], "m.ddl", READ);
+    refused(&["plan", "check", "m.ddl", "p.ddl"], "p.ddl", READ);
+    let validate = ["plan", "validate", "m.ddl", "p.ddl", "plan.json"];
+    refused(&validate, "plan.json", READ);
     // The log in the middle of what is printed.
     let twice = "is written to by this command twice: it is also standard output";
     for out in ["/dev/stdout", "/dev/fd/1", "new.mcap"] {

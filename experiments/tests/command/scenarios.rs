@@ -149,3 +149,16 @@ fn every_key_of_links_and_its_other_names_are_explained() {
     }
     assert!(names > 30, "{names}");
 }
+
+/// Each route is a search of its own: their number is bounded, and the bound is told.
+#[test]
+fn along_how_many_routes_a_path_is_looked_for_is_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    for (routes, code) in [("100", 0), ("101", 2), ("4294967295", 2), ("0", 2)] {
+        let set = format!("network.complete.routes={routes}");
+        let output = farside(folder.path(), &["check", "network/rubble", "--set", &set]);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{routes}: {said}");
+        assert!(code == 0 || said.contains("routes"), "{said}");
+    }
+}

@@ -30,7 +30,7 @@ fn what_another_command_takes_is_called_what_it_is() {
     );
     for (arguments, said) in [
         (
-            &["run", "run.mcap"][..],
+            &["check", "run.mcap"][..],
             "run.mcap: is a log, and a scenario is expected",
         ),
         (

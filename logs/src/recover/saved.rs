@@ -7,10 +7,11 @@ use std::path::Path;
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use tempfile::NamedTempFile;
 
+use super::tally::Tally;
 use super::{FirstDeclared, RecoverReport};
 use crate::LogError;
 use crate::parse::{ChannelRecord, SchemaRecord};
-use crate::salvage::Part;
+use crate::salvage::{Counted, Part};
 use crate::source::{Attached, Source, Sum};
 
 /// A schema or a channel, owned.
@@ -65,6 +66,9 @@ pub(super) struct Saved<'a> {
     channels: BTreeMap<u16, (Declaration, Result<u16, String>)>,
     /// Ids of channels of the new file.
     taken: BTreeSet<u16>,
+    /// The end of the data was found.
+    ended: bool,
+    tally: Tally,
     report: RecoverReport,
 }
 
@@ -73,6 +77,7 @@ impl<'a> Saved<'a> {
         broken: &Path,
         path: &'a Path,
         known: FirstDeclared,
+        counted: Option<Counted>,
     ) -> Result<Self, LogError> {
         let folder = path.parent().filter(|folder| *folder != Path::new(""));
         let folder = folder.unwrap_or(Path::new("."));
@@ -96,6 +101,8 @@ impl<'a> Saved<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             taken: BTreeSet::new(),
+            ended: false,
+            tally: Tally::new(counted),
             report: RecoverReport::default(),
         })
     }
@@ -137,7 +144,12 @@ impl<'a> Saved<'a> {
                 let header = (profile.to_owned(), library.to_owned());
                 self.header.get_or_insert(header);
             }
-            Part::Chunk => self.report.chunks += 1,
+            Part::Chunk => {
+                self.report.chunks += 1;
+                self.tally.chunk();
+            }
+            Part::Index { channel, messages } => self.tally.index(channel, messages),
+            Part::DataEnd => self.ended = true,
             Part::Schema {
                 record,
                 in_summary,
@@ -175,7 +187,16 @@ impl<'a> Saved<'a> {
                 self.report
                     .note(format!("private records of opcode 0x{opcode:02x}: {what}"));
             }
-            Part::Lost { bytes, what } => self.report.lose(bytes, what),
+            Part::Lost {
+                bytes,
+                what,
+                messages,
+            } => {
+                if messages {
+                    self.tally.lost();
+                }
+                self.report.lose(bytes, what);
+            }
             Part::Note(what) => self.report.note(what),
         }
         Ok(())
@@ -260,11 +281,13 @@ impl<'a> Saved<'a> {
         let channel = match self.channels.get(&id) {
             Some((_, Ok(channel))) => *channel,
             Some((_, Err(_))) => {
+                self.tally.lost();
                 self.report.bytes_lost += data.len() as u64;
                 return Ok(());
             }
             None => {
                 let what = format!("messages on channel {id}, which is not declared anywhere");
+                self.tally.lost();
                 self.report.lose(data.len() as u64, what);
                 return Ok(());
             }
@@ -277,6 +300,7 @@ impl<'a> Saved<'a> {
         let written = self.writer()?.write_to_known_channel(&header, data);
         written.map_err(|error| LogError::mcap(path, error))?;
         self.report.messages += 1;
+        self.tally.saved(id, head.log_time);
         self.report.unchecked += u64::from(!sure);
         Ok(())
     }
@@ -325,6 +349,12 @@ impl<'a> Saved<'a> {
             file.as_file().sync_all().map_err(io)?;
             file.persist(path).map_err(|error| io(error.error))?;
         }
+        self.report.cut = !self.ended;
+        let topic = |channel| match self.known.channels.get(&channel) {
+            Some((Declaration::Channel { topic, .. }, _)) => Some(topic.clone()),
+            _ => None,
+        };
+        self.report.lost_messages = self.tally.finish(self.report.cut, topic);
         Ok(self.report)
     }
 }

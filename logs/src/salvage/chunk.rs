@@ -142,7 +142,7 @@ impl Salvage<'_> {
             let what = format!("the chunk at byte {at} {fault}: what is left of it is unchecked");
             self.lose(head.size.saturating_sub(records.len() as u64), what)?;
         }
-        self.unsure = fault.is_some() || cut;
+        self.unsure = fault.is_some() || cut || self.in_summary;
         let mut opened = Opened(&records);
         let mut next = Some(0);
         while let Some(at_record) = next {

@@ -1,9 +1,11 @@
 //! Whether bytes are a record, and where the next one starts.
 
+use std::collections::BTreeMap;
+
 use mcap::MAGIC;
 use mcap::records::op;
 
-use super::{Bytes, Hints, Salvage};
+use super::{Bytes, Counted, Hints, Salvage};
 use crate::LogError;
 use crate::frames::{HEAD_BYTES, LIMIT_BYTES, record_head};
 use crate::parse::{
@@ -30,6 +32,12 @@ impl Hints {
             return Ok(hints);
         };
         hints.starts.insert(start);
+        let sum = parser.u64().and(parser.u32());
+        let trusted = match sum {
+            // It ends with the footer's own beginning.
+            Some(sum) if sum != 0 => checksum(source, start, footer + HEAD_BYTES + 16)? == sum,
+            _ => true,
+        };
         let mut at = start;
         while at < footer {
             let Some((opcode, bytes)) = record_head(source.at(at, HEAD_BYTES)?) else {
@@ -37,6 +45,9 @@ impl Hints {
             };
             if bytes > footer - at {
                 break;
+            }
+            if opcode == op::STATISTICS && trusted && bytes <= STATISTICS_BYTES {
+                hints.counted = counted(source.at(at + HEAD_BYTES, bytes)?);
             }
             let mut parser = Parser::new(source.at(at + HEAD_BYTES, bytes.min(64))?);
             let (first, second) = (parser.u64(), parser.u64());
@@ -57,6 +68,35 @@ impl Hints {
         hints.starts.retain(|at| *at >= 8 && *at < length);
         Ok(hints)
     }
+}
+
+/// As long as statistics can be: one entry for each channel that MCAP can number.
+const STATISTICS_BYTES: u64 = 46 + 10 * (1 << 16);
+
+/// What statistics say of messages.
+fn counted(statistics: &[u8]) -> Option<Counted> {
+    let mut parser = Parser::new(statistics);
+    // How many there are of everything.
+    parser.bytes(26)?;
+    let times_ns = (parser.u64()?, parser.u64()?);
+    let entries = parser.u32()?;
+    let mut by_channel = BTreeMap::new();
+    for _ in 0..entries / 10 {
+        by_channel.insert(parser.u16()?, parser.u64()?);
+    }
+    Some(Counted {
+        by_channel,
+        times_ns,
+    })
+}
+
+fn checksum(source: &mut Source, from: u64, to: u64) -> Result<u32, LogError> {
+    let mut sum = crc32fast::Hasher::new();
+    source.each(from, to, |part| {
+        sum.update(part);
+        Ok(())
+    })?;
+    Ok(sum.finalize())
 }
 
 impl Salvage<'_> {

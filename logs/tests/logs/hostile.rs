@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::sync::OnceLock;
 
-use farside_logs::{DiffOptions, Log, diff, info, recover};
+use farside_logs::{Compression, DiffOptions, Log, LogOptions, diff, info, recover};
 use proptest::prelude::*;
 
-use crate::common::{Plan, logged};
+use crate::common::{Plan, log_to, logged, options};
 
 fn small_log() -> &'static [u8] {
     static LOG: OnceLock<Vec<u8>> = OnceLock::new();
@@ -152,6 +152,53 @@ fn sizes_that_lie_cost_no_memory() {
         // The length of the record.
         file[9..17].copy_from_slice(&claim.to_le_bytes());
         read_all(&file);
+    }
+}
+
+/// A log whose chunks are not compressed, and which nothing says is damaged: lengths in records are read.
+fn open_log() -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let options = LogOptions {
+        compression: Compression::None,
+        ..options()
+    };
+    let plan = Plan {
+        rovers: 1,
+        cycles: 2,
+        ..Plan::default()
+    };
+    log_to(&path, &plan, options);
+    let mut bytes = fs::read(&path).unwrap();
+    let mut at = 8;
+    while at + 9 <= bytes.len() {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        match bytes[at] {
+            mcap::records::op::CHUNK => bytes[at + 33..at + 37].fill(0),
+            mcap::records::op::DATA_END => bytes[at + 9..at + 13].fill(0),
+            _ => {}
+        }
+        at += 9 + length;
+    }
+    bytes
+}
+
+/// However long something says that it is, and wherever: what is read takes as much memory as what is there.
+#[test]
+fn lengths_that_lie_cost_no_memory_wherever_they_stand() {
+    let whole = open_log();
+    let usual = allocation_counter::measure(|| read_all(&whole)).bytes_max;
+    for at in (8..whole.len() - 8).step_by(223) {
+        for (bytes, claim) in [(8, u64::MAX), (8, 1 << 40), (8, 1 << 28), (4, 1 << 31)] {
+            let mut broken = whole.clone();
+            broken[at..at + bytes].copy_from_slice(&claim.to_le_bytes()[..bytes]);
+            let most = allocation_counter::measure(|| read_all(&broken)).bytes_max;
+            // The largest message that is allowed is not there.
+            assert!(
+                most < 2 * usual + (4 << 20),
+                "{claim} at {at}: {most} bytes, and {usual} for the whole file"
+            );
+        }
     }
 }
 

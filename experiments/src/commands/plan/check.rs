@@ -6,7 +6,7 @@ use farside_planning::language::{self, Finding, Read, Severity};
 use serde_json::json;
 
 use super::files::{self, Task};
-use crate::commands::{CommandError, Exit, print, print_json};
+use crate::commands::{CommandError, Exit, output, print, print_json};
 
 const AFTER: &str = "\
 Exit codes:
@@ -32,6 +32,12 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
+    let inputs: Vec<PathBuf> = [Some(&args.model), args.problem.as_ref()]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
+    output::spare(&inputs, &[])?;
     if files::is_project(&args.model) {
         let task = Task::read(&args.model, None)?;
         let goals = task.problem.goals.len();

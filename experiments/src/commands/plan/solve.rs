@@ -123,9 +123,10 @@ pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
         }
     };
     task.warn();
+    // Before the search, which may take long.
+    let outputs = args.out.as_ref().map_or(&[][..], std::slice::from_ref);
+    output::spare(&task.files, outputs)?;
     if let Some(out) = &args.out {
-        // Before the search, which may take long.
-        output::spare(&task.files, std::slice::from_ref(out))?;
         output::may_write(out, plan_beginning().as_bytes(), Format::Plan, &task.files)?;
     }
     let settings = Settings {

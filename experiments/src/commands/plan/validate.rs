@@ -6,7 +6,7 @@ use farside_planning::checker::{self, MAX_VIOLATIONS};
 use serde_json::json;
 
 use super::files::{self, Task};
-use crate::commands::{CommandError, Exit, print, print_json};
+use crate::commands::{CommandError, Exit, output, print, print_json};
 
 const AFTER: &str = "\
 Exit codes:
@@ -30,6 +30,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
+    output::spare(&args.files, &[])?;
     let (task, plan): (Task, &Path) = match args.files.as_slice() {
         [project, plan] if files::is_project(project) => (Task::read(project, None)?, plan),
         [model, problem, plan] if !files::is_project(model) => {
