@@ -9,6 +9,7 @@ mod event;
 mod flows;
 mod hash;
 mod hops;
+mod outbox;
 mod parts;
 mod remains;
 mod store;
@@ -110,14 +111,23 @@ impl Engine {
 
     /// Time and step of the next event.
     pub(crate) fn peek(&mut self) -> Option<Bound> {
+        self.queue_sent();
         self.parts.queue.peek()
     }
 
     /// Handles every event before `bound`, unless the sink or an actor asks for a pause.
     pub(crate) fn run(&mut self, bound: Bound, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
         while !sink.paused() && self.parts.stop.is_none() {
-            let Some(entry) = self.parts.queue.pop_before(bound) else {
-                break;
+            if self.parts.outbox.is_full() {
+                self.queue_sent();
+            }
+            let before = self.parts.outbox.before(bound);
+            let Some(entry) = self.parts.queue.pop_before(before) else {
+                if self.parts.outbox.is_empty() {
+                    break;
+                }
+                self.queue_sent();
+                continue;
             };
             if self.parts.queue.has_unread() && self.parts.store.is_large() {
                 self.read_ahead();
@@ -156,28 +166,58 @@ impl Engine {
         std::hint::black_box(counts);
     }
 
+    /// Numbers and queues what was sent; see [`Outbox`](outbox::Outbox).
+    #[inline(never)]
+    fn queue_sent(&mut self) {
+        let Parts {
+            topology,
+            queue,
+            store,
+            outbox,
+            ..
+        } = &mut self.parts;
+        // Each of these reads misses the cache, and none depends on those for the message before.
+        let mut read = 0;
+        for message in outbox.iter() {
+            let receiver = topology.declared[message.declared as usize];
+            let sender = &self.actors[message.sender as usize];
+            read ^= u64::from(sender.state.read_flow(receiver, message.kind));
+            read ^= queue.read_ahead(&message.entry);
+        }
+        std::hint::black_box(read);
+        for message in outbox.take() {
+            let receiver = topology.declared[message.declared as usize];
+            let sender = &mut self.actors[message.sender as usize];
+            let ordinal = sender.state.next_in_flow(receiver, message.kind);
+            store.complete(message.entry.slot, receiver, ordinal);
+            queue.push(message.entry);
+        }
+    }
+
     /// The way of nearly all events: a message or a timer for an actor that is there, of which
     /// nothing more is to be known.
     #[inline(always)]
     fn handle(&mut self, entry: Entry, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
         let head = self.parts.store.take_head(entry.slot);
         let mut letter = self.parts.store.take_letter(entry.slot);
-        let key = entry.key();
         let local = self.parts.topology.place(head.receiver).local as usize;
         let record = match head.class {
             Class::Message if !head.has_side => RecordClass::Delivered,
             Class::Timer if head.life() == self.actors[local].state.incarnation => {
                 RecordClass::Timer
             }
-            _ => return self.handle_other(key, head, letter, entry.slot, sink),
+            _ => return self.handle_other(entry.key(), head, letter, entry.slot, sink),
         };
-        if self.actors[local].actor.is_none() || self.parts.topology.is_late_step(key.step) {
-            return self.handle_other(key, head, letter, entry.slot, sink);
+        if self.actors[local].actor.is_none() || self.parts.topology.is_late_step(entry.step()) {
+            return self.handle_other(entry.key(), head, letter, entry.slot, sink);
         }
-        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
-            return Err(self.unfinished(key, &head, &mut letter, fault));
+        // The key is made where it goes, each time anew: one that is put in memory in parts, and
+        // copied from there as a whole, waits for everything that was written before.
+        self.parts.begin(entry.key());
+        if let Err(fault) = self.parts.encode(letter.as_ref(), &head) {
+            return Err(self.unfinished(entry.key(), &head, &mut letter, fault));
         }
-        self.run_handler_of(local, record, key, &head, &mut letter, sink)
+        self.run_handler_of(local, record, entry, &head, &mut letter, sink)
     }
 
     /// The way of every event, whatever it is.
@@ -198,7 +238,8 @@ impl Engine {
         if self.died_with_its_incarnation(&head) {
             return self.discard(key, head, letter);
         }
-        if let Err(fault) = self.parts.begin(key, letter.as_ref(), &head) {
+        self.parts.begin(key);
+        if let Err(fault) = self.parts.encode(letter.as_ref(), &head) {
             return Err(self.unfinished(key, &head, &mut letter, fault));
         }
         if self.parts.topology.is_late_step(key.step) {
@@ -314,7 +355,7 @@ impl Engine {
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
         let local = self.parts.topology.place(head.receiver).local as usize;
-        self.run_handler_of(local, record, key, head, &mut letter, sink)
+        self.run_handler_of(local, record, Entry::new(key, 0), head, &mut letter, sink)
     }
 
     /// [`Engine::run_handler`] of the actor whose place is known. The letter is handed on where it
@@ -324,16 +365,16 @@ impl Engine {
         &mut self,
         local: usize,
         record: RecordClass,
-        key: EventKey,
+        entry: Entry,
         head: &Head,
         letter: &mut Option<Sealed>,
         sink: &mut impl Sink,
     ) -> Result<(), Box<Fault>> {
         let result = invoke(&mut self.actors[local], &mut self.parts, letter);
         if result.is_err() || self.parts.fault.is_some() {
-            return Err(self.handler_fault(key, head, result));
+            return Err(self.handler_fault(entry.key(), head, result));
         }
-        self.commit(record, key, head, sink);
+        self.commit(record, entry.key(), head, sink);
         Ok(())
     }
 
@@ -409,7 +450,7 @@ impl Engine {
         let mut head = Head::of_entity(Class::Tell, entity);
         head.sender = EntityId::CONTROL;
         let local = self.parts.topology.place(entity).local as usize;
-        self.parts.begin(key, None, &head)?;
+        self.parts.begin(key);
         match action {
             Action::Crash => {
                 dropped(self.actors[local].actor.take())
@@ -472,10 +513,11 @@ impl Engine {
         let local = self.parts.topology.place(head.receiver).local as usize;
         let state = &mut self.actors[local].state;
         // The flow from `@control`, to which no actor sends anything.
-        let (ordinal, _) = state.next_in_flow(EntityId::CONTROL, kind, None);
+        let ordinal = state.next_in_flow(EntityId::CONTROL, kind);
         let mut head = head.of_kind(Some(kind));
         head.ordinal = ordinal;
-        if let Err(fault) = self.parts.begin(key, Some(&letter), &head) {
+        self.parts.begin(key);
+        if let Err(fault) = self.parts.encode(Some(&letter), &head) {
             // Nobody sent it: it has no fate.
             let _ = dropped(letter);
             return Err(fault);
@@ -514,6 +556,7 @@ impl Engine {
 
     /// Takes apart what is left once the run is over; see [`Remains`].
     pub(crate) fn dissolve(&mut self, until: Option<EventKey>, remains: &mut Remains) {
+        self.queue_sent();
         self.parts.take_in_flight(until, remains);
         for ActorCell { actor, state } in std::mem::take(&mut self.actors) {
             let (entity, rest) = (state.entity, *state.rest);

@@ -38,6 +38,17 @@ impl Entry {
         }
     }
 
+    #[inline(always)]
+    pub(crate) fn time(&self) -> SimTime {
+        self.time
+    }
+
+    #[inline(always)]
+    pub(crate) fn step(&self) -> u32 {
+        (self.rest >> 32) as u32
+    }
+
+    #[inline(always)]
     pub(crate) fn key(&self) -> EventKey {
         let Bound { time, step } = self.bound();
         EventKey {
@@ -53,7 +64,7 @@ impl Entry {
     fn bound(&self) -> Bound {
         Bound {
             time: self.time,
-            step: (self.rest >> 32) as u32,
+            step: self.step(),
         }
     }
 
@@ -163,6 +174,12 @@ impl Queue {
         } else {
             self.push_timed(entry);
         }
+    }
+
+    /// Reads where an entry will be put, if that is far ahead.
+    #[inline(always)]
+    pub(crate) fn read_ahead(&self, entry: &Entry) -> u64 {
+        self.far.read_ahead(entry)
     }
 
     #[inline(always)]

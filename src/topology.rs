@@ -364,6 +364,8 @@ pub(crate) struct Topology {
     pub(crate) type_of_actor: Vec<u32>,
     pub(crate) places: Vec<Location>,
     pub(crate) host_names: Vec<String>,
+    /// All actors live on one host, and there is no shared link.
+    pub(crate) has_one_host: bool,
     pub(crate) routes: Vec<Routes>,
     pub(crate) links: Links,
     pub(crate) kind_of_type: FixedMap<TypeId, KindIndex>,

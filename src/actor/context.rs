@@ -366,20 +366,25 @@ impl<'a, A: Actor> Context<'a, A> {
         if target.owner() != self.parts.topology.owner {
             return self.of_another_simulation("actor", target.declared());
         }
-        let receiver = self.parts.topology.declared[target.declared() as usize];
         let Some(kind) = self.parts.kind_of(TypeId::of::<M>()) else {
-            self.not_listed::<M>(receiver);
-            return;
+            let receiver = self.parts.topology.declared[target.declared() as usize];
+            return self.not_listed::<M>(receiver);
         };
-        let letter = target.seal(message);
-        let outbound = Outbound {
-            receiver,
+        let (me, declared) = (self.me(), target.declared());
+        let outbound = |letter| Outbound {
+            declared,
             kind,
             letter,
             match_key,
             delay,
         };
-        self.parts.send(self.state, self.me(), outbound);
+        // Sealed on each way by itself: a letter is built where it waits.
+        if self.parts.goes_by_outbox(me, declared) {
+            let outbound = outbound(target.seal(message));
+            return self.parts.send_by_outbox(self.state, me, outbound);
+        }
+        let outbound = outbound(target.seal(message));
+        self.parts.send(self.state, me, outbound);
     }
 
     #[cold]
@@ -388,6 +393,7 @@ impl<'a, A: Actor> Context<'a, A> {
             .raise(FaultCause::OtherSimulation { what, number });
     }
 
+    #[cold]
     fn not_listed<M>(&mut self, receiver: EntityId) {
         let receiver = self.parts.topology.name(receiver).to_owned();
         let kind = std::any::type_name::<M>().to_owned();

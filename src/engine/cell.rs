@@ -57,17 +57,16 @@ impl CellState {
         }
     }
 
-    /// The ordinal of the next message in a flow, and how many right before it had the same key.
+    /// The ordinal of the next message in a flow.
     #[inline(always)]
-    pub(crate) fn next_in_flow(
-        &mut self,
-        receiver: EntityId,
-        kind: KindIndex,
-        match_key: Option<MatchKey>,
-    ) -> (u64, u32) {
-        let ordinal = self.flows.next(receiver, kind);
-        let repeat = match_key.map_or(0, |key| self.repeats(receiver, kind, key));
-        (ordinal, repeat)
+    pub(crate) fn next_in_flow(&mut self, receiver: EntityId, kind: KindIndex) -> u64 {
+        self.flows.next(receiver, kind)
+    }
+
+    /// Reads what [`CellState::next_in_flow`] will need.
+    #[inline(always)]
+    pub(crate) fn read_flow(&self, receiver: EntityId, kind: KindIndex) -> u32 {
+        self.flows.read_ahead(receiver, kind)
     }
 
     /// The ordinal of the next timer of this kind.
@@ -76,9 +75,9 @@ impl CellState {
         self.flows.next_timer(kind)
     }
 
-    /// How many messages right before had this key too.
+    /// How many messages right before in a flow had this key too.
     #[inline(never)]
-    fn repeats(&mut self, receiver: EntityId, kind: KindIndex, key: MatchKey) -> u32 {
+    pub(crate) fn repeats(&mut self, receiver: EntityId, kind: KindIndex, key: MatchKey) -> u32 {
         let flow = (receiver, kind);
         let keyed = self.rest.keyed_flows.entry(flow).or_default();
         keyed.repeat = if keyed.last_key == Some(key) {
@@ -141,7 +140,7 @@ impl ActorCell {
             .as_ref()
             .map_or(0, |(name, _)| name.len());
         let actor = self.actor.as_ref().map_or(0, |actor| actor.read_ahead());
-        state.count ^ stream as u64 ^ state.flows.read_ahead() ^ actor
+        state.count ^ stream as u64 ^ actor
     }
 }
 

@@ -322,7 +322,8 @@ impl Head {
 
 /// A message as a handler sends it.
 pub(crate) struct Outbound {
-    pub(crate) receiver: EntityId,
+    /// The number in the receiver's address.
+    pub(crate) declared: u32,
     pub(crate) kind: KindIndex,
     pub(crate) letter: Sealed,
     pub(crate) match_key: Option<MatchKey>,

@@ -63,17 +63,18 @@ impl Flows {
         }
     }
 
-    /// Reads a part of the table, for [`Engine::read_ahead`].
+    /// Reads where a flow probably is; see [`Engine::queue_sent`].
     ///
-    /// [`Engine::read_ahead`]: super::Engine::read_ahead
+    /// [`Engine::queue_sent`]: super::Engine::queue_sent
     #[inline(always)]
-    pub(crate) fn read_ahead(&self) -> u64 {
-        self.places.first().map_or(0, |place| place.count.into())
+    pub(crate) fn read_ahead(&self, receiver: EntityId, kind: KindIndex) -> u32 {
+        let at = first_place(short_flow(receiver.0, kind), self.places.len());
+        self.places.get(at).map_or(0, |place| place.count)
     }
 
     #[inline(always)]
     fn next_short(&mut self, receiver: u32, kind: KindIndex) -> u32 {
-        let flow = kind << RECEIVER_BITS | receiver;
+        let flow = short_flow(receiver, kind);
         let last = self.places.len().wrapping_sub(1);
         let mut at = first_place(flow, self.places.len());
         while let Some(place) = self.places.get_mut(at) {
@@ -132,6 +133,12 @@ fn grown(places: usize) -> usize {
     } else {
         places * 2
     }
+}
+
+/// What a flow is in a table.
+#[inline(always)]
+fn short_flow(receiver: u32, kind: KindIndex) -> u32 {
+    kind << RECEIVER_BITS | receiver
 }
 
 /// Where a flow is looked for first, in a table of this size.

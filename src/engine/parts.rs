@@ -8,6 +8,7 @@ use std::any::TypeId;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::outbox::{Outbox, Unqueued};
 use super::store::Store;
 use super::{
     CellState, Class, Head, Hops, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side,
@@ -58,6 +59,7 @@ pub(crate) struct Parts {
     links: Vec<LinkCell>,
     pub(crate) queue: Queue,
     pub(super) store: Store,
+    pub(super) outbox: Outbox,
     pub(crate) outgoing: Vec<Outgoing>,
     /// The key of the event in hand.
     key: EventKey,
@@ -97,6 +99,7 @@ impl Parts {
             links,
             queue: Queue::default(),
             store: Store::default(),
+            outbox: Outbox::default(),
             outgoing: Vec::new(),
             body: Vec::new(),
             side: None,
@@ -141,18 +144,22 @@ impl Parts {
         self.key
     }
 
-    /// Gets ready for the event `key`, and encodes its message if anyone will look at it.
+    /// Gets ready for the event `key`.
     #[inline(always)]
-    pub(crate) fn begin(
-        &mut self,
-        key: EventKey,
-        letter: Option<&Sealed>,
-        head: &Head,
-    ) -> Result<(), Box<Fault>> {
+    pub(crate) fn begin(&mut self, key: EventKey) {
         self.key = key;
         self.sends = 0;
         self.carrying = None;
         self.body.clear();
+    }
+
+    /// Encodes the message of the event in hand, if anyone will look at it.
+    #[inline(always)]
+    pub(crate) fn encode(
+        &mut self,
+        letter: Option<&Sealed>,
+        head: &Head,
+    ) -> Result<(), Box<Fault>> {
         if !self.recording {
             return Ok(());
         }
@@ -162,7 +169,7 @@ impl Parts {
             let encoded = guarded(|| letter.0.encode(kind.schema(), body));
             if !matches!(encoded, Ok(Ok(()))) {
                 let kind = kind.name().to_owned();
-                return Err(self.encoding_fault(key, head, kind, encoded));
+                return Err(self.encoding_fault(self.key, head, kind, encoded));
             }
         }
         Ok(())
@@ -231,19 +238,34 @@ impl Parts {
         self.unfinished = Some((key, head));
     }
 
+    /// True for a message that goes by the [`Outbox`]: within a host, where very much waits. Once that
+    /// is so it stays so: a flow's later messages are never numbered before its earlier ones.
+    #[inline(always)]
+    pub(crate) fn goes_by_outbox(&self, me: EntityId, declared: u32) -> bool {
+        self.store.is_large() && (self.topology.has_one_host || self.is_near(me, declared))
+    }
+
+    #[inline(never)]
+    fn is_near(&self, me: EntityId, declared: u32) -> bool {
+        let receiver = self.topology.declared[declared as usize];
+        self.topology.place(me).host == self.topology.place(receiver).host
+    }
+
     #[inline]
     pub(crate) fn send(&mut self, state: &mut CellState, me: EntityId, outbound: Outbound) {
         if self.fault.is_some() {
             return;
         }
         let Outbound {
-            receiver,
+            declared,
             kind,
             letter,
             match_key,
             delay,
         } = outbound;
-        let (ordinal, repeat) = state.next_in_flow(receiver, kind, match_key);
+        let receiver = self.topology.declared[declared as usize];
+        let ordinal = state.next_in_flow(receiver, kind);
+        let repeat = match_key.map_or(0, |key| state.repeats(receiver, kind, key));
         // Called on each way by itself: what one way puts in memory the other keeps in registers.
         let head = |parts: &Parts| {
             let mut head = Head::of_entity(Class::Message, me).caused(parts.key, kind, ordinal);
@@ -265,6 +287,40 @@ impl Parts {
             let receiver = self.topology.name(receiver).to_owned();
             self.raise(FaultCause::DelayedAcrossHosts { receiver });
         }
+    }
+
+    /// [`Parts::send`] for a message that [`Parts::goes_by_outbox`].
+    #[inline]
+    pub(crate) fn send_by_outbox(
+        &mut self,
+        state: &mut CellState,
+        me: EntityId,
+        outbound: Outbound,
+    ) {
+        if self.fault.is_some() {
+            return;
+        }
+        let Outbound {
+            declared,
+            kind,
+            letter,
+            match_key,
+            delay,
+        } = outbound;
+        self.sends += 1;
+        let key = self.later_key(me, &mut state.count, delay);
+        let mut head = Head::of_entity(Class::Message, me).caused(self.key, kind, 0);
+        if let Some(match_key) = match_key {
+            let receiver = self.topology.declared[declared as usize];
+            head = head.keyed(match_key, state.repeats(receiver, kind, match_key));
+        }
+        let slot = self.store.insert(head, Some(letter));
+        self.outbox.push(Unqueued {
+            entry: Entry::new(key, slot),
+            sender: self.topology.place(me).local,
+            declared,
+            kind,
+        });
     }
 
     /// Sends a message to another host. The letter is taken, unless there is no way.

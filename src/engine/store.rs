@@ -107,6 +107,13 @@ impl Store {
         self.waiting.len() >= LARGE
     }
 
+    /// Completes the head of a message that waits.
+    #[inline(always)]
+    pub(crate) fn complete(&mut self, slot: u32, receiver: EntityId, ordinal: u64) {
+        let head = &mut self.waiting[slot as usize].head;
+        (head.receiver, head.ordinal) = (receiver, ordinal);
+    }
+
     /// Cancels the timer in `slot` if `is_it` says that it is the one meant; true if so.
     pub(crate) fn cancel(&mut self, slot: u32, is_it: impl FnOnce(&Head) -> bool) -> bool {
         let Some(Waiting { head, letter }) = self.waiting.get_mut(slot as usize) else {

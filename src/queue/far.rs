@@ -145,6 +145,18 @@ impl Far {
         unreachable!("what comes before `beyond` lies in the coarsest rung");
     }
 
+    /// Reads the end of the bucket that [`Far::push`] would put an entry in. Those of the coarsest rung
+    /// lie far apart; the others' are few.
+    #[inline(always)]
+    pub(super) fn read_ahead(&self, entry: &Entry) -> u64 {
+        let time_ns = entry.time.as_nanos();
+        let coarsest = self.rungs.first();
+        let rung = coarsest.filter(|rung| (rung.start_ns..self.beyond_ns).contains(&time_ns));
+        let bucket = rung.and_then(|rung| rung.buckets.get(rung.bucket_of(entry.time)));
+        let last = bucket.and_then(|bucket| bucket.last());
+        last.map_or(0, |last| last.count)
+    }
+
     /// Appends the events of the next bucket that has any to `out`, in no order.
     pub(super) fn take_next(&mut self, out: &mut Vec<Entry>) {
         while self.len > 0 {

@@ -91,6 +91,7 @@ impl Simulation {
             [] => None,
             declared => Some(resolved(declared, &info)?),
         };
+        let host_names = self.process_names();
         let topology = Arc::new(Topology {
             owner: self.owner,
             seed: self.seed,
@@ -105,7 +106,8 @@ impl Simulation {
             actor_types: std::mem::take(&mut self.types),
             type_of_actor: self.actors.iter().map(|actor| actor.actor_type).collect(),
             places,
-            host_names: self.process_names(),
+            has_one_host: host_names.len() == 1,
+            host_names,
             routes,
             links,
             kind_of_type: kinds.of_type,

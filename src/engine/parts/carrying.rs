@@ -216,10 +216,10 @@ impl Parts {
             });
         }
         let kind = self.topology.links.get(link).map(|link| link.change_kind);
-        let flow = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX), None);
+        let ordinal = state.next_in_flow(link, kind.unwrap_or(KindIndex::MAX));
         let mut head = Head::of_entity(Class::Tell, me);
         head.receiver = link;
-        let head = head.caused(self.key, KindIndex::MAX, flow.0).of_kind(kind);
+        let head = head.caused(self.key, KindIndex::MAX, ordinal).of_kind(kind);
         let key = self.later_key(me, &mut state.count, SimDuration::ZERO);
         self.schedule(its.engine, key, head, Some(letter));
     }
