@@ -229,6 +229,7 @@ impl Engine {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.topology.place(head.receiver).local as usize;
                 let charge = charge.unwrap_or_default();
+                self.parts.note_charge(key, head.receiver, charge, None);
                 self.actors[local].state.rest.charged_j += charge.energy_j;
                 let host = self.parts.topology.place(head.receiver).host;
                 let energy = self.parts.energy(host);
@@ -291,7 +292,7 @@ impl Engine {
         &self.actors[self.parts.topology.place(actor).local as usize]
     }
 
-    fn is_crashed(&self, actor: EntityId) -> bool {
+    pub(crate) fn is_crashed(&self, actor: EntityId) -> bool {
         self.cell(actor).actor.is_none()
     }
 
@@ -439,6 +440,14 @@ impl Engine {
             }
             Action::Tell(kind, letter) => self.tell_actor(key, head, kind, letter, sink),
         }
+    }
+
+    /// From its next restart on, the actor is built so.
+    pub(crate) fn exchange_constructor(&mut self, actor: EntityId, factory: Factory) {
+        let local = self.parts.topology.place(actor).local as usize;
+        let old = std::mem::replace(&mut self.actors[local].state.rest.factory, factory);
+        // What a run would make of a panic here is not what is replayed.
+        let _ = dropped(old);
     }
 
     /// Builds an actor anew, in a new incarnation.
