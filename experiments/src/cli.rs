@@ -12,13 +12,13 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, problem,
-    recover, report, reproduce, run, shown, study, verify,
+    recover, replay, report, reproduce, run, shown, study, verify,
 };
 use crate::registry::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done; for verify, diff and reproduce: the same
+  0  done; for verify, diff, replay and reproduce: the same
   1  the answer is \"different\" or \"violated\"
   2  the input is wrong
   3  the run failed or was interrupted; what was logged until then is readable";
@@ -65,6 +65,8 @@ enum Command {
     Diff(diff::Args),
     /// Run a log's scenario again with something changed from an instant on, and compare
     Fork(fork::Args),
+    /// Let some actors of a logged run live again, all else as recorded, and compare what they do
+    Replay(replay::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
@@ -214,6 +216,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args, registry),
         Command::Fork(args) => fork::run(&args, registry),
+        Command::Replay(args) => replay::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),

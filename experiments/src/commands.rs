@@ -15,6 +15,7 @@ pub(crate) mod plan;
 pub(crate) mod problem;
 mod progress;
 pub(crate) mod recover;
+pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod run;

@@ -40,6 +40,7 @@ use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
 use fork::Changed;
+pub(crate) use fork::check_replay;
 pub use fork::Fork;
 pub use location::SourceLocation;
 pub use planned::{Never, Planned};

@@ -118,6 +118,11 @@ impl Comparer {
         self.left_out = Some(Box::new(which));
     }
 
+    pub(super) fn leaves_out(&self, class: OutputClass, actor: EntityId, kind: &str) -> bool {
+        let is_out = self.left_out.as_ref();
+        is_out.is_some_and(|is_out| is_out(class, self.topology.name(actor), kind))
+    }
+
     pub(super) fn is_live(&self, entity: EntityId) -> bool {
         self.live[entity.index()]
     }
@@ -139,14 +144,11 @@ impl Comparer {
         if let Some(at) = self.by_key.get(&key) {
             return *at;
         }
-        let (actor, kind) = (
-            self.topology.name(key.actor),
-            &self.kinds[key.kind as usize],
-        );
-        let left_out = self.left_out.as_ref();
+        let kind = &self.kinds[key.kind as usize];
+        let left_out = self.leaves_out(key.class, key.actor, kind);
         self.flows.push(Flow {
             key,
-            left_out: left_out.is_some_and(|is_out| is_out(key.class, actor, kind)),
+            left_out,
             tally: Tally::default(),
             waiting: [VecDeque::new(), VecDeque::new()],
             met: [0; 2],

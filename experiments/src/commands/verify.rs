@@ -152,7 +152,7 @@ pub(super) fn scenario_of(
 }
 
 /// What the reader should know beside the outcome.
-fn notes(summary: &RunSummary, registry: &Registry) -> Vec<String> {
+pub(super) fn notes(summary: &RunSummary, registry: &Registry) -> Vec<String> {
     let mut notes = Vec::new();
     let version = registry.version();
     if summary.code_version != version {
