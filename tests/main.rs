@@ -20,6 +20,7 @@ mod network_safety;
 mod network_team;
 mod outside;
 mod panics;
+mod replay;
 mod scale;
 mod scenarios;
 mod seams;
