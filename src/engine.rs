@@ -113,6 +113,25 @@ impl Engine {
         self.parts.queue.peek()
     }
 
+    /// Handles every event up to the one with this key.
+    pub(crate) fn run_through(
+        &mut self,
+        key: EventKey,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        const ANY: Bound = Bound {
+            time: SimTime::MAX,
+            step: u32::MAX,
+        };
+        while self.parts.stop.is_none()
+            && self.parts.queue.peek_key().is_some_and(|next| next <= key)
+            && let Some(entry) = self.parts.queue.pop_before(ANY)
+        {
+            self.handle(entry, sink)?;
+        }
+        Ok(())
+    }
+
     /// Handles every event before `bound`, unless the sink or an actor asks for a pause.
     pub(crate) fn run(&mut self, bound: Bound, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
         while !sink.paused() && self.parts.stop.is_none() {
@@ -292,7 +311,7 @@ impl Engine {
         &self.actors[self.parts.topology.place(actor).local as usize]
     }
 
-    pub(crate) fn is_crashed(&self, actor: EntityId) -> bool {
+    fn is_crashed(&self, actor: EntityId) -> bool {
         self.cell(actor).actor.is_none()
     }
 

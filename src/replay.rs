@@ -199,11 +199,15 @@ pub enum RecordEnd {
         at: SimTime,
         /// What the fault says.
         text: String,
+        /// The key of the last event before it, of whomever, as far as it is known.
+        last: Option<EventKey>,
     },
     /// Somewhere: the run may have gone on.
     Cut {
         /// The time of the last record.
         at: SimTime,
+        /// Its key, as far as it is known.
+        last: Option<EventKey>,
     },
 }
 
@@ -417,6 +421,17 @@ impl Replay {
         }
     }
 
+    /// Runs the living actors up to the event with this key.
+    fn advance_through(&mut self, key: EventKey) {
+        while self.fault.is_none() {
+            match self.engine.run_through(key, &mut self.comparer) {
+                Err(fault) => self.fault = Some(fault),
+                Ok(()) if !self.take_stop() => break,
+                Ok(()) => {}
+            }
+        }
+    }
+
     /// Keeps the first stop that an actor asked for.
     fn take_stop(&mut self) -> bool {
         let Some(stop) = self.engine.parts.stop.take() else {
@@ -516,6 +531,8 @@ impl Replay {
     /// What a link charged for a message that came to a living host, or went from there.
     fn note_charges(&mut self, record: &Recorded<'_>) {
         let Some(carriage) = record.carriage else {
+            // A link that does not say how it carried may have charged all the same.
+            self.charged |= record.link.is_some() && self.is_near(record.sender);
             return;
         };
         let reached = match record.class {
@@ -537,7 +554,11 @@ impl Replay {
         let (class, key, actor) = (record.class, record.key, record.receiver);
         if matches!(
             class,
-            RecordClass::Start | RecordClass::Delivered | RecordClass::Timer | RecordClass::Restart
+            RecordClass::Start
+                | RecordClass::Delivered
+                | RecordClass::Timer
+                | RecordClass::Restart
+                | RecordClass::Told
         ) {
             self.comparer.step(Side::Recorded, key.time);
         }
@@ -556,9 +577,6 @@ impl Replay {
             RecordClass::Told => {
                 let (head, letter) = self.message(record)?;
                 let kind = head.kind().unwrap_or_default();
-                if !self.engine.is_crashed(actor) {
-                    self.comparer.step(Side::Recorded, key.time);
-                }
                 self.control(key, actor, Action::Tell(kind, letter));
             }
             _ => {}
@@ -640,20 +658,19 @@ impl Replay {
                 step: u32::MAX,
             }),
             RecordEnd::Stopped { at } => self.advance(Bound::at(*at)),
-            RecordEnd::Fault { at, text } => self.run_into(*at, text),
-            RecordEnd::Cut { at } => {
+            RecordEnd::Fault { at, text, last } => {
+                self.advance_through(last.unwrap_or(self.last));
+                self.run_into(*at, text);
+            }
+            RecordEnd::Cut { at, last } => {
                 self.advance(Bound::at(*at));
-                // What was fed last was put in the queue.
-                self.advance(Bound {
-                    time: self.last.time,
-                    step: self.last.step.saturating_add(1),
-                });
+                self.advance_through(last.unwrap_or(self.last));
             }
         }
         let (RecordEnd::Completed { at }
         | RecordEnd::Stopped { at }
         | RecordEnd::Fault { at, .. }
-        | RecordEnd::Cut { at }) = &end;
+        | RecordEnd::Cut { at, .. }) = &end;
         if *at > self.last.time {
             self.last = self.topology.key(*at, 0, EntityId::CONTROL, 0);
         }
@@ -792,12 +809,16 @@ impl Replay {
             body: Some(text.as_bytes().to_vec()),
         };
         let recorded = match end {
-            RecordEnd::Fault { at, text } => {
+            RecordEnd::Fault { at, text, .. } => {
                 let mut actors = topology.declared.iter().copied();
                 let whose = actors.find(|actor| {
                     let name = topology.name(*actor);
                     self.is_live(*actor) && text.starts_with(&format!("{name} at "))
                 });
+                // What a control event does is recorded once it is done: one that failed is not.
+                let is_control = text.contains(" from @control: ")
+                    || !text.contains(" handling ") && *at > SimTime::ZERO;
+                let whose = whose.filter(|_| !is_control);
                 whose.map(|whose| (*at, whose, text.as_str()))
             }
             _ => None,

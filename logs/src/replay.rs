@@ -20,7 +20,7 @@ pub use told::{OutputCount, OutputSide, ReplayOutcome, ReplayedOutput, ReplayedS
 use crate::LogError;
 use crate::envelope::{KeyRef, RecordRef};
 use crate::log::{Ending, Log, Step};
-use crate::scan::SchemaInfo;
+use crate::scan::{ScannedMessage, SchemaInfo};
 use crate::topics::{Topics, topic_before_1_3, topic_of};
 use crate::wire::{Fields, Value};
 use told::Schemas;
@@ -60,13 +60,14 @@ pub fn replay(
     }
     let info = replay.info().clone();
     let names = Names::of(&replay);
+    let live = accepted(&replay);
     let wrong = |reason: String| LogError::Replay {
         path: log.path().to_owned(),
         reason,
     };
     let mut records = log.records()?;
     let mut schemas: BTreeMap<String, Arc<SchemaInfo>> = BTreeMap::new();
-    let mut last_ns = 0;
+    let mut last = Last::default();
     loop {
         match records.step()? {
             Step::End => break,
@@ -88,12 +89,11 @@ pub fn replay(
             }
             Step::Record => {
                 let message = records.message()?;
+                last.meet(&message);
                 if !names.concern(message.data) {
-                    last_ns = message.head.log_time;
                     continue;
                 }
-                let (record, message) = records.record()?;
-                last_ns = message.head.log_time;
+                let (record, _) = records.record()?;
                 let read = recorded(&record, &info).map_err(&wrong)?;
                 let fed = replay.feed(&read);
                 fed.map_err(|error| wrong(error.to_string()))?;
@@ -101,8 +101,7 @@ pub fn replay(
         }
     }
     let ending = records.ending();
-    let last = SimTime::from_nanos(last_ns.saturating_sub(log.head().epoch_ns));
-    let report = replay.finish(end_of(ending, last));
+    let report = replay.finish(last.end_of(ending, log.head().epoch_ns, &info));
     let mut outcome = ReplayOutcome::of(
         &report,
         &Schemas {
@@ -111,21 +110,48 @@ pub fn replay(
         },
     );
     outcome.missing_record = ending.missing();
+    if hides_steps(&log, &info, &live)? {
+        outcome.differing_instants = 0;
+        outcome.first_differing_instant_s = None;
+    }
     Ok(outcome)
 }
 
-/// How a record ends, as the replay wants to know it.
-fn end_of(ending: &Ending, last: SimTime) -> RecordEnd {
-    let at = ending.text("end_time_ns").and_then(|at| at.parse().ok());
-    let at = at.map_or(last, SimTime::from_nanos);
-    match ending.text("end").filter(|_| ending.cut.is_none()) {
-        Some("completed") => RecordEnd::Completed { at },
-        Some("stopped") => RecordEnd::Stopped { at },
-        Some("fault") => RecordEnd::Fault {
-            at,
-            text: ending.text("end_detail").unwrap_or_default().to_owned(),
-        },
-        _ => RecordEnd::Cut { at: last },
+/// The last record but for messages in flight, unread.
+#[derive(Default)]
+struct Last {
+    log_time: u64,
+    envelope: Vec<u8>,
+}
+
+impl Last {
+    fn meet(&mut self, message: &ScannedMessage<'_>) {
+        self.log_time = message.head.log_time;
+        if !message.channel.topic.starts_with("/in_flight/") {
+            self.envelope.clear();
+            self.envelope.extend_from_slice(message.data);
+        }
+    }
+
+    /// How the record ends, as the replay wants to know it.
+    fn end_of(&self, ending: &Ending, epoch_ns: u64, info: &RunInfo) -> RecordEnd {
+        let last = RecordRef::read(&self.envelope);
+        let last = last
+            .and_then(|last| recorded(&last, info).ok())
+            .map(|last| last.key);
+        let logged = SimTime::from_nanos(self.log_time.saturating_sub(epoch_ns));
+        let at = ending.text("end_time_ns").and_then(|at| at.parse().ok());
+        let at = at.map_or(logged, SimTime::from_nanos);
+        match ending.text("end").filter(|_| ending.cut.is_none()) {
+            Some("completed") => RecordEnd::Completed { at },
+            Some("stopped") => RecordEnd::Stopped { at },
+            Some("fault") => RecordEnd::Fault {
+                at,
+                text: ending.text("end_detail").unwrap_or_default().to_owned(),
+                last,
+            },
+            _ => RecordEnd::Cut { at: logged, last },
+        }
     }
 }
 
@@ -253,6 +279,35 @@ impl Filter {
     }
 }
 
+/// The living actors, and the kinds that each accepts.
+fn accepted(replay: &Replay) -> Vec<(EntityId, Vec<String>)> {
+    let entities = (0..replay.info().entities.len()).map(EntityId::from_index);
+    let live = entities.filter(|entity| replay.is_live(*entity));
+    let accepts = |actor| replay.accepts(actor).into_iter().map(str::to_owned);
+    live.map(|actor| (actor, accepts(actor).collect()))
+        .collect()
+}
+
+/// True if events of the living actors are not in the log, so that they cannot be counted.
+fn hides_steps(
+    log: &Log,
+    info: &RunInfo,
+    live: &[(EntityId, Vec<String>)],
+) -> Result<bool, LogError> {
+    let filter = Filter::of(log, log.exclude())?;
+    let classes = [RecordClass::Timer, RecordClass::Delivered];
+    let hides = |(actor, kinds): &(EntityId, Vec<String>)| {
+        let actor = info.name(*actor);
+        let start = filter.hides(RecordClass::Start, actor, actor, "");
+        let of_kind = |kind: &String| {
+            let mut classes = classes.into_iter();
+            classes.any(|class| filter.hides(class, actor, actor, kind))
+        };
+        start || kinds.iter().any(of_kind)
+    };
+    Ok(!log.exclude().is_empty() && live.iter().any(hides))
+}
+
 /// Leaves out of the comparison what the log does not hold.
 fn leave_out(log: &Log, replay: &mut Replay) -> Result<(), LogError> {
     if log.exclude().is_empty() {
@@ -343,7 +398,7 @@ pub fn filtered_inputs(log: &Log, replay: &Replay) -> Result<Vec<String>, LogErr
 }
 
 /// What links charged the hosts of the replay's actors for what was sent there, from how the log says that it
-/// was carried. None where that does not say when: a link that holds messages, or is shared, charges for each
+/// was carried: that a link charges as it says it does. None where that does not say when: a link that holds messages, or is shared, charges for each
 /// attempt, and what was filtered is not known; then the run has to be executed again ([`again`]).
 ///
 /// # Errors
@@ -365,7 +420,15 @@ pub fn charges_in(log: &Log, replay: &Replay) -> Result<Option<Vec<Charge>>, Log
             continue;
         }
         let (record, _) = records.record()?;
-        if record.class == RecordClass::HandOver {
+        // How a message is carried that is still on its way is not in the log.
+        let is_under_way = record.class == RecordClass::InFlight
+            && !record.link.is_empty()
+            && names.near.contains(record.sender.as_bytes());
+        let is_silent = record.class.is_fate()
+            && record.carriage.is_none()
+            && !record.link.is_empty()
+            && names.near.contains(record.sender.as_bytes());
+        if record.class == RecordClass::HandOver || is_under_way || is_silent {
             return Ok(None);
         }
         let energy_j = record.carriage.map_or(0.0, |carriage| carriage.energy_j);

@@ -2,7 +2,8 @@
 //!
 //! An output and its record come in either order: what becomes of a message is recorded when it becomes
 //! clear, a state sample when its event is over. What came first waits. Two that were made at one instant in
-//! one flow belong together, or that have one match key; what is left at the end, by its ordinal.
+//! one flow with one number or content belong together, or that have one match key; what is left at the end, by
+//! its instant or its number.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -195,7 +196,9 @@ impl Comparer {
         if list.len() > MOST_WAITING {
             let oldest = list.pop_front();
             let others = &mut self.flows[at].waiting[1 - side as usize];
-            let other = oldest.as_ref().and_then(|oldest| numbered(others, oldest));
+            let other = oldest
+                .as_ref()
+                .and_then(|oldest| late_partner(others, oldest));
             let pair = [oldest, other];
             match side {
                 Side::Recorded => self.settle(at, pair),
@@ -260,9 +263,13 @@ impl Comparer {
         let led = led.or_else(|| self.trail.find(cause));
         let tally = &mut self.flows[at].tally;
         let field = match &pair {
-            [Some(_), Some(_)] => {
+            [Some(recorded), Some(replayed)] => {
                 tally.changed += 1;
-                "sent"
+                match () {
+                    () if recorded.time != replayed.time => "sent",
+                    () if recorded.match_key != replayed.match_key => "match_key",
+                    () => "body",
+                }
             }
             [Some(_), None] => {
                 tally.missing += 1;
@@ -354,7 +361,7 @@ impl Comparer {
         for at in 0..self.flows.len() {
             let [mut recorded, mut replayed] = std::mem::take(&mut self.flows[at].waiting);
             for recorded in std::mem::take(&mut recorded) {
-                let other = numbered(&mut replayed, &recorded);
+                let other = late_partner(&mut replayed, &recorded);
                 self.settle(at, [Some(recorded), other]);
             }
             let is_at_once = self.flows[at].key.class != OutputClass::Message;
@@ -423,34 +430,48 @@ fn output(waiting: Waiting) -> Output {
     }
 }
 
-/// The counterpart of what is seen, among what waits.
+/// The counterpart of what is seen, among what waits: with its match key or of its instant, and either its
+/// number or its content. Of several at one instant the others may be yet to come.
 fn partner(list: &VecDeque<Waiting>, seen: &Seen<'_>) -> Option<usize> {
-    if let Some(key) = seen.match_key {
-        let keyed = |one: &&(usize, &Waiting)| one.1.match_key == Some(key);
-        let all: Vec<_> = list.iter().enumerate().collect();
-        let mut keyed = all.iter().filter(keyed);
-        let first = keyed.clone().next();
-        let at_once = keyed.find(|(_, one)| one.time == seen.time);
-        return at_once.or(first).map(|(at, _)| *at);
+    if list.is_empty() {
+        return None;
     }
-    let from = list.partition_point(|one| one.time < seen.time);
-    let at_once = list.iter().enumerate().skip(from);
-    let mut at_once = at_once.take_while(|(_, one)| one.time == seen.time);
-    let first = at_once.next()?;
-    let mut all = std::iter::once(first).chain(at_once);
-    let numbered = all.find(|(_, one)| one.ordinal == seen.ordinal);
-    numbered.or(Some(first)).map(|(at, _)| at)
+    let from = match seen.match_key {
+        Some(_) => 0,
+        None => list.partition_point(|one| one.time < seen.time),
+    };
+    let places = from..list.len();
+    let is_candidate = |at: &usize| match seen.match_key {
+        Some(key) => list[*at].match_key == Some(key),
+        None => list[*at].match_key.is_none(),
+    };
+    let goes_on = |at: &usize| seen.match_key.is_some() || list[*at].time == seen.time;
+    let candidates = || places.clone().take_while(goes_on).filter(is_candidate);
+    let numbered = candidates().find(|at| list[*at].ordinal == seen.ordinal);
+    numbered.or_else(|| {
+        let hash = xxh3_64(seen.body);
+        candidates().find(|at| list[*at].hash == hash && list[*at].time == seen.time)
+    })
 }
 
-/// Takes what has the same number in the flow, and no identity of its own.
-fn numbered(list: &mut VecDeque<Waiting>, one: &Waiting) -> Option<Waiting> {
-    // In order of time they are in that of their ordinals, too.
-    let at = list.binary_search_by_key(&one.ordinal, |other| other.ordinal);
-    let at = at.ok()?;
-    let keys = (list[at].match_key, one.match_key);
-    match keys {
-        (None, None) => list.remove(at),
-        _ => None,
+/// Takes the counterpart of what has waited in vain: with its match key, or of its instant, or with its number.
+fn late_partner(list: &mut VecDeque<Waiting>, one: &Waiting) -> Option<Waiting> {
+    let at = match one.match_key {
+        Some(key) => list.iter().position(|other| other.match_key == Some(key))?,
+        None => {
+            let at_once = list.partition_point(|other| other.time < one.time);
+            match list.get(at_once) {
+                Some(other) if other.time == one.time => at_once,
+                // In order of time they are in that of their ordinals, too.
+                _ => list
+                    .binary_search_by_key(&one.ordinal, |other| other.ordinal)
+                    .ok()?,
+            }
+        }
+    };
+    match list[at].match_key == one.match_key {
+        true => list.remove(at),
+        false => None,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use farside::key::EventKey;
 use farside::record::{Flow, Observer, ObserverError, Record, RecordClass, Wants};
 use farside::replay::{ChargeJournal, RecordEnd, Recorded, Replay};
 use farside::{End, Kind, Report, RunInfo, Simulation};
@@ -13,6 +14,8 @@ use super::told::{ReplayOutcome, Schemas};
 struct Feeder {
     state: Arc<Mutex<State>>,
     charges: ChargeJournal,
+    /// The key of the last event.
+    last: Option<EventKey>,
 }
 
 struct State {
@@ -61,6 +64,7 @@ pub fn again(sim: &mut Simulation, mut replay: Replay) -> Again {
     sim.observe(Feeder {
         state: state.clone(),
         charges,
+        last: None,
     });
     Again(state)
 }
@@ -106,6 +110,9 @@ impl Observer for Feeder {
     }
 
     fn record(&mut self, record: &Record<'_>) -> Result<Flow, ObserverError> {
+        if record.class != RecordClass::InFlight {
+            self.last = Some(record.key);
+        }
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let State {
             replay: Some(replay),
@@ -150,8 +157,12 @@ impl Observer for Feeder {
             End::Fault(fault) => RecordEnd::Fault {
                 at,
                 text: fault.to_string(),
+                last: self.last,
             },
-            End::Interrupted | End::ObserverFailed(_) => RecordEnd::Cut { at },
+            End::Interrupted | End::ObserverFailed(_) => RecordEnd::Cut {
+                at,
+                last: self.last,
+            },
         });
         let schemas = Schemas {
             info: &info,
