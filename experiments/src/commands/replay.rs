@@ -83,8 +83,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         base,
         changed,
     };
-    let actors = job.actors(&args.actors)?;
-    let (outcome, run_again_for) = job.replayed()?;
+    let sim = job.assembled(&job.base)?.sim;
+    let actors = job.actors(&args.actors, &sim)?;
+    let (outcome, run_again_for) = job.replayed(sim)?;
     let mut notes = super::verify::notes(&job.summary, registry);
     notes.retain(|note| note.starts_with("the log is from version"));
     if let Some(missing) = &outcome.missing_record {
@@ -158,8 +159,7 @@ impl Job<'_> {
     }
 
     /// The actors that live. Each pattern picks at least one.
-    fn actors(&self, globs: &[String]) -> Result<Vec<String>, CommandError> {
-        let sim = self.assembled(&self.base)?.sim;
+    fn actors(&self, globs: &[String], sim: &Simulation) -> Result<Vec<String>, CommandError> {
         for (glob, pattern) in globs.iter().zip(&self.patterns) {
             if !sim.actor_names().any(|name| pattern.matches(name)) {
                 let hint = did_you_mean(nearest(glob, sim.actor_names()).as_deref());
@@ -177,17 +177,20 @@ impl Job<'_> {
         Ok(names.map(str::to_owned).collect())
     }
 
-    fn replay(&self) -> Result<Replay, CommandError> {
-        let sim: Simulation = self
-            .assembled(self.changed.as_ref().unwrap_or(&self.base))?
-            .sim;
+    /// A replay of the living actors; `base`, if it is given, is the scenario of the log, assembled.
+    fn replay(&self, base: Option<Simulation>) -> Result<Replay, CommandError> {
+        let sim = match (&self.changed, base) {
+            (None, Some(base)) => base,
+            (None, None) => self.assembled(&self.base)?.sim,
+            (Some(changed), _) => self.assembled(changed)?.sim,
+        };
         Ok(Replay::new(sim, |name| self.is_live(name))?)
     }
 
     /// What came of it, and why the run was executed again for it.
-    fn replayed(&self) -> Result<(ReplayOutcome, Vec<String>), CommandError> {
+    fn replayed(&self, base: Simulation) -> Result<(ReplayOutcome, Vec<String>), CommandError> {
         let log = Log::open(self.path)?;
-        let replay = self.replay()?;
+        let replay = self.replay(Some(base))?;
         let filtered = filtered_inputs(&log, &replay)?;
         if !filtered.is_empty() {
             let why = format!("inputs that are not in the log: {}", filtered.join(", "));
@@ -197,7 +200,7 @@ impl Job<'_> {
         if !outcome.needs_charges {
             return Ok((outcome, Vec::new()));
         }
-        let replay = self.replay()?;
+        let replay = self.replay(None)?;
         match charges_in(&log, &replay)? {
             Some(charges) => Ok((
                 farside_logs::replay(self.path, replay, &charges)?,
@@ -320,7 +323,11 @@ fn told(first: &ReplayedOutput) -> String {
     if let Some(event) = &first.event {
         text.push_str(&format!("    made in   {}\n", step(event)));
     }
-    if let Some(cause) = first.cause.as_ref().filter(|cause| first.event.as_ref() != Some(*cause)) {
+    if let Some(cause) = first
+        .cause
+        .as_ref()
+        .filter(|cause| first.event.as_ref() != Some(*cause))
+    {
         text.push_str(&format!("    led to by {}\n", step(cause)));
     }
     text
