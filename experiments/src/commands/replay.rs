@@ -69,11 +69,16 @@ struct Job<'a> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     let path = &args.log;
     kinds::expect(FileKind::Log, path, registry)?;
-    let info = farside_logs::info(path)?;
-    let summary = info.run.ok_or_else(|| CommandError::NotRepeatable {
-        path: path.clone(),
-        reason: "it is not the log of a Farside run".to_owned(),
-    })?;
+    // What the log says at its start: to read all of it for its summary would double the work.
+    let log = Log::open(path)?;
+    let summary = RunSummary {
+        code_version: log.code_version().to_owned(),
+        seed: log.seed(),
+        tie_seed: log.tie_seed(),
+        scenario: log.scenario_name().to_owned(),
+        exclude: log.exclude().to_vec(),
+        ..RunSummary::default()
+    };
     let base = scenario_of(path, &summary, registry)?;
     let changed = changed(args, &base, registry)?;
     let job = Job {
