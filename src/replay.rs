@@ -270,6 +270,8 @@ pub struct Replay {
     charged: bool,
     /// Charges are told ([`Replay::charge`]).
     charges_told: bool,
+    /// By link, whether it charged nothing for what it carried last.
+    free: Vec<bool>,
     inputs: u64,
     last: EventKey,
     /// Stops asked for, the first of each actor.
@@ -305,6 +307,7 @@ impl Replay {
             on_sending,
             charged: false,
             charges_told: false,
+            free: vec![false; topology.info.entities.len()],
             inputs: 0,
             stops: Vec::new(),
             recorded_stop: None,
@@ -449,7 +452,8 @@ impl Replay {
     /// When it cannot be replayed.
     pub fn feed(&mut self, record: &Recorded<'_>) -> Result<(), ReplayError> {
         let count = self.topology.info.entities.len();
-        let entities = [record.sender, record.receiver, record.key.source];
+        let link = record.link.unwrap_or(record.sender);
+        let entities = [record.sender, record.receiver, record.key.source, link];
         if let Some(found) = entities.iter().find(|entity| entity.index() >= count) {
             let found = found.index();
             return Err(ReplayError::UnknownEntity { found, count });
@@ -493,6 +497,9 @@ impl Replay {
 
     fn feed_in_flight(&mut self, record: &Recorded<'_>) -> Result<(), ReplayError> {
         let is_own = self.is_live(record.sender) && record.link.is_none();
+        // What it cost is not recorded: nothing, if its link took nothing for the one before.
+        let is_free = record.link.is_none_or(|link| self.free[link.index()]);
+        self.charged |= !is_free && self.is_near(record.sender);
         let is_first = |(first, ..): &(EventKey, Head, Sealed)| record.key < *first;
         if self.is_live(record.receiver)
             && !is_own
@@ -535,6 +542,9 @@ impl Replay {
             self.charged |= record.link.is_some() && self.is_near(record.sender);
             return;
         };
+        if let Some(link) = record.link {
+            self.free[link.index()] = carriage.energy_j == 0.0;
+        }
         let reached = match record.class {
             RecordClass::Delivered => true,
             RecordClass::Lost => record.reason == "crashed",
@@ -696,14 +706,24 @@ impl Replay {
         }
     }
 
+    /// The living actor in whose event the run failed, if it was one's. What a control event does is recorded
+    /// once it is done: one that failed is not.
+    fn failed(&self, at: SimTime, text: &str) -> Option<EntityId> {
+        let is_control =
+            text.contains(" from @control: ") || !text.contains(" handling ") && at > SimTime::ZERO;
+        if is_control {
+            return None;
+        }
+        let mut actors = self.topology.declared.iter().copied();
+        actors.find(|actor| {
+            let name = self.topology.name(*actor);
+            self.is_live(*actor) && text.starts_with(&format!("{name} at "))
+        })
+    }
+
     /// Goes on into the event in which the run failed, if it was one of a living actor.
     fn run_into(&mut self, at: SimTime, text: &str) {
-        let mut actors = self.topology.declared.iter();
-        let is_its = |actor: &&EntityId| {
-            let name = self.topology.name(**actor);
-            self.is_live(**actor) && text.starts_with(&format!("{name} at "))
-        };
-        if actors.find(is_its).is_none() {
+        if self.failed(at, text).is_none() {
             return;
         }
         if let Some((key, head, letter)) = self.in_flight.take_if(|(key, ..)| key.time == at) {
@@ -810,15 +830,7 @@ impl Replay {
         };
         let recorded = match end {
             RecordEnd::Fault { at, text, .. } => {
-                let mut actors = topology.declared.iter().copied();
-                let whose = actors.find(|actor| {
-                    let name = topology.name(*actor);
-                    self.is_live(*actor) && text.starts_with(&format!("{name} at "))
-                });
-                // What a control event does is recorded once it is done: one that failed is not.
-                let is_control = text.contains(" from @control: ")
-                    || !text.contains(" handling ") && *at > SimTime::ZERO;
-                let whose = whose.filter(|_| !is_control);
+                let whose = self.failed(*at, text);
                 whose.map(|whose| (*at, whose, text.as_str()))
             }
             _ => None,
