@@ -44,7 +44,10 @@ macro_rules! accepts_tuples {
             $(Host: Handler<$name>,)*
         {
             fn list(_accepted: &mut Vec<Accepted>) {
-                $(_accepted.push(Accepted::new::<$name>(Box::new(address::sealer::<Host, $name>())));)*
+                $(_accepted.push(Accepted::new::<$name>(
+                    Box::new(address::sealer::<Host, $name>()),
+                    address::unseal::<Host, $name>,
+                ));)*
             }
         }
     };

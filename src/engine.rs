@@ -115,6 +115,25 @@ impl Engine {
         self.parts.queue.peek()
     }
 
+    /// Handles every event up to the one with this key.
+    pub(crate) fn run_through(
+        &mut self,
+        key: EventKey,
+        sink: &mut impl Sink,
+    ) -> Result<(), Box<Fault>> {
+        const ANY: Bound = Bound {
+            time: SimTime::MAX,
+            step: u32::MAX,
+        };
+        while self.parts.stop.is_none()
+            && self.parts.queue.peek_key().is_some_and(|next| next <= key)
+            && let Some(entry) = self.parts.queue.pop_before(ANY)
+        {
+            self.handle(entry, sink)?;
+        }
+        Ok(())
+    }
+
     /// Handles every event before `bound`, unless the sink or an actor asks for a pause.
     pub(crate) fn run(&mut self, bound: Bound, sink: &mut impl Sink) -> Result<(), Box<Fault>> {
         while !sink.paused() && self.parts.stop.is_none() {
@@ -270,6 +289,7 @@ impl Engine {
                 let charge = side.and_then(|side| side.carriage);
                 let local = self.parts.topology.place(head.receiver).local as usize;
                 let charge = charge.unwrap_or_default();
+                self.parts.note_charge(key, head.receiver, charge, None);
                 self.actors[local].state.rest.charged_j += charge.energy_j;
                 let host = self.parts.topology.place(head.receiver).host;
                 let energy = self.parts.energy(host);
@@ -480,6 +500,14 @@ impl Engine {
             }
             Action::Tell(kind, letter) => self.tell_actor(key, head, kind, letter, sink),
         }
+    }
+
+    /// From its next restart on, the actor is built so.
+    pub(crate) fn exchange_constructor(&mut self, actor: EntityId, factory: Factory) {
+        let local = self.parts.topology.place(actor).local as usize;
+        let old = std::mem::replace(&mut self.actors[local].state.rest.factory, factory);
+        // What a run would make of a panic here is not what is replayed.
+        let _ = dropped(old);
     }
 
     /// Builds an actor anew, in a new incarnation.

@@ -145,6 +145,7 @@ mod payload;
 mod queue;
 pub mod random;
 pub mod record;
+pub mod replay;
 pub mod report;
 pub mod ruling;
 pub mod scene;

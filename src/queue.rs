@@ -312,6 +312,15 @@ impl Queue {
         }
     }
 
+    /// The key of the next event, for who goes from one to the next.
+    pub(crate) fn peek_key(&mut self) -> Option<EventKey> {
+        let next = self.next.iter().max().copied();
+        let near = self.present.front().copied().into_iter().chain(next);
+        let timed = self.timed().copied();
+        // The greatest entry is the least key.
+        near.chain(timed).max().map(|entry| entry.key())
+    }
+
     /// Takes the event with the least key, if it comes before `bound`.
     #[inline(always)]
     pub(crate) fn pop_before(&mut self, bound: Bound) -> Option<Entry> {

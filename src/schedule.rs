@@ -1,6 +1,7 @@
 //! When a run must pause: control events fixed beforehand, and requests to stop.
 
-use crate::engine::{Action, Remains};
+use crate::engine::{Action, Factory, Remains};
+use crate::guard::dropped;
 use crate::ids::EntityId;
 use crate::key::{Bound, EventKey};
 use crate::time::{SimDuration, SimTime};
@@ -32,6 +33,20 @@ pub(crate) enum Due {
     Control(EventKey, EntityId, Action),
 }
 
+/// When a stop takes effect that was asked for in the event `key`.
+pub(crate) fn stop_of(key: EventKey, look_ahead: SimDuration) -> Bound {
+    if look_ahead.is_zero() {
+        return Bound {
+            time: key.time,
+            step: key.step + 1,
+        };
+    }
+    Bound::at(key.time + look_ahead).min(Bound {
+        time: SimTime::from_nanos(SimTime::MAX.as_nanos() - 1),
+        step: u32::MAX,
+    })
+}
+
 /// Control events to come, and the earliest stop asked for.
 pub(crate) struct Schedule {
     /// Latest first.
@@ -58,17 +73,7 @@ impl Schedule {
     /// hosts that run ahead in parallel have not passed it. Where that would be past the clock, it is
     /// after all that happens on it: whoever asks for a stop is heard.
     pub(crate) fn ask_stop(&mut self, key: EventKey, by: EntityId, reason: String) {
-        let at = if self.look_ahead.is_zero() {
-            Bound {
-                time: key.time,
-                step: key.step + 1,
-            }
-        } else {
-            Bound::at(key.time + self.look_ahead).min(Bound {
-                time: SimTime::from_nanos(SimTime::MAX.as_nanos() - 1),
-                step: u32::MAX,
-            })
-        };
+        let at = stop_of(key, self.look_ahead);
         if self
             .stop
             .as_ref()
@@ -123,6 +128,25 @@ impl Schedule {
         let (at, by, reason) = self.stop.take()?;
         let key = topology.key(at.time, at.step, EntityId::CONTROL, self.next_count);
         Some(Due::Stop { key, by, reason })
+    }
+
+    /// The constructors that actors have from some control events on, in order; the rest is dropped.
+    pub(crate) fn into_rebuilds(
+        mut self,
+        topology: &Topology,
+    ) -> Vec<(EventKey, EntityId, Factory)> {
+        let mut rebuilds = Vec::new();
+        while let Some(Control { time, count, what }) = self.controls.pop() {
+            let key = topology.key(time, 0, EntityId::CONTROL, count);
+            match what {
+                ControlAction::Entity(entity, Action::Rebuild(factory)) => {
+                    rebuilds.push((key, entity, factory));
+                }
+                // Nobody is to know of a panic in what is not wanted.
+                other => drop(dropped(other)),
+            }
+        }
+        rebuilds
     }
 
     /// Drops what was never due.

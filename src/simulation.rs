@@ -3,6 +3,7 @@
 mod assemble;
 mod controls;
 mod forks;
+mod replays;
 
 use std::any::TypeId;
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use crate::guard::{dropped, guarded};
 use crate::ids::{HostId, LinkId, Owner};
 use crate::payload::Message;
 use crate::record::{NamedObserver, Observer};
+use crate::replay::ChargeJournal;
 use crate::report::Report;
 use crate::ruling::{MessageId, Ruling};
 use crate::time::{SimDuration, SimTime};
@@ -104,6 +106,9 @@ pub struct Simulation {
     /// The first mistake that was noticed as it was made.
     mistake: Option<BuildError>,
     rulings: Vec<(MessageId, Ruling)>,
+    /// In a replay, which of the actors live, by number.
+    live: Option<Vec<bool>>,
+    charges: Option<ChargeJournal>,
 }
 
 impl Simulation {
@@ -128,6 +133,8 @@ impl Simulation {
             check_min_delay: true,
             mistake: None,
             rulings: Vec::new(),
+            live: None,
+            charges: None,
         }
     }
 

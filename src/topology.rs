@@ -6,12 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rustc_hash::FxBuildHasher;
 
-use crate::encoding::{Schema, SchemaError};
+use crate::encoding::{DecodeError, Schema, SchemaError};
+use crate::engine::Sealed;
 use crate::fault::LookupError;
 use crate::ids::{EntityId, HostIndex, KindIndex, Owner};
 use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::name_hash;
+use crate::replay::ChargeJournal;
 use crate::ruling::Rulings;
 use crate::time::{SimDuration, SimTime};
 
@@ -76,12 +78,17 @@ pub struct Accepted {
     /// How a message of this type is sealed for the actor: a function whose type only those know
     /// who know the message's.
     pub(crate) seal: Box<dyn Any + Send + Sync>,
+    /// Reads and seals one that a log holds.
+    pub(crate) unseal: Unseal,
 }
 
+/// How an encoded message becomes one sealed for an actor.
+pub(crate) type Unseal = fn(&Schema, &[u8]) -> Result<Sealed, DecodeError>;
+
 impl Accepted {
-    pub(crate) fn new<M: Message>(seal: Box<dyn Any + Send + Sync>) -> Self {
+    pub(crate) fn new<M: Message>(seal: Box<dyn Any + Send + Sync>, unseal: Unseal) -> Self {
         let kind = KindEntry::of::<M>();
-        Accepted { kind, seal }
+        Accepted { kind, seal, unseal }
     }
 }
 
@@ -383,6 +390,8 @@ pub(crate) struct Topology {
     pub(crate) check_min_delay: bool,
     /// What becomes of single messages whatever links decide; none in nearly all runs.
     pub(crate) rulings: Option<Rulings>,
+    /// Where charges are noted as they are made; none in nearly all runs.
+    pub(crate) charges: Option<ChargeJournal>,
 }
 
 impl Topology {

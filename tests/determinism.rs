@@ -5,7 +5,7 @@ use farside_tests::chatter::{Chatter, Ledger};
 use proptest::prelude::*;
 
 prop_compose! {
-    fn chatter()(
+    pub(crate) fn chatter()(
         seed in any::<u64>(),
         tie_seed in prop::option::of(any::<u64>()),
         hosts in prop::collection::vec(1u8..3, 1..5),

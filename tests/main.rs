@@ -21,6 +21,7 @@ mod network_team;
 mod outside;
 mod panics;
 mod refusals;
+mod replay;
 mod scale;
 mod scenarios;
 mod seams;

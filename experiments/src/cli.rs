@@ -12,13 +12,13 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, plot,
-    problem, recover, report, reproduce, run, shown, study, verify, why,
+    problem, recover, replay, report, reproduce, run, shown, study, verify, why,
 };
 use crate::registry::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done; for verify, diff, fork and reproduce: the same; for recover: nothing is lost
+  0  done; for verify, diff, fork, replay and reproduce: the same; for recover: nothing is lost
   1  the answer is \"different\", \"violated\" or \"something is lost\"
   2  the input is wrong
   3  the run failed or was interrupted; what was logged until then is readable";
@@ -69,6 +69,8 @@ enum Command {
     Fork(fork::Args),
     /// Say what an actor did in a run, whom it waited for, and what touched it
     Why(why::Args),
+    /// Let some actors of a logged run live again, all else as recorded, and compare what they do
+    Replay(replay::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Plot fields of messages over time, of any MCAP file
@@ -228,6 +230,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Diff(args) => diff::run(&args, registry),
         Command::Fork(args) => fork::run(&args, registry),
         Command::Why(args) => why::run(&args, registry),
+        Command::Replay(args) => replay::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Plot(args) => plot::run(&args),
         Command::Study(args) => study::run(&args, registry),

@@ -18,6 +18,7 @@ pub(crate) mod plot;
 pub(crate) mod problem;
 mod progress;
 pub(crate) mod recover;
+pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod run;

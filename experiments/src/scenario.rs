@@ -41,6 +41,7 @@ pub use crash::Crash;
 pub use error::ScenarioError;
 use fork::Changed;
 pub use fork::Fork;
+pub(crate) use fork::check_replay;
 pub use location::SourceLocation;
 pub use planned::{Never, Planned};
 pub use reference::shared_sections;

@@ -114,6 +114,14 @@ pub enum LogError {
         /// What it said.
         source: Box<mcap::McapError>,
     },
+    /// A record that cannot be replayed.
+    #[error("{path}: cannot be replayed: {reason}")]
+    Replay {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+    },
     /// A topic glob that cannot be read.
     #[error("topic glob {glob:?}: {reason}")]
     Glob {

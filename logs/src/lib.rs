@@ -71,6 +71,7 @@ mod messages;
 mod output;
 mod parse;
 mod recover;
+mod replay;
 mod salvage;
 mod scan;
 mod schema;
@@ -96,6 +97,10 @@ pub use log::{Ending, Log, LoggedKey, LoggedRecord, Records};
 pub use messages::{FoundMessage, find_messages};
 pub use output::{may_hold_log, refuse_input};
 pub use recover::{LostMessages, LostToldBy, RecoverReport, recover};
+pub use replay::{
+    Again, OutputCount, OutputSide, ReplayOutcome, ReplayedOutput, ReplayedStep, again, charges_in,
+    filtered_inputs, replay,
+};
 pub use scan::{ChannelInfo, SchemaInfo};
 pub use shown::{escaped, is_hidden};
 pub use value::{NumberKind, Numbers, Value};

@@ -338,7 +338,8 @@ impl Records {
         }
     }
 
-    fn sample(&self) -> Result<(RecordRef<'_>, &ChannelInfo), LogError> {
+    /// The state sample that [`Records::step`] came to, as a record.
+    pub(crate) fn sample(&self) -> Result<(RecordRef<'_>, &ChannelInfo), LogError> {
         let message = self.message()?;
         let topic = message.channel.topic.as_str();
         let inner = topic.strip_prefix("/state/").unwrap_or(topic);

@@ -511,7 +511,7 @@ impl Verifier {
 }
 
 /// The messages of a kind's schema.
-fn kind_types(kind: Option<&Kind>) -> Result<Types, String> {
+pub(crate) fn kind_types(kind: Option<&Kind>) -> Result<Types, String> {
     let kind = kind.ok_or("the record has no body")?;
     Types::read(
         &kind.schema().file_descriptor_set(),

@@ -114,6 +114,14 @@ pub(crate) fn sealer<A: Handler<M>, M: Message>() -> fn(M) -> Sealed {
     seal::<A, M>
 }
 
+/// Reads a message that a log holds, and seals it for actors of type `A`.
+pub(crate) fn unseal<A: Handler<M>, M: Message>(
+    schema: &Schema,
+    bytes: &[u8],
+) -> Result<Sealed, DecodeError> {
+    Ok(seal::<A, M>(schema.decode(bytes)?))
+}
+
 /// What `M` can be sent to: an [`Address`] or a [`Recipient`].
 pub trait Target<M>: Copy {
     #[doc(hidden)]
@@ -217,6 +225,6 @@ impl<A: Handler<M>, M: Message> Letter for Addressed<A, M> {
     }
 
     fn decode(&self, schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
-        Ok(seal::<A, M>(schema.decode(bytes)?))
+        unseal::<A, M>(schema, bytes)
     }
 }

@@ -208,6 +208,7 @@ impl<'a, A: Actor> Context<'a, A> {
     /// What links have charged this actor so far for transmitting what it sent, in joules. It
     /// outlives a crash, as spent energy does.
     pub fn transmit_energy_j(&self) -> f64 {
+        self.parts.energy_read.set(true);
         self.state.rest.charged_j
     }
 

@@ -179,6 +179,11 @@ impl Head {
         }
     }
 
+    /// This head, of what a link carries.
+    pub(crate) fn through(self, link: EntityId) -> Self {
+        Head { link, ..self }
+    }
+
     /// This head, with a kind.
     pub(crate) fn of_kind(self, kind: Option<KindIndex>) -> Self {
         Head {

@@ -5,6 +5,7 @@ mod carrying;
 mod sampling;
 
 use std::any::TypeId;
+use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -14,13 +15,14 @@ use super::{
     CellState, Class, Head, Hops, LinkCell, Outbound, Outgoing, Pending, Remains, Sealed, Side,
     Sink,
 };
-use crate::carrier::{SealedChange, Verdicts};
+use crate::carrier::{Carriage, SealedChange, Verdicts};
 use crate::encoding::EncodeError;
 use crate::fault::{Fault, FaultCause};
 use crate::guard::guarded;
 use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
 use crate::queue::{Entry, Queue};
+use crate::replay::{Charge, ChargedMessage};
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{Kind, Topology};
 
@@ -74,6 +76,8 @@ pub(crate) struct Parts {
     sample_types: Vec<SampleType>,
     /// By host, as far as hosts of this engine were charged anything.
     energies: Vec<HostEnergy>,
+    /// Somebody asked what was charged.
+    pub(crate) energy_read: Cell<bool>,
     pub(crate) sends: u32,
     /// Boxed: it is looked at after every event, and nearly always empty.
     pub(crate) fault: Option<Box<FaultCause>>,
@@ -108,6 +112,7 @@ impl Parts {
             verdicts: Verdicts::default(),
             sample_types: Vec::new(),
             energies: Vec::new(),
+            energy_read: Cell::new(false),
             sends: 0,
             fault: None,
             carrying: None,
@@ -355,6 +360,11 @@ impl Parts {
         if charge_j != 0.0 {
             state.rest.charged_j += charge_j;
             self.energy(from).transmit_j += charge_j;
+            let charge = Carriage {
+                energy_j: charge_j,
+                ..Carriage::default()
+            };
+            self.note_charge(self.key, me, charge, Some(head));
         }
     }
 
@@ -369,8 +379,37 @@ impl Parts {
         &mut self.energies[at]
     }
 
+    /// Notes a charge where somebody keeps a journal of them; `head` is that of the message as whose
+    /// sending it was made.
+    #[cold]
+    pub(crate) fn note_charge(
+        &self,
+        key: EventKey,
+        actor: EntityId,
+        charge: Carriage,
+        head: Option<&Head>,
+    ) {
+        let Some(journal) = &self.topology.charges else {
+            return;
+        };
+        journal.note(Charge {
+            key,
+            actor,
+            transmit_j: charge.energy_j,
+            receive_j: charge.receive_j,
+            message: head.and_then(|head| {
+                Some(ChargedMessage {
+                    receiver: head.receiver,
+                    kind: head.kind()?,
+                    ordinal: head.ordinal,
+                })
+            }),
+        });
+    }
+
     /// What links have charged this host so far.
     pub(crate) fn energy_so_far(&self, host: HostIndex) -> HostEnergy {
+        self.energy_read.set(true);
         self.energies
             .get(host as usize)
             .copied()

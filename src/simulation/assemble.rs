@@ -116,10 +116,11 @@ impl Simulation {
             step_limit: self.step_limit,
             late_step: self.step_limit.saturating_sub(Topology::TRACED_STEPS),
             digest: self.digest,
-            observed: !wants.is_empty(),
-            samples: wants.iter().any(|wants| wants.samples),
+            observed: !wants.is_empty() || self.live.is_some(),
+            samples: wants.iter().any(|wants| wants.samples) || self.live.is_some(),
             check_min_delay: self.check_min_delay,
             rulings,
+            charges: self.charges.clone(),
             info,
         });
         let schedule = Schedule::new(controls, look_ahead);
@@ -455,7 +456,9 @@ impl Simulation {
         let mut links: Vec<Vec<LinkCell>> = (0..count).map(|_| Vec::new()).collect();
         let declared = std::mem::take(&mut self.actors);
         for (declared, (actor, entity)) in declared.into_iter().zip(&ranked.actors).enumerate() {
+            let is_live = self.live.as_ref().is_none_or(|live| live[declared]);
             let built = match fault {
+                _ if !is_live => Err(()),
                 None => guarded(|| (actor.factory)(&actor.name))
                     .map_err(|cause| fault = Some(fault_of(*entity, *cause))),
                 Some(_) => Err(()),

@@ -99,9 +99,7 @@ impl Simulation {
             let (what, number) = ("actor", 0);
             return Err(BuildError::OtherSimulation { what, number });
         }
-        if let Some((own, its)) = self.first_difference(&other) {
-            return Err(BuildError::OtherTeam { own, its });
-        }
+        self.check_team(&other)?;
         let mut rebuilt = Vec::new();
         for (declared, actor) in (0..).zip(other.actors) {
             if which(&actor.name) {
@@ -111,6 +109,26 @@ impl Simulation {
             }
         }
         Ok(rebuilt)
+    }
+
+    /// Checks that `other` has the same hosts, actors and links, in the same order.
+    ///
+    /// ```
+    /// use farside::prelude::*;
+    /// let (mut a, mut b) = (Simulation::new(1), Simulation::new(2));
+    /// a.host("rover_01");
+    /// b.host("rover_02");
+    /// let error = a.check_team(&b).unwrap_err();
+    /// assert!(error.to_string().contains("rover_02"));
+    /// ```
+    ///
+    /// # Errors
+    /// With the first that they do not have alike.
+    pub fn check_team(&self, other: &Simulation) -> Result<(), BuildError> {
+        match self.first_difference(other) {
+            None => Ok(()),
+            Some((own, its)) => Err(BuildError::OtherTeam { own, its }),
+        }
     }
 
     /// The first host, actor or link that the two do not have alike, as either has it.

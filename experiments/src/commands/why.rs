@@ -20,7 +20,7 @@ use self::escape::Escapes;
 use self::story::Story;
 use self::text::Told;
 use super::kinds::{self, FileKind};
-use super::verify::scenario_of;
+use super::logged::scenario_of;
 use super::{CommandError, Exit, output, print, print_json};
 use crate::export::{self, FigureFormat};
 use crate::registry::Registry;

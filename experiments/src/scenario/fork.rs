@@ -115,6 +115,38 @@ pub(super) fn check_changes(shared: &Shared, changed: &Shared) -> Result<(), Str
     }
 }
 
+/// Checks that `changed` differs from `base` in nothing but settings of actors, as a replay may have them: all
+/// else comes from the record.
+pub(crate) fn check_replay(base: &Scenario, changed: &Scenario) -> Result<(), String> {
+    let table = |shared: &Shared| toml::Table::try_from(shared).unwrap_or_default();
+    let (mut before, mut after) = (table(&base.shared), table(&changed.shared));
+    for free in ["links", "description"] {
+        before.remove(free);
+        after.remove(free);
+    }
+    let keys = before.keys().chain(after.keys());
+    let mut differing_keys = keys.filter(|key| before.get(*key) != after.get(*key));
+    if let Some(key) = differing_keys.next() {
+        let why = match key.as_str() {
+            "seed" | "problem_seed" | "tie_seed" | "system" => refusal(key),
+            _ => "this comes from the record: a replay changes settings of its actors alone",
+        };
+        return Err(format!("{key}: {why}"));
+    }
+    let resolved = |scenario: &Scenario| scenario.settings.resolved().unwrap_or_default();
+    let keys = differing("", &resolved(base), &resolved(changed));
+    let of_world = |key: &&String| {
+        let root = key.split('.').next().unwrap_or_default();
+        matches!(root, "world" | "team")
+    };
+    match keys.iter().find(of_world) {
+        Some(key) => Err(format!(
+            "{key}: the world and the team are those of the record"
+        )),
+        None => Ok(()),
+    }
+}
+
 /// Why a key cannot be set in mid-run.
 fn refusal(key: &str) -> &'static str {
     match key {
