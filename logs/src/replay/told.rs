@@ -8,7 +8,7 @@ use farside::{Kind, RunInfo};
 use serde::Serialize;
 
 use crate::envelope::seconds;
-use crate::fields::{self, Encoded, FieldDiff};
+use crate::fields::{self, Encoded, FieldDiff, Rules};
 use crate::scan::SchemaInfo;
 use crate::schema::Types;
 use crate::shown::Seconds;
@@ -296,7 +296,7 @@ fn bodies(expected: &Output, actual: &Output, types: &Result<Types, String>) -> 
         return FieldDiff::texts("text", x, y);
     }
     let (x, y) = (Encoded::of(a, types), Encoded::of(b, types));
-    fields::protobuf("body", &x, &y, 0.0).unwrap_or_else(|| fields::raw("body", a, b))
+    fields::protobuf("body", &x, &y, &Rules::default()).unwrap_or_else(|| fields::raw("body", a, b))
 }
 
 fn shown(output: &Output, types: &Result<Types, String>) -> String {
