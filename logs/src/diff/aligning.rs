@@ -35,7 +35,7 @@ pub(super) fn aligned(a: &[Entry], b: &[Entry], offset_ns: i64) -> Matching {
 /// By what messages are paired, one after the other.
 #[derive(Clone, Copy, PartialEq)]
 enum Level {
-    /// All that is compared.
+    /// All that is compared; and of the rest, [`Level::Data`].
     Content,
     /// What a message says, where no other on the topic says it.
     Data,
@@ -47,16 +47,9 @@ enum Level {
     Nearest,
 }
 
-const LEVELS: [Level; 5] = [
-    Level::Content,
-    Level::Data,
-    Level::Sequence,
-    Level::Time,
-    Level::Nearest,
-];
+const LEVELS: [Level; 4] = [Level::Content, Level::Sequence, Level::Time, Level::Nearest];
 
-const LEVELS_WITHOUT_NUMBERS: [Level; 4] =
-    [Level::Content, Level::Data, Level::Time, Level::Nearest];
+const LEVELS_WITHOUT_NUMBERS: [Level; 3] = [Level::Content, Level::Time, Level::Nearest];
 
 /// The entries of two logs, and by how much later the second was recorded.
 struct Aligner<'e> {
@@ -112,12 +105,27 @@ impl Aligner<'_> {
         }
         let pairs = match level {
             Level::Nearest => self.nearest(xs, ys),
+            Level::Content => self.same(xs, ys),
             level => self.equal(xs, ys, *level),
         };
         for [xs, ys] in gaps(xs, ys, &pairs).values() {
             self.align(xs, ys, further, found);
         }
         found.pairs.extend(&pairs);
+    }
+
+    /// Pairs what is the same, and of the rest what says the same, wherever on the topic it is.
+    fn same(&self, xs: &[u32], ys: &[u32]) -> Vec<(u32, u32)> {
+        let mut pairs = self.equal(xs, ys, Level::Content);
+        let mut paired: Vec<u32> = pairs.iter().map(|pair| pair.1).collect();
+        paired.sort_unstable();
+        let is_left = |x: &u32| pairs.binary_search_by_key(x, |pair| pair.0).is_err();
+        let xs: Vec<u32> = xs.iter().copied().filter(is_left).collect();
+        let ys = ys.iter().copied();
+        let ys: Vec<u32> = ys.filter(|y| paired.binary_search(y).is_err()).collect();
+        pairs.extend(self.equal(&xs, &ys, Level::Data));
+        pairs.sort_unstable();
+        pairs
     }
 
     /// Pairs the n-th of those that are equal at a level with the n-th; in the order of the first log.
