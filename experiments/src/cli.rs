@@ -12,7 +12,7 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, check, complain, diff, draw, explain, fork, info, plan, problem,
-    recover, report, reproduce, run, shown, study, verify,
+    recover, report, reproduce, run, shown, shrink, study, verify,
 };
 use crate::registry::Registry;
 
@@ -65,6 +65,8 @@ enum Command {
     Diff(diff::Args),
     /// Run a log's scenario again with something changed from an instant on, and compare
     Fork(fork::Args),
+    /// Find the smallest part of a failing run that still fails so
+    Shrink(shrink::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
@@ -214,6 +216,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Verify(args) => verify::run(&args, registry),
         Command::Diff(args) => diff::run(&args, registry),
         Command::Fork(args) => fork::run(&args, registry),
+        Command::Shrink(args) => shrink::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),

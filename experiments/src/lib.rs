@@ -24,6 +24,7 @@ pub mod export;
 pub mod registry;
 pub mod report;
 pub mod scenario;
+pub mod shrink;
 pub mod stats;
 pub mod study;
 mod version;

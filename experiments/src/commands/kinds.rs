@@ -108,7 +108,7 @@ fn kind_of(given: &Path, registry: &Registry) -> Option<FileKind> {
     }
 }
 
-fn starts_as_log(path: &Path) -> bool {
+pub(super) fn starts_as_log(path: &Path) -> bool {
     let mut start = [0; MCAP_MAGIC.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
     read.is_ok() && start == MCAP_MAGIC

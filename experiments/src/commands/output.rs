@@ -28,6 +28,8 @@ pub(super) enum Format {
     Png,
     /// A plan in JSON: all are alike up to the version of their format.
     Plan,
+    /// A scenario that was made small: all are alike up to who did it.
+    Small,
     /// What there is to plan: all are alike up to the first point, in the version of their format.
     Problem,
 }
@@ -41,6 +43,7 @@ impl Format {
             Format::Table => b",",
             Format::Junit => b"name=",
             Format::Plan => b"/",
+            Format::Small => b"by ",
             Format::Problem => b".",
             Format::Pdf => return &bytes[..bytes.len().min(5)],
             Format::Png => return &bytes[..bytes.len().min(8)],
@@ -57,6 +60,7 @@ impl Format {
             Format::Table => "table of this kind",
             Format::Junit => "JUnit file",
             Format::Plan => "plan",
+            Format::Small => "scenario that was made small",
             Format::Problem => "problem of this kind",
         }
     }

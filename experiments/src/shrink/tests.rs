@@ -1,0 +1,1 @@
+//! Small scenarios made smaller.
