@@ -207,12 +207,11 @@ pub(crate) fn shrink(
     let limits = (options.jobs, options.budget);
     let interrupt = options.interrupt.clone();
     let mut search = Search::new(bench, limits, verdicts, interrupt, options.tell);
-    let (end_ns, timed_out) = first_run(&mut search, &table)?;
+    let end_ns = first_run(&mut search, &table)?;
     let whole = Whole::new(table, scenario.removable());
     let mut remarks = Vec::new();
-    let mut left = Vec::new();
-    let mut stage = Stage::new(whole, end_ns, timed_out, smaller);
-    let done = steps(&mut search, &mut stage, &mut left, &mut remarks);
+    let mut stage = Stage::new(whole, end_ns, smaller);
+    let done = steps(&mut search, &mut stage, &mut remarks);
     let end = match done {
         Ok(()) => ShrinkEnd::Minimal,
         Err(Halt::Budget) => ShrinkEnd::Budget,
@@ -221,7 +220,7 @@ pub(crate) fn shrink(
     };
     Ok(Shrunk {
         end,
-        left: stage.left(&left),
+        left: stage.left(),
         runs: search.spent,
         known,
         proved: stage.proved,
@@ -232,14 +231,12 @@ pub(crate) fn shrink(
 }
 
 /// That it happens at all, and when.
-fn first_run(search: &mut Search<'_>, table: &Table) -> Result<(u64, bool), ShrinkError> {
+fn first_run(search: &mut Search<'_>, table: &Table) -> Result<u64, ShrinkError> {
     (search.tell)(Tell::Now("the run as it is".to_owned()));
     let found = search.first(1, &|_| vec![table.clone()]);
     match found {
         Ok(Some(found)) => match found.verdict {
-            Verdict::Violates {
-                end_ns, timed_out, ..
-            } => return Ok((end_ns, timed_out)),
+            Verdict::Violates { end_ns, .. } => return Ok(end_ns),
             Verdict::Holds | Verdict::Impossible => {}
         },
         Ok(None) => {}
@@ -274,7 +271,6 @@ fn first_run(search: &mut Search<'_>, table: &Table) -> Result<(u64, bool), Shri
 fn steps(
     search: &mut Search<'_>,
     stage: &mut Stage<'_>,
-    left: &mut Vec<Left>,
     remarks: &mut Vec<String>,
 ) -> Result<(), Halt> {
     let is_lasting = search.bench.forbidden.is_lasting();
@@ -283,12 +279,10 @@ fn steps(
         stage.set_until(search, after(longest))?;
     }
     stage.reduce(search)?;
-    *left = stage.left(&[]);
     schedule_losses(search, stage, remarks)?;
     loop {
         stage.reduce(search)?;
-        if is_lasting || !stage.timed_out {
-            // Whoever ends by itself ends before that.
+        if is_lasting {
             stage.set_until(search, after(SimDuration::from_nanos(stage.end_ns)))?;
         }
         if stage.prove(search)? {
@@ -347,12 +341,8 @@ fn schedule_losses(
     }
     let found = search.first(1, &|_| vec![explicit.clone()])?;
     match found.map(|found| found.verdict) {
-        Some(Verdict::Violates {
-            end_ns,
-            timed_out,
-            idle,
-        }) => {
-            stage.begin(&search.bench, explicit, (end_ns, timed_out), &idle);
+        Some(Verdict::Violates { end_ns, idle }) => {
+            stage.begin(&search.bench, explicit, end_ns, &idle);
             Ok(())
         }
         _ => {

@@ -524,3 +524,68 @@ impl Network {
         self.site.refused.iter().map(sentence).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::TeamConfig;
+    use crate::testing::{assembled, grid};
+
+    fn part(only: &[&str], network: &NetworkConfig) -> (Simulation, Network) {
+        let (world, roadmap) = (WorldConfig::default(), Arc::new(grid(6, 6, &[])));
+        let world = WorldConfig { nodes: 4, ..world };
+        let sensors = Arc::new(world.place(&roadmap, 3).unwrap());
+        let team = TeamConfig {
+            only: only.iter().map(|name| (*name).to_owned()).collect(),
+            ..TeamConfig::of(12)
+        };
+        assembled(3, &world, roadmap, sensors, &team, network)
+    }
+
+    #[test]
+    fn those_that_take_part_are_as_in_the_whole_team_and_the_others_are_not_there() {
+        for (policy, failover_after) in [
+            (Policy::MaxPlus, None),
+            (Policy::Complete, Some(3)),
+            (Policy::Reference, None),
+        ] {
+            let network = NetworkConfig {
+                policy,
+                failover_after,
+                ..NetworkConfig::default()
+            };
+            let (_, whole) = part(&[], &network);
+            let (mut sim, some) = part(&["rover_11", "rover_03"], &network);
+            assert_eq!(some.missions(), whole.missions());
+            let hosts = sim.host_names().filter(|name| name.starts_with("rover"));
+            assert_eq!(hosts.collect::<Vec<_>>(), ["rover_03", "rover_11"]);
+            assert_eq!((whole.team_size(), some.team_size()), (12, 2));
+            if failover_after.is_some() {
+                // Its backup hears from the two there are, and waits for no others.
+                let at = SimTime::ZERO + SimDuration::from_millis(1500);
+                sim.crash_named_at(at, "node_02").unwrap();
+            }
+            sim.run(Executor::Inline).unwrap();
+            let metrics = some.metrics();
+            let done = (metrics.rovers, metrics.arrived, metrics.arrival_s.len());
+            assert_eq!(done, (2, 2, 2), "{policy:?}: {metrics:?}");
+            assert!(metrics.completed && metrics.collisions == 0);
+            assert_eq!(metrics.failovers > 0, failover_after.is_some());
+        }
+    }
+
+    #[test]
+    fn whom_nobody_knows_takes_no_part() {
+        let names = names("rover", 12);
+        let error = |only: &[&str]| {
+            let only: Vec<String> = only.iter().map(|name| (*name).to_owned()).collect();
+            takes_part(&names, &only).unwrap_err().to_string()
+        };
+        assert_eq!(
+            error(&["rover_01", "rover_13"]),
+            "\"rover_13\": expected the name of one of 12 rovers; did you mean \"rover_03\"?"
+        );
+        let twice = error(&["rover_01", "rover_02", "rover_01"]);
+        assert_eq!(twice, "\"rover_01\": expected each name once");
+    }
+}

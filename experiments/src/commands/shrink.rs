@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use farside::{End, Executor, SimTime};
+use farside::{Executor, SimTime};
 use farside_actors::units;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -251,8 +251,7 @@ impl Small<'_> {
         let assembled = scenario.assemble()?;
         let report = assembled.sim.run(Executor::Inline)?;
         let results = (assembled.system.conclude)(&report);
-        let is_broken = forbidden.is_broken(&report, &results);
-        match is_broken || matches!(report.end, End::Interrupted) {
+        match forbidden.is_broken(&report, &results) {
             true => Ok(()),
             false => Err(CommandError::Arguments(format!(
                 "{name}: written, and {} does not happen when it is run: it ended at {}",

@@ -13,30 +13,27 @@ use super::{Left, Tell, losses};
 pub(super) struct Stage<'s> {
     pub(super) whole: Whole,
     pub(super) kept: Selection,
+    /// All lists there ever were.
+    lists: Vec<Left>,
     /// When the run of what is left ended [ns].
     pub(super) end_ns: u64,
-    /// Because its time was over.
-    pub(super) timed_out: bool,
     /// How many single entries were left out at last, in vain.
     pub(super) proved: usize,
     smaller: &'s mut dyn FnMut(&Table),
 }
 
 impl<'s> Stage<'s> {
-    pub(super) fn new(
-        whole: Whole,
-        end_ns: u64,
-        timed_out: bool,
-        smaller: &'s mut dyn FnMut(&Table),
-    ) -> Self {
-        Stage {
+    pub(super) fn new(whole: Whole, end_ns: u64, smaller: &'s mut dyn FnMut(&Table)) -> Self {
+        let mut stage = Stage {
             kept: whole.all(),
             whole,
+            lists: Vec::new(),
             end_ns,
-            timed_out,
             proved: 0,
             smaller,
-        }
+        };
+        stage.note();
+        stage
     }
 
     /// The scenario as it is left.
@@ -45,45 +42,42 @@ impl<'s> Stage<'s> {
     }
 
     /// Goes on with another scenario with which it happens.
-    pub(super) fn begin(
-        &mut self,
-        bench: &Bench<'_>,
-        table: Table,
-        (end_ns, timed_out): (u64, bool),
-        idle: &[u32],
-    ) {
+    pub(super) fn begin(&mut self, bench: &Bench<'_>, table: Table, end_ns: u64, idle: &[u32]) {
         // Places of entries within others are other ones now.
         let read = bench.read(&table);
         let removable = read.map_or_else(|_| Vec::new(), |scenario| scenario.removable());
         self.whole = Whole::new(table, removable);
         self.kept = self.whole.all();
-        (self.end_ns, self.timed_out) = (end_ns, timed_out);
+        self.note();
+        self.end_ns = end_ns;
         self.drop_idle(idle);
         self.tell_smaller();
     }
 
-    /// How much is left of each list; what there was is as `before` has it, where it does.
-    pub(super) fn left(&self, before: &[Left]) -> Vec<Left> {
-        let parts = self.whole.parts.iter().zip(&self.kept);
-        let mut all: Vec<Left> = before
-            .iter()
-            .map(|left| Left {
-                left: 0,
-                ..left.clone()
-            })
-            .collect();
-        for (part, kept) in parts {
-            match all.iter_mut().find(|left| left.key == part.key) {
-                Some(known) => known.left = kept.len(),
-                None => all.push(Left {
+    /// Remembers how much there is of each list that is seen for the first time.
+    fn note(&mut self) {
+        for part in &self.whole.parts {
+            if self.lists.iter().all(|known| known.key != part.key) {
+                self.lists.push(Left {
                     what: part.what,
                     key: part.key.clone(),
                     of: part.count,
-                    left: kept.len(),
-                }),
+                    left: 0,
+                });
             }
         }
-        all
+    }
+
+    /// How much is left of each list there ever was.
+    pub(super) fn left(&self) -> Vec<Left> {
+        let left = |list: &Left| Left {
+            left: self
+                .whole
+                .place_of(&list.key)
+                .map_or(0, |place| self.kept[place].len()),
+            ..list.clone()
+        };
+        self.lists.iter().map(left).collect()
     }
 
     fn tell_smaller(&mut self) {
@@ -109,16 +103,11 @@ impl<'s> Stage<'s> {
         table.insert("until".to_owned(), Value::String(until.to_string()));
         let found = search.first(1, &|_| vec![table.clone()])?;
         if let Some(Found {
-            verdict:
-                Verdict::Violates {
-                    end_ns,
-                    timed_out,
-                    idle,
-                },
+            verdict: Verdict::Violates { end_ns, idle },
             ..
         }) = found
         {
-            self.begin(&search.bench, table, (end_ns, timed_out), &idle);
+            self.begin(&search.bench, table, end_ns, &idle);
         }
         Ok(())
     }
@@ -195,17 +184,12 @@ impl<'s> Stage<'s> {
     /// Goes on with what was found.
     fn take(&mut self, search: &Search<'_>, kept: Selection, verdict: &Verdict) {
         self.kept = kept;
-        if let Verdict::Violates {
-            end_ns,
-            timed_out,
-            idle,
-        } = verdict
-        {
-            (self.end_ns, self.timed_out) = (*end_ns, *timed_out);
+        if let Verdict::Violates { end_ns, idle } = verdict {
+            self.end_ns = *end_ns;
             self.drop_idle(idle);
         }
         self.tell_smaller();
-        (search.tell)(Tell::Smaller(self.left(&[])));
+        (search.tell)(Tell::Smaller(self.left()));
     }
 
     /// Leaves out losses that met no message, or changed nothing: without them it is the same run.

@@ -33,9 +33,6 @@ pub(super) enum Verdict {
     Violates {
         /// When the run ended [ns].
         end_ns: u64,
-        /// The run's time was over: it did not end by itself, nor because it had happened.
-        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-        timed_out: bool,
         /// The places of `[[lose]]` entries that met no message, or changed nothing.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         idle: Vec<u32>,
@@ -50,7 +47,6 @@ pub(super) enum Verdict {
 pub(super) struct Tried {
     pub(super) report: Report,
     pub(super) results: Results,
-    pub(super) timed_out: bool,
     lose: usize,
 }
 
@@ -88,7 +84,6 @@ impl Bench<'_> {
             let report = report.map_err(|error| error.to_string())?;
             let results = (assembled.system.conclude)(&report);
             let tried = Tried {
-                timed_out: scenario.is_time_out(&report.end),
                 lose: scenario.shared().lose.len(),
                 report,
                 results,
@@ -133,7 +128,6 @@ impl Bench<'_> {
             .filter(|(_, end)| **end != RulingEnd::Applied);
         Verdict::Violates {
             end_ns: report.end_time.as_nanos(),
-            timed_out: tried.timed_out,
             idle: idle.map(|(at, _)| at).collect(),
         }
     }

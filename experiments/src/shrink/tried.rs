@@ -198,7 +198,6 @@ mod tests {
         let path = folder.path().join("tried");
         let violates = Verdict::Violates {
             end_ns: 5,
-            timed_out: false,
             idle: vec![3],
         };
         let mut verdicts = Verdicts::open(&path, &search("x")).unwrap();
