@@ -18,7 +18,8 @@ use super::{CommandError, Exit, complain, interrupt, print, print_json};
 use crate::registry::Registry;
 use crate::scenario::{Forbidden, Scenario};
 use crate::shrink::{
-    BEGINNING, Budget, Left, ShrinkEnd, ShrinkOptions, Shrunk, Tell, beside, short, shrink,
+    BEGINNING, Budget, Left, ShrinkEnd, ShrinkError, ShrinkOptions, Shrunk, Tell, beside, short,
+    shrink,
 };
 use farside_actors::system::Files;
 
@@ -141,6 +142,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         files: &files,
         inputs: &inputs,
     };
+    let was_begun = state.exists();
     let mut unwritten = None;
     let shrunk = shrink(&scenario, registry, &options, &mut |table| {
         if let Err(error) = small.write(table, &["not yet searched through".to_owned()]) {
@@ -148,6 +150,10 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         }
     });
     progress.clear();
+    if let (Err(ShrinkError::Holds { .. }), false) = (&shrunk, was_begun) {
+        // Nothing is to be gone on with; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&state);
+    }
     let shrunk = shrunk?;
     if let Some(error) = unwritten {
         return Err(error);
@@ -225,10 +231,12 @@ impl Small<'_> {
         let Args {
             input, violates, ..
         } = self.args;
-        let version = self.registry.version();
-        let program = self.registry.program();
-        let mut text =
-            format!("{BEGINNING}{version}: {program} shrink {input} --violates '{violates}'");
+        let (program, version) = (self.registry.program(), self.registry.version());
+        // A binary of somebody else's has its name in its version.
+        let version = version.strip_prefix(program).unwrap_or(&version).trim();
+        let mut text = format!(
+            "{BEGINNING}{program} {version}: {program} shrink {input} --violates '{violates}'"
+        );
         for set in &self.args.sets {
             text.push_str(&format!(" --set '{set}'"));
         }

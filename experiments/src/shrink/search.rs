@@ -167,11 +167,14 @@ impl<'a> Search<'a> {
                 });
             };
             for key in outcome.keys {
-                let is_new = self.asked.insert(key) && !self.verdicts.is_from_before(key);
-                self.spent += u64::from(is_new);
-            }
-            if matches!(self.budget, Some(Budget::Runs(runs)) if self.spent > runs) {
-                return Err(Halt::Budget);
+                if self.asked.contains(&key) || self.verdicts.is_from_before(key) {
+                    continue;
+                }
+                if matches!(self.budget, Some(Budget::Runs(runs)) if self.spent >= runs) {
+                    return Err(Halt::Budget);
+                }
+                self.asked.insert(key);
+                self.spent += 1;
             }
             if number == found {
                 return Ok(Some(Found {
