@@ -267,15 +267,15 @@ pub(crate) fn declare(
 /// Which rovers there are, by the names that a scenario gives; all if it gives none.
 fn takes_part(names: &[String], only: &[String]) -> Result<Vec<bool>, NetworkError> {
     for (at, name) in only.iter().enumerate() {
-        let message = match () {
-            () if !names.contains(name) => {
-                let close = suggest::nearest(name, names.iter().map(String::as_str));
-                let hint = suggest::did_you_mean(close.as_deref());
-                let count = names.len();
-                format!("{name:?}: expected the name of one of {count} rovers{hint}")
-            }
-            () if only[..at].contains(name) => format!("{name:?}: expected each name once"),
-            () => continue,
+        let message = if !names.contains(name) {
+            let close = suggest::nearest(name, names.iter().map(String::as_str));
+            let hint = suggest::did_you_mean(close.as_deref());
+            let count = names.len();
+            format!("{name:?}: expected the name of one of {count} rovers{hint}")
+        } else if only[..at].contains(name) {
+            format!("{name:?}: expected each name once")
+        } else {
+            continue;
         };
         return Err(NetworkError::Only { at, message });
     }
