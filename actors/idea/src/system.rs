@@ -89,15 +89,15 @@ const INVARIANTS: [Invariant; 7] = [
     Invariant::new("faulty", "faulty_agents>0", "an agent was found faulty").lasting(),
     Invariant::new("given_up", "goals_given_up>0", "a goal was given up").lasting(),
     Invariant::new(
-        "lease",
-        "driving_without_lease_s>0",
-        "a rover drove after its lease had ended",
-    )
-    .lasting(),
-    Invariant::new(
         "late_response",
         "max_response_lambda>=2",
         "news waited for two latencies or longer until its answer left",
+    )
+    .lasting(),
+    Invariant::new(
+        "lease",
+        "driving_without_lease_s>0",
+        "a rover drove after its lease had ended",
     )
     .lasting(),
     Invariant::new("repeated_goal", "goals_repeated>0", "a goal was done twice").lasting(),
