@@ -54,7 +54,7 @@ fn queued(
     let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
     let mut sim = Simulation::new(seed);
     let parts = Parts::placed(world, roadmap, config, seed).unwrap();
-    let missions = missions(world, &parts.roadmap, &TeamConfig { rovers }, seed).unwrap();
+    let missions = missions(world, &parts.roadmap, &TeamConfig::of(rovers), seed).unwrap();
     let network = assemble_over(&mut sim, &parts, &Missions::Queued(missions), |_, _| {
         radio.link()
     });
@@ -110,6 +110,7 @@ pub(crate) fn network_of(
         sensors: Arc::new(sensors),
         config,
         terrain: None,
+        only: &[],
     };
     let network = assemble_over(&mut sim, &parts, missions, |_, _| radio.link());
     (sim, network)
@@ -261,7 +262,7 @@ fn the_references_plan_is_driven() {
     let metrics = network.metrics();
     all_arrive(&metrics);
     let roadmap = Roadmap::builtin(world.roadmap.name()).unwrap();
-    let all = missions(&world, &roadmap, &TeamConfig { rovers: 60 }, 4).unwrap();
+    let all = missions(&world, &roadmap, &TeamConfig::of(60), 4).unwrap();
     let all = all.into_iter().map(|(a, b)| Mission::new(a, b)).collect();
     let problem = Problem::new(&roadmap, all, Rules::DisappearAtTarget).unwrap();
     let plan = reference(&problem, &Order::QueuePosition).plan;

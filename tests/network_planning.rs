@@ -96,7 +96,7 @@ fn run(rovers: u32, latency: SimDuration, network: &NetworkConfig) -> Result<Run
     let mut sim = Simulation::new(seed);
     let wire = FixedDelay::new(latency);
     let parts = Parts::placed(&world, roadmap, network, seed).unwrap();
-    let missions = missions(&world, &parts.roadmap, &TeamConfig { rovers }, seed)?;
+    let missions = missions(&world, &parts.roadmap, &TeamConfig::of(rovers), seed)?;
     let missions = Missions::Queued(missions);
     let system = assemble_over(&mut sim, &parts, &missions, |_, _| wire.clone())?;
     let book = Arc::new(Mutex::new(Book::default()));

@@ -289,7 +289,7 @@ fn plain(seed: u64) -> Case {
             radius_m: Some(100.0),
             ..WorldConfig::default()
         },
-        team: TeamConfig { rovers: 6 },
+        team: TeamConfig::of(6),
         network: rigid(),
         ..Case::default()
     }

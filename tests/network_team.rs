@@ -25,7 +25,7 @@ fn team(seed: u64, rovers: u32) -> Result<(Simulation, Network), NetworkError> {
     let world = WorldConfig::default();
     let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name()).unwrap());
     let mut sim = Simulation::new(seed);
-    let (team, network) = (TeamConfig { rovers }, NetworkConfig::default());
+    let (team, network) = (TeamConfig::of(rovers), NetworkConfig::default());
     let parts = Parts::placed(&world, roadmap, &network, seed).unwrap();
     let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
     let network = assemble_over(&mut sim, &parts, &missions, |_, _| lossy())?;

@@ -32,8 +32,9 @@ pub use farside::scene::{Drawing, Level, Scene};
 pub use crate::figure::{Figure, svg};
 pub use crate::system::settings::{in_unit, over};
 pub use crate::system::{
-    Assembly, Better, Builtin, Gathered, Metric, OwnTable, PictureError, PictureInfo,
-    PictureRequest, Recording, Results, Series, SeriesIndex, Setup, SetupError, System,
+    Assembly, Better, Builtin, Entries, Gathered, Invariant, Metric, OwnTable, PictureError,
+    PictureInfo, PictureRequest, Recording, Removable, Results, Series, SeriesIndex, Setup,
+    SetupError, System,
 };
 pub use crate::wiring::Wiring;
 pub use crate::{settings, units};

@@ -10,9 +10,11 @@ mod documented;
 mod error;
 mod files;
 mod gathered;
+mod invariant;
 mod metric;
 mod own_table;
 mod picture;
+mod removable;
 mod section;
 mod series;
 pub mod settings;
@@ -33,11 +35,13 @@ pub use documented::{parted, with_about};
 pub use error::SetupError;
 pub use files::{Files, no_file};
 pub use gathered::Gathered;
+pub use invariant::Invariant;
 pub use metric::{Better, Metric, MetricKind, SeriesIndex};
 pub use own_table::OwnTable;
 pub use picture::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recorded, Recording, RecordingEnd,
 };
+pub use removable::{Entries, Removable};
 pub use section::{Key, Section};
 pub use series::{Series, SeriesError};
 
@@ -58,6 +62,12 @@ pub trait System: Send + Sync {
 
     /// What a run of it can be measured by.
     fn metrics(&self) -> &[Metric] {
+        &[]
+    }
+
+    /// What must never happen in a run of it, sorted by name. Scenarios name them in `never`, and who
+    /// makes a failing run small says by them what failed.
+    fn invariants(&self) -> &[Invariant] {
         &[]
     }
 
@@ -131,6 +141,12 @@ pub trait Settings: Send + Sync {
     /// fork of a run may set. None, the default, for a key with which the world or the team is built.
     fn taken_up_by(&self, _key: &str) -> Option<Vec<Pattern>> {
         None
+    }
+
+    /// What of these settings a smaller scenario can be without, the most costly first: members of the
+    /// team, goals. What all systems share, such as crashes, is known without.
+    fn removable(&self) -> Vec<Removable> {
+        Vec::new()
     }
 
     /// What the planners of a run have to solve, as the text of a file, if its system has such a
@@ -288,6 +304,9 @@ pub struct Assembly {
     /// results is told if the run ends before. Crashes, degradations, contacts and what actors are
     /// told are known without.
     pub planned: Vec<(String, SimDuration)>,
+    /// Tells whether the invariant of this name is broken by now, for invariants that last and that
+    /// are watched while the run is on; false for all others. Asked after each record.
+    pub watch: Option<Watch>,
 }
 
 impl Assembly {
@@ -299,7 +318,15 @@ impl Assembly {
             scene: None,
             notes: Vec::new(),
             planned: Vec::new(),
+            watch: None,
         }
+    }
+
+    /// Watched while the run is on.
+    #[must_use]
+    pub fn with_watch(mut self, watch: impl Fn(&str) -> bool + Send + 'static) -> Self {
+        self.watch = Some(Box::new(watch));
+        self
     }
 
     /// With something that begins at an instant of the run, and the key that says so.
@@ -340,6 +367,9 @@ pub struct Goal {
     /// How many are done. Asked many times a second.
     pub done: Box<dyn Fn() -> u64 + Send>,
 }
+
+/// Tells whether an invariant is broken by now.
+pub type Watch = Box<dyn Fn(&str) -> bool + Send>;
 
 /// Tells what came of a run.
 pub type Conclude = Box<dyn FnOnce(&Report) -> Results>;

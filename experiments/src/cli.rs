@@ -12,7 +12,7 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, plot,
-    problem, recover, replay, report, reproduce, run, shown, study, verify, why,
+    problem, recover, replay, report, reproduce, run, shown, shrink, study, verify, why,
 };
 use crate::registry::Registry;
 
@@ -71,6 +71,8 @@ enum Command {
     Why(why::Args),
     /// Let some actors of a logged run live again, all else as recorded, and compare what they do
     Replay(replay::Args),
+    /// Find the smallest part of a failing run that still fails so
+    Shrink(shrink::Args),
     /// Draw a picture of a run, from its log
     Draw(draw::Args),
     /// Plot fields of messages over time, of any MCAP file
@@ -231,6 +233,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Fork(args) => fork::run(&args, registry),
         Command::Why(args) => why::run(&args, registry),
         Command::Replay(args) => replay::run(&args, registry),
+        Command::Shrink(args) => shrink::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Plot(args) => plot::run(&args),
         Command::Study(args) => study::run(&args, registry),

@@ -22,6 +22,7 @@ pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod run;
+pub(crate) mod shrink;
 pub(crate) mod study;
 mod table;
 pub(crate) mod verify;
@@ -90,6 +91,9 @@ pub(crate) enum CommandError {
     /// A figure that is not to be had as this kind of file.
     #[error(transparent)]
     Export(#[from] crate::export::ExportError),
+    /// A run that cannot be made small.
+    #[error(transparent)]
+    Shrink(#[from] crate::shrink::ShrinkError),
     /// A file of planning, or what a planner made of it.
     #[error(transparent)]
     Plan(#[from] plan::PlanError),
@@ -130,7 +134,9 @@ impl CommandError {
             }
             CommandError::Log(error) if error.is_of_output() => Exit::Failed,
             CommandError::Plan(plan::PlanError::Planner { .. }) => Exit::Failed,
+            CommandError::Shrink(error) if error.is_of_output() => Exit::Failed,
             CommandError::Plan(_)
+            | CommandError::Shrink(_)
             | CommandError::Study(_)
             | CommandError::Store(_)
             | CommandError::Scenario(_)

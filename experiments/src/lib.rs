@@ -26,6 +26,7 @@ pub mod registry;
 pub mod report;
 pub mod scenario;
 mod sequence;
+pub mod shrink;
 pub mod stats;
 pub mod study;
 mod version;

@@ -5,6 +5,7 @@
 //! message with its place, what was found, what was expected and the nearest valid name.
 
 mod blame;
+pub(crate) mod condition;
 pub mod contacts;
 mod crash;
 mod error;
@@ -36,6 +37,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::registry::Registry;
+pub use condition::Forbidden;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
@@ -91,6 +93,9 @@ settings! {
         pub postpone: Vec<Postpone> [skip_serializing_if = "Vec::is_empty"];
         /// Other settings from an instant on.
         pub fork: Vec<Fork> [skip_serializing_if = "Vec::is_empty"];
+        /// What must never happen, whatever else does: invariants of the system by name, or conditions
+        /// over its metrics, as in `arrived<rovers`. A run in which it does is a violated one.
+        pub never: Vec<String> [skip_serializing_if = "Vec::is_empty"];
         /// What the log holds.
         pub log: LogSettings;
     }
@@ -136,6 +141,8 @@ pub struct Scenario {
     settings: Box<dyn Settings>,
     source: Source,
     files: Files,
+    /// What must never happen.
+    forbidden: Vec<Forbidden>,
     /// What holds from each of its forks on.
     changed: Vec<Changed>,
 }
@@ -245,11 +252,13 @@ impl Scenario {
             settings,
             source,
             files,
+            forbidden: Vec::new(),
             changed: Vec::new(),
         };
         let checked = scenario.settings.check();
         checked.map_err(|error| ScenarioError::from_setup(&scenario.source, error))?;
         scenario.check_crashes()?;
+        scenario.read_never(system)?;
         rulings::check(&scenario.shared)
             .map_err(|mistake| scenario.invalid(mistake.key, mistake.message))?;
         scenario.read_forks(&text, sets, registry)?;
@@ -359,6 +368,7 @@ impl Scenario {
         } = declared;
         let mut setup = Setup::new(seeds, self.until(), &mut sim, &mut files, links);
         let mut system = self.settings.assemble(&mut setup).map_err(wrong)?;
+        self.forbid(&mut system);
         let remarks = setup.close().map_err(|error| wrong(error.into()))?;
         notes.append(&mut system.notes);
         self.check_places(&sim)?;

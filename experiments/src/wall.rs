@@ -10,3 +10,23 @@ pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let result = work();
     (result, start.elapsed().as_secs_f64())
 }
+
+/// How long it is since it was started.
+#[allow(
+    clippy::disallowed_types,
+    reason = "how long a search has taken is for people to bound; no simulated code sees it"
+)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stopwatch(std::time::Instant);
+
+impl Stopwatch {
+    #[allow(clippy::disallowed_types, reason = "as above")]
+    pub(crate) fn start() -> Self {
+        Stopwatch(std::time::Instant::now())
+    }
+
+    /// Seconds since the start.
+    pub(crate) fn elapsed_s(self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+}

@@ -9,8 +9,8 @@ use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
-    Settings, Setup, SetupError, System,
+    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
+    Recording, Removable, Section, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -54,6 +54,10 @@ impl System for IdeaSystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -73,6 +77,36 @@ impl System for IdeaSystem {
         Ok(Box::new(IdeaScenario::deserialize(sections)?))
     }
 }
+
+/// What must never happen, or should not.
+const INVARIANTS: [Invariant; 7] = [
+    Invariant::new(
+        "abort",
+        "aborted_cycles>0",
+        "a cycle took too many operations",
+    )
+    .lasting(),
+    Invariant::new("faulty", "faulty_agents>0", "an agent was found faulty").lasting(),
+    Invariant::new("given_up", "goals_given_up>0", "a goal was given up").lasting(),
+    Invariant::new(
+        "late_response",
+        "max_response_lambda>=2",
+        "news waited for two latencies or longer until its answer left",
+    )
+    .lasting(),
+    Invariant::new(
+        "lease",
+        "driving_without_lease_s>0",
+        "a rover drove after its lease had ended",
+    )
+    .lasting(),
+    Invariant::new("repeated_goal", "goals_repeated>0", "a goal was done twice").lasting(),
+    Invariant::new(
+        "unfinished",
+        "complete=false",
+        "not all goals were achieved",
+    ),
+];
 
 impl Settings for IdeaScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
@@ -98,6 +132,16 @@ impl Settings for IdeaScenario {
         goals(self, &names, 0).map(drop)
     }
 
+    fn removable(&self) -> Vec<Removable> {
+        let counted = |what, key: &str| Removable::new(what, key, Entries::Counted);
+        vec![
+            counted("rovers", "agents.rovers"),
+            Removable::new("goals", "goal", Entries::Listed),
+            counted("goals by chance", "goals.count"),
+            Removable::new("faults of rovers", "rover.fault", Entries::Listed),
+        ]
+    }
+
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let Some(until) = setup.until else {
             let message = "missing: agents go on planning, so a run needs an end";
@@ -121,11 +165,22 @@ impl Settings for IdeaScenario {
             until,
         };
         let team = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
+        let watched = team.tally.clone();
+        let watch = move |invariant: &str| {
+            let tally = watched.lock().unwrap_or_else(PoisonError::into_inner);
+            match invariant {
+                "given_up" => tally.given_up > 0,
+                "repeated_goal" => tally.done.values().any(|times| *times > 1),
+                "abort" => tally.agents.iter().any(|agent| agent.aborted > 0),
+                "faulty" => tally.agents.iter().any(|agent| agent.faulty > 0),
+                _ => false,
+            }
+        };
         let assembly = Assembly::new(move |report: &Report| {
             let mut tally = team.tally.lock().unwrap_or_else(PoisonError::into_inner);
             metrics::results(&team.watched, &mut tally, report.end_time)
         });
-        let assembly = assembly.with_scene(scene);
+        let assembly = assembly.with_scene(scene).with_watch(watch);
         let faults = self.rover.faults.iter().enumerate();
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)

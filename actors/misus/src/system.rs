@@ -6,8 +6,8 @@ use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
-    Settings, Setup, SetupError, System,
+    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
+    Recording, Removable, Section, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -43,6 +43,10 @@ impl System for MisusSystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -63,6 +67,12 @@ impl System for MisusSystem {
     }
 }
 
+/// What should not happen.
+const INVARIANTS: [Invariant; 2] = [
+    Invariant::new("brown_out", "brown_outs>0", "a rover's battery was empty").lasting(),
+    Invariant::new("hardware", "faults>0", "a rover's hardware had a fault").lasting(),
+];
+
 impl Settings for MisusScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
@@ -77,6 +87,13 @@ impl Settings for MisusScenario {
         let rovers: Vec<&str> = rovers.iter().map(String::as_str).collect();
         self.rover.check_rovers("rover", &rovers)?;
         self.learn.check("learn")
+    }
+
+    fn removable(&self) -> Vec<Removable> {
+        vec![
+            Removable::new("rovers", "team.rovers", Entries::Counted),
+            Removable::new("faults of rovers", "rover.fault", Entries::Listed),
+        ]
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

@@ -49,7 +49,7 @@ fn run(nodes: u32, network: &NetworkConfig, seed: u64) -> Cost {
     let mut sim = Simulation::new(seed);
     sim.without_digest();
     let wire = FixedDelay::new(SimDuration::from_millis(5));
-    let team = TeamConfig { rovers: ROVERS };
+    let team = TeamConfig::of(ROVERS);
     let missions = missions(&world, &parts.roadmap, &team, seed).expect("there is a way");
     let missions = Missions::Queued(missions);
     let system = assemble_over(&mut sim, &parts, &missions, |_, _| wire.clone());

@@ -89,7 +89,7 @@ fn problem(
         endpoints,
         ..WorldConfig::default()
     };
-    let missions = missions(&world, map, &TeamConfig { rovers }, seed)?;
+    let missions = missions(&world, map, &TeamConfig::of(rovers), seed)?;
     let missions = missions.into_iter().map(Mission::from).collect();
     Ok(Problem::new(map, missions, Rules::DisappearAtTarget)?)
 }

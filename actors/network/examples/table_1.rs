@@ -154,7 +154,7 @@ fn run(
     };
     let roadmap = Arc::new(Roadmap::builtin(map)?);
     let parts = Parts::placed(&world, roadmap, &options.network, seed)?;
-    let team = TeamConfig { rovers };
+    let team = TeamConfig::of(rovers);
     let mut sim = Simulation::new(seed);
     if !options.digest {
         sim.without_digest();

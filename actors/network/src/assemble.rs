@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use farside::carrier::Carrier;
 use farside::prelude::*;
+use farside::suggest;
 use farside_actors::processor::{Processor, Speed};
 use farside_actors::wiring::{Links, Wire, Wiring};
 use farside_worlds::{HeightField, NodeId, Roadmap, SensorError, SensorNetwork, VertexId};
@@ -49,6 +50,8 @@ pub struct Parts<'a> {
     pub config: &'a NetworkConfig,
     /// The ground that radios look over, if it is known.
     pub terrain: Option<Arc<HeightField>>,
+    /// The names of the rovers that take part; all if it is empty.
+    pub only: &'a [String],
 }
 
 impl<'a> Parts<'a> {
@@ -69,6 +72,7 @@ impl<'a> Parts<'a> {
             sensors,
             config,
             terrain: None,
+            only: &[],
         })
     }
 }
@@ -135,13 +139,15 @@ pub fn assemble(
         refused,
         node_names,
         rover_names,
+        takes_part,
         wired,
         timing,
     } = declare(sim, parts, missions, wire)?;
     let sensors = &parts.sensors;
     let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all().to_vec();
-    let has_way = |rover: &RoverId| refused.iter().all(|r| r.rover != *rover);
+    let has_way =
+        |rover: &RoverId| takes_part[rover.0 as usize] && refused.iter().all(|r| r.rover != *rover);
     let queues = match stay_at_target {
         true => BTreeMap::new(),
         false => queues(&missions, has_way),
@@ -157,7 +163,9 @@ pub fn assemble(
         Some(_) => failover::backup_lists(&roadmap, sensors),
         None => Vec::new(),
     };
-    let is_well_formed = stay_at_target && is_well_formed(&roadmap, &missions);
+    let all = takes_part.iter().zip(&missions);
+    let team: Vec<_> = all.filter(|(is, _)| **is).map(|(_, one)| *one).collect();
+    let is_well_formed = stay_at_target && is_well_formed(&roadmap, &team);
     let site = Arc::new(Shared {
         backup_lists,
         payoffs: Payoffs::new(config, &roadmap),
@@ -167,6 +175,7 @@ pub fn assemble(
         roadmap_from: source(config, &node_names)?,
         node_names,
         rover_names,
+        takes_part,
         config: config.clone(),
         queues: queues.into_iter().collect(),
         refused,
@@ -190,6 +199,7 @@ pub(crate) struct Declared {
     refused: Vec<Refused>,
     node_names: Vec<String>,
     rover_names: Vec<String>,
+    takes_part: Vec<bool>,
     wired: Links,
     /// How long the parts of a planning cycle last.
     pub(crate) timing: Timing,
@@ -213,11 +223,18 @@ pub(crate) fn declare(
     let stay_at_target = matches!(missions, Missions::Standing(_));
     let missions = missions.all();
     let roadmap = parts.world.open_part(&parts.roadmap, sensors);
-    let refused = gaps::refused(&roadmap, sensors, missions);
     let node_names = names("node", sensors.len());
     let rover_names = names("rover", missions.len());
-    gaps::check_refused(&refused, &rover_names, stay_at_target)?;
-    let mut wiring = wiring(sim, sensors, &node_names, &rover_names);
+    let takes_part = takes_part(&rover_names, parts.only)?;
+    let refused = gaps::refused(&roadmap, sensors, missions, &takes_part);
+    let team = takes_part.iter().filter(|is| **is).count();
+    gaps::check_refused(&refused, &rover_names, team, stay_at_target)?;
+    let is_there = |rover: &usize| takes_part[*rover];
+    let there: Vec<&String> = (0..rover_names.len())
+        .filter(is_there)
+        .map(|rover| &rover_names[rover])
+        .collect();
+    let mut wiring = wiring(sim, sensors, &node_names, &there);
     let places = places_m(&roadmap, sensors, missions);
     for (name, place_m) in node_names.iter().chain(&rover_names).zip(places) {
         wiring.place(name, place_m);
@@ -241,9 +258,29 @@ pub(crate) fn declare(
         refused,
         node_names,
         rover_names,
+        takes_part,
         wired,
         timing,
     })
+}
+
+/// Which rovers there are, by the names that a scenario gives; all if it gives none.
+fn takes_part(names: &[String], only: &[String]) -> Result<Vec<bool>, NetworkError> {
+    for (at, name) in only.iter().enumerate() {
+        let message = if !names.contains(name) {
+            let close = suggest::nearest(name, names.iter().map(String::as_str));
+            let hint = suggest::did_you_mean(close.as_deref());
+            let count = names.len();
+            format!("{name:?}: expected the name of one of {count} rovers{hint}")
+        } else if only[..at].contains(name) {
+            format!("{name:?}: expected each name once")
+        } else {
+            continue;
+        };
+        return Err(NetworkError::Only { at, message });
+    }
+    let is_there = |name: &String| only.is_empty() || only.contains(name);
+    Ok(names.iter().map(is_there).collect())
 }
 
 /// Whether each rover that stands on the map has a path round all others' starts and goals.
@@ -378,7 +415,8 @@ fn declare_nodes(sim: &mut Simulation, site: &Arc<Shared>, wired: &Links) {
 }
 
 fn declare_rovers(sim: &mut Simulation, site: &Arc<Shared>) {
-    for (id, name) in (0..).map(RoverId).zip(&site.rover_names) {
+    for (id, _) in site.team() {
+        let name = &site.rover_names[id.0 as usize];
         let (host, site) = (sim.host(name), site.clone());
         sim.actor(host, name, move |_| Rover::new(site.clone(), id));
     }
@@ -389,11 +427,10 @@ fn wiring(
     sim: &mut Simulation,
     sensors: &SensorNetwork,
     node_names: &[String],
-    rover_names: &[String],
+    rover_names: &[&String],
 ) -> Wiring {
-    let mut hosts =
-        |names: &[String]| -> Vec<HostId> { names.iter().map(|name| sim.host(name)).collect() };
-    let (node_hosts, rover_hosts) = (hosts(node_names), hosts(rover_names));
+    let node_hosts: Vec<HostId> = node_names.iter().map(|name| sim.host(name)).collect();
+    let rover_hosts: Vec<HostId> = rover_names.iter().map(|name| sim.host(name)).collect();
     let mut wiring = Wiring::default();
     for id in sensors.nodes() {
         let node = (node_hosts[id.0 as usize], &*node_names[id.0 as usize]);
@@ -466,9 +503,14 @@ impl Network {
         &self.site.node_names
     }
 
-    /// The rovers' names, in order; hosts are called the same.
+    /// The names of the rovers of the whole team, in order; hosts are called the same.
     pub fn rover_names(&self) -> &[String] {
         &self.site.rover_names
+    }
+
+    /// How many of them take part.
+    pub fn team_size(&self) -> usize {
+        self.site.team().count()
     }
 
     /// Each rover's entry and goal, in the order of the names.
@@ -480,5 +522,70 @@ impl Network {
     pub fn refused(&self) -> Vec<String> {
         let sentence = |r: &Refused| r.sentence(&self.site.rover_names);
         self.site.refused.iter().map(sentence).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::TeamConfig;
+    use crate::testing::{assembled, grid};
+
+    fn part(only: &[&str], network: &NetworkConfig) -> (Simulation, Network) {
+        let (world, roadmap) = (WorldConfig::default(), Arc::new(grid(6, 6, &[])));
+        let world = WorldConfig { nodes: 4, ..world };
+        let sensors = Arc::new(world.place(&roadmap, 3).unwrap());
+        let team = TeamConfig {
+            only: only.iter().map(|name| (*name).to_owned()).collect(),
+            ..TeamConfig::of(12)
+        };
+        assembled(3, &world, roadmap, sensors, &team, network)
+    }
+
+    #[test]
+    fn those_that_take_part_are_as_in_the_whole_team_and_the_others_are_not_there() {
+        for (policy, failover_after) in [
+            (Policy::MaxPlus, None),
+            (Policy::Complete, Some(3)),
+            (Policy::Reference, None),
+        ] {
+            let network = NetworkConfig {
+                policy,
+                failover_after,
+                ..NetworkConfig::default()
+            };
+            let (_, whole) = part(&[], &network);
+            let (mut sim, some) = part(&["rover_11", "rover_03"], &network);
+            assert_eq!(some.missions(), whole.missions());
+            let hosts = sim.host_names().filter(|name| name.starts_with("rover"));
+            assert_eq!(hosts.collect::<Vec<_>>(), ["rover_03", "rover_11"]);
+            assert_eq!((whole.team_size(), some.team_size()), (12, 2));
+            if failover_after.is_some() {
+                // Its backup hears from the two there are, and waits for no others.
+                let at = SimTime::ZERO + SimDuration::from_millis(1500);
+                sim.crash_named_at(at, "node_02").unwrap();
+            }
+            sim.run(Executor::Inline).unwrap();
+            let metrics = some.metrics();
+            let done = (metrics.rovers, metrics.arrived, metrics.arrival_s.len());
+            assert_eq!(done, (2, 2, 2), "{policy:?}: {metrics:?}");
+            assert!(metrics.completed && metrics.collisions == 0);
+            assert_eq!(metrics.failovers > 0, failover_after.is_some());
+        }
+    }
+
+    #[test]
+    fn whom_nobody_knows_takes_no_part() {
+        let names = names("rover", 12);
+        let error = |only: &[&str]| {
+            let only: Vec<String> = only.iter().map(|name| (*name).to_owned()).collect();
+            takes_part(&names, &only).unwrap_err().to_string()
+        };
+        assert_eq!(
+            error(&["rover_01", "rover_13"]),
+            "\"rover_13\": expected the name of one of 12 rovers; did you mean \"rover_03\"?"
+        );
+        let twice = error(&["rover_01", "rover_02", "rover_01"]);
+        assert_eq!(twice, "\"rover_01\": expected each name once");
     }
 }

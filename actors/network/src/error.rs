@@ -83,6 +83,14 @@ pub enum NetworkError {
         /// How long that is.
         limit: SimDuration,
     },
+    /// A name in `team.only` that cannot be there.
+    #[error("{message}")]
+    Only {
+        /// Its place in the list.
+        at: usize,
+        /// What was found and what was expected.
+        message: String,
+    },
     /// No node has the name that `network.roadmap_from` gives.
     #[error("network.roadmap_from is {name}, but there are {first} to {last}")]
     UnknownSource {
@@ -107,6 +115,9 @@ pub(crate) fn blame(error: NetworkError) -> SetupError {
         NetworkError::Links(error) => error.into(),
         NetworkError::Config(ConfigError::Value { key, message }) => {
             SetupError::value(&key, message)
+        }
+        NetworkError::Only { at, message } => {
+            SetupError::value(&format!("team.only.{at}"), message)
         }
         error => SetupError::value(key_of(&error), error),
     }

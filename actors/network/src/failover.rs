@@ -101,16 +101,17 @@ impl FencingTokens {
 pub(crate) struct PendingFailover {
     pub(crate) region: NodeId,
     pub(crate) rank: u32,
-    /// What each rover has answered.
+    /// What each rover of the whole team has answered.
     pub(crate) accounts: Vec<Option<Account>>,
+    /// The rovers that take part, which all have to.
+    pub(crate) asked: Vec<RoverId>,
 }
 
 impl PendingFailover {
     /// Rovers that have not answered.
     pub(crate) fn missing(&self) -> impl Iterator<Item = RoverId> + '_ {
-        let all = (0..).map(RoverId).zip(&self.accounts);
-        all.filter(|(_, account)| account.is_none())
-            .map(|(rover, _)| rover)
+        let has_none = |rover: &RoverId| self.accounts[rover.0 as usize].is_none();
+        self.asked.iter().copied().filter(has_none)
     }
 }
 

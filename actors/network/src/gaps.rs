@@ -95,11 +95,13 @@ impl Refused {
     }
 }
 
-/// The rovers that have no way, in order. `roadmap` is the part that they may use.
+/// The rovers that have no way, in order, of those that take part. `roadmap` is the part that they
+/// may use.
 pub(super) fn refused(
     roadmap: &Roadmap,
     sensors: &SensorNetwork,
     missions: &[(VertexId, VertexId)],
+    takes_part: &[bool],
 ) -> Vec<Refused> {
     let why = |entry, goal| {
         if !sensors.covers(entry) {
@@ -112,23 +114,25 @@ pub(super) fn refused(
         }
     };
     let all = (0..).map(RoverId).zip(missions);
-    let refusals = all.filter_map(|(rover, &(entry, goal))| {
+    let team = all.filter(|(rover, _)| takes_part[rover.0 as usize]);
+    let refusals = team.filter_map(|(rover, &(entry, goal))| {
         let why = why(entry, goal)?;
         Some(Refused { rover, why })
     });
     refusals.collect()
 }
 
-/// Checks that some rover has a way, or, where rovers stand on the map from the start, that all do.
+/// Checks that some rover of so many has a way, or, where rovers stand on the map from the start, that all do.
 ///
 /// # Errors
 /// When that is not so; it names them.
 pub(super) fn check_refused(
     refused: &[Refused],
     rover_names: &[String],
+    rovers: usize,
     stay_at_target: bool,
 ) -> Result<(), NetworkError> {
-    let too_many = if stay_at_target { 1 } else { rover_names.len() };
+    let too_many = if stay_at_target { 1 } else { rovers };
     if refused.len() < too_many {
         return Ok(());
     }

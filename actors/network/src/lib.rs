@@ -18,7 +18,7 @@
 //!
 //! let (world, seed) = (WorldConfig::default(), 1);
 //! let roadmap = Arc::new(Roadmap::builtin(world.roadmap.name())?);
-//! let (team, network) = (TeamConfig { rovers: 3 }, NetworkConfig::default());
+//! let (team, network) = (TeamConfig::of(3), NetworkConfig::default());
 //! let parts = Parts::placed(&world, roadmap, &network, seed)?;
 //! let missions = Missions::Queued(missions(&world, &parts.roadmap, &team, seed)?);
 //! let mut sim = Simulation::new(seed);

@@ -12,7 +12,7 @@ use crate::error::NetworkError;
 /// use farside_network::{TeamConfig, WorldConfig, missions};
 /// use farside_worlds::Roadmap;
 /// let map = Roadmap::builtin("crater-dense")?;
-/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig { rovers: 25 }, 1)?;
+/// let missions = missions(&WorldConfig::default(), &map, &TeamConfig::of(25), 1)?;
 /// assert!(missions.iter().all(|(entry, goal)| entry != goal));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

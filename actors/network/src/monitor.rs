@@ -106,9 +106,9 @@ impl Monitor {
     /// A monitor, and what it will write the score to.
     pub(crate) fn new(site: Arc<Shared>) -> (Monitor, Arc<Mutex<Score>>) {
         let start = |(rover, &(entry, goal)): (RoverId, &(VertexId, VertexId))| {
-            let remaining = match site.is_refused(rover) {
-                true => 0,
-                false => site.roadmap.distance(entry, goal),
+            let remaining = match site.is_to_drive(rover) {
+                true => site.roadmap.distance(entry, goal),
+                false => 0,
             };
             Track {
                 remaining,
@@ -370,7 +370,7 @@ impl Score {
 
     /// Whether the rover has still to leave the roadmap, or to come to stand at its goal.
     fn is_out(&self, site: &Shared, rover: usize) -> bool {
-        if site.is_refused(RoverId(rover as u32)) {
+        if !site.is_to_drive(RoverId(rover as u32)) {
             return false;
         }
         let (track, place) = (&self.tracks[rover], self.collisions.place(rover));
@@ -446,7 +446,7 @@ impl Score {
     pub(crate) fn metrics(&self, site: &Shared) -> NetworkMetrics {
         let rover_name = |rover: &u32| site.rover_names[*rover as usize].clone();
         let mut metrics = NetworkMetrics {
-            rovers: self.tracks.len() as u32,
+            rovers: site.team().count() as u32,
             collisions: self.collisions(),
             collided: self.collisions.named().to_vec(),
             wait_cycles: self.wait_cycles.clone(),
@@ -478,8 +478,9 @@ impl Score {
         metrics.refused_missions = refused.map(|r| r.sentence(&site.rover_names)).collect();
         metrics.failovers = self.failed_over.len() as u32;
         metrics.failed_over = self.failed_over.iter().map(sentence).collect();
-        let arrived_s = |track: &Track| track.arrived_at.map(SimTime::as_secs_f64);
-        metrics.arrival_s = self.tracks.iter().map(arrived_s).collect();
+        let track = |rover: RoverId| &self.tracks[rover.0 as usize];
+        let arrived_s = |(rover, _)| track(rover).arrived_at.map(SimTime::as_secs_f64);
+        metrics.arrival_s = site.team().map(arrived_s).collect();
         let name = |rover: &RoverId| site.rover_names.get(rover.0 as usize).cloned();
         let ring: Vec<_> = self.last_confirmed.iter().filter_map(name).collect();
         metrics.last_confirmed = (!ring.is_empty()).then(|| ring.join(" > "));
@@ -493,9 +494,9 @@ impl Score {
         let rover_cycles = f64::from(metrics.rovers) * f64::from(metrics.cycles);
         metrics.messages_per_rover_cycle = self.messages as f64 / rover_cycles;
         metrics.bytes_per_rover_cycle = self.bytes as f64 / rover_cycles;
-        let rovers = self.tracks.iter().zip(&site.missions);
-        let cost = |(track, &(start, goal)): (&Track, &(VertexId, VertexId))| {
-            (track.cost, site.roadmap.distance(start, goal))
+        let rovers = site.team();
+        let cost = |(rover, (start, goal)): (RoverId, (VertexId, VertexId))| {
+            (track(rover).cost, site.roadmap.distance(start, goal))
         };
         metrics.costs = site
             .stay_at_target

@@ -114,9 +114,7 @@ impl Case {
                 false => self.loss,
             }
         };
-        let team = TeamConfig {
-            rovers: self.rovers,
-        };
+        let team = TeamConfig::of(self.rovers);
         let missions = missions(&world, &self.map, &team, self.seed)?;
         let parts = Parts {
             world: &world,
@@ -124,6 +122,7 @@ impl Case {
             sensors: Arc::new(sensors),
             config: &self.network,
             terrain: None,
+            only: &[],
         };
         let missions = Missions::Queued(missions);
         let network = assemble_over(&mut sim, &parts, &missions, |a, b| lossy(loss(a, b)))?;
@@ -301,7 +300,7 @@ mod motion {
             let (driven, _) = case.arrives();
             let (rovers, network) = (case.rovers, &case.network);
             let missions =
-                missions(&case.world().0, &case.map, &TeamConfig { rovers }, seed).unwrap();
+                missions(&case.world().0, &case.map, &TeamConfig::of(rovers), seed).unwrap();
             let timing = network.timing(SimDuration::from_millis(5), None).unwrap();
             let missions: Vec<_> = (0..).map(RoverId).zip(missions).collect();
             let plan = Schedule::of(network, &timing, &case.map, &missions, false);
@@ -601,6 +600,7 @@ mod gaps {
                 sensors: sensors.clone(),
                 config: &network,
                 terrain: None,
+                only: &[],
             };
             let (mut sim, missions) = (Simulation::new(1), Missions::Standing(missions));
             let made = assemble_over(&mut sim, &parts, &missions, |_, _| lossy(0.0));

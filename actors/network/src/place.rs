@@ -59,6 +59,7 @@ impl Place {
             sensors: self.sensors.clone(),
             config: &scenario.network,
             terrain: self.terrain.clone(),
+            only: &scenario.team.only,
         }
     }
 

@@ -372,7 +372,7 @@ mod tests {
             sabotage,
             ..NetworkConfig::default()
         };
-        let team = TeamConfig { rovers };
+        let team = TeamConfig::of(rovers);
         let (map, posts) = (roadmap.clone(), sensors.clone());
         let (mut sim, system) = assembled(1, &world, map, posts, &team, &network);
         let system = Arc::new(system);

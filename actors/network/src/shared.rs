@@ -31,6 +31,8 @@ pub(crate) struct Shared {
     pub(crate) payoffs: Payoffs,
     pub(crate) node_names: Vec<String>,
     pub(crate) rover_names: Vec<String>,
+    /// Which rovers there are at all; the others have names and missions, and no actors.
+    pub(crate) takes_part: Vec<bool>,
     /// Each rover's entry, or where it stands at first, and its goal.
     pub(crate) missions: Vec<(VertexId, VertexId)>,
     /// Rovers stand on the map from the start, and stay at their goals; there are no queues.
@@ -53,11 +55,17 @@ impl Shared {
         u32::try_from(now.as_nanos() / self.timing.cycle.as_nanos()).unwrap_or(u32::MAX)
     }
 
+    /// The rovers that there are, each with its entry, or where it stands at first, and its goal.
+    pub(crate) fn team(&self) -> impl Iterator<Item = (RoverId, (VertexId, VertexId))> + '_ {
+        let all = (0..).map(RoverId).zip(self.missions.iter().copied());
+        all.filter(|(rover, _)| self.takes_part[rover.0 as usize])
+    }
+
     /// Who stands where at the start.
     pub(crate) fn standing(&self) -> impl Iterator<Item = (RoverId, VertexId)> + '_ {
-        let all = (0..).map(RoverId).zip(&self.missions);
-        all.filter(|_| self.stay_at_target)
-            .map(|(id, (start, _))| (id, *start))
+        self.team()
+            .filter(|_| self.stay_at_target)
+            .map(|(id, (start, _))| (id, start))
     }
 
     /// Who waits at `entry`, in order.
@@ -66,11 +74,10 @@ impl Shared {
         at.map_or(&[], |at| &self.queues[at].1)
     }
 
-    /// Whether a rover has no way, and stays out.
-    pub(crate) fn is_refused(&self, rover: RoverId) -> bool {
-        self.refused
-            .binary_search_by_key(&rover, |r| r.rover)
-            .is_ok()
+    /// Whether a rover is to drive: it takes part, and has a way.
+    pub(crate) fn is_to_drive(&self, rover: RoverId) -> bool {
+        let has_no_way = self.refused.binary_search_by_key(&rover, |r| r.rover);
+        self.takes_part[rover.0 as usize] && has_no_way.is_err()
     }
 
     /// Where a vertex is, on the ground, in the world's frame [m].

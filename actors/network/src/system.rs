@@ -6,8 +6,8 @@ use farside::{Pattern, Report};
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Account, Assembly, Builtin, Goal, Metric, PictureError, PictureInfo, PictureRequest, Recording,
-    Renamed, Results, Section, Settings, Setup, SetupError, System,
+    Account, Assembly, Builtin, Goal, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
+    Recording, Removable, Renamed, Results, Section, Settings, Setup, SetupError, System,
 };
 use farside_worlds::SensorNetwork;
 use serde::Deserialize;
@@ -15,6 +15,7 @@ use serde_json::Value;
 
 use crate::account;
 use crate::error::blame;
+use crate::ids;
 use crate::place::Place;
 use crate::scenario::NetworkScenario;
 use crate::scene::NetworkScene;
@@ -76,6 +77,10 @@ impl System for NetworkSystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -96,6 +101,28 @@ impl System for NetworkSystem {
     }
 }
 
+/// What must never happen, or should not.
+const INVARIANTS: [Invariant; 4] = [
+    Invariant::new("collision", "collisions>0", "two rovers claim one place").lasting(),
+    Invariant::new(
+        "deadlock",
+        "deadlocked=true",
+        "some rover can never arrive any more",
+    )
+    .lasting(),
+    Invariant::new(
+        "standstill",
+        "stuck=true",
+        "a deadlock, or no progress for long",
+    )
+    .lasting(),
+    Invariant::new(
+        "unfinished",
+        "completed=false",
+        "not all rovers have arrived",
+    ),
+];
+
 impl Settings for NetworkScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
@@ -115,6 +142,15 @@ impl Settings for NetworkScenario {
         is_taken_up.then(|| Pattern::over_names("node_*").into_iter().collect())
     }
 
+    fn removable(&self) -> Vec<Removable> {
+        let TeamConfig { rovers, only } = &self.team;
+        let mut names: Vec<String> = (0..*rovers)
+            .map(|rover| ids::name("rover", rover, *rovers))
+            .collect();
+        names.retain(|name| only.is_empty() || only.contains(name));
+        vec![Removable::named("rovers", "team.only", names)]
+    }
+
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         let place = Place::of(self, setup)?;
         let (sensors, in_crater) = (place.sensors.clone(), in_crater(&self.world));
@@ -132,16 +168,20 @@ impl Settings for NetworkScenario {
         let watched = system.clone();
         let goal = Goal {
             what: "rovers arrived",
-            of: u64::from(self.team.rovers),
+            of: system.team_size() as u64,
             done: Box::new(move || u64::from(watched.arrived())),
         };
         let notes = gaps(&sensors, &system);
-        let blocked = place.grid.map(|grid| {
+        // Of a part of the team nobody has worked it out.
+        let grid = place.grid.filter(|_| self.team.only.is_empty());
+        let blocked = grid.map(|grid| {
             let all = grid.blocked();
             all.iter()
                 .map(|blocked| grid.explain(blocked))
                 .collect::<Vec<_>>()
         });
+        let watched = system.clone();
+        let watch = move |invariant: &str| invariant == "collision" && watched.collisions() > 0;
         let conclude = move |_: &Report| {
             let mut results = results(&system.metrics());
             if let Some(blocked) = &blocked {
@@ -152,6 +192,7 @@ impl Settings for NetworkScenario {
         Ok(Assembly::new(conclude)
             .with_goal(goal)
             .with_scene(scene)
+            .with_watch(watch)
             .with_notes(notes))
     }
 

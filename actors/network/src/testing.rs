@@ -26,6 +26,7 @@ pub(crate) fn assembled(
         sensors,
         config,
         terrain: None,
+        only: &team.only,
     };
     let wire = FixedDelay::new(SimDuration::from_millis(5));
     let missions = Missions::Queued(missions);

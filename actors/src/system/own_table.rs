@@ -8,8 +8,8 @@ use serde::de::DeserializeOwned;
 
 use super::settings::Table;
 use super::{
-    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
-    Settings, Setup, SetupError, System,
+    Assembly, Builtin, Invariant, Metric, PictureError, PictureInfo, PictureRequest, Recording,
+    Removable, Section, Settings, Setup, SetupError, System,
 };
 use crate::figure::Figure;
 
@@ -52,6 +52,9 @@ pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
     /// As [`System::metrics`].
     const METRICS: &'static [Metric] = &[];
 
+    /// As [`System::invariants`].
+    const INVARIANTS: &'static [Invariant] = &[];
+
     /// As [`System::scenarios`].
     const SCENARIOS: &'static [Builtin] = &[];
 
@@ -69,6 +72,11 @@ pub trait OwnTable: Table + DeserializeOwned + Send + Sync + 'static {
     /// # Errors
     /// When the settings cannot be; the error names the key.
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError>;
+
+    /// As [`Settings::removable`].
+    fn removable(&self) -> Vec<Removable> {
+        Vec::new()
+    }
 
     /// As [`Settings::problem`].
     ///
@@ -119,6 +127,10 @@ impl<T: OwnTable> System for OfTable<T> {
         T::METRICS
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        T::INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         T::SCENARIOS
     }
@@ -156,6 +168,10 @@ impl<T: OwnTable> Settings for Alone<T> {
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
         self.0.assemble(setup)
+    }
+
+    fn removable(&self) -> Vec<Removable> {
+        self.0.removable()
     }
 
     fn problem(&self, setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {

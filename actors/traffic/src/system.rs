@@ -3,7 +3,8 @@
 use farside::{Report, SimDuration};
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, Results, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Entries, Invariant, Metric, Removable, Results, Section, Settings, Setup,
+    SetupError, System,
 };
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,10 @@ impl System for TrafficSystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -50,6 +55,18 @@ impl System for TrafficSystem {
     }
 }
 
+/// What should not happen.
+const INVARIANTS: [Invariant; 3] = [
+    Invariant::new("duplicate", "duplicates>0", "a message arrived twice").lasting(),
+    Invariant::new("loss", "delivered<sent", "not all messages have arrived"),
+    Invariant::new(
+        "reordering",
+        "reordered>0",
+        "a message arrived after a later one",
+    )
+    .lasting(),
+];
+
 impl Settings for TrafficScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
@@ -57,6 +74,21 @@ impl Settings for TrafficScenario {
 
     fn check(&self) -> Result<(), SetupError> {
         Ok(self.traffic.check_all()?)
+    }
+
+    fn removable(&self) -> Vec<Removable> {
+        let groups = 0..self.traffic.groups.len();
+        let members = groups.map(|group| {
+            let key = format!("traffic.groups.{group}.count");
+            Removable::new("members of groups", key, Entries::Counted)
+        });
+        let listed = |what, key: &str| Removable::new(what, key, Entries::Listed);
+        let rest = [
+            listed("flows", "traffic.flow"),
+            listed("groups", "traffic.groups"),
+            listed("hosts", "traffic.hosts"),
+        ];
+        members.chain(rest).collect()
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

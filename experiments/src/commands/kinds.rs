@@ -113,7 +113,7 @@ pub(super) fn is_log(given: &Path, registry: &Registry) -> bool {
     kind_of(given, registry) == Some(FileKind::Log)
 }
 
-fn starts_as_log(path: &Path) -> bool {
+pub(super) fn starts_as_log(path: &Path) -> bool {
     let mut start = [0; MCAP_MAGIC.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
     read.is_ok() && start == MCAP_MAGIC

@@ -28,6 +28,8 @@ pub(super) enum Format {
     Png,
     /// A plan in JSON: all are alike up to the version of their format.
     Plan,
+    /// A scenario that was made small: all are alike up to who did it.
+    Small,
     /// What there is to plan: all are alike up to the first point, in the version of their format.
     Problem,
     /// A sequence chart for Mermaid.
@@ -47,6 +49,7 @@ impl Format {
             Format::Table => b",",
             Format::Junit => b"name=",
             Format::Plan => b"/",
+            Format::Small => b"by ",
             Format::Problem => b".",
             Format::Mermaid => b":",
             Format::Plantuml => b"title",
@@ -66,6 +69,7 @@ impl Format {
             Format::Table => "table of this kind",
             Format::Junit => "JUnit file",
             Format::Plan => "plan",
+            Format::Small => "scenario that was made small",
             Format::Problem => "problem of this kind",
             Format::Mermaid | Format::Plantuml | Format::Dot => "chart of this kind",
         }

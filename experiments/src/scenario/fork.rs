@@ -161,6 +161,9 @@ fn refusal(key: &str) -> &'static str {
             "this is about single messages whenever they are sent: it goes to the top of the scenario"
         }
         "fork" => "a fork within a fork: expected an entry of its own",
+        "never" => {
+            "what must never happen is judged at the run's end: it goes to the top of the scenario"
+        }
         "log" => "what the log holds cannot change in mid-run",
         _ => "this cannot change in mid-run",
     }

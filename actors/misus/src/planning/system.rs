@@ -4,8 +4,8 @@ use farside::Report;
 use farside_actors::figure::Figure;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
-    Seeds, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
+    Recording, Removable, Section, Seeds, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -51,6 +51,10 @@ impl System for PlanningSystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -75,6 +79,20 @@ impl System for PlanningSystem {
     }
 }
 
+/// What must never happen, or should not.
+const INVARIANTS: [Invariant; 2] = [
+    Invariant::new(
+        "plan",
+        "plan_violations>0",
+        "the team's plan cannot be carried out so",
+    ),
+    Invariant::new(
+        "unfinished",
+        "complete=false",
+        "the plan does not achieve all goals",
+    ),
+];
+
 impl Settings for PlanningScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
@@ -86,6 +104,13 @@ impl Settings for PlanningScenario {
 
     fn problem(&self, setup: &mut Setup<'_>) -> Result<Option<String>, SetupError> {
         Ok(Some(problem(self, setup.problem_seed)?.to_json()))
+    }
+
+    fn removable(&self) -> Vec<Removable> {
+        vec![
+            Removable::new("rovers", "problem.rovers", Entries::Counted),
+            Removable::new("rocks", "problem.rocks_most", Entries::Counted),
+        ]
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

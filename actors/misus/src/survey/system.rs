@@ -1,11 +1,14 @@
 //! The closed loop as scenarios see it.
 
+use std::sync::PoisonError;
+
 use farside::Report;
 use farside_actors::field::{FieldConfig, Place};
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Entries, Invariant, Metric, Removable, Section, Settings, Setup, SetupError,
+    System,
 };
 use serde::Deserialize;
 
@@ -58,6 +61,10 @@ impl System for SurveySystem {
         metrics::all()
     }
 
+    fn invariants(&self) -> &[Invariant] {
+        &INVARIANTS
+    }
+
     fn scenarios(&self) -> &[Builtin] {
         &builtin::SCENARIOS
     }
@@ -74,6 +81,40 @@ impl System for SurveySystem {
     }
 }
 
+/// What must never happen, or should not.
+const INVARIANTS: [Invariant; 6] = [
+    Invariant::new(
+        "failed_activity",
+        "activities_failed>0",
+        "an activity failed",
+    )
+    .lasting(),
+    Invariant::new(
+        "lost_goal",
+        "lost_goals>0",
+        "the centre in office does not know a goal",
+    ),
+    Invariant::new(
+        "missed_communication",
+        "missed_comm>0",
+        "a rover missed a daily communication",
+    )
+    .lasting(),
+    Invariant::new(
+        "plan",
+        "plan_violations>0",
+        "a plan could not be carried out so",
+    )
+    .lasting(),
+    Invariant::new(
+        "sharing",
+        "sharing_violations>0",
+        "a rule of sharing was broken",
+    )
+    .lasting(),
+    Invariant::new("unfinished", "complete=false", "not all goals are achieved"),
+];
+
 impl Settings for SurveyScenario {
     fn resolved(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
@@ -81,6 +122,16 @@ impl Settings for SurveyScenario {
 
     fn check(&self) -> Result<(), SetupError> {
         self.check_all()
+    }
+
+    fn removable(&self) -> Vec<Removable> {
+        let listed = |what, key: &str| Removable::new(what, key, Entries::Listed);
+        vec![
+            Removable::new("rovers", "team.rovers", Entries::Counted),
+            listed("combinations of goals", "combination"),
+            listed("goals", "goal"),
+            listed("faults of rovers", "rover.fault"),
+        ]
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {
@@ -97,10 +148,20 @@ impl Settings for SurveyScenario {
             until,
         };
         let survey = setup.wired(|sim, wire| assemble(sim, &parts, wire))?;
+        let course = survey.course.clone();
+        let watch = move |invariant: &str| {
+            let course = course.lock().unwrap_or_else(PoisonError::into_inner);
+            match invariant {
+                "plan" => course.tally.plan_violations > 0,
+                "sharing" => course.tally.sharing_violations > 0,
+                _ => false,
+            }
+        };
         let (field, rovers) = (place.field.clone(), survey.shared.site.rovers.clone());
         let assembly = Assembly::new(move |report: &Report| {
             metrics::results(&survey, &field, report.end_time)
         });
+        let assembly = assembly.with_watch(watch);
         let assembly = assembly.with_scene(MisusScene::new(place.field.clone(), rovers));
         let faults = self.rover.faults.iter().enumerate();
         Ok(faults.fold(assembly, |assembly, (index, fault)| {

@@ -146,6 +146,7 @@ impl Case {
             sensors,
             config: &self.network,
             terrain: None,
+            only: &self.team.only,
         };
         let system = assemble(
             sim,

@@ -173,9 +173,7 @@ fn run_on(
         sabotage: trial.sabotage,
         ..NetworkConfig::default()
     };
-    let team = TeamConfig {
-        rovers: trial.rovers,
-    };
+    let team = TeamConfig::of(trial.rovers);
     let missions = missions(&world, &map, &team, trial.seed).unwrap();
     let parts = Parts {
         world: &world,
@@ -183,6 +181,7 @@ fn run_on(
         sensors,
         config: &settings,
         terrain: None,
+        only: &[],
     };
     let missions = Missions::Queued(missions);
     let network = assemble_over(&mut sim, &parts, &missions, link).unwrap();

@@ -26,7 +26,8 @@ pub(super) struct Base {
     pub(super) site: Arc<Shared>,
     pub(super) id: NodeId,
     pub(super) neighbors: Vec<Neighbor>,
-    pub(super) rovers: Vec<Address<Rover>>,
+    /// Those of the whole team; none of one that does not take part.
+    pub(super) rovers: Vec<Option<Address<Rover>>>,
     /// The planning cycle.
     pub(super) cycle: u32,
     /// Who answers for which node's vertices, with `network.failover_after`.
@@ -71,8 +72,9 @@ impl Base {
                 answers: Vec::new(),
             });
         }
-        for name in &self.site.rover_names {
-            self.rovers.push(ctx.lookup::<Rover>(name)?);
+        for (name, is_there) in self.site.rover_names.iter().zip(&self.site.takes_part) {
+            let rover = is_there.then(|| ctx.lookup::<Rover>(name)).transpose()?;
+            self.rovers.push(rover);
         }
         Ok(())
     }
@@ -94,7 +96,12 @@ impl Base {
     }
 
     pub(super) fn is_rover(&self, rover: RoverId) -> bool {
-        (rover.0 as usize) < self.rovers.len()
+        self.address(rover).is_some()
+    }
+
+    /// Where a rover hears, if it takes part.
+    pub(super) fn address(&self, rover: RoverId) -> Option<Address<Rover>> {
+        self.rovers.get(rover.0 as usize).copied().flatten()
     }
 
     pub(super) fn send_grant(
@@ -105,7 +112,9 @@ impl Base {
         to: Option<VertexId>,
     ) {
         let node = self.id;
-        ctx.send(self.rovers[rover.0 as usize], Grant { node, step, to });
+        if let Some(address) = self.address(rover) {
+            ctx.send(address, Grant { node, step, to });
+        }
     }
 
     /// Step 1: tells neighbours who is on the node's vertices, and what else its policy has to say.

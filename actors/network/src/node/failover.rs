@@ -11,7 +11,6 @@ use crate::config::Sabotage;
 use crate::failover::messages::{Account, Content, FailedOver, Inquiry, Passed, Replaced};
 use crate::failover::rank::Replacement;
 use crate::failover::{FailoverRecord, PendingFailover, holder, released};
-use crate::ids::RoverId;
 use crate::node::messages::Locations;
 use crate::reservation::Registries;
 use crate::safety::OccupancyTable;
@@ -340,6 +339,7 @@ impl Node {
                         region,
                         rank: rank as u32,
                         accounts: vec![None; self.base.rovers.len()],
+                        asked: self.base.site.team().map(|(rover, _)| rover).collect(),
                     });
                 }
             }
@@ -355,7 +355,9 @@ impl Node {
         let questions: Vec<_> = pending.iter().flat_map(asks).collect();
         for ((region, rank), rover) in questions {
             let inquiry = Inquiry { node, region, rank };
-            ctx.send(self.base.rovers[rover.0 as usize], inquiry);
+            if let Some(rover) = self.base.address(rover) {
+                ctx.send(rover, inquiry);
+            }
         }
     }
 
@@ -412,8 +414,8 @@ impl Node {
 impl Handler<Account> for Node {
     fn handle(&mut self, account: Account, ctx: &mut Context<'_, Self>) -> Outcome {
         let (region, rank) = (account.region, account.rank);
-        let RoverId(rover) = account.whereabouts.rover;
-        if !self.base.is_member(region, rank) || rover as usize >= self.base.rovers.len() {
+        let rover = account.whereabouts.rover;
+        if !self.base.is_member(region, rank) || !self.base.is_rover(rover) {
             return Ok(());
         }
         self.hear(ctx, &account.whereabouts, Some(account.goal));

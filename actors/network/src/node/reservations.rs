@@ -11,7 +11,6 @@ use super::messages::RoadmapKnown;
 use crate::failover::FailoverRecord;
 use crate::failover::messages::{Account, Content};
 use crate::failover::rank::Replacement;
-use crate::ids::RoverId;
 use crate::reservation::messages::{Between, ItineraryAnswer, Relay};
 use crate::reservation::{Atlas, Desk, Receipt, Registries, Registry};
 use crate::safety::messages::Whereabouts;
@@ -180,8 +179,9 @@ impl Reservations {
                 false => None,
             };
             for itinerary in registry.proposals_due(&desk(*region), base.id) {
-                let RoverId(rover) = itinerary.path.request.rover;
-                ctx.send(base.rovers[rover as usize], itinerary);
+                if let Some(rover) = base.address(itinerary.path.request.rover) {
+                    ctx.send(rover, itinerary);
+                }
             }
             send_items(base, ctx, *region, registry, &ranks);
             let may_use = |to| base.acting(to) != base.id;

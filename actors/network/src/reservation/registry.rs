@@ -360,11 +360,10 @@ impl Registry {
                 return None;
             };
             let site = desk.site;
-            let others: BTreeSet<VertexId> = (0..)
-                .map(RoverId)
-                .zip(&site.missions)
+            let others: BTreeSet<VertexId> = site
+                .team()
                 .filter(|(other, _)| *other != rover)
-                .flat_map(|(_, &(start, goal))| [start, goal])
+                .flat_map(|(_, (start, goal))| [start, goal])
                 .collect();
             let avoided = |v| others.contains(&v);
             let route = clear_route(&site.roadmap, &site.sensors, ends, avoided);

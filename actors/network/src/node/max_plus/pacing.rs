@@ -89,13 +89,14 @@ mod tests {
         sim.observe(vectors.clone());
         let params: LinkParams =
             toml::from_str(&format!("latency = '5ms'\nrate = '{rate}'")).unwrap();
-        let missions = missions(&world, &map, &TeamConfig { rovers }, 1).unwrap();
+        let missions = missions(&world, &map, &TeamConfig::of(rovers), 1).unwrap();
         let parts = Parts {
             world: &world,
             roadmap: Arc::new(map),
             sensors,
             config: network,
             terrain: None,
+            only: &[],
         };
         let link = |_: &str, _: &str| Link::new(params.clone());
         let system = assemble_over(&mut sim, &parts, &Missions::Queued(missions), link).unwrap();

@@ -41,7 +41,7 @@ fn head_on(seed: u64, network: &NetworkConfig) -> Option<NetworkMetrics> {
         cycle_limit: 400,
         ..network.clone()
     };
-    let team = TeamConfig { rovers: 2 };
+    let team = TeamConfig::of(2);
     let (sim, system) = assembled(seed, &world, roadmap, sensors, &team, &network);
     if system.missions()[0].0 == system.missions()[1].0 {
         return None;
