@@ -11,8 +11,8 @@ use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::prelude::*;
 
 use crate::commands::{
-    CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, problem,
-    recover, report, reproduce, run, shown, study, verify,
+    CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan,
+    problem, recover, report, reproduce, run, shown, study, verify,
 };
 use crate::registry::Registry;
 
