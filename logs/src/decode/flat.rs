@@ -1,9 +1,8 @@
 //! FlatBuffers by reflection: the schema of a log is a FlatBuffer itself, which says where in a message each
 //! field is.
 //!
-//! Read here, with every offset checked against the bytes: the crate for reflection takes a message as it is
-//! or verifies it by unsafe code, and neither gives a value of all of it. What a message unfolds into is
-//! bounded, as tables may share their parts.
+//! Read here, with every offset checked against the bytes, since messages may be anybody's. What a message unfolds
+//! into is bounded, as tables may share their parts.
 
 mod buffer;
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Types in OMG's interface definition language, as far as ROS 2 writes them: modules, structs, enums,
 //! typedefs, constants, sequences, arrays and annotations.
 //!
-//! Read here, as there is no crate that parses IDL for readers of messages: those that there are generate
-//! code, and take no hostile input. Unions, maps and bit sets are kept as what they are, and refused where a
-//! message holds one.
+//! Read here: the crates for IDL that were found generate code, and do not read a schema while a program runs. Unions,
+//! maps and bit sets are kept as what they are, and refused where a message holds one.
 
 mod tokens;
 

@@ -1,7 +1,7 @@
 //! Message definitions of ROS 1 and ROS 2, with those of all types that they use behind them.
 //!
-//! Read here, as the crates for it are made for other things: they copy texts, take what is malformed,
-//! know one of the two versions or only what they were compiled for.
+//! Read here, and not by a crate: one reader serves both versions, says the line of what is wrong, and its
+//! types are those of `idl`.
 
 use std::collections::BTreeMap;
 

@@ -34,10 +34,6 @@ impl<'a> Tokens<'a> {
     }
 
     /// The next token.
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "what cannot be read is an error, and no item"
-    )]
     pub(super) fn next(&mut self) -> Result<Option<Token<'a>>, String> {
         self.skip()?;
         let Some((token, length)) = self.token()? else {
