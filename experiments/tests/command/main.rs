@@ -11,6 +11,7 @@ mod outputs;
 mod pictures;
 mod plan;
 mod problem;
+mod reading;
 mod replays;
 mod report;
 mod running;
