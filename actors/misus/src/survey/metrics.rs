@@ -45,7 +45,7 @@ const fn curve(
 }
 
 /// Those that a survey has beside what is learnt.
-const OWN: [Metric; 25] = [
+const OWN: [Metric; 26] = [
     number("activities_failed", "activities that failed", "", Lower),
     Metric::new("complete", "all goals achieved", "", Rate, Higher),
     number("duplicated", "goals achieved twice", "goals", Lower),
@@ -59,6 +59,12 @@ const OWN: [Metric; 25] = [
         "How many goals were achieved by the end of each hour.",
     ),
     number("goals_total", "goals wished for", "goals", Neither),
+    number(
+        "half_goals",
+        "goals for two rovers that one did alone",
+        "goals",
+        Lower,
+    ),
     number("loops", "turns of the closed loop", "loops", Higher),
     number("lost_goals", "goals lost", "goals", Lower),
     number("missed_comm", "daily communications missed", "", Lower),
@@ -143,6 +149,8 @@ farside_actors::documented! {
         pub goals_total: u32,
         /// How many different goals were achieved.
         pub goals_achieved: u32,
+        /// Goals for two rovers of which only one rover did its half: worth nothing.
+        pub half_goals: u32,
         /// Whether all goals of the last list are achieved.
         pub complete: bool,
         /// How far all rovers drove \[m\].
@@ -226,7 +234,8 @@ fn figures(shared: &Shared, course: &Course, end: SimTime) -> SurveyMetrics {
     SurveyMetrics {
         score: tally.score,
         goals_total: tally.wished().len() as u32,
-        goals_achieved: tally.achieved.len() as u32,
+        goals_achieved: tally.goals_achieved(),
+        half_goals: tally.half_goals(),
         complete: last.is_some_and(is_done),
         traverse_m: rovers().map(|rover| rover.driven_m).sum(),
         shed: rovers().map(|rover| rover.shed).sum(),
@@ -243,7 +252,7 @@ fn figures(shared: &Shared, course: &Course, end: SimTime) -> SurveyMetrics {
         replans,
         plan_moved: (replans > 0).then(|| moved as f64 / f64::from(replans)),
         plan_operations: tally.operations(),
-        loops: tally.loops,
+        loops: tally.loops(),
         wished_editions: tally.lists.len() as u32,
     }
 }

@@ -17,6 +17,7 @@ use super::wishes::{CombinationConfig, GoalConfig};
 use super::{builtin, metrics};
 use crate::config::{LearnConfig, TeamConfig};
 use crate::planner::casper::PlannerConfig;
+use crate::planner::objective::ObjectiveConfig;
 use crate::scene::MisusScene;
 
 /// MISUS as a whole: rovers that plan, execute, learn and plan again.
@@ -46,6 +47,7 @@ impl System for SurveySystem {
             RoverConfig::sections("rover"),
             LearnConfig::sections("learn"),
             PlannerConfig::sections("planner"),
+            ObjectiveConfig::sections("objective"),
             ExecutionConfig::sections("execution"),
             SurveyConfig::sections("survey"),
             GoalConfig::sections("goal"),
@@ -88,6 +90,7 @@ impl Settings for SurveyScenario {
             let message = "missing: rovers go on sol after sol, so a run needs an end";
             return Err(SetupError::value("until", message));
         };
+        self.check_until(until)?;
         let place = Place::of(&self.world, setup)?;
         let parts = Parts {
             scenario: self,

@@ -5,6 +5,9 @@
 #[allow(dead_code, reason = "examples use the rest")]
 mod survey;
 
+mod elections;
 mod loops;
+mod meetings;
 mod own_goals;
+mod random;
 mod refusals;
