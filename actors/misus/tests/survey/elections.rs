@@ -6,7 +6,9 @@ use crate::survey::Run;
 const LOST: &str = r#"
 until = "0.4sol"
 world = { rocks = 20, side = "40m" }
-survey = { rocks = 2, squares = 0, loop_every = "2h" }
+survey.rocks = 2
+survey.squares = 0
+survey.loop_every = "2h"
 goal = [
     { name = "early", observation = "panoramic-image", east_m = 4.0, weight = 50.0 },
     { name = "late", observation = "panoramic-image", north_m = 4.0, weight = 50.0, added = "3h" },

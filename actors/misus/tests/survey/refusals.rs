@@ -93,7 +93,7 @@ fn mandatory_goals_that_do_not_fit_are_explained() {
 #[test]
 fn mandatory_goals_for_which_there_is_too_little_of_anything_are_explained() {
     check(
-        "goal = [{ name = 'far', east_m = 39.0, mandatory = true, closes = '40min' }]",
+        "goal = [{ name = 'far', east_m = 39.0, mandatory = true, closes = '30min' }]",
         "goal.0.mandatory: mandatory goal \"far\" cannot be met for want of time: the drive takes",
     );
     check(
@@ -110,7 +110,7 @@ fn mandatory_goals_for_which_there_is_too_little_of_anything_are_explained() {
     );
     // One without a window has the whole run.
     check(
-        "until = '30min'\ngoal = [{ name = 'far', east_m = 39.0, mandatory = true }]",
+        "until = '25min'\ngoal = [{ name = 'far', east_m = 39.0, mandatory = true }]",
         "goal.0.mandatory: mandatory goal \"far\" cannot be met for want of time",
     );
 }
