@@ -7,4 +7,5 @@ mod survey;
 
 mod loops;
 mod own_goals;
+mod pictures;
 mod refusals;

@@ -87,7 +87,7 @@ fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) 
         };
     }
     if let Some(series) = measure.series(cell) {
-        return html! { td { (super::series::in_short(study, measure, cell, series)) } };
+        return html! { td { (super::series::in_short(measure, series)) } };
     }
     let Some(estimate) = measure.estimate(cell) else {
         return html! { td { "–" } };
