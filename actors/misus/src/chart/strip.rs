@@ -5,9 +5,6 @@ use farside_actors::figure::scale::{Scale, Tick, text_width};
 use farside_actors::figure::svg::{Area, Frame, Px, TEXT, path};
 use maud::{Markup, html};
 
-/// The most values of a curve that are marked.
-const MARKED: usize = 60;
-
 /// A curve.
 pub(crate) struct Curve {
     /// What it is called beside others; a strip with one curve does without.
@@ -18,6 +15,8 @@ pub(crate) struct Curve {
     pub(crate) dashes: &'static str,
     /// Its points, in order: along the axis, and the value.
     pub(crate) points: Vec<(f64, f64)>,
+    /// Whether each point has a mark.
+    pub(crate) is_marked: bool,
 }
 
 /// One strip.
@@ -81,7 +80,7 @@ impl Strip {
                 g class={ "s" (curve.series) } {
                     path class="line" stroke-dasharray=(curve.dashes)
                         d=(path(curve.points.iter().map(px))) { title { (curve.name) } }
-                    @if curve.points.len() <= MARKED {
+                    @if curve.is_marked {
                         @for point in &curve.points {
                             @let (x, y) = px(point);
                             circle class="mark" cx=(Px(x)) cy=(Px(y)) r="3" {

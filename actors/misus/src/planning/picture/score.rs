@@ -60,6 +60,7 @@ fn strips(shared: &Shared, curves: &Curves) -> [Strip; 3] {
                 name: label.to_owned(),
                 series,
                 dashes: "none",
+                is_marked: true,
                 points: steps
                     .map(|(step, value)| (f64::from(step), *value))
                     .collect(),

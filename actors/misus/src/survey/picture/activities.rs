@@ -5,7 +5,7 @@ use farside_actors::figure::scale::text_width;
 use farside_actors::figure::svg::{Area, Px, path};
 use maud::{Markup, html};
 
-use super::history::Carried;
+use super::history::{Carried, RoverHistory};
 use super::in_hours;
 use crate::analysis::goals::{GoalId, Observation, Target};
 use crate::shac::GoalKey;
@@ -122,7 +122,7 @@ fn observed(id: &GoalId) -> String {
 /// The bars of a rover's activities, the upper edge of the planned ones at the top of an area whose sides are two
 /// instants.
 pub(super) fn draw(
-    carried: &[Carried],
+    rover: &RoverHistory,
     span_ns: (u64, u64),
     tolerance_ns: u64,
     area: &Area,
@@ -144,8 +144,8 @@ pub(super) fn draw(
     };
     let done = area.top + ROW;
     html! {
-        @for one in carried {
-            @let ended_ns = one.ended.map_or(to_ns, |(ended_ns, _)| ended_ns);
+        @for one in &rover.carried {
+            @let ended_ns = rover.ended_ns(one, to_ns);
             @let planned = (one.planned.starts.as_nanos(), one.planned.ends.as_nanos());
             @let says = in_full(one, tolerance_ns);
             @let ending = ending(one, tolerance_ns);
@@ -295,8 +295,11 @@ mod tests {
         };
         let of = |from_s: u64, to_s: u64| {
             let span = (from_s * 1_000_000_000, to_s * 1_000_000_000);
-            let all = [carried(600, Some((900, ActivityEnd::Done)))];
-            draw(&all, span, 60_000_000_000, &area).into_string()
+            let rover = RoverHistory {
+                carried: vec![carried(600, Some((900, ActivityEnd::Done)))],
+                ..RoverHistory::default()
+            };
+            draw(&rover, span, 60_000_000_000, &area).into_string()
         };
         assert!(of(0, 1000).contains(r#"class="planned" x="0" y="0" width="60""#));
         assert!(of(0, 1000).contains(r#"class="late""#));

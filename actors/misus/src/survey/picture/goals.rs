@@ -55,9 +55,9 @@ pub(super) fn figure(history: &History, place: &Place, (from_ns, to_ns): (u64, u
     let body = html! {
         text class="title" x="16" y="28" { (title) }
         text class="tick" x="16" y="50" { (says) }
-        (stacked.draw(&axis, area))
         (nights::shades(place, span_s, &area))
-        (incidents::draw(history, (from_ns, to_ns), &area))
+        (stacked.draw(&axis, area))
+        (incidents::draw(history, (from_ns, to_ns), &area, true))
         (stacked.legend(area))
     };
     Figure {

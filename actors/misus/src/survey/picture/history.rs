@@ -310,8 +310,19 @@ impl RoverHistory {
         }
     }
 
-    /// The plan that is in force at a time.
+    /// When what was begun had ended, at the latest at `to_ns`. What a crash cut off had ended with it.
+    pub(super) fn ended_ns(&self, carried: &Carried, to_ns: u64) -> u64 {
+        let crashes = self.outages.spans_ns.iter().map(|(down_ns, _)| *down_ns);
+        let crash = crashes.filter(|down_ns| *down_ns >= carried.began_ns).min();
+        let ended = carried.ended.map(|(ended_ns, _)| ended_ns);
+        ended.or(crash).unwrap_or(to_ns)
+    }
+
+    /// The plan that is in force at a time; none while it is down.
     pub(super) fn plan_at(&self, at_ns: u64) -> Option<&(u64, PlanMade)> {
+        if self.outages.within((at_ns, at_ns + 1)).next().is_some() {
+            return None;
+        }
         let made = self.plans.partition_point(|(time_ns, _)| *time_ns <= at_ns);
         made.checked_sub(1).map(|last| &self.plans[last])
     }

@@ -11,8 +11,8 @@ const ROW: f64 = 15.0;
 /// The size of names.
 const TEXT: f64 = 12.0;
 
-/// Lines with names through an area that shows a span of time.
-pub(super) fn draw(history: &History, span_ns: (u64, u64), area: &Area) -> Markup {
+/// Lines through an area that shows a span of time, with names or without.
+pub(super) fn draw(history: &History, span_ns: (u64, u64), area: &Area, has_names: bool) -> Markup {
     let rovers = history.rovers.iter().zip(&history.names);
     let rovers = rovers.map(|(rover, name)| (name.clone(), &rover.outages));
     let several = history.centres.len() > 1;
@@ -36,7 +36,7 @@ pub(super) fn draw(history: &History, span_ns: (u64, u64), area: &Area) -> Marku
             @let is_right = x + 4.0 + text_width(says, TEXT) > area.x(1.0);
             @let (at, anchor) = if is_right { (x - 4.0, "end") } else { (x + 4.0, "start") };
             path class="fault" d=(path([(x, area.top), (x, area.y(0.0))])) { title { (says) } }
-            (over_lines("fault-name", (at, y), anchor, says))
+            @if has_names { (over_lines("fault-name", (at, y), anchor, says)) }
         }
     }
 }

@@ -116,8 +116,7 @@ impl Scene<'_> {
         let span_s = (self.span.0 as f64 / 1e9, self.span.1 as f64 / 1e9);
         let made: Vec<u64> = rover.plans.iter().map(|(at_ns, _)| *at_ns).collect();
         let here = rover.carried.iter().filter(|one| {
-            let ended_ns = one.ended.map_or(self.span.1, |(ended_ns, _)| ended_ns);
-            one.began_ns <= self.span.1 && ended_ns >= self.span.0
+            one.began_ns <= self.span.1 && rover.ended_ns(one, self.span.1) >= self.span.0
         });
         html! {
             text class="facet" x="16" y=(Px(top + 14.0)) { (self.history.names[number]) }
@@ -129,7 +128,7 @@ impl Scene<'_> {
             (self.windows(&lanes))
             (lane("planned", bars.top + 0.5 * activities::BAR))
             (lane("done", bars.top + activities::ROW + 0.5 * activities::BAR))
-            (activities::draw(&rover.carried, self.span, self.tolerance_ns(), &bars))
+            (activities::draw(rover, self.span, self.tolerance_ns(), &bars))
             @for (at, (name, class, times_ns)) in [
                 ("plans made", "ticks s6", &made),
                 ("heard by the centre", "ticks s2", &rover.heard_ns),

@@ -44,7 +44,7 @@ pub(super) fn figure(history: &History, place: &Place, span_ns: (u64, u64)) -> F
         @for (row, strip) in strips.iter().enumerate() {
             (nights::shades(place, span_s, &area(row)))
             (strip.draw(&axis, area(row), row + 1 == strips.len()))
-            (incidents::draw(history, span_ns, &area(row)))
+            (incidents::draw(history, span_ns, &area(row), row == 0))
         }
     };
     Figure {
@@ -93,6 +93,7 @@ impl Courses {
             series: series % SERIES,
             dashes: DASHES[series % SERIES],
             points: points.clone(),
+            is_marked: false,
         };
         let span_h = |points: &Points| {
             let ends = points.first().zip(points.last());
@@ -117,7 +118,7 @@ impl Courses {
             let made = || rover.plans.iter();
             let scores = made().map(|(at_ns, plan)| (hours(*at_ns), plan.score));
             planned.push(curve(
-                &format!("as {name} plans"),
+                &format!("ahead, as {name} plans"),
                 at + 1,
                 &steps(scores, span_h),
             ));

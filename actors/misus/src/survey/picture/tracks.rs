@@ -3,6 +3,7 @@
 use farside_actors::figure::Figure;
 use farside_actors::figure::ground::{Ground, LegendRow, Moment, arrow, legend};
 use farside_actors::figure::relief;
+use farside_actors::figure::scale::text_width;
 use farside_actors::figure::svg::{Px, over_lines, path, shortened};
 use farside_worlds::RockField;
 use maud::{Markup, html};
@@ -52,6 +53,10 @@ pub(super) fn figure(history: &History, field: &RockField, at_ns: u64) -> Figure
     // What matters least comes first, so that others are drawn over it.
     let mut ordered: Vec<&(&ListedGoal, Standing)> = goals.iter().collect();
     ordered.sort_by_key(|(_, standing)| std::cmp::Reverse(rank(*standing)));
+    let marks = goals
+        .iter()
+        .map(|(goal, _)| shape(&goal.key).beside(ground.px(goal.position_m)));
+    let marks: Vec<(f64, f64)> = marks.collect();
     let body = html! {
         text class="title" x="16" y="28" { (title) }
         text class="tick" x="16" y="50" { (says) }
@@ -63,9 +68,7 @@ pub(super) fn figure(history: &History, field: &RockField, at_ns: u64) -> Figure
         @for (goal, standing) in ordered {
             (mark(*standing, shape(&goal.key), shape(&goal.key).beside(ground.px(goal.position_m)), &says_of(history, goal, *standing)))
         }
-        @for (number, rover) in history.rovers.iter().enumerate() {
-            (stands(history, number, Moment::until(&rover.moments, at_ns), at_ns, &ground))
-        }
+        @for number in 0..history.rovers.len() { (stands(history, number, at_ns, &ground, &marks)) }
         (legend(&rows(history, &goals, field), (LEFT + SIDE + 20.0, TOP + 12.0)))
     };
     Figure {
@@ -119,16 +122,16 @@ fn track(number: usize, moments: &[Moment], ground: &Ground<'_>) -> Markup {
     }
 }
 
-/// Where a rover stands, and whether it is down.
+/// Where a rover stands, and whether it is down; its name where it hides the fewest of these marks.
 fn stands(
     history: &History,
     number: usize,
-    moments: &[Moment],
     at_ns: u64,
     ground: &Ground<'_>,
+    marks: &[(f64, f64)],
 ) -> Markup {
-    let outages = &history.rovers[number].outages;
-    let is_down = outages.within((at_ns, at_ns + 1)).next().is_some();
+    let rover = &history.rovers[number];
+    let is_down = rover.outages.within((at_ns, at_ns + 1)).next().is_some();
     let name = shortened(&history.names[number], 12);
     let name = if is_down {
         format!("{name}, down")
@@ -136,14 +139,44 @@ fn stands(
         name
     };
     html! {
-        @if let Some(last) = moments.last() {
+        @if let Some(last) = Moment::until(&rover.moments, at_ns).last() {
             @let (x, y) = ground.px(last.true_m);
+            @let at = free_place((x, y), text_width(&name, 12.0), ground, marks);
             g class={ "s" (number % COLOURS) } {
                 path class="stands" d=(arrow((x, y), last.yaw_rad)) { title { (name) } }
             }
-            (over_lines("who", (x, y - 13.0), "middle", &name))
+            (over_lines("who", at, "middle", &name))
         }
     }
+}
+
+/// Where a text of a width, its middle at the point that is returned, hides the fewest marks around a point.
+fn free_place(
+    (x, y): (f64, f64),
+    width: f64,
+    ground: &Ground<'_>,
+    marks: &[(f64, f64)],
+) -> (f64, f64) {
+    let aside = 0.5 * width + 13.0;
+    let places = [
+        (0.0, -13.0),
+        (0.0, 22.0),
+        (aside, 4.0),
+        (-aside, 4.0),
+        (aside, -14.0),
+        (-aside, -14.0),
+    ];
+    let places = places.map(|(dx, dy)| (x + dx, y + dy));
+    let hidden = |(x, y): &(f64, f64)| {
+        let (left, right) = (x - 0.5 * width, x + 0.5 * width);
+        let outside = !ground.is_inside((left, y - 12.0)) || !ground.is_inside((right, y + 2.0));
+        let under = marks.iter().filter(|(mark_x, mark_y)| {
+            (left - 7.0..right + 7.0).contains(mark_x) && (y - 17.0..y + 8.0).contains(mark_y)
+        });
+        (outside, under.count())
+    };
+    let best = places.into_iter().min_by_key(hidden);
+    best.unwrap_or((x, y))
 }
 
 fn shape(goal: &GoalKey) -> Shape {
