@@ -67,7 +67,7 @@ fn a_rover_that_is_lost_is_seen_to_be(run: &Run<'_>, tape: &Tape) {
         assert!(!svg(picture, &hours(0, 4)).contains("is down"), "{picture}");
     }
     assert!(svg("tracks", &hours(0, 8)).contains(">rover_02, down</text>"));
-    assert!(!svg("tracks", &hours(0, 4)).contains("down"));
+    assert!(!svg("tracks", &hours(0, 4)).contains(", down"));
 }
 
 /// How many samples of what is done are in the legend: one for each kind of activity.
