@@ -87,10 +87,8 @@ fn what_is_left_of_a_log_is_drawn(run: &Run<'_>, tape: &Tape) {
                 ),
             }
         }
-        assert_eq!(
-            part >= tape.len() / 2,
-            run.draw(&cut, "plans", &PictureRequest::default()).is_ok()
-        );
+        let has_plans = run.draw(&cut, "plans", &PictureRequest::default()).is_ok();
+        assert_eq!(has_plans, part > 10, "{part}");
     }
 }
 
