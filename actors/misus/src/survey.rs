@@ -20,6 +20,7 @@ mod messages;
 mod metrics;
 mod monitor;
 pub mod outlook;
+mod picture;
 mod scenario;
 mod science;
 mod shared;

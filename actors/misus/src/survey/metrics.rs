@@ -53,7 +53,7 @@ const OWN: [Metric; 26] = [
     number("goals_achieved", "goals achieved", "goals", Higher),
     curve(
         "goals_by_step",
-        "goals achieved",
+        "goals achieved, by hour",
         "goals",
         Higher,
         "How many goals were achieved by the end of each hour.",
@@ -70,7 +70,7 @@ const OWN: [Metric; 26] = [
     number("missed_comm", "daily communications missed", "", Lower),
     curve(
         "operations_by_step",
-        "operations of planning",
+        "operations of planning in an hour",
         "operations",
         Lower,
         "What all planners looked at in each hour.",
@@ -95,7 +95,7 @@ const OWN: [Metric; 26] = [
     number("score", "score", "", Higher),
     curve(
         "score_by_step",
-        "score",
+        "score, by hour",
         "",
         Higher,
         "What the goals that were achieved by the end of each hour are worth by Equation 1.",
@@ -109,7 +109,7 @@ const OWN: [Metric; 26] = [
     number("shed", "goals refused or given back", "goals", Neither),
     curve(
         "traverse_by_step",
-        "driven",
+        "driven, by hour",
         "m",
         Lower,
         "How far all rovers had driven by the end of each hour.",

@@ -2,10 +2,12 @@
 
 use farside::Report;
 use farside_actors::field::{FieldConfig, Place};
+use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Metric, Section, Settings, Setup, SetupError, System,
+    Assembly, Builtin, Metric, PictureError, PictureInfo, PictureRequest, Recording, Section,
+    Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -14,7 +16,7 @@ use super::config::SurveyConfig;
 use super::execution::ExecutionConfig;
 use super::scenario::SurveyScenario;
 use super::wishes::{CombinationConfig, GoalConfig};
-use super::{builtin, metrics};
+use super::{builtin, metrics, picture};
 use crate::config::{LearnConfig, TeamConfig};
 use crate::planner::casper::PlannerConfig;
 use crate::planner::objective::ObjectiveConfig;
@@ -68,6 +70,10 @@ impl System for SurveySystem {
         &builtin::STUDIES
     }
 
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
+    }
+
     fn parse(
         &self,
         sections: toml::Deserializer<'_>,
@@ -109,5 +115,15 @@ impl Settings for SurveyScenario {
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)
         }))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        setup: &mut Setup<'_>,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, setup)
     }
 }

@@ -104,7 +104,9 @@ fn of_twenty_proven_optima_rovers_reach_nine_tenths_and_the_team_almost_all() {
 #[ignore = "ten seconds in a release build"]
 fn of_twenty_proven_optima_the_team_reaches_all_but_a_twentieth_in_a_second() {
     let teams = proven();
-    let teams = teams.iter().map(|(problem, bound)| team(problem, 20_000_000) / bound);
+    let teams = teams
+        .iter()
+        .map(|(problem, bound)| team(problem, 20_000_000) / bound);
     let teams: Vec<f64> = teams.collect();
     assert!(mean(&teams) >= 0.97 && worst(&teams) >= 0.95, "{teams:?}");
 }

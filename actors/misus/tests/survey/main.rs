@@ -9,5 +9,6 @@ mod elections;
 mod loops;
 mod meetings;
 mod own_goals;
+mod pictures;
 mod random;
 mod refusals;

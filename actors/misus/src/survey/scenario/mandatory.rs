@@ -125,7 +125,7 @@ fn check_within(
         energy(scenario, sky, &within, [from, until]),
         memory(scenario, &within, [from, until]),
     ];
-    for short in balances.iter().filter(|one| one.takes > one.has) {
+    if let Some(short) = balances.iter().find(|one| one.takes > one.has) {
         let names = within
             .iter()
             .map(|goal| scenario.goals[goal.at].name.as_str());
