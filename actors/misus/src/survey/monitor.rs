@@ -171,7 +171,12 @@ impl Observer for SurveyMonitor {
         let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
         let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
         course.note(record.time());
-        let role = self.roles[record.sender.index()];
+        // Nobody in the run sends a crash.
+        let actor = match record.class {
+            RecordClass::Crash | RecordClass::Restart => record.receiver,
+            _ => record.sender,
+        };
+        let role = self.roles[actor.index()];
         match (record.class, role, record.kind) {
             (RecordClass::Crash, Role::Planner(rover), _) => {
                 course.tally.rovers[rover].is_down = true;

@@ -44,6 +44,23 @@ fn goals_of_a_lost_rover_are_assigned_again_or_given_up() {
 }
 
 #[test]
+fn goals_that_a_lost_rover_keeps_are_counted() {
+    let lost = |more: &str| {
+        let text = format!("until = \"10h\"\n{more}");
+        let run = Run {
+            text: &text,
+            crashes: &[("rover_02", 2.0, None)],
+            ..Run::default()
+        };
+        let ran = run.run();
+        ran.assert_sound(more);
+        ran.figure("orphaned")
+    };
+    assert_eq!(lost(""), 0.0);
+    assert!(lost("survey.reassign = \"never\"") > 0.0);
+}
+
+#[test]
 fn a_rover_that_nobody_hears_goes_on_with_its_own_goals() {
     let silent = Run {
         text: "until = \"0.42sol\"\nlinks.\"rover_01-*\".outage = true",
