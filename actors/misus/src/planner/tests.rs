@@ -220,6 +220,18 @@ fn the_dearer_a_metre_is_the_less_is_driven() {
     );
 }
 
+/// Who chooses goals without regard to what they cost takes no plan that costs more than it is worth.
+#[test]
+fn no_plan_is_taken_that_costs_more_than_it_is_worth() {
+    let mut problem = generate(&ProblemConfig::default(), 4).unwrap();
+    for choice in [Choice::SimpleReward, Choice::Random] {
+        problem.objective.drive_per_m = 0.0;
+        assert!(planned(&problem, choice, 1).traverse_m[19] > 0.0);
+        problem.objective.drive_per_m = 1e6;
+        assert_eq!(planned(&problem, choice, 1).traverse_m[19], 0.0);
+    }
+}
+
 /// What the same planner is given comes out the same, to the last bit.
 #[test]
 fn the_same_draws_give_the_same_plans() {

@@ -69,9 +69,28 @@ impl Shared {
     /// The next edition after one, of the scientist who closes the loop at a site.
     pub(crate) fn next_edition(&self, edition: u64, site: u32) -> u64 {
         let sites = self.settings.candidates.len() as u64;
-        let rank = self.settings.rank(site);
-        let mut next = edition + 1;
-        next += (rank + sites - next % sites) % sites;
-        next
+        edition_after(edition, self.settings.rank(site), sites)
+    }
+}
+
+/// The next edition of the site of a rank: no two sites ever make the same, and its rest tells whose it is.
+fn edition_after(edition: u64, rank: u64, sites: u64) -> u64 {
+    let next = edition + 1;
+    next + (rank + sites - next % sites) % sites
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edition_is_newer_and_of_one_site_only() {
+        for sites in 1..5 {
+            for (rank, edition) in (0..sites).flat_map(|rank| (0..20).map(move |at| (rank, at))) {
+                let next = edition_after(edition, rank, sites);
+                assert!(next > edition && next <= edition + sites);
+                assert_eq!(next % sites, rank);
+            }
+        }
     }
 }

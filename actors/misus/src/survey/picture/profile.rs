@@ -121,3 +121,62 @@ impl Resource {
         (0..PREDICTIONS).filter_map(of).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::messages::{Activity, PlanMade, PlanMode, ReplanCause};
+    use crate::survey::picture::history::Level;
+    use farside::SimTime;
+
+    const S_NS: u64 = 1_000_000_000;
+
+    /// A plan that predicts so much at the end of each hour.
+    fn plan(battery_j: f64) -> PlanMade {
+        let hour = |number: u64| PlannedActivity {
+            activity: Activity::Communication(0),
+            position_m: [0.0; 2],
+            starts: SimTime::from_secs(3600 * number),
+            ends: SimTime::from_secs(3600 * (number + 1)),
+            battery_j,
+            memory_bits: 0,
+        };
+        PlanMade {
+            number: 1,
+            cause: ReplanCause::Started,
+            mode: PlanMode::Continuous,
+            edition: 1,
+            operations: 0,
+            moved: 0,
+            shed: Vec::new(),
+            unmet: Vec::new(),
+            score: 0.0,
+            traverse_m: 0.0,
+            reserve_j: 0.0,
+            memory_size_bits: 0,
+            activities: (0..24).map(hour).collect(),
+        }
+    }
+
+    #[test]
+    fn what_is_predicted_is_what_the_plan_of_that_time_says() {
+        let end_ns = 24 * 3600 * S_NS;
+        let rover = RoverHistory {
+            plans: vec![(0, plan(36e3)), (end_ns / 2, plan(72e3))],
+            levels: vec![Level {
+                time_ns: 0,
+                battery_j: 180e3,
+                memory_bits: 0.0,
+            }],
+            ..RoverHistory::default()
+        };
+        let predictions = BATTERY.predictions(&rover, (0, end_ns));
+        assert_eq!(predictions.len() as u64, PREDICTIONS);
+        for prediction in predictions {
+            let (at_ns, now_wh) = prediction[0];
+            let expected_wh = if at_ns < end_ns / 2 { 10.0 } else { 20.0 };
+            assert_eq!(now_wh, 50.0);
+            assert!(prediction[1..].iter().all(|(_, wh)| *wh == expected_wh));
+        }
+    }
+}
