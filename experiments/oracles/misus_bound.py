@@ -245,7 +245,9 @@ def enter(table, digest, bound, proven, name):
     if table.exists():
         with table.open(newline="") as file:
             rows = {row["digest"]: row for row in csv.DictReader(file)}
-    if digest not in rows or bound < float(rows[digest]["bound"]):
+    known = rows.get(digest)
+    is_news = known is None or bound < float(known["bound"])
+    if is_news or (proven and bound <= float(known["bound"])):
         rows[digest] = {"digest": digest, "bound": bound, "optimal": str(proven).lower(), "problem": name}
     with table.open("w", newline="") as file:
         writer = csv.DictWriter(file, ["digest", "bound", "optimal", "problem"], lineterminator="\n")

@@ -17,6 +17,7 @@
 pub mod analysis;
 mod assemble;
 mod builtin;
+mod chart;
 mod config;
 mod learner;
 mod learning;

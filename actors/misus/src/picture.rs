@@ -10,8 +10,10 @@ use std::sync::LazyLock;
 
 use farside::SimDuration;
 use farside::suggest::{did_you_mean, nearest};
+use farside_actors::field::{FieldConfig, Place};
 use farside_actors::figure::numbers::plain;
 use farside_actors::figure::{Figure, ground};
+use farside_actors::rover::RoverConfig;
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recording, Setup,
 };
@@ -19,13 +21,19 @@ use farside_actors::system::{
 use farside_worlds::sky::SOL_S;
 
 use crate::assemble::names;
-use crate::scenario::MisusScenario;
-use farside_actors::field::Place;
+use crate::chart;
+use crate::config::TeamConfig;
 use history::History;
 
 /// The style of pictures, beside that of all figures.
-static STYLE: LazyLock<String> =
-    LazyLock::new(|| [ground::STYLE, include_str!("picture/picture.css")].concat());
+static STYLE: LazyLock<String> = LazyLock::new(|| {
+    [
+        ground::STYLE,
+        chart::STYLE,
+        include_str!("picture/picture.css"),
+    ]
+    .concat()
+});
 
 /// The pictures that there are.
 pub(crate) const ALL: [PictureInfo; 2] = [
@@ -45,30 +53,25 @@ pub(crate) const ALL: [PictureInfo; 2] = [
     },
 ];
 
-/// Draws one of them.
+/// Draws one of them, of a run with this world, team and these rovers.
 pub(crate) fn draw(
-    scenario: &MisusScenario,
+    (world, team, rover_config): (&FieldConfig, &TeamConfig, &RoverConfig),
     picture: &str,
     run: &dyn Recording,
     request: &PictureRequest,
     setup: &mut Setup<'_>,
 ) -> Result<Figure, PictureError> {
-    let place = Place::of(&scenario.world, setup)?;
-    let history = History::read(run, names(&scenario.team))?;
+    let place = Place::of(world, setup)?;
+    let history = History::read(run, names(team))?;
     let rover = rover(&history.names, request.along.as_deref())?;
-    let to_ns = time_ns(&history, request.at)?;
     match picture {
-        "field" => Ok(field::figure(&history, &place.field, rover, to_ns)),
+        "field" => {
+            let at_ns = chart::time_ns(history.end_ns, request.at)?;
+            Ok(field::figure(&history, &place.field, rover, at_ns))
+        }
         "profiles" => {
-            let from = request.from.unwrap_or(SimDuration::ZERO);
-            let from_ns = time_ns(&history, Some(from))?;
-            if from_ns >= to_ns {
-                let to = SimDuration::from_nanos(to_ns);
-                let message = format!("from {from} to {to}: expected a time span");
-                return Err(PictureError::NotDrawn(message));
-            }
-            let capacity = [scenario.rover.battery_j, scenario.rover.memory_bytes as f64];
-            let span = (from_ns, to_ns);
+            let span = chart::span_ns(history.end_ns, request)?;
+            let capacity = [rover_config.battery_j, rover_config.memory_bytes as f64];
             Ok(profiles::figure(&history, &place, capacity, rover, span))
         }
         other => Err(PictureError::Unknown {
@@ -78,7 +81,7 @@ pub(crate) fn draw(
 }
 
 /// Which rover is meant.
-fn rover(names: &[String], wanted: Option<&str>) -> Result<usize, PictureError> {
+pub(crate) fn rover(names: &[String], wanted: Option<&str>) -> Result<usize, PictureError> {
     let Some(wanted) = wanted else {
         return Ok(0);
     };
@@ -93,20 +96,8 @@ fn rover(names: &[String], wanted: Option<&str>) -> Result<usize, PictureError> 
     })
 }
 
-/// A time within the run; its end unless given.
-fn time_ns(history: &History, at: Option<SimDuration>) -> Result<u64, PictureError> {
-    let end = SimDuration::from_nanos(history.end_ns);
-    match at {
-        None => Ok(history.end_ns),
-        Some(at) if at > end => Err(PictureError::NotDrawn(format!(
-            "at {at}: the run ended at {end}"
-        ))),
-        Some(at) => Ok(at.as_nanos()),
-    }
-}
-
 /// A time of a run in sols, to a thousandth.
-fn in_sols(time: SimDuration) -> String {
+pub(crate) fn in_sols(time: SimDuration) -> String {
     format!(
         "{} sol",
         plain(libm::round(time.as_secs_f64() / SOL_S * 1e3) / 1e3)

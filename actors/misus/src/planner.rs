@@ -13,6 +13,7 @@
 //! | [`score`] | Equation 1 over a planner's own goals and those it last heard others hold |
 //! | [`casper`] | a rover's planner: iterative repair, and three ways to choose the next goal |
 //! | [`central`] | who is assigned which goal, and what becomes of shed ones |
+//! | [`objective`] | what counts besides Equation 1 |
 //! | [`lns`] | a planner of the whole team by large-neighbourhood search |
 //! | [`bounds`] | what plans of known problems are worth at the most |
 //! | [`rounds`] | the paper's evaluation: planners synchronised after each step, links perfect |
@@ -24,6 +25,7 @@ pub mod central;
 pub mod chain;
 pub mod instance;
 pub mod lns;
+pub mod objective;
 pub mod plan;
 pub mod problem;
 pub mod rounds;

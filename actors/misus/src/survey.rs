@@ -20,6 +20,7 @@ mod messages;
 mod metrics;
 mod monitor;
 pub mod outlook;
+mod picture;
 mod scenario;
 mod science;
 mod shared;
@@ -33,8 +34,8 @@ pub use costs::Cost;
 pub use execution::ExecutionConfig;
 pub use messages::{
     Activity, ActivityBegan, ActivityEnd, ActivityEnded, GoalList, GoalListHeld, GoalsAchieved,
-    GoalsShared, ListedCombination, ListedGoal, LoopMade, PlanMade, PlanMode, PlannedActivity,
-    ReplanCause, Window,
+    GoalsShared, HalfReady, ListedCombination, ListedGoal, LoopMade, OfficeHeld, PlanMade,
+    PlanMode, PlannedActivity, ReplanCause, UnmetGoal, Window,
 };
 pub use metrics::SurveyMetrics;
 pub use system::SurveySystem;

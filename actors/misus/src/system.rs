@@ -132,6 +132,7 @@ impl Settings for MisusScenario {
         request: &PictureRequest,
         setup: &mut Setup<'_>,
     ) -> Result<Figure, PictureError> {
-        picture::draw(self, picture, run, request, setup)
+        let tables = (&self.world, &self.team, &self.rover);
+        picture::draw(tables, picture, run, request, setup)
     }
 }

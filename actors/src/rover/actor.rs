@@ -1,8 +1,9 @@
-//! The actor: hands messages to the hardware and its answers to the controller. What it knows of
-//! the rover is durable, because metal does not forget.
+//! The actor: hands messages to the hardware and its answers to the controller, and tells radios where the rover
+//! is. What it knows of the rover is durable, because metal does not forget.
 
 use std::sync::Arc;
 
+use farside::LinkId;
 use farside::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,8 @@ use super::RoverSpec;
 use super::command::{CommandReport, RenewLease, RoverCommand, RoverQuery, RoverState};
 use super::faults::{self, FaultBegins, FaultEnds, PlannedFault};
 use super::hardware::{Hardware, Output};
+use super::record::RoverPose;
+use crate::radio::RadioChange;
 
 /// A rover's hardware: see [`add_hardware`](super::add_hardware).
 ///
@@ -24,6 +27,10 @@ pub struct RoverHardware {
     states: Recipient<RoverState>,
     /// When something happens by itself, and the timer for it.
     timer: Option<(SimTime, TimerId)>,
+    /// The radios that links of its host go through.
+    radios: Vec<LinkId<RadioChange>>,
+    /// Where they were last told that it is, east and north \[m\].
+    told_m: Option<[f64; 2]>,
 }
 
 /// The rover, which a crash leaves as it is.
@@ -54,6 +61,8 @@ pub(super) fn add(
         reports,
         states,
         timer: None,
+        radios: Vec::new(),
+        told_m: None,
     });
     for fault in faults.iter() {
         sim.tell_at(fault.at, address, fault.begins.clone());
@@ -84,13 +93,35 @@ impl RoverHardware {
         for output in out {
             match output {
                 Output::Report(report) => ctx.send(self.reports, report),
-                Output::Pose(pose) => ctx.sample(&pose),
+                Output::Pose(pose) => {
+                    ctx.sample(&pose);
+                    self.tell_radios(&pose, ctx);
+                }
                 Output::Resources(resources) => ctx.sample(&resources),
                 Output::Incident(incident) => ctx.sample(&incident),
             }
         }
         self.set_timer(ctx, next);
         result
+    }
+
+    /// Radios learn where it is whenever that is recorded and has changed.
+    fn tell_radios(&mut self, pose: &RoverPose, ctx: &mut Context<'_, Self>) {
+        let place_m = [pose.east_m, pose.north_m];
+        if self.radios.is_empty() || self.told_m == Some(place_m) {
+            return;
+        }
+        self.told_m = Some(place_m);
+        let at_m = [pose.east_m, pose.north_m, pose.height_m];
+        for radio in &self.radios {
+            let moves = RadioChange::Moves {
+                host: self.spec.name.clone(),
+                from_m: at_m,
+                to_m: at_m,
+                end_ns: ctx.now().as_nanos(),
+            };
+            ctx.tell_link(*radio, moves);
+        }
     }
 
     fn set_timer(&mut self, ctx: &mut Context<'_, Self>, next: Option<SimTime>) {
@@ -116,6 +147,7 @@ impl Actor for RoverHardware {
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.radios = ctx.links();
         let (now, is_first) = (ctx.now(), ctx.incarnation() == 0);
         let faults = self.faults.clone();
         self.with(ctx, |hardware, links_j, out| match is_first {

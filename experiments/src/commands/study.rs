@@ -345,12 +345,17 @@ fn text(results: &Results, document: &Document<'_>) -> String {
         row.push(results.of_cell(index).len().to_string());
         for metric in &manifest.metrics {
             let said = &document.cells[index]["metrics"][&metric.name];
-            let figure = said["mean"].as_f64().or_else(|| said["median"].as_f64());
-            row.push(figure.map_or_else(|| "-".to_owned(), short));
+            row.push(figure(said).map_or_else(|| "-".to_owned(), short));
         }
         rows.push(row);
     }
     let curves = curves(manifest, &document.cells);
+    let has_curves = manifest.metrics.iter().any(|one| one.index.is_some());
+    let last_values = if has_curves {
+        ", of curves the last values"
+    } else {
+        ""
+    };
     let (study, question, out) = (&document.study, &document.question, &document.out);
     let runs = document.runs;
     let failed = match document.failed {
@@ -364,10 +369,21 @@ fn text(results: &Results, document: &Document<'_>) -> String {
     let notices = document.notices.iter();
     let notices: String = notices.map(|notice| format!("NOTE: {notice}\n")).collect();
     format!(
-        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians; {after}\n{}",
+        "{study}: {question}\n\n{}\n{curves}{notices}means, of lists the medians{last_values}; {after}\n{}",
         columns(&rows),
         document.check.map(against::text).unwrap_or_default()
     )
+}
+
+/// What stands for a metric of a cell in a table: the mean, of lists the median, of curves the mean at the last
+/// index that any run has.
+fn figure(said: &Value) -> Option<f64> {
+    let last = said["points"].as_array().and_then(|points| {
+        let mut points = points.iter().rev();
+        points.find(|point| point["n"].as_u64() > Some(0))
+    });
+    let mean = last.unwrap_or(said)["mean"].as_f64();
+    mean.or_else(|| said["median"].as_f64())
 }
 
 /// From which index on curves differ from those of the baseline, a line for each; none without

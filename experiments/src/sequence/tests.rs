@@ -201,6 +201,6 @@ proptest! {
         }
         let records = vec![lost];
         let graph = graph(&name, Selected { records, remarks: Vec::new() });
-        prop_assert_eq!(graph.text.lines().count(), 6);
+        prop_assert_eq!(graph.text.lines().count(), 5);
     }
 }

@@ -7,6 +7,7 @@ use farside_actors::figure::ground::Moment;
 use farside_actors::rover::{FaultBegins, RoverPose, RoverResources, hardware_name};
 use farside_actors::system::{PictureError, Recorded, Recording};
 
+use crate::chart::nothing;
 use crate::messages::FieldModel;
 
 /// What a rover has at an instant.
@@ -100,13 +101,7 @@ impl History {
             Ok(())
         })?;
         if history.moments.iter().all(Vec::is_empty) {
-            let excluded = match run.excluded() {
-                [] => String::new(),
-                left_out => format!("; left out of it were {}", left_out.join(", ")),
-            };
-            return Err(PictureError::NotDrawn(format!(
-                "it holds no states of rovers: expected samples of RoverPose{excluded}"
-            )));
+            return Err(nothing(run, "no states of rovers", "RoverPose"));
         }
         history.end_ns = ending.time_ns.unwrap_or(history.end_ns);
         Ok(history)

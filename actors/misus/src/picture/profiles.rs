@@ -10,6 +10,7 @@ use maud::{Markup, html};
 
 use super::history::{Fault, History, Level};
 use super::in_sols;
+use crate::chart::nights;
 use farside_actors::field::Place;
 
 /// The width of a strip, in pixels.
@@ -73,7 +74,7 @@ pub(super) fn figure(
                 width: WIDTH,
                 height: HEIGHT,
             };
-            (nights(place, &x, &area))
+            (nights::shades(place, (x.from_s, x.to_s), &area))
             (drawn(strip, levels, &x, &area, row + 1 == strips.len()))
             (faulty(&faults, &x, &area, row == 0))
         }
@@ -189,31 +190,6 @@ fn drawn(strip: &Strip, levels: &[Level], x: &Axis, area: &Area, is_last: bool) 
                         d=(path([(left, y - 4.5), (left + 24.0, y - 4.5)])) {}
                     text x=(Px(left + 30.0)) y=(Px(y)) { (curve.name) }
                 }
-            }
-        }
-    }
-}
-
-/// When the Sun is below the horizon.
-fn nights(place: &Place, x: &Axis, area: &Area) -> Markup {
-    let first = libm::floor((place.starts_s + x.from_s) / SOL_S).max(0.0) as u32;
-    let last = libm::floor((place.starts_s + x.to_s) / SOL_S).max(0.0) as u32;
-    // From each sunset to the next sunrise, in the run's time.
-    let mut dark_from_s = x.from_s;
-    let mut nights = Vec::new();
-    for sol in first..=last {
-        if let Some([rises_s, sets_s]) = place.sky.daylight_s(sol) {
-            nights.push([dark_from_s, rises_s - place.starts_s]);
-            dark_from_s = sets_s - place.starts_s;
-        }
-    }
-    nights.push([dark_from_s, x.to_s]);
-    html! {
-        @for [from_s, to_s] in nights {
-            @let (left, right) = (area.x(x.place(from_s)), area.x(x.place(to_s)));
-            @if right > left {
-                rect class="night" x=(Px(left)) y=(Px(area.top)) width=(Px(right - left))
-                    height=(Px(area.height)) { title { "night" } }
             }
         }
     }

@@ -80,7 +80,10 @@ pub struct Casper {
     /// By goal: how often it was deleted since the best plan had it.
     deletions: Vec<u32>,
     best: Chain,
+    /// What the team's plan is worth with it, as the planner knows it, less what it costs by the user's
+    /// preferences.
     best_value: f64,
+    best_cost: f64,
     /// The plan that is being worked on, kept for its memory.
     current: Chain,
     /// Of the best plan between steps, and of the current one during a step.
@@ -116,6 +119,7 @@ impl Casper {
             current: best.clone(),
             best,
             best_value: 0.0,
+            best_cost: 0.0,
             score: Score::new(instance),
             draws: key.text("casper").number(rover as u64).stream(),
         })
@@ -148,7 +152,7 @@ impl Casper {
     /// Another rover holds these goals now, and no others.
     pub fn hear(&mut self, rover: usize, goals: &[usize]) {
         self.score.hear(rover, goals);
-        self.best_value = self.score.value();
+        self.best_value = self.score.value() - self.best_cost;
     }
 
     /// The planner may plan a goal from now on; at `start_ms` and no other time, if that is given. A
@@ -322,14 +326,15 @@ impl Casper {
             if !self.current.violation().is_none() {
                 continue;
             }
-            if self.score.value() > self.best_value + EQUAL {
+            let value = self.score.value() - instance.costs().of_plan(instance, &self.current);
+            if value > self.best_value + EQUAL {
                 step.improved = true;
                 if self.config.step_end == StepEnd::FirstBetter {
                     std::mem::swap(&mut self.best, &mut self.current);
                     break;
                 }
                 self.best.clone_from(&self.current);
-                self.best_value = self.score.value();
+                self.best_value = value;
             } else if self.config.step_end == StepEnd::Restart {
                 self.current.clone_from(&self.best);
                 self.reset(instance);
@@ -382,18 +387,29 @@ impl Casper {
         if any {
             return self.draws.choose(&open).map(|(at, _)| *at);
         }
-        let worth = |goal: usize| match self.config.choice {
-            Choice::Idgs => self.score.gain(goal),
-            _ => instance.weights()[goal],
-        };
         let mut best = (0.0, None);
         for &(at, goal) in &open {
-            let worth = worth(goal);
+            let worth = match self.config.choice {
+                Choice::Idgs => self.gain(instance, at, goal, step),
+                _ => instance.weights()[goal],
+            };
             if worth > best.0 {
                 best = (worth, Some(at));
             }
         }
         best.1
+    }
+
+    /// By how much the objective would rise with a goal: with preferences that hangs on where it would be put.
+    fn gain(&self, instance: &Instance, at: usize, goal: usize, step: &mut Step) -> f64 {
+        let (gain, costs) = (self.score.gain(goal), instance.costs());
+        if costs.is_plain() || gain <= 0.0 {
+            return gain;
+        }
+        let (found, tested) = self.current.best_insertion(instance, &self.assigned[at]);
+        step.operations += tested;
+        let added_ms = found.map_or(0, |found| found.added_ms);
+        gain - costs.of_goal(goal) - costs.of_drive(self.current.rover(), added_ms)
     }
 
     /// An iteration of repair.
@@ -454,6 +470,7 @@ impl Casper {
         for goal in self.best.goals(instance) {
             self.score.hold(goal);
         }
-        self.best_value = self.score.value();
+        self.best_cost = instance.costs().of_plan(instance, &self.best);
+        self.best_value = self.score.value() - self.best_cost;
     }
 }

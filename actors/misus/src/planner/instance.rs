@@ -3,6 +3,7 @@
 //! Goals and activities are *tasks*, numbered: goals first, as in the problem, then activities. Places
 //! are numbered too: that of each goal has the goal's number, and then come the places where rovers start.
 
+use super::objective::Costs;
 use super::problem::{Problem, ProblemError};
 
 /// The duration of a drive that cannot be made \[ms\]: longer than any sol.
@@ -78,6 +79,7 @@ pub struct Instance {
     lengths_mm: Vec<u32>,
     /// How long each takes \[ms\], for each speed.
     tables_ms: Vec<Vec<u32>>,
+    costs: Costs,
 }
 
 impl Instance {
@@ -146,7 +148,20 @@ impl Instance {
             tables_ms: tables_ms.collect(),
             places_m,
             lengths_mm,
+            costs: Costs::new(
+                &problem.objective,
+                problem
+                    .goals
+                    .iter()
+                    .map(|at| (at.duration_ms, at.power_mw * at.duration_ms)),
+                problem.rovers.iter().map(|at| (at.speed_mm_s, at.drive_mw)),
+            ),
         })
+    }
+
+    /// What the user's preferences take from the worth of plans.
+    pub fn costs(&self) -> &Costs {
+        &self.costs
     }
 
     /// How many goals there are.

@@ -71,7 +71,7 @@ pub fn plan(instance: &Instance, config: &LnsConfig, key: RandomKey) -> Result<F
     let mut state = mandatory(instance)?;
     let mut current = state.chains.clone();
     let mut best = state.chains.clone();
-    let (mut value, mut best_value) = (state.value(), state.value());
+    let (mut value, mut best_value) = (state.value(instance), state.value(instance));
     let mut history = vec![(state.operations, state.objective.score())];
     state.mark(&mut current);
     while state.operations < config.operations {
@@ -88,7 +88,7 @@ pub fn plan(instance: &Instance, config: &LnsConfig, key: RandomKey) -> Result<F
         // Who has not been at a place at the end of a sol may have too far to go in the next.
         let valid = state.chains.iter().all(|chain| chain.violation().is_none());
         let found = if valid {
-            state.value()
+            state.value(instance)
         } else {
             f64::NEG_INFINITY
         };

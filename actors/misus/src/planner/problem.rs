@@ -10,6 +10,8 @@ mod settings;
 
 use serde::{Deserialize, Serialize};
 
+use super::objective::ObjectiveConfig;
+
 pub use check::{ProblemError, Resolved};
 pub use generate::generate;
 pub use settings::ProblemConfig;
@@ -50,6 +52,9 @@ pub struct Problem {
     pub combinations: Vec<Combination>,
     /// What rovers have to do besides, wherever they are.
     pub activities: Vec<Activity>,
+    /// What counts besides what goals and combinations are worth.
+    #[serde(default, skip_serializing_if = "ObjectiveConfig::is_plain")]
+    pub objective: ObjectiveConfig,
 }
 
 /// A rover and what it has.

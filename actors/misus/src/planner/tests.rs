@@ -191,6 +191,47 @@ fn a_combination_of_negative_weight_is_declined_by_who_knows_it() {
     }
 }
 
+/// What users want of plans besides: the dearer a metre is, the less is driven, whoever plans.
+#[test]
+fn the_dearer_a_metre_is_the_less_is_driven() {
+    let driven = |drive_per_m: f64| {
+        let mut problem = generate(&ProblemConfig::default(), 4).unwrap();
+        problem.objective.drive_per_m = drive_per_m;
+        let rounds = planned(&problem, Choice::Idgs, 1);
+        assert_eq!(violations(&problem, &rounds.plan), []);
+        let instance = Instance::new(&problem).unwrap();
+        let config = LnsConfig {
+            operations: 50_000,
+            ..LnsConfig::default()
+        };
+        let found = lns::plan(&instance, &config, RandomKey::new(1)).unwrap();
+        let chains = found.chains.iter();
+        let lns_mm: u64 = chains.map(|chain| chain.drive_mm(&instance)).sum();
+        [rounds.traverse_m[19], lns_mm as f64 * 1e-3]
+    };
+    let [free, cheap, dear] = [0.0, 1.0, 1e6].map(driven);
+    assert!(
+        cheap[0] < free[0] && cheap[1] < free[1],
+        "{free:?} {cheap:?}"
+    );
+    assert!(
+        dear[0] < cheap[0] && dear[1] < cheap[1],
+        "{cheap:?} {dear:?}"
+    );
+}
+
+/// Who chooses goals without regard to what they cost takes no plan that costs more than it is worth.
+#[test]
+fn no_plan_is_taken_that_costs_more_than_it_is_worth() {
+    let mut problem = generate(&ProblemConfig::default(), 4).unwrap();
+    for choice in [Choice::SimpleReward, Choice::Random] {
+        problem.objective.drive_per_m = 0.0;
+        assert!(planned(&problem, choice, 1).traverse_m[19] > 0.0);
+        problem.objective.drive_per_m = 1e6;
+        assert_eq!(planned(&problem, choice, 1).traverse_m[19], 0.0);
+    }
+}
+
 /// What the same planner is given comes out the same, to the last bit.
 #[test]
 fn the_same_draws_give_the_same_plans() {

@@ -1,4 +1,4 @@
-//! What a scenario says: `[problem]`, `[planner]`, `[lns]`, `[rounds]`.
+//! What a scenario says: `[problem]`, `[planner]`, `[objective]`, `[lns]`, `[rounds]`.
 
 use farside::SimDuration;
 use farside_actors::processor::Speed;
@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::planner::casper::PlannerConfig;
 use crate::planner::lns::LnsConfig;
+use crate::planner::objective::ObjectiveConfig;
 use crate::planner::problem::ProblemConfig;
 
 settings! {
@@ -31,6 +32,7 @@ settings! {
 pub(super) struct PlanningScenario {
     pub(super) problem: ProblemConfig,
     pub(super) planner: PlannerConfig,
+    pub(super) objective: ObjectiveConfig,
     pub(super) lns: LnsConfig,
     pub(super) rounds: RoundsConfig,
 }
@@ -39,6 +41,7 @@ impl PlanningScenario {
     pub(super) fn check_all(&self) -> Result<(), SetupError> {
         self.problem.check("problem")?;
         self.planner.check("planner")?;
+        self.objective.check("objective")?;
         self.lns.check("lns")?;
         self.rounds.check("rounds")
     }

@@ -46,7 +46,7 @@ const ALL: [Metric; 21] = [
     ),
     curve(
         "goals_by_step",
-        "goals in the plan",
+        "goals in the plan, by step",
         "goals",
         Higher,
         "How many goals the team's plan achieves after each optimisation step. Source: the MISUS paper, Figure 4.",
@@ -133,7 +133,7 @@ const ALL: [Metric; 21] = [
     ),
     curve(
         "score_by_step",
-        "score of the plan",
+        "score of the plan, by step",
         "",
         Higher,
         "What the team's plan is worth by Equation 1 after each optimisation step. Source: the MISUS paper, \
@@ -149,7 +149,7 @@ const ALL: [Metric; 21] = [
     Metric::new("shed", "goals shed", "goals", Number, Neither),
     curve(
         "traverse_by_step",
-        "length of all drives",
+        "length of all drives, by step",
         "m",
         Lower,
         "How far the team drives in all by its plan, after each optimisation step. Source: the MISUS paper, \

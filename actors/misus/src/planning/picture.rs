@@ -8,7 +8,6 @@ mod tours;
 
 use std::sync::LazyLock;
 
-use farside::SimDuration;
 use farside_actors::figure::{Figure, ground};
 use farside_actors::system::{
     PictureError, PictureInfo, PictureOption, PictureRequest, Recording, Seeds, Setup,
@@ -16,11 +15,18 @@ use farside_actors::system::{
 
 use super::config::PlanningScenario;
 use super::shared::shared;
+use crate::chart;
 use history::History;
 
 /// The style of pictures, beside that of all figures.
-static STYLE: LazyLock<String> =
-    LazyLock::new(|| [ground::STYLE, include_str!("picture/picture.css")].concat());
+static STYLE: LazyLock<String> = LazyLock::new(|| {
+    [
+        ground::STYLE,
+        chart::STYLE,
+        include_str!("picture/picture.css"),
+    ]
+    .concat()
+});
 
 /// The pictures that there are.
 pub(super) const ALL: [PictureInfo; 3] = [
@@ -59,15 +65,7 @@ pub(super) fn draw(
     };
     let shared = shared(scenario, seeds, setup.files)?;
     let history = History::read(run, &shared.rovers)?;
-    let at_ns = match request.at {
-        None => history.end_ns,
-        Some(at) if at.as_nanos() > history.end_ns => {
-            let end = SimDuration::from_nanos(history.end_ns);
-            let message = format!("at {at}: the run ended at {end}");
-            return Err(PictureError::NotDrawn(message));
-        }
-        Some(at) => at.as_nanos(),
-    };
+    let at_ns = chart::time_ns(history.end_ns, request.at)?;
     match picture {
         "tours" => Ok(tours::figure(&history, &shared, at_ns)),
         "score" => Ok(score::figure(&history, &shared, at_ns)),

@@ -35,7 +35,10 @@ pub(super) fn problem(
     scenario: &PlanningScenario,
     problem_seed: u64,
 ) -> Result<Problem, SetupError> {
-    generate(&scenario.problem, problem_seed).map_err(|error| SetupError::value("problem", error))
+    let problem = generate(&scenario.problem, problem_seed);
+    let mut problem = problem.map_err(|error| SetupError::value("problem", error))?;
+    problem.objective = scenario.objective.clone();
+    Ok(problem)
 }
 
 /// What planners carry in a run with these seeds.

@@ -1,4 +1,4 @@
-//! Planners over links as scenarios see them: `[problem]`, `[planner]`, `[lns]`, `[rounds]`.
+//! Planners over links as scenarios see them: `[problem]`, `[planner]`, `[objective]`, `[lns]`, `[rounds]`.
 
 use farside::Report;
 use farside_actors::figure::Figure;
@@ -15,6 +15,7 @@ use super::shared::{problem, shared};
 use super::{builtin, metrics, picture};
 use crate::planner::casper::PlannerConfig;
 use crate::planner::lns::LnsConfig;
+use crate::planner::objective::ObjectiveConfig;
 use crate::planner::problem::ProblemConfig;
 
 /// The planners of MISUS over links: the paper's evaluation, and what becomes of it on bad links.
@@ -24,7 +25,7 @@ use crate::planner::problem::ProblemConfig;
 /// use farside_misus::PlanningSystem;
 /// assert_eq!(PlanningSystem.name(), "misus-planning");
 /// let tables: Vec<String> = PlanningSystem.sections().into_iter().map(|one| one.name).collect();
-/// assert_eq!(tables, ["problem", "planner", "lns", "rounds"]);
+/// assert_eq!(tables, ["problem", "planner", "objective", "lns", "rounds"]);
 /// ```
 pub struct PlanningSystem;
 
@@ -41,6 +42,7 @@ impl System for PlanningSystem {
         [
             ProblemConfig::sections("problem"),
             PlannerConfig::sections("planner"),
+            ObjectiveConfig::sections("objective"),
             LnsConfig::sections("lns"),
             RoundsConfig::sections("rounds"),
         ]

@@ -34,6 +34,8 @@ pub struct Centre {
     /// When each record was last changed, counted in changes.
     changed: BTreeMap<GoalKey, u32>,
     changes: u32,
+    /// When it started.
+    started: SimTime,
     /// What owners have told of goals that this centre has no record of.
     strangers: BTreeMap<GoalKey, Vec<(u32, Held)>>,
     auctions: BTreeMap<GoalKey, Auction>,
@@ -122,6 +124,7 @@ impl Centre {
             rovers: vec![Rover::default(); settings.rovers as usize],
             changed,
             changes,
+            started: now,
             strangers: BTreeMap::new(),
             auctions: BTreeMap::new(),
             seeks: None,

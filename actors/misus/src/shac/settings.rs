@@ -209,13 +209,13 @@ impl Settings {
     }
 
     /// How many candidates are asked before this one.
-    pub(super) fn rank(&self, site: u32) -> u64 {
+    pub(crate) fn rank(&self, site: u32) -> u64 {
         let place = self.candidates.iter().position(|&other| other == site);
         place.unwrap_or(self.candidates.len()) as u64
     }
 
     /// When a lease that is granted now ends.
-    pub(super) fn lease_end(&self, now: SimTime) -> SimTime {
+    pub(crate) fn lease_end(&self, now: SimTime) -> SimTime {
         let lease = self.protocol.lease;
         lease.map_or(SimTime::MAX, |lease| now.saturating_add(lease))
     }

@@ -174,4 +174,6 @@ pub enum Reason {
     Revoked,
     /// The central planner declared it unachievable.
     Declared,
+    /// The rover that was to do the other half did not come.
+    Partner,
 }

@@ -78,6 +78,7 @@ fn shared(parts: &Parts<'_>) -> Result<Shared, SetupError> {
         rover: scenario.rover.clone(),
         survey: scenario.survey.clone(),
         planner: scenario.planner.clone(),
+        objective: scenario.objective.clone(),
         execution: scenario.execution.clone(),
         own,
         starts_m: starts.map(|at| [at.east_m, at.north_m]).collect(),
@@ -145,16 +146,24 @@ pub(super) fn assemble(
                 }
             }
         }
+        let is_first = site == shared.site_of_centre();
+        let may_lead = shared.settings.candidates.contains(&site) && !is_first;
         if (site as usize) < shared.site.rovers.len() {
             let shared = shared.clone();
-            sim.actor(*host, host_name, move |_| {
-                FieldScientist::new(shared.clone(), site)
-            });
+            if may_lead {
+                sim.actor(*host, host_name, move |_| {
+                    LeadScientist::new(shared.clone(), site)
+                });
+            } else {
+                sim.actor(*host, host_name, move |_| {
+                    FieldScientist::new(shared.clone(), site)
+                });
+            }
         }
-        if site == shared.site_of_centre() {
+        if is_first {
             let shared = shared.clone();
             sim.actor(*host, SCIENTIST, move |_| {
-                LeadScientist::new(shared.clone())
+                LeadScientist::new(shared.clone(), site)
             });
         }
     }

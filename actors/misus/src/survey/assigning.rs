@@ -2,6 +2,8 @@
 //! has, and declares what cannot be done any more. It knows where rovers were last and how long goals take, and
 //! nothing of batteries and memory (section 3.1).
 
+mod meetings;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
@@ -10,9 +12,11 @@ use farside_actors::processor::Processor;
 
 use super::costs::Cost;
 use super::messages::{GoalList, GoalsShared, ListedGoal};
+use super::outlook::Forecast;
 use super::shared::Shared;
 use crate::planner::central::{Open, share};
 use crate::planner::instance::Instance;
+use crate::planner::objective::ObjectiveConfig;
 use crate::planner::problem::{FORMAT, Goal, Problem, ProblemError, Rover, Sol};
 use crate::shac::{
     Centre, Chooser, GoalKey, Parameters, Reason, SharedGoal, Standing, Term, Vacancy,
@@ -38,11 +42,24 @@ pub(super) struct TeamPlanner {
     wake: SimTime,
     told: Option<GoalsShared>,
     fault: Option<ProblemError>,
+    /// When it is light, for meetings.
+    forecast: Forecast,
+    /// When goals for two rovers are looked at again.
+    again: BTreeMap<GoalKey, SimTime>,
 }
 
 impl TeamPlanner {
     pub(super) fn new(shared: Arc<Shared>, processor: Processor) -> TeamPlanner {
+        let site = &shared.site;
         TeamPlanner {
+            forecast: Forecast::new(
+                site.sky,
+                site.starts_s,
+                &shared.rover,
+                site.config.sun_least_rad,
+                shared.execution.sun_share,
+            ),
+            again: BTreeMap::new(),
             shared,
             processor,
             list: GoalList::default(),
@@ -89,6 +106,7 @@ impl TeamPlanner {
     fn shared_goal(&self, goal: &ListedGoal) -> Option<SharedGoal> {
         let cost = Cost::of(goal.observation, &self.shared.rover)?;
         let mut shared = SharedGoal::new(goal.key, goal.position_m, cost.duration);
+        shared.partner = goal.partner;
         shared.parameters.memory_bits = cost.memory_bits as f64;
         shared.parameters.weight = goal.weight;
         shared.parameters.start = goal.window.map_or(SimTime::ZERO, |window| window.opens);
@@ -119,7 +137,11 @@ impl TeamPlanner {
                         true => to,
                         false => Parameters {
                             target_m: wanted.parameters.target_m,
-                            start: wanted.parameters.start,
+                            // When two rovers meet is the centre's to say.
+                            start: match goal.partner {
+                                Some(_) => now.start,
+                                None => wanted.parameters.start,
+                            },
                             ..to
                         },
                     };
@@ -210,7 +232,10 @@ impl TeamPlanner {
             let last = last.saturating_sub(cost.duration.as_nanos());
             Some(SimTime::from_nanos(last.saturating_add(1)))
         });
-        let all = ready.into_iter().chain(late);
+        let all = ready
+            .into_iter()
+            .chain(late)
+            .chain(self.appoints_again(now));
         self.wake = all.filter(|at| *at > now).min().unwrap_or(SimTime::MAX);
     }
 }
@@ -234,6 +259,10 @@ impl TeamMind for TeamPlanner {
             return Some(next);
         }
         if centre.settings().protocol.chooser == Chooser::Planner {
+            self.appoint(now, centre);
+            if let Some(next) = self.moves.pop_front() {
+                return Some(next);
+            }
             if self.shares.is_empty() {
                 self.share_out(now, centre);
             }
@@ -273,7 +302,7 @@ impl Abstract {
         }
         let vacant = vacancies
             .iter()
-            .filter(|one| planner.listed(one.goal).is_some());
+            .filter(|one| one.partner.is_none() && planner.listed(one.goal).is_some());
         let vacant: Vec<&Vacancy> = vacant.collect();
         if vacant.is_empty() {
             return None;
@@ -330,6 +359,8 @@ impl Abstract {
             goals: goals.collect(),
             combinations: Vec::new(),
             activities: Vec::new(),
+            // Tours are short whatever a metre costs.
+            objective: ObjectiveConfig::default(),
         };
         Some(Abstract {
             problem,

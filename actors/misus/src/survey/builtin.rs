@@ -9,7 +9,7 @@ pub(super) const SCENARIOS: [Builtin; 1] = [Builtin {
 }];
 
 /// Sorted by name.
-pub(super) const STUDIES: [Builtin; 3] = [
+pub(super) const STUDIES: [Builtin; 6] = [
     Builtin {
         name: "misus/batch-or-continuous",
         text: include_str!("../../studies/batch-or-continuous.toml"),
@@ -21,5 +21,17 @@ pub(super) const STUDIES: [Builtin; 3] = [
     Builtin {
         name: "misus/degradation",
         text: include_str!("../../studies/degradation.toml"),
+    },
+    Builtin {
+        name: "misus/hill-between",
+        text: include_str!("../../studies/hill-between.toml"),
+    },
+    Builtin {
+        name: "misus/rover-lost",
+        text: include_str!("../../studies/rover-lost.toml"),
+    },
+    Builtin {
+        name: "misus/slow-processors",
+        text: include_str!("../../studies/slow-processors.toml"),
     },
 ];

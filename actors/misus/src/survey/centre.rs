@@ -6,8 +6,8 @@ use farside::prelude::*;
 use farside_actors::processor::{Processor, ProcessorChange};
 
 use super::assigning::TeamPlanner;
-use super::messages::{GoalList, GoalListHeld, GoalsAchieved};
-use super::shared::{SCIENTIST, Shared};
+use super::messages::{GoalList, GoalListHeld, GoalsAchieved, OfficeHeld};
+use super::shared::Shared;
 use crate::shac::{
     GoalAck, GoalAssign, GoalCancel, GoalDigest, GoalOutcome, GoalRelease, GoalStatus, Message,
     Party,
@@ -22,6 +22,8 @@ pub(super) struct SurveyCentre {
     mind: TeamPlanner,
     /// How many goals the scientist was told to be achieved.
     told: usize,
+    /// What the scientist was told of who is the centre, with elections.
+    told_office: Option<bool>,
 }
 
 /// What it keeps through crashes, besides what the protocol keeps.
@@ -37,6 +39,7 @@ impl SurveyCentre {
             shared,
             site,
             told: 0,
+            told_office: None,
         }
     }
 
@@ -51,10 +54,7 @@ impl SurveyCentre {
         if let Some(shared) = told.map_err(|fault| HandlerError::new(fault.to_string()))? {
             ctx.sample(&shared);
         }
-        if self.shared.is_at_site(Party::Centre(self.site)) {
-            self.tell_scientist(ctx)?;
-        }
-        Ok(())
+        self.tell_scientist(ctx)
     }
 
     fn tell_scientist(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -64,8 +64,17 @@ impl SurveyCentre {
         let goals = centre.durable().outcomes.goals_achieved();
         if goals.len() > self.told {
             self.told = goals.len();
-            let scientist = ctx.recipient::<GoalsAchieved>(SCIENTIST)?;
+            let scientist = self.shared.lead_at(self.site);
+            let scientist = ctx.recipient::<GoalsAchieved>(scientist)?;
             ctx.send(scientist, GoalsAchieved { goals });
+        }
+        let holds = centre.is_in_office(ctx.now());
+        if self.shared.settings.election.is_some() && self.told_office != Some(holds) {
+            self.told_office = Some(holds);
+            let scientist = self.shared.lead_at(self.site);
+            let scientist = ctx.recipient::<OfficeHeld>(scientist)?;
+            let list = self.mind.list().clone();
+            ctx.send(scientist, OfficeHeld { holds, list });
         }
         Ok(())
     }
@@ -94,6 +103,7 @@ impl Actor for SurveyCentre {
 
 impl Handler<GoalList> for SurveyCentre {
     fn handle(&mut self, list: GoalList, ctx: &mut Context<'_, Self>) -> Outcome {
+        let author = self.shared.author_of(list.edition).to_owned();
         self.mind.take(list);
         let edition = self.mind.list().edition;
         if ctx.durable::<Kept>().0.edition < edition {
@@ -101,8 +111,8 @@ impl Handler<GoalList> for SurveyCentre {
         }
         let from = Party::Centre(self.site);
         let is_open = self.shared.settings.windows.is_open(ctx.now());
-        if is_open || self.shared.is_at_site(from) {
-            let scientist = ctx.recipient::<GoalListHeld>(SCIENTIST)?;
+        if is_open || author == self.shared.lead_at(self.site) {
+            let scientist = ctx.recipient::<GoalListHeld>(&author)?;
             ctx.send(scientist, GoalListHeld { from, edition });
         }
         self.think(ctx)

@@ -13,6 +13,7 @@ mod ending;
 mod execution;
 mod goals;
 mod logbook;
+mod meeting;
 mod replanning;
 mod updates;
 
@@ -26,9 +27,9 @@ use farside_actors::rover::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::messages::{GoalList, GoalListHeld, PlannedActivity, ReplanCause};
+use super::messages::{GoalList, GoalListHeld, HalfReady, PlannedActivity, ReplanCause};
 use super::outlook::{Forecast, Known, Means, Outlook, Piece, Plan};
-use super::shared::{SCIENTIST, Shared};
+use super::shared::Shared;
 use crate::shac::{
     GoalAck, GoalAssign, GoalCancel, GoalDigest, GoalOutcome, GoalRelease, GoalStatus, Message,
     Party, Reason,
@@ -36,6 +37,7 @@ use crate::shac::{
 use crate::sharing::{OwnerSeat, SharingDue, receives};
 use goals::Desk;
 use logbook::Logbook;
+use meeting::Meetings;
 
 /// A timer: the plan that was begun with is ready.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -106,6 +108,8 @@ pub(crate) struct Explorer {
     is_waiting: bool,
     /// Why what runs is broken off.
     broken_off: Option<Reason>,
+    /// Who waits for whom at goals for two rovers.
+    meetings: Meetings,
 }
 
 /// A plan that is being made.
@@ -137,7 +141,8 @@ impl Explorer {
             site.config.reserve,
             site.side_m,
             site.catalogue.iter().map(|rock| rock.diameter_m),
-        );
+        )
+        .with_objective(shared.objective.clone());
         let key = shared.key.text("explorer").number(u64::from(number));
         let (planner, mode) = (shared.planner.clone(), shared.execution.mode);
         Explorer {
@@ -162,6 +167,7 @@ impl Explorer {
             bid_operations: 0,
             is_waiting: false,
             broken_off: None,
+            meetings: Meetings::default(),
             shared,
             number,
             processor,
@@ -263,6 +269,7 @@ impl Actor for Explorer {
         GoalDigest,
         SharingDue,
         GoalList,
+        HalfReady,
         CommandReport,
         RoverState,
         PlanReady,
@@ -275,6 +282,7 @@ impl Actor for Explorer {
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
         self.log.clone_from(ctx.durable::<Logbook>());
+        self.desk.read(&self.log.list);
         self.is_restarted = ctx.incarnation() > 0;
         self.seat.start(ctx)?;
         self.plan_anew(ReplanCause::Started);
@@ -286,7 +294,9 @@ impl Actor for Explorer {
 
 impl Handler<GoalList> for Explorer {
     fn handle(&mut self, list: GoalList, ctx: &mut Context<'_, Self>) -> Outcome {
+        let author = self.shared.author_of(list.edition).to_owned();
         if list.edition > self.log.list.edition {
+            self.desk.read(&list);
             self.log.list = list;
             self.plan_anew(ReplanCause::Worth);
         }
@@ -294,7 +304,7 @@ impl Handler<GoalList> for Explorer {
             from: Party::Owner(self.number),
             edition: self.log.list.edition,
         };
-        let science = ctx.recipient::<GoalListHeld>(SCIENTIST)?;
+        let science = ctx.recipient::<GoalListHeld>(&author)?;
         ctx.send(science, held);
         self.settle_goals(ctx)
     }

@@ -208,6 +208,7 @@ mod tests {
             operations: 0,
             moved: 0,
             shed: Vec::new(),
+            unmet: Vec::new(),
             score: 0.0,
             traverse_m: 0.0,
             reserve_j: 10.0,
@@ -237,6 +238,7 @@ mod tests {
                 mandatory: false,
                 window: Some(window),
                 requires: Vec::new(),
+                partner: None,
             }],
             combinations: Vec::new(),
         });

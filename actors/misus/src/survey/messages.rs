@@ -35,6 +35,9 @@ pub struct ListedGoal {
     pub window: Option<Window>,
     /// Goals that the same rover has to have achieved before.
     pub requires: Vec<GoalKey>,
+    /// The other half, if two rovers have to do it at one time: each half is a goal of the list that is worth
+    /// nothing by itself, and both together are a combination.
+    pub partner: Option<GoalKey>,
 }
 
 /// Goals that change each other's worth.
@@ -47,7 +50,8 @@ pub struct ListedCombination {
 }
 
 /// Science to the centre and to all planners: all that is wished for. Of two lists the one with the higher
-/// edition holds. It is sent again until its receiver has said that it has it.
+/// edition holds. It is sent again until its receiver has said that it has it. With elections each site that may have
+/// the centre has editions of its own: those that leave its rank among them over when divided by their number.
 ///
 /// Goals that were achieved stay on the list, since combinations with them are still open.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -120,6 +124,15 @@ pub enum Activity {
     Sleep,
 }
 
+/// A goal that a plan should have and has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct UnmetGoal {
+    /// Which.
+    pub goal: GoalKey,
+    /// What there is too little of for it.
+    pub reason: Reason,
+}
+
 /// An activity in a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedActivity {
@@ -155,6 +168,8 @@ pub struct PlanMade {
     pub moved: u32,
     /// Goals that it had and gave up for want of room or worth.
     pub shed: Vec<GoalKey>,
+    /// Mandatory goals that it has and cannot plan, each with what there is too little of.
+    pub unmet: Vec<UnmetGoal>,
     /// What the team's goals are worth by this plan and what it last heard of others (Equation 1).
     pub score: f64,
     /// How far it drives \[m\].
@@ -208,11 +223,33 @@ pub struct ActivityEnded {
     pub memory_bits: i64,
 }
 
+/// A rover's planner to the others: it is where its half of a goal for two rovers is done, and waits for whoever
+/// has the other half.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HalfReady {
+    /// Who waits.
+    pub rover: u32,
+    /// Its half.
+    pub goal: GoalKey,
+    /// Whether it has heard that the other one is there, too.
+    pub heard: bool,
+}
+
 /// The centre to the scientist at its site: the goals that it knows to be achieved, in the order of their names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GoalsAchieved {
     /// All of them.
     pub goals: Vec<GoalKey>,
+}
+
+/// A centre to the scientist at its site, with elections: whether it is the centre now, so that this scientist closes
+/// the loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OfficeHeld {
+    /// Whether it is.
+    pub holds: bool,
+    /// The goal list that it knows.
+    pub list: GoalList,
 }
 
 /// A timer: it is time to ask the prioritiser.

@@ -45,7 +45,7 @@ const fn curve(
 }
 
 /// Those that a survey has beside what is learnt.
-const OWN: [Metric; 25] = [
+const OWN: [Metric; 26] = [
     number("activities_failed", "activities that failed", "", Lower),
     Metric::new("complete", "all goals achieved", "", Rate, Higher),
     number("duplicated", "goals achieved twice", "goals", Lower),
@@ -53,18 +53,24 @@ const OWN: [Metric; 25] = [
     number("goals_achieved", "goals achieved", "goals", Higher),
     curve(
         "goals_by_step",
-        "goals achieved",
+        "goals achieved, by hour",
         "goals",
         Higher,
         "How many goals were achieved by the end of each hour.",
     ),
     number("goals_total", "goals wished for", "goals", Neither),
+    number(
+        "half_goals",
+        "goals for two rovers that one did alone",
+        "goals",
+        Lower,
+    ),
     number("loops", "turns of the closed loop", "loops", Higher),
     number("lost_goals", "goals lost", "goals", Lower),
     number("missed_comm", "daily communications missed", "", Lower),
     curve(
         "operations_by_step",
-        "operations of planning",
+        "operations of planning in an hour",
         "operations",
         Lower,
         "What all planners looked at in each hour.",
@@ -89,7 +95,7 @@ const OWN: [Metric; 25] = [
     number("score", "score", "", Higher),
     curve(
         "score_by_step",
-        "score",
+        "score, by hour",
         "",
         Higher,
         "What the goals that were achieved by the end of each hour are worth by Equation 1.",
@@ -103,7 +109,7 @@ const OWN: [Metric; 25] = [
     number("shed", "goals refused or given back", "goals", Neither),
     curve(
         "traverse_by_step",
-        "driven",
+        "driven, by hour",
         "m",
         Lower,
         "How far all rovers had driven by the end of each hour.",
@@ -143,6 +149,8 @@ farside_actors::documented! {
         pub goals_total: u32,
         /// How many different goals were achieved.
         pub goals_achieved: u32,
+        /// Goals for two rovers of which only one rover did its half: worth nothing.
+        pub half_goals: u32,
         /// Whether all goals of the last list are achieved.
         pub complete: bool,
         /// How far all rovers drove \[m\].
@@ -226,7 +234,8 @@ fn figures(shared: &Shared, course: &Course, end: SimTime) -> SurveyMetrics {
     SurveyMetrics {
         score: tally.score,
         goals_total: tally.wished().len() as u32,
-        goals_achieved: tally.achieved.len() as u32,
+        goals_achieved: tally.goals_achieved(),
+        half_goals: tally.half_goals(),
         complete: last.is_some_and(is_done),
         traverse_m: rovers().map(|rover| rover.driven_m).sum(),
         shed: rovers().map(|rover| rover.shed).sum(),
@@ -243,7 +252,7 @@ fn figures(shared: &Shared, course: &Course, end: SimTime) -> SurveyMetrics {
         replans,
         plan_moved: (replans > 0).then(|| moved as f64 / f64::from(replans)),
         plan_operations: tally.operations(),
-        loops: tally.loops,
+        loops: tally.loops(),
         wished_editions: tally.lists.len() as u32,
     }
 }

@@ -9,7 +9,7 @@ use farside::{RunInfo, SimDuration, SimTime};
 use farside_actors::rover::{RoverPose, hardware_name};
 
 use super::messages::{GoalListHeld, GoalsShared, PlanMade};
-use super::shared::{SCIENTIST, Shared};
+use super::shared::Shared;
 use super::tally::SurveyTally;
 use crate::shac::{CentreWrite, OwnerWrite, Party};
 
@@ -29,7 +29,8 @@ pub(super) struct Point {
 #[derive(Clone, Copy)]
 enum Role {
     Other,
-    Scientist,
+    /// Who closes the loop while the centre is at this site.
+    Scientist(u32),
     Planner(usize),
     Centre(u32),
     Hardware(usize),
@@ -57,7 +58,7 @@ impl Course {
             let rovers = self.tally.rovers.iter();
             let point = Point {
                 score: self.tally.score,
-                goals: self.tally.achieved.len() as u32,
+                goals: self.tally.goals_achieved(),
                 operations: self.tally.operations(),
                 driven_m: rovers.map(|rover| rover.driven_m).sum(),
             };
@@ -89,8 +90,14 @@ impl SurveyMonitor {
         });
         let hardware = self.shared.site.rovers.iter().enumerate();
         let hardware = hardware.map(|(at, rover)| (hardware_name(rover), Role::Hardware(at)));
-        let scientist = [(SCIENTIST.to_owned(), Role::Scientist)];
-        parties.chain(hardware).chain(scientist).collect()
+        let leads = self.shared.settings.candidates.iter();
+        let leads = leads.map(|site| {
+            (
+                self.shared.lead_at(*site).to_owned(),
+                Role::Scientist(*site),
+            )
+        });
+        parties.chain(hardware).chain(leads).collect()
     }
 
     fn sample(
@@ -132,8 +139,8 @@ impl SurveyMonitor {
                 let shared: GoalsShared = kind.schema().decode(body)?;
                 tally.central_operations += shared.operations;
             }
-            (Role::Scientist, "GoalList") => tally.lists.push(kind.schema().decode(body)?),
-            (Role::Scientist, "LoopMade") => tally.looped(kind.schema().decode(body)?),
+            (Role::Scientist(_), "GoalList") => tally.listed(kind.schema().decode(body)?),
+            (Role::Scientist(site), "LoopMade") => tally.looped(site, kind.schema().decode(body)?),
             (Role::Hardware(rover), "RoverPose") => {
                 let pose: RoverPose = kind.schema().decode(body)?;
                 tally.rovers[rover].driven_m = pose.driven_m;
@@ -164,7 +171,12 @@ impl Observer for SurveyMonitor {
         let failed = |error: farside::encoding::DecodeError| ObserverError(error.to_string());
         let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
         course.note(record.time());
-        let role = self.roles[record.sender.index()];
+        // Nobody in the run sends a crash.
+        let actor = match record.class {
+            RecordClass::Crash | RecordClass::Restart => record.receiver,
+            _ => record.sender,
+        };
+        let role = self.roles[actor.index()];
         match (record.class, role, record.kind) {
             (RecordClass::Crash, Role::Planner(rover), _) => {
                 course.tally.rovers[rover].is_down = true;

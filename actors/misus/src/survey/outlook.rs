@@ -18,6 +18,7 @@ mod posing;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use farside::SimDuration;
 use farside::random::RandomKey;
 
 use super::messages::{Activity, ListedCombination, PlanMode};
@@ -27,6 +28,9 @@ use crate::shac::{GoalKey, Reason};
 pub use forecast::{Forecast, Load, Profile};
 pub use means::Means;
 pub use posing::{Posed, pose};
+
+/// How long a rover waits for another one before it gives up a goal for two.
+pub(crate) const WAITS: SimDuration = SimDuration::from_secs(1200);
 
 /// A goal that a rover has, as it plans it.
 #[derive(Clone, Debug, PartialEq)]
@@ -154,8 +158,10 @@ pub struct Plan {
     pub missed: Vec<u32>,
     /// What the planner looked at.
     pub operations: u64,
-    /// What the team's goals are worth by this plan and by what others hold.
+    /// What the team's goals are worth by this plan and by what others hold (Equation 1).
     pub score: f64,
+    /// The same, less what its drives and goals cost by the user's objective.
+    pub value: f64,
     /// How far it drives \[m\].
     pub traverse_m: f64,
     /// What the battery is predicted to hold at any time.

@@ -1,5 +1,6 @@
 //! What a scenario says of a survey, and whether it can be so.
 
+mod mandatory;
 mod own_goals;
 
 use std::sync::Arc;
@@ -18,9 +19,11 @@ use super::wishes::{CombinationConfig, GoalConfig};
 use crate::analysis::goals::Observation;
 use crate::assemble::names;
 use crate::config::{LearnConfig, TeamConfig};
-use crate::planner::casper::PlannerConfig;
+use crate::planner::casper::{Choice, PlannerConfig};
+use crate::planner::objective::ObjectiveConfig;
 use crate::shac::{
-    Calendar, CalendarError, Definitions, Party, Protocol, Reassign, Settings, SettingsError,
+    Calendar, CalendarError, Chooser, Definitions, Party, Protocol, Reassign, Settings,
+    SettingsError,
 };
 use crate::sharing::Names;
 
@@ -39,6 +42,7 @@ pub(super) struct SurveyScenario {
     pub(super) rover: RoverConfig,
     pub(super) learn: LearnConfig,
     pub(super) planner: PlannerConfig,
+    pub(super) objective: ObjectiveConfig,
     pub(super) execution: ExecutionConfig,
     pub(super) survey: SurveyConfig,
     #[serde(rename = "goal", skip_serializing_if = "Vec::is_empty")]
@@ -59,6 +63,8 @@ impl SurveyScenario {
         self.rover.check_rovers("rover", &rovers)?;
         self.learn.check("learn")?;
         self.planner.check("planner")?;
+        self.planner_choice()?;
+        self.objective.check("objective")?;
         self.execution.check_together("execution")?;
         self.survey.check("survey")?;
         self.site()?;
@@ -72,7 +78,23 @@ impl SurveyScenario {
         for (at, one) in self.combinations.iter().enumerate() {
             one.check(&format!("combination.{at}"))?;
         }
-        own_goals::check(self)
+        own_goals::check(self)?;
+        mandatory::check(self, None)
+    }
+
+    /// Checks what only a run with an end can be checked for.
+    pub(super) fn check_until(&self, until: farside::SimDuration) -> Result<(), SetupError> {
+        mandatory::check(self, Some(until))
+    }
+
+    /// The planner of the whole team needs to know what nobody in a survey does.
+    fn planner_choice(&self) -> Result<(), SetupError> {
+        if self.planner.choice != Choice::Lns {
+            return Ok(());
+        }
+        let message = "\"lns\" plans for all rovers at once with all batteries and memories known, which the \
+                       centre of a survey does not know: expected \"idgs\", \"simple-reward\" or \"random\"";
+        Err(SetupError::value("planner.choice", message))
     }
 
     /// The number of the centre's site.
@@ -146,6 +168,7 @@ impl SurveyScenario {
             SetupError::value(&key, error)
         })?;
         self.check_lease(&settings)?;
+        self.check_chooser(&settings)?;
         Ok(settings)
     }
 
@@ -167,6 +190,22 @@ impl SurveyScenario {
         let offers = Some(self.planner.offers);
         protocol.give_up_after = protocol.give_up_after.or(offers);
         Ok(protocol)
+    }
+
+    /// Who meets whom and when is decided by the centre's planner alone.
+    fn check_chooser(&self, settings: &Settings) -> Result<(), SetupError> {
+        let joint = self.goals.iter().position(|goal| goal.rovers > 1);
+        match joint {
+            Some(at) if settings.protocol.chooser != Chooser::Planner => {
+                let (name, protocol) = (&self.goals[at].name, &self.survey.protocol);
+                let message = format!(
+                    "goal {name:?} needs 2 rovers, whom the centre's planner appoints: expected a protocol other \
+                     than {protocol:?}, with chooser = \"planner\""
+                );
+                Err(SetupError::value(&format!("goal.{at}.rovers"), message))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether every observation fits into a lease, so that it can be begun.

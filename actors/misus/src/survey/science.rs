@@ -1,6 +1,7 @@
 //! The scientists of the closed loop. That of a rover keeps, exchanges and learns, and commands nothing. That
 //! at the centre's site does the same, and closes the loop: it asks the prioritiser what to look at next, and
-//! tells all planners and centres.
+//! tells all planners and centres. With elections it is that of whichever site has the centre: a centre that takes
+//! office tells the scientist at its site, with the list that it knows, and so does one that leaves it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use farside_actors::rover::CommandReport;
 
 use super::costs::Cost;
 use super::messages::{
-    GoalList, GoalListHeld, GoalsAchieved, ListDue, LoopDue, LoopMade, WishesDue,
+    GoalList, GoalListHeld, GoalsAchieved, ListDue, LoopDue, LoopMade, OfficeHeld, WishesDue,
 };
 use super::shared::{SCIENTIST, Shared};
 use super::wishlist::Wishlist;
@@ -100,10 +101,13 @@ impl Handler<Statistics> for FieldScientist {
     }
 }
 
-/// The scientist at the centre's site.
+/// The scientist at a site that has the centre, or may come to have it.
 pub(super) struct LeadScientist {
     shared: Arc<Shared>,
+    site: u32,
     learner: Learner,
+    /// Whether something was learnt since the prioritiser was asked last.
+    has_learnt: bool,
     prioritiser: Prioritiser,
     /// The edition of the list that each planner and centre is known to have.
     held: BTreeMap<Party, u64>,
@@ -115,11 +119,16 @@ pub(super) struct LeadScientist {
 struct Kept {
     wishlist: Wishlist,
     loops: u32,
+    /// Whether the centre of this site is the centre now, with elections.
+    leads: bool,
 }
 
 impl LeadScientist {
-    pub(super) fn new(shared: Arc<Shared>) -> LeadScientist {
-        let number = shared.site.rovers.len() as u32;
+    pub(super) fn new(shared: Arc<Shared>, site: u32) -> LeadScientist {
+        let number = match site == shared.site_of_centre() {
+            true => shared.site.rovers.len() as u32,
+            false => site,
+        };
         let learner = Learner::new(shared.site.clone(), number, peers(&shared, number));
         let prioritiser = Prioritiser::new(PrioritiserSettings {
             rocks: shared.survey.rocks as usize,
@@ -129,9 +138,30 @@ impl LeadScientist {
         LeadScientist {
             held: shared.names.keys().map(|party| (*party, 0)).collect(),
             shared,
+            site,
             learner,
+            has_learnt: false,
             prioritiser,
             timer: None,
+        }
+    }
+
+    /// Whether it closes the loop now.
+    fn leads(&self, ctx: &mut Context<'_, Self>) -> bool {
+        self.shared.settings.election.is_none() || ctx.durable::<Kept>().leads
+    }
+
+    /// Whether it shares its host with a party of the protocol.
+    fn is_at_home(&self, party: Party) -> bool {
+        let (Party::Owner(site) | Party::Centre(site)) = party;
+        site == self.site
+    }
+
+    /// Learns, and records it.
+    fn learn(&mut self, ctx: &mut Context<'_, Self>) {
+        if let Some(model) = self.learner.learn(0) {
+            ctx.sample(&model);
+            self.has_learnt = true;
         }
     }
 
@@ -139,11 +169,11 @@ impl LeadScientist {
     /// anything yet.
     fn prioritise(&mut self, ctx: &mut Context<'_, Self>) -> bool {
         let site = self.shared.site.clone();
-        match (self.learner.learn(0), self.learner.lesson()) {
-            (Some(model), Some(lesson)) => {
+        self.learn(ctx);
+        match (std::mem::take(&mut self.has_learnt), self.learner.lesson()) {
+            (true, Some(lesson)) => {
                 let objective = lesson.objective(&site);
                 self.prioritiser.revise(lesson.learned(), objective);
-                ctx.sample(&model);
                 true
             }
             (_, None) => {
@@ -152,7 +182,7 @@ impl LeadScientist {
                 }
                 false
             }
-            (None, Some(_)) => false,
+            (false, Some(_)) => false,
         }
     }
 
@@ -163,9 +193,11 @@ impl LeadScientist {
         let can = |observation| Cost::of(observation, &self.shared.rover).is_some();
         let kept = ctx.durable::<Kept>();
         kept.loops += u32::from(has_learnt);
-        let difference = kept
-            .wishlist
-            .revise(wishes, (scale, can), &self.shared.own, now);
+        let edition = kept.wishlist.list.edition;
+        let edition = self.shared.next_edition(edition, self.site);
+        let difference =
+            kept.wishlist
+                .revise(wishes, (scale, can), &self.shared.own, (now, edition));
         let made = LoopMade {
             loops: kept.loops,
             readings: self.learner.readings() as u32,
@@ -190,6 +222,9 @@ impl LeadScientist {
         if let Some(timer) = self.timer.take() {
             ctx.cancel(timer);
         }
+        if !self.leads(ctx) {
+            return Ok(());
+        }
         let (now, list) = (ctx.now(), ctx.durable::<Kept>().wishlist.list.clone());
         let windows = &self.shared.settings.windows;
         let is_open = windows.is_open(now);
@@ -197,7 +232,7 @@ impl LeadScientist {
         let lacking: Vec<Party> = lacking.map(|(party, _)| *party).collect();
         for party in lacking
             .iter()
-            .filter(|party| is_open || self.shared.is_at_site(**party))
+            .filter(|party| is_open || self.is_at_home(**party))
         {
             let recipient = ctx.recipient::<GoalList>(&self.shared.names[party])?;
             ctx.send(recipient, list.clone());
@@ -208,6 +243,11 @@ impl LeadScientist {
             self.timer = Some(ctx.timer(next.since(now), ListDue));
         }
         Ok(())
+    }
+
+    /// Whether it is a rover's scientist, too.
+    fn is_of_rover(&self) -> bool {
+        self.site != self.shared.site_of_centre()
     }
 
     fn schedule_own(&self, ctx: &mut Context<'_, Self>) {
@@ -226,6 +266,9 @@ impl Actor for LeadScientist {
         ListDue,
         GoalListHeld,
         GoalsAchieved,
+        OfficeHeld,
+        CommandReport,
+        LessonDue,
     );
 
     fn started(&mut self, ctx: &mut Context<'_, Self>) -> Outcome {
@@ -233,7 +276,10 @@ impl Actor for LeadScientist {
         self.learner.schedule_exchange(ctx);
         ctx.timer(self.shared.survey.loop_every, LoopDue);
         self.schedule_own(ctx);
-        if ctx.incarnation() > 0 {
+        if self.is_of_rover() {
+            ctx.timer(self.shared.site.config.learn_every, LessonDue);
+        }
+        if ctx.incarnation() > 0 || !self.leads(ctx) {
             // What is wished for is made anew when the others have told what was read.
             return self.tell(ctx);
         }
@@ -258,7 +304,7 @@ impl Handler<Statistics> for LeadScientist {
 impl Handler<LoopDue> for LeadScientist {
     fn handle(&mut self, _: LoopDue, ctx: &mut Context<'_, Self>) -> Outcome {
         ctx.timer(self.shared.survey.loop_every, LoopDue);
-        if self.prioritise(ctx) {
+        if self.leads(ctx) && self.prioritise(ctx) {
             self.revise(true, ctx)?;
         }
         Ok(())
@@ -268,6 +314,9 @@ impl Handler<LoopDue> for LeadScientist {
 impl Handler<WishesDue> for LeadScientist {
     fn handle(&mut self, _: WishesDue, ctx: &mut Context<'_, Self>) -> Outcome {
         self.schedule_own(ctx);
+        if !self.leads(ctx) {
+            return Ok(());
+        }
         if self.prioritiser.wishes().goals.is_empty() {
             self.prioritise(ctx);
         }
@@ -283,9 +332,18 @@ impl Handler<ListDue> for LeadScientist {
 }
 
 impl Handler<GoalListHeld> for LeadScientist {
-    fn handle(&mut self, held: GoalListHeld, _: &mut Context<'_, Self>) -> Outcome {
+    fn handle(&mut self, held: GoalListHeld, ctx: &mut Context<'_, Self>) -> Outcome {
         let known = self.held.entry(held.from).or_default();
         *known = held.edition.max(*known);
+        let kept = ctx.durable::<Kept>();
+        if held.edition > kept.wishlist.list.edition && self.leads(ctx) {
+            // Of a list that somebody made who is the centre no more: this one has to be newer.
+            let kept = ctx.durable::<Kept>();
+            kept.wishlist.list.edition = self.shared.next_edition(held.edition, self.site);
+            let list = kept.wishlist.list.clone();
+            ctx.sample(&list);
+            return self.tell(ctx);
+        }
         Ok(())
     }
 }
@@ -293,6 +351,36 @@ impl Handler<GoalListHeld> for LeadScientist {
 impl Handler<GoalsAchieved> for LeadScientist {
     fn handle(&mut self, achieved: GoalsAchieved, ctx: &mut Context<'_, Self>) -> Outcome {
         ctx.durable::<Kept>().wishlist.achieve(&achieved.goals);
+        Ok(())
+    }
+}
+
+impl Handler<OfficeHeld> for LeadScientist {
+    fn handle(&mut self, office: OfficeHeld, ctx: &mut Context<'_, Self>) -> Outcome {
+        let kept = ctx.durable::<Kept>();
+        kept.wishlist.take(office.list);
+        let has_led = std::mem::replace(&mut kept.leads, office.holds);
+        if has_led || !office.holds {
+            return Ok(());
+        }
+        // Whoever had the list of another scientist is told this one.
+        self.held.values_mut().for_each(|held| *held = 0);
+        let has_learnt = self.prioritise(ctx);
+        self.revise(has_learnt, ctx)?;
+        self.tell(ctx)
+    }
+}
+
+impl Handler<CommandReport> for LeadScientist {
+    fn handle(&mut self, report: CommandReport, _: &mut Context<'_, Self>) -> Outcome {
+        self.learner.keep(&report)
+    }
+}
+
+impl Handler<LessonDue> for LeadScientist {
+    fn handle(&mut self, _: LessonDue, ctx: &mut Context<'_, Self>) -> Outcome {
+        self.learn(ctx);
+        ctx.timer(self.shared.site.config.learn_every, LessonDue);
         Ok(())
     }
 }

@@ -10,7 +10,8 @@ use super::config::SurveyConfig;
 use super::execution::ExecutionConfig;
 use super::wishes::OwnWishes;
 use crate::planner::casper::PlannerConfig;
-use crate::shac::{Party, Settings};
+use crate::planner::objective::ObjectiveConfig;
+use crate::shac::Settings;
 use crate::sharing::Names;
 use crate::site::SharedSite;
 
@@ -28,6 +29,8 @@ pub(crate) struct Shared {
     pub(crate) survey: SurveyConfig,
     /// `[planner]`.
     pub(crate) planner: PlannerConfig,
+    /// `[objective]`.
+    pub(crate) objective: ObjectiveConfig,
     /// `[execution]`.
     pub(crate) execution: ExecutionConfig,
     /// Goals of the users' own.
@@ -49,9 +52,45 @@ impl Shared {
         self.settings.candidates[0]
     }
 
-    /// Whether a party is on the host of that scientist.
-    pub(crate) fn is_at_site(&self, party: Party) -> bool {
-        let (Party::Owner(site) | Party::Centre(site)) = party;
-        site == self.site_of_centre()
+    /// The scientist who closes the loop while the centre is at a site.
+    pub(crate) fn lead_at(&self, site: u32) -> &str {
+        match site == self.site_of_centre() {
+            true => SCIENTIST,
+            false => &self.site.rovers[site as usize],
+        }
+    }
+
+    /// The scientist who has made an edition of the goal list.
+    pub(crate) fn author_of(&self, edition: u64) -> &str {
+        let sites = &self.settings.candidates;
+        self.lead_at(sites[(edition % sites.len() as u64) as usize])
+    }
+
+    /// The next edition after one, of the scientist who closes the loop at a site.
+    pub(crate) fn next_edition(&self, edition: u64, site: u32) -> u64 {
+        let sites = self.settings.candidates.len() as u64;
+        edition_after(edition, self.settings.rank(site), sites)
+    }
+}
+
+/// The next edition of the site of a rank: no two sites ever make the same, and its rest tells whose it is.
+fn edition_after(edition: u64, rank: u64, sites: u64) -> u64 {
+    let next = edition + 1;
+    next + (rank + sites - next % sites) % sites
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edition_is_newer_and_of_one_site_only() {
+        for sites in 1..5 {
+            for (rank, edition) in (0..sites).flat_map(|rank| (0..20).map(move |at| (rank, at))) {
+                let next = edition_after(edition, rank, sites);
+                assert!(next > edition && next <= edition + sites);
+                assert_eq!(next % sites, rank);
+            }
+        }
     }
 }

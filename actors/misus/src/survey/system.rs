@@ -4,11 +4,12 @@ use std::sync::PoisonError;
 
 use farside::Report;
 use farside_actors::field::{FieldConfig, Place};
+use farside_actors::figure::Figure;
 use farside_actors::rover::RoverConfig;
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Entries, Invariant, Metric, Removable, Section, Settings, Setup, SetupError,
-    System,
+    Assembly, Builtin, Entries, Invariant, Metric, PictureError, PictureInfo, PictureRequest,
+    Recording, Removable, Section, Settings, Setup, SetupError, System,
 };
 use serde::Deserialize;
 
@@ -17,9 +18,10 @@ use super::config::SurveyConfig;
 use super::execution::ExecutionConfig;
 use super::scenario::SurveyScenario;
 use super::wishes::{CombinationConfig, GoalConfig};
-use super::{builtin, metrics};
+use super::{builtin, metrics, picture};
 use crate::config::{LearnConfig, TeamConfig};
 use crate::planner::casper::PlannerConfig;
+use crate::planner::objective::ObjectiveConfig;
 use crate::scene::MisusScene;
 
 /// MISUS as a whole: rovers that plan, execute, learn and plan again.
@@ -49,6 +51,7 @@ impl System for SurveySystem {
             RoverConfig::sections("rover"),
             LearnConfig::sections("learn"),
             PlannerConfig::sections("planner"),
+            ObjectiveConfig::sections("objective"),
             ExecutionConfig::sections("execution"),
             SurveyConfig::sections("survey"),
             GoalConfig::sections("goal"),
@@ -71,6 +74,10 @@ impl System for SurveySystem {
 
     fn studies(&self) -> &[Builtin] {
         &builtin::STUDIES
+    }
+
+    fn pictures(&self) -> &[PictureInfo] {
+        &picture::ALL
     }
 
     fn parse(
@@ -139,6 +146,7 @@ impl Settings for SurveyScenario {
             let message = "missing: rovers go on sol after sol, so a run needs an end";
             return Err(SetupError::value("until", message));
         };
+        self.check_until(until)?;
         let place = Place::of(&self.world, setup)?;
         let parts = Parts {
             scenario: self,
@@ -167,5 +175,15 @@ impl Settings for SurveyScenario {
         Ok(faults.fold(assembly, |assembly, (index, fault)| {
             assembly.with_planned(format!("rover.fault.{index}"), fault.at)
         }))
+    }
+
+    fn draw(
+        &self,
+        picture: &str,
+        run: &dyn Recording,
+        request: &PictureRequest,
+        setup: &mut Setup<'_>,
+    ) -> Result<Figure, PictureError> {
+        picture::draw(self, picture, run, request, setup)
     }
 }

@@ -20,9 +20,12 @@ pub(super) struct SurveyTally {
     pub(super) centres: BTreeMap<u32, CentreTally>,
     /// All editions of the goal list, in order.
     pub(super) lists: Vec<GoalList>,
-    pub(super) loops: u32,
+    /// By the site of who closed the loop.
+    loops: BTreeMap<u32, u32>,
     /// The goals that were achieved, and how often.
     pub(super) achieved: BTreeMap<GoalKey, u32>,
+    /// The other half of each goal for two rovers, by half.
+    pub(super) partners: BTreeMap<GoalKey, GoalKey>,
     /// The combinations that were achieved as a whole.
     combined: BTreeSet<Vec<GoalKey>>,
     pub(super) score: f64,
@@ -69,6 +72,42 @@ impl SurveyTally {
             rovers: (0..rovers).map(|_| RoverTally::default()).collect(),
             ..SurveyTally::default()
         }
+    }
+
+    /// There is a new list.
+    pub(super) fn listed(&mut self, list: GoalList) {
+        let halves = list
+            .goals
+            .iter()
+            .filter_map(|goal| Some((goal.key, goal.partner?)));
+        self.partners.extend(halves);
+        self.lists.push(list);
+    }
+
+    /// Goals, of those for two rovers one half.
+    fn whole(&self, goals: impl Iterator<Item = GoalKey>) -> BTreeSet<GoalKey> {
+        let first = |goal: GoalKey| {
+            self.partners
+                .get(&goal)
+                .map_or(goal, |other| goal.min(*other))
+        };
+        goals.map(first).collect()
+    }
+
+    /// How many goals were achieved: those for two rovers when both halves were.
+    pub(super) fn goals_achieved(&self) -> u32 {
+        self.whole(self.achieved.keys().copied()).len() as u32 - self.half_goals()
+    }
+
+    /// How many goals for two rovers only one has done.
+    pub(super) fn half_goals(&self) -> u32 {
+        let halves = self
+            .achieved
+            .keys()
+            .filter_map(|goal| self.partners.get(goal));
+        halves
+            .filter(|other| !self.achieved.contains_key(other))
+            .count() as u32
     }
 
     /// The list of an edition.
@@ -185,8 +224,13 @@ impl SurveyTally {
     }
 
     /// The list was looked at again.
-    pub(super) fn looped(&mut self, made: LoopMade) {
-        self.loops = made.loops;
+    pub(super) fn looped(&mut self, site: u32, made: LoopMade) {
+        self.loops.insert(site, made.loops);
+    }
+
+    /// How often the loop was closed.
+    pub(super) fn loops(&self) -> u32 {
+        self.loops.values().sum()
     }
 
     /// A goal that nobody knows of any more: the centre in office has been told of it and has no record of it,
@@ -248,6 +292,6 @@ impl SurveyTally {
     /// All goals that were ever listed.
     pub(super) fn wished(&self) -> BTreeSet<GoalKey> {
         let goals = self.lists.iter().flat_map(|list| &list.goals);
-        goals.map(|goal| goal.key).collect()
+        self.whole(goals.map(|goal| goal.key))
     }
 }

@@ -27,6 +27,8 @@ settings! {
         pub weight: f64 = 1.0, -1e9..=1e9;
         /// Whether it is planned first and never shed.
         pub mandatory: bool;
+        /// How many rovers have to do it at one time: 1 or 2.
+        pub rovers: u32 = 1, 1..=2;
         /// The earliest start.
         pub opens: Option<SimDuration>
             [with = "units::duration::option", skip_serializing_if = "Option::is_none"];
@@ -118,15 +120,28 @@ impl<T> Timed<T> {
     }
 }
 
+/// The number from which on second halves of goals for two rovers are counted.
+const SECOND_HALVES: u32 = 1 << 31;
+
 /// The name of a goal of one's own: that of the observation, if it is one of a rock, so that it is the same goal
-/// as the prioritiser's.
+/// as the prioritiser's. Of a goal for two rovers, the name of its first half.
 pub(super) fn key_of(number: usize, goal: &GoalConfig) -> GoalKey {
     match goal.rock {
-        Some(rock) => GoalKey::Observation(GoalId {
+        Some(rock) if goal.rovers == 1 => GoalKey::Observation(GoalId {
             target: Target::Rock(rock),
             observation: goal.observation,
         }),
-        None => GoalKey::Numbered(number as u32),
+        _ => GoalKey::Numbered(number as u32),
+    }
+}
+
+/// The names of a goal of one's own: one, or one for each half.
+fn keys_of(number: usize, goal: &GoalConfig) -> Vec<GoalKey> {
+    let first = key_of(number, goal);
+    let second = GoalKey::Numbered(SECOND_HALVES + number as u32);
+    match goal.rovers {
+        1 => vec![first],
+        _ => vec![first, second],
     }
 }
 
@@ -137,23 +152,25 @@ impl OwnWishes {
         combinations: &[CombinationConfig],
         place_m: impl Fn(u32) -> Option<[f64; 2]>,
     ) -> OwnWishes {
-        let keys: Vec<GoalKey> = (0..)
+        let keys: Vec<Vec<GoalKey>> = (0..)
             .zip(goals)
-            .map(|(at, goal)| key_of(at, goal))
+            .map(|(at, goal)| keys_of(at, goal))
             .collect();
         let named = |name: &String| {
             let at = goals.iter().position(|goal| goal.name == *name);
-            at.map(|at| keys[at])
+            at.map_or(&[][..], |at| keys[at].as_slice())
         };
         let all = |names: &[String]| {
-            let mut all: Vec<GoalKey> = names.iter().filter_map(named).collect();
+            let mut all: Vec<GoalKey> = names.iter().flat_map(named).copied().collect();
             all.sort_unstable();
             all
         };
         let at = |time: Option<SimDuration>, else_at: SimTime| {
             time.map_or(else_at, |time| SimTime::ZERO + time)
         };
-        let goals = goals.iter().zip(&keys).map(|(goal, &key)| {
+        let halves = goals.iter().zip(&keys);
+        let halves = halves.flat_map(|(goal, keys)| keys.iter().map(move |key| (goal, keys, *key)));
+        let listed = halves.map(|(goal, keys, key)| {
             let window = (goal.opens.is_some() || goal.closes.is_some()).then(|| Window {
                 opens: at(goal.opens, SimTime::ZERO),
                 closes: at(goal.closes, SimTime::MAX),
@@ -168,6 +185,22 @@ impl OwnWishes {
                 mandatory: goal.mandatory,
                 window,
                 requires: all(&goal.requires),
+                partner: keys.iter().find(|other| **other != key).copied(),
+            };
+            match keys.len() {
+                1 => {
+                    let first = (goal.added, goal.weight);
+                    Timed::new(listed, first, &goal.changes, goal.withdrawn)
+                }
+                // Both together are worth what the goal is.
+                _ => Timed::new(listed, (goal.added, 0.0), &[], goal.withdrawn),
+            }
+        });
+        let pairs = goals.iter().zip(&keys).filter(|(_, keys)| keys.len() == 2);
+        let pairs = pairs.map(|(goal, keys)| {
+            let listed = ListedCombination {
+                goals: keys.clone(),
+                weight: goal.weight,
             };
             let first = (goal.added, goal.weight);
             Timed::new(listed, first, &goal.changes, goal.withdrawn)
@@ -181,8 +214,8 @@ impl OwnWishes {
             Timed::new(listed, first, &one.changes, one.withdrawn)
         });
         OwnWishes {
-            goals: goals.collect(),
-            combinations: combinations.collect(),
+            goals: listed.collect(),
+            combinations: pairs.chain(combinations).collect(),
         }
     }
 
@@ -229,6 +262,31 @@ mod tests {
             rock: Some(rock),
             ..GoalConfig::default()
         }
+    }
+
+    #[test]
+    fn both_halves_of_a_goal_for_two_rovers_are_worth_what_it_is() {
+        let joint = GoalConfig {
+            rovers: 2,
+            weight: 7.0,
+            changes: vec![ChangeConfig {
+                at: HOUR,
+                weight: 9.0,
+            }],
+            ..goal("joint", 4)
+        };
+        let wishes = OwnWishes::new(&[goal("one", 1), joint], &[], |_| Some([0.0; 2]));
+        let goals: Vec<ListedGoal> = wishes.goals(SimTime::ZERO).collect();
+        assert_eq!(goals.len(), 3);
+        assert_eq!(goals[1].partner, Some(goals[2].key));
+        assert_eq!(goals[2].partner, Some(goals[1].key));
+        assert_eq!([goals[1].weight, goals[2].weight], [0.0; 2]);
+        let worth = |now| {
+            let mut combinations = wishes.combinations(now);
+            combinations.next().map(|one| one.weight)
+        };
+        assert_eq!(worth(SimTime::ZERO), Some(7.0));
+        assert_eq!(worth(SimTime::ZERO + HOUR), Some(9.0));
     }
 
     #[test]

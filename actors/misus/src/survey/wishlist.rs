@@ -37,13 +37,14 @@ impl Wishlist {
     }
 
     /// Wishes anew: what the prioritiser wishes for, with its weights times `scale`, as far as rovers can do
-    /// it, and what is of one's own, which goes before. There is a new edition if anything differs.
+    /// it, and what is of one's own, which goes before. There is a new edition, with the number that is given, if
+    /// anything differs.
     pub(super) fn revise(
         &mut self,
         wishes: &Wishes,
         (scale, can): (f64, impl Fn(Observation) -> bool),
         own: &OwnWishes,
-        now: SimTime,
+        (now, edition): (SimTime, u64),
     ) -> Option<Difference> {
         let mut goals: BTreeMap<GoalKey, ListedGoal> = BTreeMap::new();
         for (&id, goal) in wishes.goals.iter().filter(|(id, _)| can(id.observation)) {
@@ -74,13 +75,22 @@ impl Wishlist {
         combinations.retain(|keys, _| keys.iter().all(|key| goals.contains_key(key)));
         let combinations = combinations.into_iter();
         let combinations = combinations.map(|(goals, weight)| ListedCombination { goals, weight });
-        self.replace(goals.into_values().collect(), combinations.collect())
+        let (goals, combinations) = (goals.into_values().collect(), combinations.collect());
+        self.replace(goals, combinations, edition)
+    }
+
+    /// Takes over a list that somebody else has made, if it is newer.
+    pub(super) fn take(&mut self, list: GoalList) {
+        if list.edition > self.list.edition {
+            self.list = list;
+        }
     }
 
     fn replace(
         &mut self,
         goals: Vec<ListedGoal>,
         combinations: Vec<ListedCombination>,
+        edition: u64,
     ) -> Option<Difference> {
         let before: BTreeMap<GoalKey, &ListedGoal> = self
             .list
@@ -105,7 +115,7 @@ impl Wishlist {
             return None;
         }
         self.list = GoalList {
-            edition: self.list.edition + 1,
+            edition,
             goals,
             combinations,
         };
@@ -127,6 +137,7 @@ fn listed(id: GoalId, position_m: [f64; 2], weight: f64) -> ListedGoal {
         mandatory: false,
         window: None,
         requires: Vec::new(),
+        partner: None,
     }
 }
 
@@ -164,19 +175,19 @@ mod tests {
         let (own, now) = (OwnWishes::default(), SimTime::ZERO);
         let mut list = Wishlist::default();
         let first = list
-            .revise(&wishes(&[3, 5], 2.0), (10.0, |_| true), &own, now)
+            .revise(&wishes(&[3, 5], 2.0), (10.0, |_| true), &own, (now, 1))
             .unwrap();
         assert_eq!((first.added, list.list.edition), (4, 1));
         assert_eq!(list.list.combinations[0].weight, 10.0 * 1.25 * 4.0);
         assert_eq!(
-            list.revise(&wishes(&[3, 5], 2.0), (10.0, |_| true), &own, now),
+            list.revise(&wishes(&[3, 5], 2.0), (10.0, |_| true), &own, (now, 1)),
             None
         );
 
         let image = list.list.goals[0].key;
         list.achieve(&[image]);
         let later = list
-            .revise(&wishes(&[5, 8], 1.0), (10.0, |_| true), &own, now)
+            .revise(&wishes(&[5, 8], 1.0), (10.0, |_| true), &own, (now, 2))
             .unwrap();
         assert_eq!((later.added, later.changed, later.withdrawn), (2, 2, 1));
         assert_eq!(list.list.goals[0].key, image);

@@ -246,6 +246,49 @@ fn after_a_crash_a_rover_asks_what_runs_and_goes_on() {
 }
 
 #[test]
+fn actions_of_a_chain_do_not_start_together() {
+    let ran = run("", 6, &[]);
+    let mut under = None;
+    let (mut drives, mut observed) = (0, 0);
+    for (at, _, entry) in &ran.diary {
+        match entry {
+            Entry::Began(began) => {
+                assert_eq!(under, None, "{at}\n{}", told(&ran.diary, ""));
+                under = Some(began.planned.activity);
+            }
+            Entry::Ended(ended) if under == Some(ended.planned.activity) => {
+                under = None;
+                let activity = ended.planned.activity;
+                drives += u32::from(matches!(activity, Activity::Drive(_)));
+                observed += u32::from(matches!(activity, Activity::Goal(_)));
+            }
+            _ => {}
+        }
+    }
+    assert!(drives >= 2 && observed >= 4, "{}", told(&ran.diary, ""));
+}
+
+#[test]
+fn a_mandatory_goal_that_a_plan_has_no_room_for_is_explained() {
+    // It is wished for only when it is too late for what it takes.
+    let more = "[[goal]]\nname = 'late'\nobservation = 'point-spectrum'\nrock = 5\nadded = '2h'\n\
+        closes = '3h'\nmandatory = true\n[[rover.fault]]\nat = '1h'\nkind = 'instrument-fails'\n\
+        part = 'mini_tes'\n";
+    let ran = run(more, 5, &[]);
+    let plans = ran.diary.iter().filter_map(|(_, _, entry)| match entry {
+        Entry::Plan(plan) => Some(plan),
+        _ => None,
+    });
+    let unmet = plans.flat_map(|plan| &plan.unmet);
+    let reasons: Vec<Reason> = unmet.map(|one| one.reason).collect();
+    assert!(
+        reasons.contains(&Reason::Time),
+        "{reasons:?}\n{}",
+        told(&ran.diary, "")
+    );
+}
+
+#[test]
 fn windows_of_goals_are_obeyed_and_mandatory_goals_come_first() {
     let more = "[[goal]]\nname = 'late'\nobservation = 'point-image'\nrock = 5\nopens = '4h'\ncloses = '5h'\n\
         mandatory = true\n";

@@ -2,6 +2,7 @@
 //! is said by key.
 
 mod exported;
+mod gaps;
 mod joint;
 mod links;
 mod refusals;

@@ -68,6 +68,51 @@ fn a_goal_of_a_silent_rover_is_owned_again_within_lease_and_guard_and_two_contac
     ));
 }
 
+/// What a rover is given when nobody has heard it for hours comes back with all else that it has, and when that is
+/// too soon for it, it gets nothing.
+#[test]
+fn a_rover_that_is_silent_has_no_goal_for_longer_than_a_lease_after_it_was_heard() {
+    let settings = settings("lease");
+    let (lease, guard) = (settings.protocol.lease.unwrap(), settings.guard);
+    let mut team = owned(settings);
+    team.pass(MINUTE * 30);
+    team.silent = vec![0];
+    let heard = team.centre.heard(0).unwrap();
+    team.pass(MINUTE * 300);
+    team.centre(|centre, now| centre.add(now, goal(8)));
+    team.centre(|centre, now| centre.assign(now, key(8), &[0]));
+    team.pass(MINUTE * 25);
+    team.centre(|centre, now| centre.add(now, goal(9)));
+    let vacancies = team.centre.vacancies(team.now);
+    assert_eq!(vacancies.len(), 1);
+    assert_eq!(vacancies[0].candidates, [0, 1, 2]);
+    while team.now + MINUTE * 10 + guard <= heard + lease {
+        team.pass(MINUTE);
+    }
+    let candidates = |team: &Team| {
+        let vacancies = team.centre.vacancies(team.now);
+        let of = |number| {
+            let vacancy = vacancies.iter().find(|one| one.goal == key(number));
+            vacancy.map(|one| one.candidates.clone())
+        };
+        [of(7), of(8), of(9)]
+    };
+    // The lease of the first was given before it was last heard.
+    assert_eq!(
+        candidates(&team),
+        [Some(vec![1, 2]), None, Some(vec![1, 2])]
+    );
+    while team.now < heard + lease + guard {
+        team.pass(MINUTE);
+    }
+    let others = Some(vec![1, 2]);
+    assert_eq!(candidates(&team), [others.clone(), others.clone(), others]);
+    // Heard again, it gets what it has not lost.
+    team.silent.clear();
+    team.pass(MINUTE * 20);
+    assert_eq!(candidates(&team)[2], Some(vec![0, 1, 2]));
+}
+
 #[test]
 fn without_leases_a_goal_of_a_silent_rover_stays_its_own() {
     let mut team = owned(settings("assign-and-release"));

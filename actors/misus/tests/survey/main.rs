@@ -5,6 +5,10 @@
 #[allow(dead_code, reason = "examples use the rest")]
 mod survey;
 
+mod elections;
 mod loops;
+mod meetings;
 mod own_goals;
+mod pictures;
+mod random;
 mod refusals;

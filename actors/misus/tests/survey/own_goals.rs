@@ -57,3 +57,28 @@ fn goals_are_added_changed_and_withdrawn() {
         4.0 + ran.figure("goals_achieved") - 1.0
     );
 }
+
+#[test]
+fn what_a_drive_costs_by_the_users_objective_is_weighed_against_what_it_is_for() {
+    let goals = r#"
+        until = "0.4sol"
+        survey = { rocks = 0, squares = 0 }
+        team.rovers = 1
+        goal = [
+            { name = "near", observation = "panoramic-image", east_m = 3.0, weight = 10.0 },
+            { name = "far", observation = "panoramic-image", east_m = -25.0, weight = 10.0 },
+        ]
+    "#;
+    let achieved = |objective: &str| {
+        let text = format!("{goals}\n{objective}");
+        let run = Run {
+            text: &text,
+            ..Run::default()
+        };
+        let ran = run.run();
+        ran.assert_sound(objective);
+        ran.figure("goals_achieved")
+    };
+    assert_eq!(achieved(""), 2.0);
+    assert_eq!(achieved("objective.drive_per_m = 1.0"), 1.0);
+}

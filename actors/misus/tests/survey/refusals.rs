@@ -91,6 +91,70 @@ fn mandatory_goals_that_do_not_fit_are_explained() {
 }
 
 #[test]
+fn mandatory_goals_for_which_there_is_too_little_of_anything_are_explained() {
+    check(
+        "goal = [{ name = 'far', east_m = 39.0, mandatory = true, closes = '30min' }]",
+        "goal.0.mandatory: mandatory goal \"far\" cannot be met for want of time: the drive takes",
+    );
+    check(
+        "rover = { array_efficiency = 0, charge = 0.45 }\n\
+         goal = [{ name = 'a', rock = 1 }, { name = 'b', rock = 2, mandatory = true, closes = '8h' }]",
+        "goal.1.mandatory: mandatory goals cannot all be met: b take 26400 J beyond what rovers' bodies take between \
+         0s and 28800s, where 3 rovers have 0 J above their reserve",
+    );
+    check(
+        "rover.memory = '20kB'\nexecution.communication = '0s'\n\
+         goal = [{ name = 'b', rock = 2, mandatory = true, closes = '8h' }]",
+        "goal.0.mandatory: mandatory goals cannot all be met: b store 2000000 bit between 0s and 28800s, where 3 \
+         rovers can store and send home 480000 bit",
+    );
+    // One without a window has the whole run.
+    check(
+        "until = '25min'\ngoal = [{ name = 'far', east_m = 39.0, mandatory = true }]",
+        "goal.0.mandatory: mandatory goal \"far\" cannot be met for want of time",
+    );
+}
+
+#[test]
+fn goals_for_two_rovers_that_cannot_be_are_named() {
+    let goal = |more: &str| {
+        format!(
+            "goal = [{{ name = 'a', rock = 1 }}, {{ name = 'meet', east_m = 1.0, rovers = 2{more} }}]"
+        )
+    };
+    check(
+        &format!("team.rovers = 1\n{}", goal("")),
+        "goal.1.rovers: goal \"meet\" needs 2 rovers, and there is 1",
+    );
+    check(
+        &goal(", mandatory = true"),
+        "goal.1.mandatory: goal \"meet\" needs 2 rovers, and neither",
+    );
+    check(
+        &goal(", requires = ['a']"),
+        "goal.1.requires: goal \"meet\" needs 2 rovers",
+    );
+    check(
+        &format!("survey.protocol = 'market'\n{}", goal("")),
+        "goal.1.rovers: goal \"meet\" needs 2 rovers, whom the centre's planner appoints",
+    );
+    check(
+        "goal = [{ name = 'a', rock = 1, rovers = 3 }]",
+        "goal.0.rovers: 3: expected 1 to 2",
+    );
+}
+
+#[test]
+fn a_planner_of_the_whole_team_and_an_objective_that_is_none_are_refused() {
+    check(
+        "planner.choice = 'lns'",
+        "planner.choice: \"lns\" plans for all rovers at once with all batteries and memories known",
+    );
+    check("objective.drive_per_m = nan", "objective.drive_per_m: NaN");
+    check("objective.drive = 1.0", "unknown field `drive`");
+}
+
+#[test]
 fn a_centre_windows_and_protocols_that_cannot_be_are_named() {
     check(
         "survey.central = 'rover_04'",

@@ -7,7 +7,7 @@ use crate::report::measure::{Measure, Study};
 use crate::report::numbers::Style;
 use crate::stats::Estimate;
 use crate::study::summary::CellSummary;
-use crate::study::summary::series::{SeriesDifference, SeriesSummary};
+use crate::study::summary::series::{SeriesDifference, SeriesPoint, SeriesSummary};
 use farside_actors::figure::numbers::plain;
 
 /// The most cells of which a sentence is said; the table has all.
@@ -61,15 +61,19 @@ fn sentence(measure: &Measure<'_>, difference: &SeriesDifference) -> String {
     }
 }
 
-/// What a cell of the table of all cells says of a curve.
-pub(super) fn in_short(
-    study: &Study<'_>,
-    measure: &Measure<'_>,
-    cell: &CellSummary,
-    series: &SeriesSummary,
-) -> Markup {
+/// The last index at which any run has a value.
+fn last(series: &SeriesSummary) -> Option<&SeriesPoint> {
+    series.points.iter().rfind(|point| point.n > 0)
+}
+
+/// What a cell of the table of all cells says of a curve: where it ends, and from where on it differs.
+pub(super) fn in_short(measure: &Measure<'_>, series: &SeriesSummary) -> Markup {
     let difference = series.difference.as_ref();
     html! {
+        @if let Some(last) = last(series) {
+            (measure.style.value(&last.estimate()))
+            small { "at " (measure.index_told(last.index)) }
+        }
         @match difference.map(|one| (one.holds_from, one.is_more)) {
             Some((Some(from), Some(is_more))) => {
                 small class="sure" {
@@ -77,15 +81,14 @@ pub(super) fn in_short(
                 }
             }
             Some(_) => { small { "no lasting difference" } }
-            None if study.baseline() == Some(cell.cell) => { small { "curve" } }
-            None => { "–" }
+            None => {}
         }
     }
 }
 
 /// A cell's fields of the metric's table: the last index, and from where on it differs.
 pub(super) fn fields(measure: &Measure<'_>, series: &SeriesSummary) -> Markup {
-    let last = series.points.iter().rfind(|point| point.n > 0);
+    let last = last(series);
     let difference = series.difference.as_ref();
     let points = difference.map_or(&[][..], |one| &one.points);
     let at_last = points

@@ -27,8 +27,8 @@ pub(super) fn overview(study: &Study<'_>, measures: &[Measure<'_>]) -> Markup {
                          differences whose interval leaves out 0: of twenty that are none, about \
                          one is marked. Differences of rates are in percentage points (pp)."
                         @if shown.iter().any(|measure| measure.kind == ValueKind::Series) {
-                            " Of curves it is said from which index on they differ, if they do at \
-                             the last."
+                            " Of curves there is the mean at the last index, and from which one \
+                             on they differ, if they do at the last."
                         }
                     } @else { "." }
                     @if has_partial(study, &shown) {
@@ -87,7 +87,7 @@ fn overview_field(study: &Study<'_>, measure: &Measure<'_>, cell: &CellSummary) 
         };
     }
     if let Some(series) = measure.series(cell) {
-        return html! { td { (super::series::in_short(study, measure, cell, series)) } };
+        return html! { td { (super::series::in_short(measure, series)) } };
     }
     let Some(estimate) = measure.estimate(cell) else {
         return html! { td { "–" } };

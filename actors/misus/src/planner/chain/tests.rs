@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::planner::objective::ObjectiveConfig;
 use crate::planner::problem::{Activity, FORMAT, Goal, Problem, Rover, Sol};
 
 const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
@@ -77,6 +78,7 @@ fn problems() -> impl Strategy<Value = Problem> {
                         .map(|(n, (at, numbers, window))| goal(n, at, numbers, window))
                         .collect(),
                     combinations: Vec::new(),
+                    objective: ObjectiveConfig::default(),
                     activities: activities
                         .map(|(number, (opens, duration_ms, power_mw, sends_bits))| {
                             let base_ms = (number % sols) as i64 * 7_000;
@@ -230,6 +232,7 @@ fn what_a_goal_requires_comes_before_it() {
             .collect(),
         combinations: Vec::new(),
         activities: Vec::new(),
+        objective: ObjectiveConfig::default(),
     };
     problem.goals[0].requires = vec!["c".to_owned()];
     let instance = Instance::new(&problem).unwrap();

@@ -115,12 +115,11 @@ impl Manner<'_> {
                 (task.rovers > 1, task.duration_ms)
             };
             // Where two rovers could meet is looked for when they are to.
-            let cost_ms = match state.best_fit(goal) {
-                Some((_, fit)) => fit.cost_ms,
-                None if joint => 2 * duration_ms,
+            let (cost_ms, gain) = match state.best_fit(goal) {
+                Some((rover, fit)) => (fit.cost_ms, state.gain(instance, goal, rover, &fit)),
+                None if joint => (2 * duration_ms, state.objective.gain(goal)),
                 None => continue,
             };
-            let gain = state.objective.gain(goal);
             let worth = gain + self.part * state.objective.promise(goal);
             enter(worth, cost_ms, Candidate::One(goal));
             if !self.pairs || joint {
@@ -130,10 +129,10 @@ impl Manner<'_> {
                 if other < goal || state.has(other) || tried[other] {
                     continue;
                 }
-                if let Some((_, fit)) = state.best_fit(other) {
+                if let Some((rover, fit)) = state.best_fit(other) {
                     state.operations += 1;
                     state.objective.set(goal, true);
-                    let worth = gain + state.objective.gain(other);
+                    let worth = gain + state.gain(instance, other, rover, &fit);
                     state.objective.set(goal, false);
                     enter(worth, cost_ms + fit.cost_ms, Candidate::Pair(goal, other));
                 }
@@ -224,7 +223,7 @@ fn drop_losses(instance: &Instance, state: &mut State) {
         if state.has(goal)
             && alone
             && !instance.task(goal).mandatory
-            && state.objective.gain(goal) < 0.0
+            && state.objective.gain(goal) < instance.costs().of_goal(goal)
         {
             state.remove(instance, goal);
         }

@@ -69,9 +69,20 @@ impl State {
     }
 
     /// What the plan is worth: by so little less, the more is driven, that it decides between equals only.
-    pub(super) fn value(&self) -> f64 {
+    pub(super) fn value(&self, instance: &Instance) -> f64 {
         let drive_ms: i64 = self.chains.iter().map(Chain::drive_ms).sum();
-        self.objective.score() - drive_ms as f64 * 1e-9
+        let costs = self
+            .chains
+            .iter()
+            .map(|chain| instance.costs().of_plan(instance, chain));
+        self.objective.score() - costs.sum::<f64>() - drive_ms as f64 * 1e-9
+    }
+
+    /// What is gained by a goal of a rover that takes so long, drive and all, by the objective \[ms\].
+    pub(super) fn gain(&self, instance: &Instance, goal: usize, rover: usize, fit: &Fit) -> f64 {
+        let costs = instance.costs();
+        let drive_ms = fit.cost_ms - instance.task(goal).duration_ms;
+        self.objective.gain(goal) - costs.of_goal(goal) - costs.of_drive(rover, drive_ms)
     }
 
     pub(super) fn has(&self, goal: usize) -> bool {

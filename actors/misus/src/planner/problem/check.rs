@@ -117,6 +117,14 @@ pub(super) fn resolve(problem: &Problem) -> Result<Resolved, ProblemError> {
     let what = || format!("problem {:?}", problem.name);
     number(what(), "side_m", problem.side_m)?;
     within(what(), "side_m", problem.side_m, 1.0, 1e6)?;
+    for (key, value) in [
+        ("drive_per_m", problem.objective.drive_per_m),
+        ("energy_per_kj", problem.objective.energy_per_kj),
+        ("busy_per_h", problem.objective.busy_per_h),
+    ] {
+        number(what(), key, value)?;
+        within(what(), key, value, 0.0, 1e6)?;
+    }
     for (key, count) in [
         ("rovers", problem.rovers.len()),
         ("goals", problem.goals.len()),

@@ -4,6 +4,8 @@ use farside::SimDuration;
 use farside::random::{RandomKey, Stream};
 use farside_actors::system::settings::Table;
 
+use crate::planner::objective::ObjectiveConfig;
+
 use super::{
     Activity, Combination, FORMAT, Goal, Kind, Problem, ProblemConfig, ProblemError, Rover, Sol,
 };
@@ -41,6 +43,7 @@ pub fn generate(config: &ProblemConfig, seed: u64) -> Result<Problem, ProblemErr
         goals: Vec::new(),
         combinations: Vec::new(),
         activities: Vec::new(),
+        objective: ObjectiveConfig::default(),
     };
     for number in 0..config.rovers {
         let stream = key.text("rover").number(u64::from(number)).stream();

@@ -4,6 +4,7 @@ use farside::encoding::{DecodeError, Schema, SchemaError};
 use farside::record::RecordClass;
 use farside_actors::system::{PictureError, Recording};
 
+use crate::chart::nothing;
 use crate::planning::messages::{CentralRound, PlanSettled, PlannerStep};
 use crate::planning::monitor::Tally;
 use crate::planning::shared::CENTRE;
@@ -66,13 +67,7 @@ impl History {
             Ok(())
         })?;
         if history.steps.iter().all(Vec::is_empty) {
-            let excluded = match run.excluded() {
-                [] => String::new(),
-                left_out => format!("; left out of it were {}", left_out.join(", ")),
-            };
-            return Err(PictureError::NotDrawn(format!(
-                "it holds no steps of planners: expected samples of PlannerStep{excluded}"
-            )));
+            return Err(nothing(run, "no steps of planners", "PlannerStep"));
         }
         history.end_ns = ending.time_ns.unwrap_or(history.end_ns);
         Ok(history)

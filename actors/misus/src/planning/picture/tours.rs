@@ -7,6 +7,7 @@ use maud::{Markup, html};
 
 use super::history::History;
 use super::title;
+use crate::chart::marks::Shape;
 use crate::planner::problem::Kind;
 use crate::planning::messages::PlannedStop;
 use crate::planning::metrics::{achieved, recorded};
@@ -80,12 +81,7 @@ impl Map<'_> {
     /// Where a goal is drawn: those of one rock that are made from one place beside each other.
     fn spot(&self, goal: usize) -> (f64, f64) {
         let goal = &self.shared.problem.goals[goal];
-        let (x, y) = self.px(goal.position_m);
-        match goal.kind {
-            Some(Kind::CloseUpImage) => (x - 4.5, y),
-            Some(Kind::CloseUpSpectrum) => (x + 4.5, y),
-            _ => (x, y),
-        }
+        shape(goal.kind).beside(self.px(goal.position_m))
     }
 
     /// The goals of a rover's plan, with the sol.
@@ -134,7 +130,7 @@ impl Map<'_> {
                     None => ("spot open", "nobody"),
                 };
                 g class={ "s" (rover.unwrap_or(0) % COLOURS) } {
-                    path class=(class) d=(shape(goal.kind, at)) {
+                    path class=(class) d=(shape(goal.kind).outline(at)) {
                         title { (goal.name) ", worth " (goal.weight) ": " (who) }
                     }
                 }
@@ -169,7 +165,7 @@ impl Map<'_> {
         };
         let mark = |class: &str, kind| {
             html! {
-                g class="lost" { path class=(class) d=(shape(kind, (x + 13.0, 0.0))) {} }
+                g class="lost" { path class=(class) d=(shape(kind).outline((x + 13.0, 0.0))) {} }
             }
         };
         let mut rows: Vec<(Markup, String)> = Vec::new();
@@ -211,12 +207,11 @@ impl Map<'_> {
     }
 }
 
-/// The outline of a goal's mark: a triangle from afar, a square and a diamond from near.
-fn shape(kind: Option<Kind>, (x, y): (f64, f64)) -> String {
-    let points: &[(f64, f64)] = match kind {
-        Some(Kind::CloseUpImage) => &[(-3.6, -3.6), (3.6, -3.6), (3.6, 3.6), (-3.6, 3.6)],
-        Some(Kind::CloseUpSpectrum) => &[(0.0, -5.0), (5.0, 0.0), (0.0, 5.0), (-5.0, 0.0)],
-        _ => &[(0.0, -5.0), (4.6, 3.6), (-4.6, 3.6)],
-    };
-    format!("{}Z", path(points.iter().map(|(dx, dy)| (x + dx, y + dy))))
+/// The shape of the mark of a goal.
+fn shape(kind: Option<Kind>) -> Shape {
+    match kind {
+        Some(Kind::CloseUpImage) => Shape::Image,
+        Some(Kind::CloseUpSpectrum) => Shape::Spectrum,
+        _ => Shape::Afar,
+    }
 }

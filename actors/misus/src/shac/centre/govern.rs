@@ -17,7 +17,8 @@ pub struct Vacancy {
     pub goal: GoalKey,
     /// The other half of a joint goal.
     pub partner: Option<GoalKey>,
-    /// The rovers that do not refuse it, ascending. A joint goal has at least two.
+    /// The rovers that do not refuse it and whose lease would be long enough, ascending. A joint goal has at least
+    /// two.
     pub candidates: Vec<u32>,
 }
 
@@ -90,7 +91,14 @@ impl Centre {
                 Some(other)
             }
         };
-        let candidates = self.candidates(now, record, other);
+        let mut candidates = self.candidates(now, record, other);
+        let halves = [Some(record), other];
+        let durations = halves
+            .iter()
+            .flatten()
+            .map(|half| half.wish.goal.parameters.duration);
+        let lasts = durations.max().unwrap_or_default() + self.settings.guard;
+        candidates.retain(|&rover| self.lease_end(now, rover) >= now.saturating_add(lasts));
         let vacancy = Vacancy {
             goal,
             partner,
@@ -103,6 +111,23 @@ impl Centre {
         record.standing(&self.durable.outcomes) == Standing::Pooled
     }
 
+    /// The end of a lease that a rover gets now. Of who has been silent for a quarter of a lease, it counts from
+    /// The end of a lease that a rover gets now. Of who has been silent for a quarter of a lease, it counts from
+    /// when it was last heard: all goals of a rover that is lost are back after a lease and a quarter, whenever it
+    /// got them, and it gets no others when that is too soon for them.
+    fn lease_end(&self, now: SimTime, rover: u32) -> SimTime {
+        let heard = self.rovers[rover as usize].heard.unwrap_or(self.started);
+        let is_silent = self.settings.protocol.lease.is_some_and(|lease| {
+            now.since(heard) > farside::SimDuration::from_nanos(lease.as_nanos() / 4)
+        });
+        let from = match is_silent {
+            true => heard,
+            false => now,
+        };
+        self.settings.lease_end(from)
+    }
+
+    /// The rovers that do not refuse a goal, or either half of a joint goal.
     fn candidates(
         &self,
         now: SimTime,
@@ -199,7 +224,9 @@ impl Centre {
             term: self.durable.office.term,
             epoch: epoch.unwrap_or(0) + 1,
         };
-        let lease_end = self.settings.lease_end(now);
+        // Those who do a goal together have it for equally long, or one would be left alone.
+        let lease_ends = rovers.iter().map(|&rover| self.lease_end(now, rover));
+        let lease_end = lease_ends.min().unwrap_or(now);
         self.auctions.remove(&vacancy.goal);
         for (mut record, &rover) in records.into_iter().zip(rovers) {
             record.grant = grant;

@@ -247,7 +247,7 @@ impl Explorer {
         let sol = self.log.sol;
         self.log.given_up.insert(goal, (reason, sol));
         self.desk.refuses.insert(goal, reason);
-        if let Err(OwnerError::Started { .. }) =
+        if let Err(OwnerError::Started { .. } | OwnerError::Bound { .. }) =
             self.seat.decide(RoverMove::Release(goal, reason), ctx)?
         {
             // What is neither held nor started is gone already.

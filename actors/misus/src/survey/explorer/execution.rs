@@ -5,8 +5,9 @@ use farside_actors::rover::{Command, RoverState};
 use farside_worlds::sky::SOL_S;
 
 use super::conduct::{Drive, Look, Next};
-use super::goals::{goal_of, observation};
+use super::goals::goal_of;
 use super::logbook::{Conduct, Under};
+use super::meeting::Wait;
 use super::{ActivityDue, Explorer, bits, planned, time};
 use crate::analysis::goals::Observation;
 use crate::shac::{GoalKey, OwnerError, Reason};
@@ -51,6 +52,16 @@ impl Explorer {
             let is_optional = goal_of(piece.activity).is_some();
             if is_optional && self.must_rest() {
                 return self.rest(ctx);
+            }
+            if let Activity::Goal(goal) = piece.activity {
+                match self.wait_for_partner(ctx, goal)? {
+                    Wait::No => {}
+                    Wait::Over => continue,
+                    Wait::Until(at) => {
+                        self.wake_at(ctx, at);
+                        return Ok(());
+                    }
+                }
             }
             self.log.ahead.remove(next);
             self.begin(ctx, piece)?;
@@ -263,7 +274,7 @@ impl Explorer {
             Activity::Goal(goal) | Activity::Drive(goal) => goal,
             Activity::Communication(_) | Activity::Sleep => return Conduct::Single,
         };
-        let (observation, rock) = (observation(goal), self.rock(goal));
+        let (observation, rock) = (self.desk.observation(goal), self.rock(goal));
         match piece.activity {
             Activity::Goal(_) => {
                 let is_point = matches!(

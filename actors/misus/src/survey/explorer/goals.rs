@@ -11,8 +11,8 @@ use crate::planner::problem::ProblemError;
 use crate::shac::{GoalKey, Holding, Owner, OwnerError, Parameters, Reason, SharedGoal};
 use crate::sharing::{RoverMind, RoverMove};
 use crate::survey::costs::Cost;
-use crate::survey::messages::{Activity, ListedGoal, ReplanCause};
-use crate::survey::outlook::{OwnGoal, Worth};
+use crate::survey::messages::{Activity, GoalList, ListedGoal, ReplanCause};
+use crate::survey::outlook::{OwnGoal, WAITS, Worth};
 use crate::survey::shared::Shared;
 
 /// The share of rocks for which a rover expects to look round before it has seen any, and how fast it learns
@@ -29,6 +29,8 @@ pub(super) struct Desk {
     pub(super) refuses: BTreeMap<GoalKey, Reason>,
     /// What goals that are called out would add to the score; none for those that do not fit.
     pub(super) bids: BTreeMap<GoalKey, Option<f64>>,
+    /// What is done for goals that have no name of the analysis, as the list says.
+    pub(super) observations: BTreeMap<GoalKey, Observation>,
 }
 
 impl Desk {
@@ -38,16 +40,35 @@ impl Desk {
             moves: VecDeque::new(),
             refuses: BTreeMap::new(),
             bids: BTreeMap::new(),
+            observations: BTreeMap::new(),
         }
     }
 
     /// Why a goal cannot be this rover's; None if it can.
-    fn refuses(&self, goal: GoalKey, partner: Option<GoalKey>) -> Option<Reason> {
-        let able = Cost::of(observation(goal), &self.shared.rover).is_some();
-        match able && partner.is_none() {
-            true => self.refuses.get(&goal).copied(),
-            false => Some(Reason::Hardware),
+    fn refuses(&self, goal: GoalKey) -> Option<Reason> {
+        match Cost::of(self.observation(goal), &self.shared.rover) {
+            Some(_) => self.refuses.get(&goal).copied(),
+            None => Some(Reason::Hardware),
         }
+    }
+
+    /// What is done for a goal. What the list has not yet and has no name of the analysis is taken for an image
+    /// of what is around.
+    pub(super) fn observation(&self, goal: GoalKey) -> Observation {
+        match goal {
+            GoalKey::Observation(id) => id.observation,
+            GoalKey::Numbered(_) => {
+                let listed = self.observations.get(&goal);
+                listed.copied().unwrap_or(Observation::PanoramicImage)
+            }
+        }
+    }
+
+    /// Learns what is done for which goal.
+    pub(super) fn read(&mut self, list: &GoalList) {
+        let goals = list.goals.iter();
+        let numbered = goals.filter(|goal| matches!(goal.key, GoalKey::Numbered(_)));
+        self.observations = numbered.map(|goal| (goal.key, goal.observation)).collect();
     }
 }
 
@@ -63,8 +84,8 @@ impl RoverMind for Desk {
             return Some(next);
         }
         if let Some(offer) = owner.offers().next() {
-            let (key, partner) = (offer.goal.key, offer.goal.partner);
-            return Some(match self.refuses(key, partner) {
+            let key = offer.goal.key;
+            return Some(match self.refuses(key) {
                 Some(reason) => RoverMove::Refuse(key, reason),
                 None => RoverMove::Accept(key),
             });
@@ -79,14 +100,6 @@ impl RoverMind for Desk {
 
     fn wake(&self) -> SimTime {
         SimTime::MAX
-    }
-}
-
-/// What is done for a goal. Goals without a name of the analysis are images of what is around.
-pub(super) fn observation(goal: GoalKey) -> Observation {
-    match goal {
-        GoalKey::Observation(id) => id.observation,
-        GoalKey::Numbered(_) => Observation::PanoramicImage,
     }
 }
 
@@ -116,7 +129,7 @@ impl Explorer {
             self.forget(&lost, ctx)?;
             self.plan_anew(ReplanCause::Goals);
         }
-        if self.is_news(&now) {
+        if self.is_news(&self.plannable_keys()) {
             self.plan_anew(ReplanCause::Goals);
         }
         if self.others_changed() {
@@ -136,6 +149,17 @@ impl Explorer {
 
     pub(super) fn held_keys(&self) -> BTreeSet<GoalKey> {
         self.holdings().map(|holding| holding.goal.key).collect()
+    }
+
+    /// Whether a goal may be planned: half of one for two rovers only when another rover is bound to the other
+    /// half.
+    fn is_plannable(holding: &Holding) -> bool {
+        holding.goal.partner.is_none() || holding.confirmed
+    }
+
+    fn plannable_keys(&self) -> BTreeSet<GoalKey> {
+        let plannable = self.holdings().filter(|one| Self::is_plannable(one));
+        plannable.map(|holding| holding.goal.key).collect()
     }
 
     /// Goals that run or are ahead.
@@ -181,7 +205,9 @@ impl Explorer {
                 held.any(|held| held.goal == *goal && held.state.is_open())
             });
             let mut done = durable.outcomes.of(*goal);
-            is_held || done.any(|outcome| outcome.rover != self.number)
+            let mut own = self.holdings();
+            let is_bound = own.any(|own| own.goal.partner == Some(*goal) && own.confirmed);
+            is_held || is_bound || done.any(|outcome| outcome.rover != self.number)
         };
         self.combined().into_iter().filter(is_open).collect()
     }
@@ -211,8 +237,17 @@ impl Explorer {
 
     /// The goals that may be planned.
     pub(super) fn own_goals(&self) -> Vec<OwnGoal> {
-        let goals = self.holdings().map(|holding| &holding.goal);
-        let goals = goals.filter_map(|goal| self.own_goal(goal.key, &goal.parameters));
+        let goals = self.holdings().filter(|one| Self::is_plannable(one));
+        let goals = goals.filter_map(|one| {
+            let mut own = self.own_goal(one.goal.key, &one.goal.parameters)?;
+            if one.goal.partner.is_some() {
+                // Both are there at one time, or not at all.
+                let waits_ms = (WAITS.as_nanos() / 1_000_000) as i64;
+                let closes_ms = millis(one.goal.parameters.start) + waits_ms + own.duration_ms;
+                own.window_ms[1] = own.window_ms[1].min(closes_ms);
+            }
+            Some(own)
+        });
         goals.collect()
     }
 
@@ -246,8 +281,9 @@ impl Explorer {
     /// What an observation takes: a spectrum is taken only once an image has shown that the mast points at
     /// the rock.
     pub(super) fn cost(&self, goal: GoalKey) -> Option<Cost> {
-        let mut cost = Cost::of(observation(goal), &self.shared.rover)?;
-        if observation(goal) == Observation::PointSpectrum
+        let observation = self.desk.observation(goal);
+        let mut cost = Cost::of(observation, &self.shared.rover)?;
+        if observation == Observation::PointSpectrum
             && self.shared.site.instruments.camera.is_some()
             && let Some(image) = Cost::of(Observation::PointImage, &self.shared.rover)
         {
@@ -316,7 +352,7 @@ impl Explorer {
         self.bid_operations += without.operations;
         for goal in calls {
             let own = self.own_goal(goal.key, &goal.parameters);
-            let own = own.filter(|_| self.desk.refuses(goal.key, goal.partner).is_none());
+            let own = own.filter(|_| self.desk.refuses(goal.key).is_none());
             let Some(own) = own else {
                 self.desk.bids.insert(goal.key, None);
                 continue;
@@ -329,7 +365,7 @@ impl Explorer {
             let with = with.map_err(failed)?;
             self.bid_operations += with.operations;
             let is_planned = with.goals().any(|planned| planned == goal.key);
-            let bid = is_planned.then_some(with.score - without.score);
+            let bid = is_planned.then_some(with.value - without.value);
             self.desk.bids.insert(goal.key, bid);
         }
         Ok(())

@@ -7,7 +7,9 @@ use super::goals::goal_of;
 use super::{Explorer, InHand, PlanDue, PlanReady, bits, millis, planned};
 use crate::shac::{GoalKey, Parameter, Parameters, Reason};
 use crate::sharing::RoverMove;
-use crate::survey::messages::{Activity, ActivityEnd, ActivityEnded, PlanMade, ReplanCause};
+use crate::survey::messages::{
+    Activity, ActivityEnd, ActivityEnded, PlanMade, ReplanCause, UnmetGoal,
+};
 use crate::survey::outlook::{Known, Piece, Plan};
 
 /// The least time from the beginning of a plan to that of the next.
@@ -218,6 +220,7 @@ impl Explorer {
             operations: plan.operations,
             moved,
             shed: self.sheds(&plan).iter().map(|(goal, _)| *goal).collect(),
+            unmet: self.unmet(&plan),
             score: plan.score,
             traverse_m: plan.traverse_m,
             reserve_j: plan.reserve_j,
@@ -272,6 +275,19 @@ impl Explorer {
         sheds.sort_unstable();
         sheds.dedup_by_key(|(goal, _)| *goal);
         sheds
+    }
+
+    /// Mandatory goals that a plan has not, and why.
+    fn unmet(&self, plan: &Plan) -> Vec<UnmetGoal> {
+        let is_mandatory = |goal| self.listed(goal).is_some_and(|listed| listed.mandatory);
+        let missing = plan.shed.iter().chain(&plan.left_out);
+        let unmet = missing.filter(|(goal, _)| is_mandatory(*goal) && self.holds(*goal));
+        let mut unmet: Vec<UnmetGoal> = unmet
+            .map(|&(goal, reason)| UnmetGoal { goal, reason })
+            .collect();
+        unmet.sort_unstable();
+        unmet.dedup_by_key(|one| one.goal);
+        unmet
     }
 
     fn note_left_out(&mut self, plan: &Plan) {

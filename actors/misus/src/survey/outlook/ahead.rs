@@ -263,13 +263,23 @@ impl Outlook {
 
     /// Why a goal is not in the plan; None if there is room for it.
     fn why_not(&self, casper: &Casper, instance: &Instance, goal: usize) -> Option<Reason> {
-        if self.planner.choice == Choice::Idgs && casper.score().gain(goal) <= 0.0 {
+        let gain = casper.score().gain(goal);
+        if self.planner.choice == Choice::Idgs && gain <= 0.0 {
             return Some(Reason::Worth);
         }
         let visit = Visit::new(instance, goal);
         let (place, _) = casper.plan().best_insertion(instance, &visit);
+        let costs =
+            |added_ms| instance.costs().of_goal(goal) + instance.costs().of_drive(0, added_ms);
         match place {
             None => Some(Reason::Time),
+            Some(place)
+                if !instance.costs().is_plain()
+                    && self.planner.choice != Choice::Random
+                    && gain <= costs(place.added_ms) =>
+            {
+                Some(Reason::Worth)
+            }
             Some(place) if place.violation.is_none() => None,
             Some(place) => Some(lack(&place.violation)),
         }
@@ -317,6 +327,7 @@ impl Outlook {
             missed: found.missed,
             operations: end.operations,
             score: 0.0,
+            value: 0.0,
             traverse_m: 0.0,
             profile: end.profile,
             stored_bits: known.memory_bits,
@@ -325,10 +336,17 @@ impl Outlook {
         goals.extend(plan.goals());
         plan.score = known.worth.of(&goals);
         let mut at_m = known.position_m;
+        plan.value = plan.score;
         for piece in &plan.pieces {
             let to_m = piece.position_m;
-            plan.traverse_m += libm::hypot(to_m[0] - at_m[0], to_m[1] - at_m[1]);
+            let way_m = libm::hypot(to_m[0] - at_m[0], to_m[1] - at_m[1]);
+            plan.traverse_m += way_m;
             at_m = to_m;
+            if let Activity::Goal(_) | Activity::Drive(_) = piece.activity {
+                let lasts_ms = piece.ends_ms - piece.starts_ms;
+                let power_mw = piece.power_w * 1e3;
+                plan.value -= self.means.objective.drive(way_m, lasts_ms, power_mw);
+            }
         }
         plan
     }

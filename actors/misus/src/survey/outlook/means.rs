@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use farside_actors::rover::RoverModel;
 
+use crate::planner::objective::ObjectiveConfig;
 use crate::survey::costs::Cost;
 use crate::survey::execution::ExecutionConfig;
 
@@ -33,6 +34,8 @@ pub struct Means {
     pub communicates_s: [f64; 2],
     /// For how many sols it plans.
     pub horizon: u32,
+    /// What counts besides what goals are worth.
+    pub objective: ObjectiveConfig,
 }
 
 impl Means {
@@ -62,7 +65,14 @@ impl Means {
             communicates_s: [config.communicate_from, config.communicate_until]
                 .map(|at| at.as_secs_f64()),
             horizon: config.horizon,
+            objective: ObjectiveConfig::default(),
         }
+    }
+
+    /// The same for users who want this of plans besides.
+    pub fn with_objective(mut self, objective: ObjectiveConfig) -> Means {
+        self.objective = objective;
+        self
     }
 
     /// What an observation takes beyond what the body takes \[W\].

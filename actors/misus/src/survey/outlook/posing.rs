@@ -178,6 +178,7 @@ fn team(means: &Means, known: &Known, ready: &Ready, days: &[(u32, Sol)]) -> Pro
         goals: Vec::new(),
         combinations: Vec::new(),
         activities: Vec::new(),
+        objective: means.objective.clone(),
     }
 }
 

@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use farside::{SimDuration, SimTime, suggest};
+use farside::{SimDuration, suggest};
 use farside_actors::system::SetupError;
-use farside_worlds::Sky;
-use farside_worlds::sky::SOL_S;
 
 use super::SurveyScenario;
 use crate::shac::GoalKey;
@@ -28,6 +26,7 @@ pub(super) fn check(scenario: &SurveyScenario) -> Result<(), SetupError> {
         }
     }
     check_requirements(goals)?;
+    check_joint(scenario)?;
     for (at, one) in scenario.combinations.iter().enumerate() {
         let key = |key: &str| format!("combination.{at}.{key}");
         for name in &one.goals {
@@ -44,10 +43,10 @@ pub(super) fn check(scenario: &SurveyScenario) -> Result<(), SetupError> {
         let times = (one.added, one.withdrawn, one.changes.as_slice());
         check_times(&format!("combination.{at}"), times)?;
     }
-    check_mandatory(scenario)
+    Ok(())
 }
 
-fn wrong(goal: usize, key: &str, message: impl ToString) -> SetupError {
+pub(super) fn wrong(goal: usize, key: &str, message: impl ToString) -> SetupError {
     SetupError::value(&format!("goal.{goal}.{key}"), message)
 }
 
@@ -161,6 +160,42 @@ fn check_requirements(goals: &[GoalConfig]) -> Result<(), SetupError> {
     Ok(())
 }
 
+/// Goals for two rovers: what cannot be asked of them.
+fn check_joint(scenario: &SurveyScenario) -> Result<(), SetupError> {
+    let goals = &scenario.goals;
+    let is_joint = |name: &String| {
+        goals
+            .iter()
+            .any(|goal| goal.name == *name && goal.rovers > 1)
+    };
+    for (at, goal) in goals.iter().enumerate() {
+        let name = &goal.name;
+        if let Some(other) = goal.requires.iter().find(|other| is_joint(other)) {
+            let message =
+                format!("{other:?} of goal {name:?}: a goal for two rovers is no single rover's");
+            return Err(wrong(at, "requires", message));
+        }
+        if goal.rovers == 1 {
+            continue;
+        }
+        if goal.rovers > scenario.team.rovers {
+            let rovers = scenario.team.rovers;
+            let message = format!("goal {name:?} needs 2 rovers, and there is {rovers}");
+            return Err(wrong(at, "rovers", message));
+        }
+        if goal.mandatory {
+            let message =
+                format!("goal {name:?} needs 2 rovers, and neither can answer for the other");
+            return Err(wrong(at, "mandatory", message));
+        }
+        if !goal.requires.is_empty() {
+            let message = format!("goal {name:?} needs 2 rovers, and a goal is required of one");
+            return Err(wrong(at, "requires", message));
+        }
+    }
+    Ok(())
+}
+
 /// Whether a way leads from the first goal of a path, beyond its last, back to the first; the path is that way
 /// then.
 fn leads_back(requires: &[Vec<usize>], path: &mut Vec<usize>, seen: &mut [bool]) -> bool {
@@ -179,82 +214,4 @@ fn leads_back(requires: &[Vec<usize>], path: &mut Vec<usize>, seen: &mut [bool])
         path.pop();
     }
     false
-}
-
-/// Mandatory goals whose windows lie within a stretch of time have to fit into what all rovers have of it in
-/// the light.
-fn check_mandatory(scenario: &SurveyScenario) -> Result<(), SetupError> {
-    let mandatory = scenario.goals.iter().enumerate();
-    let mandatory = mandatory.filter(|(_, goal)| goal.mandatory && goal.closes.is_some());
-    let windows: Vec<(usize, [SimDuration; 3])> = mandatory
-        .filter_map(|(at, goal)| {
-            let cost = Cost::of(goal.observation, &scenario.rover)?;
-            let opens = goal.opens.unwrap_or_default().max(goal.added);
-            Some((at, [opens, goal.closes?, cost.duration]))
-        })
-        .collect();
-    let rovers = u64::from(scenario.team.rovers);
-    for (_, [from, ..]) in &windows {
-        for (_, [_, until, _]) in &windows {
-            let within = windows.iter();
-            let within = within.filter(|(_, [opens, closes, _])| opens >= from && closes <= until);
-            let within: Vec<_> = within.collect();
-            let needed = within.iter().map(|(_, [.., takes])| *takes);
-            let needed = needed.fold(SimDuration::ZERO, |sum, takes| sum + takes);
-            let Some((at, _)) = within.last() else {
-                continue;
-            };
-            let light = light(scenario, SimTime::ZERO + *from, SimTime::ZERO + *until)?;
-            if needed > light * rovers {
-                let names = within
-                    .iter()
-                    .map(|(at, _)| scenario.goals[*at].name.as_str());
-                let names: Vec<&str> = names.collect();
-                let message = format!(
-                    "mandatory goals cannot all be met: {} take {needed} between {from} and {until}, where \
-                     {rovers} rovers have {} of light",
-                    names.join(", "),
-                    light * rovers
-                );
-                return Err(wrong(*at, "mandatory", message));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// For how long it is light enough to work within a stretch of time.
-fn light(
-    scenario: &SurveyScenario,
-    from: SimTime,
-    until: SimTime,
-) -> Result<SimDuration, SetupError> {
-    const STEP: SimDuration = SimDuration::from_secs(300);
-    let world = &scenario.world;
-    let sky = Sky::new(
-        world.latitude_rad.to_degrees(),
-        world.season_rad.to_degrees(),
-        world.dust,
-    );
-    let sky = sky.map_err(|error| SetupError::value("world", error))?;
-    let least_deg = scenario.learn.sun_least_rad.to_degrees();
-    // Days are alike: what is beyond some sols is as it is within them.
-    let length = until.since(from);
-    let sols = (length.as_secs_f64() / SOL_S) as u64;
-    let sol = SimDuration::from_nanos((SOL_S * 1e9) as u64);
-    let lit = |length: SimDuration| {
-        let steps = length.as_nanos().div_ceil(STEP.as_nanos());
-        let lit = (0..steps).filter(|step| {
-            let at_s = world.starts.as_secs_f64() + (from + STEP * *step).as_secs_f64();
-            sky.elevation_deg(at_s) >= least_deg
-        });
-        STEP * lit.count() as u64
-    };
-    let rest = SimDuration::from_nanos(length.as_nanos().saturating_sub((sol * sols).as_nanos()));
-    let whole = if sols == 0 {
-        SimDuration::ZERO
-    } else {
-        lit(sol) * sols
-    };
-    Ok(whole + lit(rest).min(rest))
 }
