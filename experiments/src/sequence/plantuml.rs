@@ -37,17 +37,20 @@ pub(super) fn write(chart: &Chart) -> String {
     text
 }
 
-/// A text in which nothing means something else: Creole's marks and tags, and what ends a text.
+/// A text in which nothing means something else: Creole's marks, which are letters twice, tags, and what ends a text.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
+    let mut last = ' ';
     for letter in escaped(text).chars() {
+        let is_mark = matches!(letter, '*' | '/' | '-' | '_' | '~' | '.' | '=') && letter == last;
         match letter {
-            '"' | '<' | '>' | '&' | '\\' | '~' | '*' | '/' | '-' | '_' | '%' | '$' | '#' | '['
-            | ']' => {
+            '"' | '<' | '>' | '&' | '\\' | '%' | '$' | '#' | '[' | ']' => {
                 plain.push_str(&format!("&#{};", u32::from(letter)));
             }
+            _ if is_mark => plain.push_str(&format!("&#{};", u32::from(letter))),
             _ => plain.push(letter),
         }
+        last = letter;
     }
     plain
 }

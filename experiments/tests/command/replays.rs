@@ -32,7 +32,9 @@ fn actors_do_what_they_did_and_a_change_is_named() {
         assert_eq!(replayed["identical"], true);
         assert!(replayed["same"].as_u64().unwrap() > 0);
         assert_eq!(replayed["steps"], replayed["recorded_steps"]);
-        assert_eq!(replayed["run_again_for"].as_array().unwrap().len(), 0);
+        // Rovers ask what their links charged, attempt by attempt, which the log does not have.
+        let again = replayed["run_again_for"].as_array().unwrap().len();
+        assert_eq!(again, usize::from(!actor.starts_with("node")), "{actor}");
     }
     let noise = ["--set", "network.max_plus.noise=0.2", "--json"];
     let output = farside(
@@ -88,7 +90,10 @@ fn mistakes_are_named() {
             &["--actor", "node_03", "--set", "crash=[]"],
             "comes from the record",
         ),
-        (&["--actor", "node_03", "--set", "network.noise=1"], "noise"),
+        (
+            &["--actor", "node_03", "--set", "network.max_plus.nois=1"],
+            "did you mean \"noise\"?",
+        ),
         (&[], "--actor"),
     ] {
         let output = farside(folder, &[&["replay", "run.mcap"], arguments].concat());

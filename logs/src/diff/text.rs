@@ -156,8 +156,8 @@ impl DiffReport {
 }
 
 /// Topics whose behaviour people are shown, and fields of each.
-const BEHAVIOUR_SHOWN: usize = 10;
-const FIELDS_SHOWN: usize = 5;
+const BEHAVIOUR_SHOWN: usize = 5;
+const FIELDS_SHOWN: usize = 3;
 
 impl DiffReport {
     /// How often there are messages, how long there is none, and what changed by how much.
