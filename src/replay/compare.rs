@@ -72,7 +72,7 @@ const MOST_WAITING: usize = 1 << 16;
 const MOST_BYTES: usize = 64 << 20;
 
 /// The first difference so far, with what it is first by.
-type First = Option<((EventKey, u64), Difference)>;
+pub(super) type First = Option<((EventKey, u64), Difference)>;
 
 pub(super) struct Comparer {
     pub(super) topology: Arc<Topology>,
@@ -89,8 +89,11 @@ pub(super) struct Comparer {
     pub(super) steps: Steps,
     first: First,
     differences: u64,
-    left_out: Option<Box<dyn Fn(OutputClass, &str, &str) -> bool + Send>>,
+    left_out: Option<LeavesOut>,
 }
+
+/// Whether outputs are not compared, by what they are, whose and which kind.
+type LeavesOut = Box<dyn Fn(OutputClass, &str, &str) -> bool + Send>;
 
 impl Comparer {
     pub(super) fn new(topology: Arc<Topology>, live: Vec<bool>) -> Self {
@@ -353,11 +356,7 @@ impl Comparer {
 
     /// Settles what waits; `is_over` says that the record is over, and not cut. Returns the tallies and the
     /// first difference.
-    pub(super) fn close(
-        &mut self,
-        is_over: bool,
-        last: SimTime,
-    ) -> (Vec<KindTally>, Option<((EventKey, u64), Difference)>) {
+    pub(super) fn close(&mut self, is_over: bool, last: SimTime) -> (Vec<KindTally>, First) {
         for at in 0..self.flows.len() {
             let [mut recorded, mut replayed] = std::mem::take(&mut self.flows[at].waiting);
             for recorded in std::mem::take(&mut recorded) {

@@ -1,6 +1,6 @@
 //! The end of a replay: what is left is compared, and why the run and the replay ended.
 
-use super::compare::{FlowKey, Seen, Side};
+use super::compare::{First, FlowKey, Seen, Side};
 use super::report::{Difference, KindTally, Output, OutputClass, ReplayReport, Tally};
 use super::{RecordEnd, Replay};
 use crate::engine::{Class, Remains};
@@ -219,7 +219,7 @@ impl Replay {
 /// What is compared once all is over.
 struct Ended {
     kinds: Vec<KindTally>,
-    first: Option<((EventKey, u64), Difference)>,
+    first: First,
 }
 
 impl Ended {
