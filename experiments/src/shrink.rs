@@ -2,7 +2,7 @@
 //! so that what must never happen still does.
 //!
 //! Candidates are run one by one, on all cores. First members of the team are left out, because that makes all
-//! later runs faster, then what else there is, list by list ([`ddmin`]), again and again until nothing more
+//! later runs faster, then what else there is, list by list (`shrink/ddmin.rs`), again and again until nothing more
 //! goes. Then what links lost by chance becomes a list of messages that are lost, of which again is left out
 //! what can be. At last every single entry that is left is left out once more, in vain: what remains is
 //! 1-minimal.
@@ -46,7 +46,7 @@ const MAX_LOSSES_BYTES: usize = 3 << 20;
 pub enum Budget {
     /// So many runs.
     Runs(u64),
-    /// So long [s].
+    /// So long \[s\].
     WallS(f64),
 }
 
@@ -197,7 +197,7 @@ pub(crate) fn shrink(
             scenario: written(key(&text)),
         },
     )?;
-    let known = verdicts.from_before();
+    let known = verdicts.known_before();
     let bench = Bench {
         registry,
         files: scenario.files(),

@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
                 });
             };
             for key in outcome.keys {
-                if self.asked.contains(&key) || self.verdicts.is_from_before(key) {
+                if self.asked.contains(&key) || self.verdicts.is_known_before(key) {
                     continue;
                 }
                 if matches!(self.budget, Some(Budget::Runs(runs)) if self.spent >= runs) {

@@ -149,12 +149,12 @@ impl Verdicts {
     }
 
     /// Whether a verdict was there at the start.
-    pub(super) fn is_from_before(&self, key: u128) -> bool {
+    pub(super) fn is_known_before(&self, key: u128) -> bool {
         self.before.contains(&key)
     }
 
     /// How many were there at the start.
-    pub(super) fn from_before(&self) -> usize {
+    pub(super) fn known_before(&self) -> usize {
         self.before.len()
     }
 
@@ -210,14 +210,14 @@ mod tests {
         let mut verdicts = Verdicts::open(&path, &search("x")).unwrap();
         assert_eq!((verdicts.get(1), verdicts.get(3)), (Some(&violates), None));
         assert_eq!(
-            (verdicts.get(2), verdicts.from_before()),
+            (verdicts.get(2), verdicts.known_before()),
             (Some(&Verdict::Holds), 2)
         );
         verdicts.keep(3, Verdict::Holds).unwrap();
         drop(verdicts);
         let verdicts = Verdicts::open(&path, &search("x")).unwrap();
         assert_eq!(
-            (verdicts.get(3), verdicts.from_before()),
+            (verdicts.get(3), verdicts.known_before()),
             (Some(&Verdict::Holds), 3)
         );
     }

@@ -194,7 +194,7 @@ fn feasible(map: &Roadmap, nodes: usize, radius_m: u32, seed: u64) -> (usize, u3
 
 /// Teams of 1 to so many rovers.
 pub fn teams(rovers: u32) -> impl Strategy<Value = TeamConfig> {
-    (1..=rovers).prop_map(|rovers| TeamConfig::of(rovers))
+    (1..=rovers).prop_map(TeamConfig::of)
 }
 
 /// Links that are late, jitter, lose and repeat, within the bounds. They shrink to 5 ms and no

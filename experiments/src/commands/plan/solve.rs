@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CommandError> {
     };
     task.warn();
     // Before the search, which may take long.
-    let outputs = args.out.as_ref().map_or(&[][..], std::slice::from_ref);
+    let outputs = args.out.as_slice();
     output::spare(&task.files, outputs)?;
     if let Some(out) = &args.out {
         output::may_write(out, plan_beginning().as_bytes(), Format::Plan, &task.files)?;

@@ -46,7 +46,8 @@ pub(super) fn rows(phases: &[Phase], least_ns: u64) -> Vec<Row> {
             (count + 1, sum + phase.until_ns - phase.from_ns)
         });
         let active = group.iter().filter(|phase| phase.doing == Doing::Active);
-        let ends = (active.clone().next(), active.last());
+        let mut active = active;
+        let ends = (active.clone().next(), active.next_back());
         let what = match ends {
             (Some(first), Some(last)) if first.text == last.text => first.text.clone(),
             (Some(first), Some(last)) => format!("{} … {}", first.text, last.text),
