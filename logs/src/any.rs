@@ -6,9 +6,10 @@ use std::sync::Arc;
 use farside::suggest::{did_you_mean, nearest};
 
 use crate::LogError;
-use crate::decode::{self, Unreadable};
+use crate::fields;
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
 use crate::topics::Topics;
+use crate::value::Unreadable;
 use crate::value::Value;
 
 /// A message of any MCAP file.
@@ -53,7 +54,7 @@ impl<'a> AnyMessage<'a> {
     /// # Errors
     /// If its encoding is not known, or it does not hold what its schema says.
     pub fn value(&self) -> Result<Value<'a>, Unreadable> {
-        decode::value(self.message.channel, self.message.data, self.channels)
+        fields::value(self.message.channel, self.message.data, self.channels)
     }
 }
 

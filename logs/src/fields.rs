@@ -6,16 +6,51 @@ mod rules;
 mod values;
 
 use std::fmt;
+use std::sync::Arc;
 
+use crate::decode::{Layout, cdr};
 use crate::envelope::RecordRef;
 use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::shown::{Seconds, apart, hex};
+use crate::value::{Unreadable, Value};
 
 pub(crate) use json::json_value;
 pub(crate) use protobuf::{Encoded, protobuf, protobuf_value};
 pub use rules::Tolerance;
 pub(crate) use rules::{Bound, Rules};
 pub(crate) use values::{Differs, each, first};
+
+/// What a message on a channel says; `others` are the channels of its log, whose types it may hold.
+///
+/// # Errors
+/// If its encoding or its schema is not known, or it does not hold what its schema says.
+pub(crate) fn value<'a>(
+    channel: &'a ChannelInfo,
+    data: &'a [u8],
+    others: &'a [Arc<ChannelInfo>],
+) -> Result<Value<'a>, Unreadable> {
+    let schema = || {
+        let missing = || Unreadable::new("the channel has no schema");
+        channel.schema.as_deref().ok_or_else(missing)
+    };
+    match channel.encoding.as_str() {
+        encoding @ ("cdr" | "ros1" | "flatbuffer") => match (encoding, schema()?.layout()?) {
+            ("cdr", Layout::Structs(structs)) => cdr::cdr(structs, data),
+            ("ros1", Layout::Structs(structs)) => cdr::ros1(structs, data),
+            ("flatbuffer", Layout::Flat(schema)) => schema.value(data),
+            _ => {
+                let what = format!("a schema that is not for messages encoded as {encoding:?}");
+                Err(Unreadable::new(what))
+            }
+        },
+        "json" => json_value(data),
+        "protobuf" => protobuf_value(data, schema()?, others),
+        other => {
+            let what = format!("messages that are encoded as {other:?} are not read");
+            Err(Unreadable::new(what))
+        }
+    }
+}
 
 /// The first field in which two things differ, with both values.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,7 +117,7 @@ impl fmt::Display for Path<'_> {
     }
 }
 
-pub(crate) use crate::decode::DEPTH;
+pub(crate) use crate::value::DEPTH;
 
 /// The first field in which two envelopes' bodies differ, read with the schemas of the envelopes.
 pub(crate) fn bodies(

@@ -84,7 +84,6 @@ mod wire;
 mod writer;
 
 pub use any::{AnyMessage, AnyMessages};
-pub use decode::Unreadable;
 pub use diff::{
     Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FieldChange, FirstDifference,
     Rate, Reached, TopicDiff, causes, diff,
@@ -103,6 +102,6 @@ pub use replay::{
 };
 pub use scan::{ChannelInfo, SchemaInfo};
 pub use shown::{escaped, is_hidden};
-pub use value::{NumberKind, Numbers, Value};
+pub use value::{NumberKind, Numbers, Unreadable, Value};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};
 pub use writer::{Attachment, Compression, LogOptions, LogWriter};

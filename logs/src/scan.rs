@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use mcap::records::{MessageHeader, op};
 
 use crate::LogError;
-use crate::decode::{Layout, Unreadable};
+use crate::decode::Layout;
 use crate::frames::{Care, Frame, Frames, LIMIT_BYTES, describe};
 use crate::parse::{
     ChannelRecord, ChunkRecord, MESSAGE_HEADER_BYTES, Parser, SchemaRecord, message_header,
@@ -16,6 +16,7 @@ use crate::parse::{
 };
 use crate::schema::Types;
 use crate::source::Attached;
+use crate::value::Unreadable;
 
 /// A schema of a log.
 #[derive(Debug, Default)]
@@ -45,7 +46,9 @@ impl SchemaInfo {
 
     /// How messages are laid out by a schema that is no protobuf.
     pub(crate) fn layout(&self) -> Result<&Layout, Unreadable> {
-        let layout = self.layout.get_or_init(|| Layout::read(self));
+        let layout = self
+            .layout
+            .get_or_init(|| Layout::read(&self.encoding, &self.name, &self.data));
         layout.as_ref().map_err(Clone::clone)
     }
 

@@ -15,7 +15,7 @@ use prost_types::{
     FileDescriptorSet,
 };
 
-use crate::decode::within;
+use crate::value::within;
 
 /// The messages of a schema, and which of them the schema is for.
 #[derive(Debug)]

@@ -3,6 +3,32 @@
 use std::borrow::Cow;
 use std::fmt::{self, Write};
 
+/// How deep messages within messages are read.
+pub(crate) const DEPTH: usize = 100;
+
+/// How many values one message may hold, lists of numbers counted as one. A message that unfolds into
+/// more, as by sharing its parts, is made to fill memory.
+pub(crate) const VALUES: usize = 2 << 20;
+
+/// A message, or its schema, cannot be read.
+///
+/// ```
+/// let error = farside_logs::Unreadable::new("a list that ends too early");
+/// assert_eq!(error.to_string(), "a list that ends too early");
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}")]
+pub struct Unreadable {
+    what: String,
+}
+
+impl Unreadable {
+    /// An error that says this.
+    pub fn new(what: impl Into<String>) -> Self {
+        Unreadable { what: what.into() }
+    }
+}
+
 /// A value of a message. Texts, bytes and lists of numbers are borrowed from the message where they can be.
 ///
 /// ```
@@ -355,6 +381,36 @@ fn write_base64(bytes: &[u8], out: &mut impl Write) -> fmt::Result {
         }
     }
     out.write_char('"')
+}
+
+/// Calls `each` with every field that a value has; elements of lists are all the same field.
+pub(crate) fn names(value: &Value<'_>, each: &mut dyn FnMut(&str)) {
+    fn walk(value: &Value<'_>, path: &mut String, each: &mut dyn FnMut(&str)) {
+        match value {
+            Value::Object(fields) => {
+                for (name, value) in fields {
+                    within(path, name, &mut |path| {
+                        each(path);
+                        walk(value, path, each);
+                    });
+                }
+            }
+            Value::List(values) => values.iter().for_each(|value| walk(value, path, each)),
+            _ => {}
+        }
+    }
+    walk(value, &mut String::new(), each);
+}
+
+/// Calls `inner` with a name added to a path.
+pub(crate) fn within(path: &mut String, name: &str, inner: &mut dyn FnMut(&mut String)) {
+    let length = path.len();
+    if length > 0 {
+        path.push('.');
+    }
+    path.push_str(name);
+    inner(path);
+    path.truncate(length);
 }
 
 #[cfg(test)]

@@ -70,13 +70,13 @@ fn the_first_difference_is_named() {
             "json-big-integer",
             0.0,
             [
-                "data.id",
+                "id",
                 "123456789012345678901234567890",
                 "123456789012345678901234567891",
             ],
         ),
-        ("json-null-absent", 0.0, ["data.a", "null", "absent"]),
-        ("json-array-length", 0.0, ["data.a.length", "100", "101"]),
+        ("json-null-absent", 0.0, ["a", "null", "absent"]),
+        ("json-array-length", 0.0, ["a.length", "100", "101"]),
     ];
     for (name, tolerance, [field, a, b]) in cases {
         let [one, other] = ["a", "b"].map(|side| format!("{name}-{side}"));
@@ -182,7 +182,7 @@ fn every_whole_message_is_saved_and_what_is_dropped_is_named() {
             false,
             "a message of 92 bytes that is not whole",
         ),
-        ("chunk-never-closed", 100, 0, true, "never closed"),
+        ("chunk-never-closed", 100, 0, false, "never closed"),
         ("chunk-one-bit", 100, 100, false, "unchecked: 100"),
         (
             "unchunked-one-bad-length",

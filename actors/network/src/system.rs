@@ -111,7 +111,7 @@ const INVARIANTS: [Invariant; 4] = [
     )
     .lasting(),
     Invariant::new(
-        "standstill",
+        "no_progress",
         "stuck=true",
         "a deadlock, or no progress for long",
     )

@@ -34,7 +34,7 @@ wrong, `fault` for a run that fails, or a condition over metrics, as in 'arrived
 What was tried is kept beside SMALL.toml: started again, the search goes on where it was.
 
 Examples:
-  farside shrink run.mcap --violates standstill --out small.toml
+  farside shrink run.mcap --violates no_progress --out small.toml
   farside run small.toml                             it stands still again
   farside shrink network/crater-dense --set links.default.loss=60% --violates 'completed=false'
       --budget 5min --out small.toml")]

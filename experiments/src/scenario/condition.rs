@@ -387,7 +387,7 @@ mod tests {
         let error = |text: &str| Forbidden::parse(text, network).unwrap_err();
         assert_eq!(
             error("deadlok"),
-            "\"deadlok\": expected collision, deadlock, standstill, unfinished, violation, fault, or a \
+            "\"deadlok\": expected collision, deadlock, no_progress, unfinished, violation, fault, or a \
              condition over metrics, as in sim_time_s>60; did you mean \"deadlock\"?"
         );
         assert_eq!(

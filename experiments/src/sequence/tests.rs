@@ -1,3 +1,5 @@
+//! Charts of records made for the purpose.
+
 use farside::MatchKey;
 use farside_logs::{CausedBy, LoggedKey};
 use proptest::prelude::*;

@@ -8,8 +8,7 @@
 use std::borrow::Cow;
 
 use super::structs::{Struct, Structs, Type};
-use super::{DEPTH, Unreadable, VALUES};
-use crate::value::{NumberKind, Numbers, Value};
+use crate::value::{DEPTH, NumberKind, Numbers, Unreadable, VALUES, Value};
 
 /// Reads a CDR message.
 ///

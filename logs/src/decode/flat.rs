@@ -10,8 +10,7 @@ mod tests;
 
 use std::borrow::Cow;
 
-use super::{DEPTH, Unreadable, VALUES, within};
-use crate::value::{NumberKind, Numbers, Value};
+use crate::value::{DEPTH, NumberKind, Numbers, Unreadable, VALUES, Value, within};
 use buffer::{Buffer, Table};
 
 /// The types of a schema, and which of them its messages are.

@@ -10,9 +10,8 @@ use std::collections::BTreeMap;
 
 use farside::suggest::{did_you_mean, nearest};
 
-use super::Unreadable;
 use super::structs::{Enumeration, Field, Struct, Structs, Type};
-use crate::value::NumberKind;
+use crate::value::{NumberKind, Unreadable};
 use tokens::{Token, Tokens};
 
 /// How deep types within types may be declared.

@@ -7,9 +7,8 @@ use std::collections::BTreeMap;
 
 use farside::suggest::{did_you_mean, nearest};
 
-use super::Unreadable;
 use super::structs::{Field, Struct, Structs, Type};
-use crate::value::NumberKind;
+use crate::value::{NumberKind, Unreadable};
 
 /// Whose definitions they are: the two differ in what their names for numbers mean.
 #[derive(Clone, Copy, PartialEq, Eq)]

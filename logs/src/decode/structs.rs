@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Unreadable, within};
-use crate::value::NumberKind;
+use crate::value::{NumberKind, Unreadable, within};
 
 /// The types of a schema, and which of them its messages are.
 #[derive(Debug, Default)]

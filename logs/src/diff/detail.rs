@@ -13,12 +13,12 @@ use super::entry::{Entry, Mode, Names};
 use super::index::Index;
 use super::{Carried, Cause, FirstDifference};
 use crate::LogError;
-use crate::decode::{self, Unreadable};
 use crate::envelope::{RecordRef, seconds};
 use crate::fields::{self, Encoded, FieldDiff, Rules, bodies, protobuf};
 use crate::log::LoggedKey;
 use crate::scan::{ChannelInfo, ScannedMessage};
 use crate::shown::Seconds;
+use crate::value::Unreadable;
 use crate::value::Value;
 
 /// Causes that are listed; beyond them only the last one is.
@@ -154,7 +154,7 @@ pub(super) fn values<'a>(
     others: [&'a [Arc<ChannelInfo>]; 2],
 ) -> Result<[Value<'a>; 2], Unreadable> {
     let value = |message: &'a ScannedMessage<'_>, others| {
-        decode::value(message.channel, message.data, others)
+        fields::value(message.channel, message.data, others)
     };
     Ok([value(a, others[0])?, value(b, others[1])?])
 }

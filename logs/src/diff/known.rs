@@ -10,9 +10,9 @@ use super::entry::Mode;
 use super::index::Index;
 use crate::LogError;
 use crate::any::AnyMessages;
-use crate::decode;
 use crate::scan::ChannelInfo;
 use crate::topics::Topics;
+use crate::value;
 
 /// How deep fields are looked for.
 const DEPTH: usize = 12;
@@ -114,7 +114,7 @@ fn of_messages(path: &Path, names: &mut BTreeSet<String>) -> Result<(), LogError
             continue;
         }
         if let Ok(value) = message.value() {
-            decode::names(&value, &mut |name| {
+            value::names(&value, &mut |name| {
                 names.insert(name.to_owned());
             });
         }

@@ -5,8 +5,8 @@
 
 use std::borrow::Cow;
 
-use crate::decode::{DEPTH, Unreadable, VALUES};
 use crate::value::Value;
+use crate::value::{DEPTH, Unreadable, VALUES};
 
 /// A JSON document as a value.
 ///

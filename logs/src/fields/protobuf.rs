@@ -16,10 +16,10 @@ use std::sync::Arc;
 use prost_types::field_descriptor_proto::Type;
 
 use super::{Bound, DEPTH, FieldDiff, Path, Rules, near, raw};
-use crate::decode::Unreadable;
 use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::schema::{Field, FieldType, MessageType, Types};
 use crate::shown::{SHOWN, shorten};
+use crate::value::Unreadable;
 use crate::wire::{Fields, Value};
 use scalar::{Scalar, WireBits};
 

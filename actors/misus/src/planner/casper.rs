@@ -326,7 +326,7 @@ impl Casper {
             if !self.current.violation().is_none() {
                 continue;
             }
-            let value = self.score.value() - instance.costs().of_plan(instance, &self.current);
+            let value = self.score.value() - self.current.cost(instance);
             if value > self.best_value + EQUAL {
                 step.improved = true;
                 if self.config.step_end == StepEnd::FirstBetter {
@@ -470,7 +470,7 @@ impl Casper {
         for goal in self.best.goals(instance) {
             self.score.hold(goal);
         }
-        self.best_cost = instance.costs().of_plan(instance, &self.best);
+        self.best_cost = self.best.cost(instance);
         self.best_value = self.score.value() - self.best_cost;
     }
 }

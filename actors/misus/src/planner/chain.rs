@@ -235,6 +235,16 @@ impl Chain {
         }
     }
 
+    /// What the user's preferences take from its worth.
+    pub fn cost(&self, instance: &Instance) -> f64 {
+        let costs = instance.costs();
+        if costs.is_plain() {
+            return 0.0;
+        }
+        let goals: f64 = self.goals(instance).map(|goal| costs.of_goal(goal)).sum();
+        goals + costs.of_drive(self.rover(), self.drive_ms())
+    }
+
     /// How long the rover drives \[ms\].
     pub fn drive_ms(&self) -> i64 {
         self.drive_ms

@@ -3,9 +3,6 @@
 
 use farside_actors::settings;
 
-use super::chain::Chain;
-use super::instance::Instance;
-
 settings! {
     /// The `[objective]` table: what a plan is worth less for, in the unit of goals' weights. With nothing said it is
     /// the paper's Equation 1, the weights of goals and combinations alone. Drives and goals are counted, the daily
@@ -92,14 +89,5 @@ impl Costs {
     /// What so much driving of a rover costs \[ms\].
     pub fn of_drive(&self, rover: usize, duration_ms: i64) -> f64 {
         self.drives[rover] * duration_ms as f64
-    }
-
-    /// What a rover's plan costs.
-    pub fn of_plan(&self, instance: &Instance, plan: &Chain) -> f64 {
-        if self.is_plain {
-            return 0.0;
-        }
-        let goals: f64 = plan.goals(instance).map(|goal| self.goals[goal]).sum();
-        goals + self.of_drive(plan.rover(), plan.drive_ms())
     }
 }

@@ -1,3 +1,5 @@
+//! Where topics end and fields begin.
+
 use super::part;
 
 #[test]

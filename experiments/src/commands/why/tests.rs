@@ -1,3 +1,5 @@
+//! Stories made for the purpose.
+
 use farside_actors::system::{Account, Doing, Phase};
 
 use super::story::{Lost, Story, Touching, seconds};

@@ -1,6 +1,6 @@
 //! The bytes of a FlatBuffer: tables, vectors and texts, each offset checked.
 
-use crate::decode::Unreadable;
+use crate::value::Unreadable;
 use crate::value::{NumberKind, Value};
 
 /// The bytes of a message or a schema.

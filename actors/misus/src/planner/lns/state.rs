@@ -71,10 +71,7 @@ impl State {
     /// What the plan is worth: by so little less, the more is driven, that it decides between equals only.
     pub(super) fn value(&self, instance: &Instance) -> f64 {
         let drive_ms: i64 = self.chains.iter().map(Chain::drive_ms).sum();
-        let costs = self
-            .chains
-            .iter()
-            .map(|chain| instance.costs().of_plan(instance, chain));
+        let costs = self.chains.iter().map(|chain| chain.cost(instance));
         self.objective.score() - costs.sum::<f64>() - drive_ms as f64 * 1e-9
     }
 
