@@ -20,7 +20,7 @@ const JUDGED: usize = 500;
 /// Offsets that are judged.
 const CANDIDATES: usize = 64;
 
-/// Below this, clocks that say almost the same are taken as one.
+/// Below this, clocks are taken as one, and what is later is a difference.
 const LEAST_NS: u64 = 100_000_000;
 
 /// Of so many messages that say the same, the times decide.
@@ -47,13 +47,12 @@ pub(super) fn common_offset(
     }
     apart.sort_unstable();
     if let Some(middle) = apart.get(apart.len() / 2).copied() {
-        let all_the_same = apart.first() == apart.last();
         let near = apart
             .iter()
             .filter(|one| one.abs_diff(middle) < LEAST_NS)
             .count();
         let sure = near * 5 >= apart.len() * 4 && apart.len() >= ENOUGH;
-        if sure && (all_the_same || middle.unsigned_abs() >= LEAST_NS) {
+        if sure && middle.unsigned_abs() >= LEAST_NS {
             return Ok(middle);
         }
         if sure {
