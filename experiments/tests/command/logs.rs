@@ -79,7 +79,7 @@ fn two_runs_are_compared_and_a_cut_log_is_saved() {
     ] {
         assert!(told.contains(part), "{part} is not in\n{told}");
     }
-    assert!(told.lines().count() < 70, "{told}");
+    assert!(told.lines().count() < 80, "{told}");
     let all = farside(folder.path(), &["diff", "a.mcap", "c.mcap", "--topics"]);
     assert!(
         text(&all.stdout).contains("/assignments  from ") && !text(&all.stdout).contains("/node_*")
