@@ -46,7 +46,7 @@ macro_rules! accepts_tuples {
             fn list(_accepted: &mut Vec<Accepted>) {
                 $(_accepted.push(Accepted::new::<$name>(
                     Box::new(address::sealer::<Host, $name>()),
-                    address::unseal::<Host, $name>,
+                    Box::new(address::unsealer::<Host, $name>()),
                 ));)*
             }
         }

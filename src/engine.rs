@@ -28,7 +28,7 @@ use crate::time::SimTime;
 use crate::topology::Topology;
 
 pub(crate) use cell::{ActorCell, CellState};
-pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed};
+pub(crate) use erased::{AnyActor, Core, Factory, Letter, Sealed, Unseal};
 pub(crate) use event::{Class, Happened, Head, InFlight, Outbound, Outgoing, Pending, Side};
 
 pub(crate) use hops::{Hop, Hops};

@@ -131,6 +131,7 @@
 
 pub mod actor;
 pub mod carrier;
+mod charge;
 mod commit;
 mod digest;
 pub mod encoding;

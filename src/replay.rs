@@ -108,7 +108,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-pub use charges::{Charge, ChargeJournal, ChargedMessage};
+pub use crate::charge::{Charge, ChargeJournal, ChargedMessage};
 pub use report::{Difference, KindTally, Output, OutputClass, ReplayReport, Step, Steps, Tally};
 
 use crate::carrier::Carriage;

@@ -6,14 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rustc_hash::FxBuildHasher;
 
-use crate::encoding::{DecodeError, Schema, SchemaError};
-use crate::engine::Sealed;
+use crate::charge::ChargeJournal;
+use crate::encoding::{Schema, SchemaError};
 use crate::fault::LookupError;
 use crate::ids::{EntityId, HostIndex, KindIndex, Owner};
 use crate::key::EventKey;
 use crate::payload::Message;
 use crate::random::name_hash;
-use crate::replay::ChargeJournal;
 use crate::ruling::Rulings;
 use crate::time::{SimDuration, SimTime};
 
@@ -78,15 +77,15 @@ pub struct Accepted {
     /// How a message of this type is sealed for the actor: a function whose type only those know
     /// who know the message's.
     pub(crate) seal: Box<dyn Any + Send + Sync>,
-    /// Reads and seals one that a log holds.
-    pub(crate) unseal: Unseal,
+    /// How one that a log holds is read and sealed: an `engine::Unseal`.
+    pub(crate) unseal: Box<dyn Any + Send + Sync>,
 }
 
-/// How an encoded message becomes one sealed for an actor.
-pub(crate) type Unseal = fn(&Schema, &[u8]) -> Result<Sealed, DecodeError>;
-
 impl Accepted {
-    pub(crate) fn new<M: Message>(seal: Box<dyn Any + Send + Sync>, unseal: Unseal) -> Self {
+    pub(crate) fn new<M: Message>(
+        seal: Box<dyn Any + Send + Sync>,
+        unseal: Box<dyn Any + Send + Sync>,
+    ) -> Self {
         let kind = KindEntry::of::<M>();
         Accepted { kind, seal, unseal }
     }

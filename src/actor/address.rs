@@ -8,7 +8,7 @@ use super::boxed::Boxed;
 use super::context::Context;
 use super::{Actor, Handler};
 use crate::encoding::{DecodeError, EncodeError, Schema};
-use crate::engine::{AnyActor, Core, Letter, Sealed};
+use crate::engine::{AnyActor, Core, Letter, Sealed, Unseal};
 use crate::fault::{LookupError, Outcome};
 use crate::ids::Owner;
 use crate::payload::{Encode, Message};
@@ -114,11 +114,12 @@ pub(crate) fn sealer<A: Handler<M>, M: Message>() -> fn(M) -> Sealed {
     seal::<A, M>
 }
 
-/// Reads a message that a log holds, and seals it for actors of type `A`.
-pub(crate) fn unseal<A: Handler<M>, M: Message>(
-    schema: &Schema,
-    bytes: &[u8],
-) -> Result<Sealed, DecodeError> {
+/// How messages of type `M` that a log holds are read and sealed for actors of type `A`.
+pub(crate) fn unsealer<A: Handler<M>, M: Message>() -> Unseal {
+    unseal::<A, M>
+}
+
+fn unseal<A: Handler<M>, M: Message>(schema: &Schema, bytes: &[u8]) -> Result<Sealed, DecodeError> {
     Ok(seal::<A, M>(schema.decode(bytes)?))
 }
 

@@ -15,6 +15,9 @@ use crate::payload::Encode;
 #[doc(hidden)]
 pub struct Sealed(pub(crate) SmallBox<dyn Letter, S4>);
 
+/// How an encoded message becomes one sealed for an actor.
+pub(crate) type Unseal = fn(&Schema, &[u8]) -> Result<Sealed, DecodeError>;
+
 /// What the engine can do with a message whose type it does not know.
 pub(crate) trait Letter: Encode + Send {
     /// Hands the message to `actor`, which must be of the type it was addressed to.

@@ -16,13 +16,13 @@ use super::{
     Sink,
 };
 use crate::carrier::{Carriage, SealedChange, Verdicts};
+use crate::charge::{Charge, ChargedMessage};
 use crate::encoding::EncodeError;
 use crate::fault::{Fault, FaultCause};
 use crate::guard::guarded;
 use crate::ids::{EntityId, HostIndex, KindIndex, TimerId};
 use crate::key::EventKey;
 use crate::queue::{Entry, Queue};
-use crate::replay::{Charge, ChargedMessage};
 use crate::time::{SimDuration, SimTime};
 use crate::topology::{Kind, Topology};
 

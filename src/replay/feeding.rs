@@ -3,7 +3,7 @@
 use super::compare::{FlowKey, Seen, Side};
 use super::report::OutputClass;
 use super::{Recorded, Replay, ReplayError};
-use crate::engine::{Action, Class, Head, Sealed};
+use crate::engine::{Action, Class, Head, Sealed, Unseal};
 use crate::guard::guarded;
 use crate::ids::{EntityId, KindIndex};
 use crate::key::{Bound, EventKey};
@@ -182,7 +182,8 @@ impl Replay {
         let found = self.accepted(record.receiver).find_map(|accepted| {
             let kind = self.topology.kind_of_type.get(&accepted.kind.type_id)?;
             let is_it = self.topology.kind(*kind).name() == record.kind;
-            is_it.then_some((*kind, accepted.unseal))
+            let unseal = accepted.unseal.downcast_ref::<Unseal>()?;
+            is_it.then_some((*kind, *unseal))
         });
         let Some((kind, unseal)) = found else {
             let accepts = self.accepts(record.receiver).into_iter();

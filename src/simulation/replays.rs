@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use super::Simulation;
 use crate::carrier::AnyCarrier;
+use crate::charge::ChargeJournal;
 use crate::engine::{Engine, Factory};
 use crate::executor::Ready;
 use crate::fault::{BuildError, Fault};
 use crate::guard::dropped;
 use crate::ids::EntityId;
 use crate::key::EventKey;
-use crate::replay::ChargeJournal;
 use crate::topology::Topology;
 
 /// A simulation of which some actors live, and the others and all links are absent.
