@@ -70,7 +70,7 @@ impl Flat {
         flat.unguarded = rule.when.is_empty() && flat.guarding.is_empty();
         let distances = flat.relations.iter().flat_map(|at| &at.distances);
         let bounds = distances.map(|at| [at.min, at.max]).chain(rule.duration);
-        flat.varies = { bounds.flatten() }.any(|at| matches!(at, Bound::Variable(_)));
+        flat.varies = { bounds }.any(varies);
         flat
     }
 
@@ -154,7 +154,14 @@ pub(super) struct Posted {
     pub(super) relation: Option<u32>,
     /// Which of its distances.
     pub(super) distance: u32,
-    pub(super) constraint: Constraint,
+    /// None where the bounds are variables, and as far as they are known today they hold between
+    /// known times, or say nothing: once they are closer they may not.
+    pub(super) constraint: Option<Constraint>,
+}
+
+/// Whether one of two bounds is a variable.
+pub(super) fn varies(bounds: [Bound; 2]) -> bool {
+    bounds.iter().any(|at| matches!(at, Bound::Variable(_)))
 }
 
 impl Instance {
@@ -350,7 +357,8 @@ impl Database {
             self.watch_bounds(instance, [min, max]);
             let span = self.span(instance, min, max, false);
             let (start, finish) = (self.at(master).start, self.at(master).finish);
-            if let Some(constraint) = self.between(start, finish, span, owner)? {
+            let constraint = self.between(start, finish, span, owner)?;
+            if constraint.is_some() || varies([min, max]) {
                 self.change_instance(instance).times.push(Posted {
                     relation: None,
                     distance: 0,
@@ -523,11 +531,14 @@ impl Database {
                     )
                 }
             };
-            if !matches!(min, Bound::Variable(_)) && !matches!(max, Bound::Variable(_)) {
+            if !varies([min, max]) {
                 continue;
             }
             let span = self.span(instance, min, max, backward);
-            let now = self.between_again(posted.constraint, from, to, span, owner)?;
+            let now = match posted.constraint {
+                Some(old) => Some(self.between_again(old, from, to, span, owner)?),
+                None => self.between(from, to, span, owner)?,
+            };
             if now != posted.constraint {
                 self.change_instance(instance).times[place].constraint = now;
             }
@@ -538,8 +549,8 @@ impl Database {
     /// What an instance brought goes; tokens that it alone asked for go with it.
     pub(super) fn withdraw(&mut self, instance: InstanceId) {
         let at = self.instance_at(instance).clone();
-        for posted in &at.times {
-            self.retract_time(posted.constraint);
+        for constraint in at.times.iter().filter_map(|posted| posted.constraint) {
+            self.retract_time(constraint);
         }
         for &(_, posted) in &at.values {
             self.retract_value(posted);

@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use super::edit::Wanted;
-use super::rules::{Open, Posted, Step, Wishes};
+use super::rules::{Open, Posted, Step, Wishes, varies};
 use super::{Cause, Conflict, Database, InstanceId, Status, Time, TokenId};
 use crate::model::{Argument, Pattern, Target, TimelineId, VariableId};
 use crate::parameters::{self, Operand};
@@ -268,7 +268,8 @@ impl Database {
             let span = self.span(instance, distance.min, distance.max, distance.backward);
             let from = self.time(anchor, distance.from);
             let to = self.time(token, distance.to);
-            if let Some(constraint) = self.between(from, to, span, owner)? {
+            let constraint = self.between(from, to, span, owner)?;
+            if constraint.is_some() || varies([distance.min, distance.max]) {
                 self.change_instance(instance).times.push(Posted {
                     relation: Some(relation),
                     distance: place as u32,
@@ -292,7 +293,12 @@ impl Database {
         if self.tokens.get(token).is_none() {
             return;
         }
-        let mine = |at: &(InstanceId, u32)| at.0 == instance;
+        // The token may fulfil other relations of the instance, under other labels.
+        let relations = self.relations(self.instance_at(instance).rule);
+        let mine = |at: &(InstanceId, u32)| {
+            at.0 == instance
+                && matches!(relations[at.1 as usize].target, Target::New(_, its) if its == label)
+        };
         let Some(place) = self.at(token).supported.iter().position(mine) else {
             return;
         };
@@ -392,10 +398,10 @@ impl Database {
         let times = std::mem::take(&mut at.times);
         let values = std::mem::take(&mut at.values);
         for posted in times {
-            if posted.relation == Some(relation) {
-                self.retract_time(posted.constraint);
-            } else {
+            if posted.relation != Some(relation) {
                 self.change_instance(instance).times.push(posted);
+            } else if let Some(constraint) = posted.constraint {
+                self.retract_time(constraint);
             }
         }
         for (of, posted) in values {

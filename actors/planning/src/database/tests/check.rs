@@ -174,7 +174,11 @@ fn constraints(database: &Database, forgot: bool) {
         values.extend(at.values.iter().chain(&at.merged_values));
     }
     for (_, at) in database.instances.iter() {
-        times.extend(at.times.iter().map(|posted| &posted.constraint));
+        times.extend(
+            at.times
+                .iter()
+                .filter_map(|posted| posted.constraint.as_ref()),
+        );
         values.extend(at.values.iter().map(|(_, posted)| posted));
     }
     for mirror in &database.mirrors {

@@ -14,11 +14,13 @@ const TEXT: &str = "
 (Define_Predicate Job ())
 (Define_Predicate Child ())
 (Define_Predicate Later ())
+(Define_Predicate Wait ((Small ?least)))
 (Define_Predicate Heat ((Small ?watts)))
-(Define_Member_Values (Lab Arm_SV) (Job Child Later))
+(Define_Member_Values (Lab Arm_SV) (Job Child Later Wait))
 (Define_Member_Values (Lab Work_SV) (Heat))
 (Define_Resource (Lab power) :kind renewable :capacity 4)
 (Define_Compatibility (SINGLE ((Lab Arm_SV) ((Child ())))) :duration_bounds [5 5])
+(Define_Compatibility (SINGLE ((Lab Arm_SV) ((Wait (?least))))) :duration_bounds [?least inf])
 (Define_Compatibility
  (SINGLE ((Lab Arm_SV) ((Job ()))))
  :duration_bounds [2 9]
@@ -190,4 +192,27 @@ fn a_strict_before_is_not_a_meets() {
         .expect("it comes later");
     assert_eq!(database.start(later).min, 8);
     assert!(!database.meets(job, later));
+}
+
+/// Ours: a bound that is a variable was asked once, while it was still open.
+#[test]
+fn a_bound_of_known_times_holds_when_its_variable_is_known() {
+    let mut lab = Lab::new();
+    let predicates = &lab.database.model.predicates;
+    let predicate = predicates.iter().position(|at| at.name == "Wait");
+    let wanted = Wanted {
+        predicate: predicate.expect("there is one"),
+        timeline: None,
+        parameters: &[None],
+        start: Some(Time::At(10)),
+        finish: Some(Time::At(13)),
+        cause: Cause::User,
+    };
+    let wait = lab.database.insert(wanted).expect("it can be");
+    lab.place(wait, ARM, None);
+    let owner = Owner::Token(wait);
+    let refused = lab.database.bind(wait, 0, 4, owner);
+    let bound = matches!(refused, Err(Conflict::Known { is: 3, .. }));
+    assert!(bound, "three ticks are not four: {refused:?}");
+    assert!(lab.database.bind(wait, 0, 3, owner).is_ok());
 }
