@@ -37,7 +37,7 @@ fn from_log(
 ) -> Option<ReplayOutcome> {
     let replay = |charges: &[_]| {
         let replay = Replay::new(build(), &live).unwrap();
-        farside_logs::replay(path, replay, charges).unwrap()
+        farside_logs::replay(&Log::open(path).unwrap(), replay, charges).unwrap()
     };
     let outcome = replay(&[]);
     if !outcome.needs_charges {
@@ -225,7 +225,7 @@ fn a_change_of_a_gain_is_seen_where_it_first_shows() {
     log(following(0.2), &path);
     let replayed = |gain: f64| {
         let replay = Replay::new(following(gain), |name| name == "follower").unwrap();
-        farside_logs::replay(&path, replay, &[]).unwrap()
+        farside_logs::replay(&Log::open(&path).unwrap(), replay, &[]).unwrap()
     };
     let same = replayed(0.2);
     assert_eq!((same.same, same.differing()), (56, 0), "{same:#?}");

@@ -9,7 +9,7 @@ use farside::{Carriage, MatchKey};
 use crate::LogError;
 use crate::envelope::{CheckpointRef, KeyRef, RecordRef};
 use crate::frames::{HEAD_BYTES, LIMIT_BYTES};
-use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+use crate::scan::{ChannelInfo, Item, Role, ScannedMessage, Scanner};
 use crate::source::{Attached, Sum};
 use crate::writer::{Attachment, FORMAT_MAJOR, FORMAT_MINOR, SCENARIO_ATTACHMENT};
 
@@ -279,12 +279,11 @@ impl Records {
         loop {
             match self.scanner.next()? {
                 None => return Ok(Step::End),
-                Some(Item::Message(message)) => match message.channel.role() {
-                    "message" | "event" => return Ok(Step::Record),
-                    "checkpoint" => return Ok(Step::Checkpoint),
-                    "state" => return Ok(Step::Sample),
-                    // What viewers draw, and what later versions may add.
-                    _ => {}
+                Some(Item::Message(message)) => match message.channel.role {
+                    Role::Record => return Ok(Step::Record),
+                    Role::Checkpoint => return Ok(Step::Checkpoint),
+                    Role::Sample => return Ok(Step::Sample),
+                    Role::Other => {}
                 },
                 Some(Item::Metadata(name, entries)) if name == "farside.end" => {
                     self.ending.end = Some(entries);

@@ -4,7 +4,6 @@ mod again;
 mod told;
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use farside::key::EventKey;
@@ -22,10 +21,9 @@ use crate::envelope::{KeyRef, RecordRef};
 use crate::log::{Ending, Log, Step};
 use crate::scan::{ScannedMessage, SchemaInfo};
 use crate::topics::{Topics, topic_before_1_3, topic_of};
-use crate::wire::{Fields, Value};
 use told::Schemas;
 
-/// Replays actors from the log at `path`, from its first record to its last.
+/// Replays actors from a log, from its first record to its last.
 ///
 /// ```no_run
 /// use farside::Simulation;
@@ -34,7 +32,8 @@ use told::Schemas;
 ///
 /// let sim = assemble(); // built as it was for the log, perhaps with a new planner
 /// let replay = Replay::new(sim, |name| name == "planner")?;
-/// let outcome = farside_logs::replay("run.mcap", replay, &[])?;
+/// let log = farside_logs::Log::open("run.mcap")?;
+/// let outcome = farside_logs::replay(&log, replay, &[])?;
 /// if let Some(first) = outcome.first {
 ///     println!("{} s: {} of {}", first.time_s, first.kind, first.actor);
 /// }
@@ -46,12 +45,11 @@ use told::Schemas;
 /// # Errors
 /// If the log cannot be read, or holds what the replay's actors cannot take; not if it is cut.
 pub fn replay(
-    path: impl AsRef<Path>,
+    log: &Log,
     mut replay: Replay,
     charges: &[Charge],
 ) -> Result<ReplayOutcome, LogError> {
-    let log = Log::open(path)?;
-    leave_out(&log, &mut replay)?;
+    leave_out(log, &mut replay)?;
     if !charges.is_empty() {
         replay.charges_are_told();
     }
@@ -110,7 +108,7 @@ pub fn replay(
         },
     );
     outcome.missing_record = ending.missing();
-    if hides_steps(&log, &info, &live)? {
+    if hides_steps(log, &info, &live)? {
         outcome.differing_instants = 0;
         outcome.first_differing_instant_s = None;
     }
@@ -172,15 +170,23 @@ impl Names {
 
     /// Whether an envelope may be of something that concerns the living.
     fn concern(&self, envelope: &[u8]) -> bool {
-        let mut fields = Fields::new(envelope);
         // Writers put these two in front; of others every record is looked at.
-        let (Some(Ok((1, Value::Bytes(sender)))), Some(Ok((2, Value::Bytes(receiver))))) =
-            (fields.next(), fields.next())
-        else {
+        let Some((sender, rest)) = short_text(envelope, 1) else {
+            return true;
+        };
+        let Some((receiver, _)) = short_text(rest, 2) else {
             return true;
         };
         receiver == b"@control" || self.near.contains(receiver) || self.near.contains(sender)
     }
+}
+
+/// The text of a field below 128 bytes, if that field is the first, and what comes after it.
+fn short_text(envelope: &[u8], field: u8) -> Option<(&[u8], &[u8])> {
+    const TEXT: u8 = 2;
+    let (&[tag, len], rest) = envelope.split_first_chunk()?;
+    let is_it = tag == field << 3 | TEXT && len < 0x80;
+    rest.split_at_checked(len.into()).filter(|_| is_it)
 }
 
 /// A record with names for numbers.

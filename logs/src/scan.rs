@@ -71,6 +71,29 @@ pub struct ChannelInfo {
     /// What else it says: `role` and `kind` in Farside's logs.
     pub metadata: BTreeMap<String, String>,
     pub(crate) schema_id: u16,
+    /// What its messages are for those who read a log of Farside's.
+    pub(crate) role: Role,
+}
+
+/// What a channel of Farside's logs is for, of what each message asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    Record,
+    Checkpoint,
+    Sample,
+    /// What viewers draw, and what later versions may add.
+    Other,
+}
+
+impl Role {
+    fn of(metadata: &BTreeMap<String, String>) -> Role {
+        match metadata.get("role").map(String::as_str) {
+            Some("message" | "event") => Role::Record,
+            Some("checkpoint") => Role::Checkpoint,
+            Some("state") => Role::Sample,
+            _ => Role::Other,
+        }
+    }
 }
 
 impl ChannelInfo {
@@ -594,6 +617,7 @@ impl Declared {
             topic: channel.topic.to_owned(),
             encoding: channel.encoding.to_owned(),
             schema: self.schemas.get(&channel.schema_id).cloned(),
+            role: Role::of(&channel.metadata),
             metadata: channel.metadata,
             schema_id: channel.schema_id,
         });

@@ -22,13 +22,22 @@ pub(super) fn scenario_of(
     summary: &RunSummary,
     registry: &Registry,
 ) -> Result<Scenario, CommandError> {
+    scenario_in(&Log::open(path)?, summary, registry)
+}
+
+/// The same of a log that is open.
+pub(super) fn scenario_in(
+    log: &Log,
+    summary: &RunSummary,
+    registry: &Registry,
+) -> Result<Scenario, CommandError> {
     let not_repeatable = |reason: String| CommandError::NotRepeatable {
-        path: path.to_owned(),
+        path: log.path().to_owned(),
         reason,
     };
     let mut text = None;
     let mut files = BTreeMap::new();
-    for attachment in Log::open(path)?.attachments() {
+    for attachment in log.attachments() {
         if attachment.name == SCENARIO {
             text = Some(attachment.bytes.clone());
         } else if let Some(name) = attachment.name.strip_prefix(FILE_PREFIX) {

@@ -12,7 +12,7 @@ use farside_logs::{
 use serde::Serialize;
 
 use super::kinds::{self, FileKind};
-use super::logged::scenario_of;
+use super::logged::scenario_in;
 use super::{CommandError, Exit, interrupt, print, print_json, progress};
 use crate::registry::Registry;
 use crate::scenario::{Assembled, Scenario, check_replay};
@@ -59,6 +59,7 @@ struct Document<'a> {
 /// A log, and what is to be replayed of it.
 struct Job<'a> {
     path: &'a Path,
+    log: Log,
     summary: RunSummary,
     base: Scenario,
     /// The scenario that the living actors are built of.
@@ -79,10 +80,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         exclude: log.exclude().to_vec(),
         ..RunSummary::default()
     };
-    let base = scenario_of(path, &summary, registry)?;
+    let base = scenario_in(&log, &summary, registry)?;
     let changed = changed(args, &base, registry)?;
     let job = Job {
         path,
+        log,
         patterns: patterns(&args.actors)?,
         summary,
         base,
@@ -194,23 +196,20 @@ impl Job<'_> {
 
     /// What came of it, and why the run was executed again for it.
     fn replayed(&self, base: Simulation) -> Result<(ReplayOutcome, Vec<String>), CommandError> {
-        let log = Log::open(self.path)?;
+        let log = &self.log;
         let replay = self.replay(Some(base))?;
-        let filtered = filtered_inputs(&log, &replay)?;
+        let filtered = filtered_inputs(log, &replay)?;
         if !filtered.is_empty() {
             let why = format!("inputs that are not in the log: {}", filtered.join(", "));
             return Ok((self.again(replay)?, vec![why]));
         }
-        let outcome = farside_logs::replay(self.path, replay, &[])?;
+        let outcome = farside_logs::replay(log, replay, &[])?;
         if !outcome.needs_charges {
             return Ok((outcome, Vec::new()));
         }
         let replay = self.replay(None)?;
-        match charges_in(&log, &replay)? {
-            Some(charges) => Ok((
-                farside_logs::replay(self.path, replay, &charges)?,
-                Vec::new(),
-            )),
+        match charges_in(log, &replay)? {
+            Some(charges) => Ok((farside_logs::replay(log, replay, &charges)?, Vec::new())),
             None => {
                 let why = "what links charged, attempt by attempt: the log has sums".to_owned();
                 Ok((self.again(replay)?, vec![why]))
