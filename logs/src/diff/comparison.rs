@@ -4,17 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::behaviour::Changes;
-use super::entry::{Entry, Mode, Names};
+use super::causal::Walker;
+use super::entry::{self, Entry, Mode, Names};
+use super::found::{Found, Pair, Places};
 use super::index::{self, Index};
-use super::matching::{self, Matching, Sequence};
+use super::matching::{self, Sequence, Shifts};
+use super::reach::Reach;
+use super::root::Starts;
 use super::spill::{BUCKETS, Buckets, Fixed};
-use super::{DiffOptions, DiffReport, FirstDifference, Limits, Reached, TopicDiff, Usage};
+use super::{DiffOptions, DiffReport, FirstDifference, Limits, TopicDiff, Usage};
 use super::{agree, aligning, beside, detail, known, offset, scenario, text};
 use crate::LogError;
 use crate::envelope::seconds;
 use crate::fields::{FieldDiff, Rules};
 use crate::log::Log;
-use crate::parse::Parser;
 use crate::shown::Seconds;
 use crate::topics::Topics;
 
@@ -51,10 +54,17 @@ pub(super) fn compare(
     let strangers = heads.iter().filter(|head| head.is_none()).count();
     comparison.note_files(strangers);
     if let [Some(a), Some(b)] = &starts {
-        scenario::note(&mut comparison.report.notes, a, b);
+        let inputs = scenario::note(&mut comparison.report.notes, a, b);
+        comparison.starts.inputs = inputs;
+        let left_out = [&options.ignore, &options.topics]
+            .iter()
+            .any(|list| !list.is_empty());
+        let filtered = !(a.exclude().is_empty() && b.exclude().is_empty());
+        comparison.starts.has_unseen = left_out || filtered;
     }
     let mut beside = std::mem::take(&mut comparison.beside);
     comparison.report.notes.append(&mut beside.notes);
+    comparison.starts.add_files(&beside.beside);
     comparison.report.beside = beside.beside;
     comparison.report.metadata = beside.metadata;
     comparison.report.attachments = beside.attachments;
@@ -64,70 +74,6 @@ pub(super) fn compare(
 /// How many pairs of Farside's logs that differ are read for which fields do: those at the front, of which
 /// few chunks are opened again.
 const SAMPLE: usize = 4096;
-
-/// A difference, and where it is.
-#[derive(Clone, Copy)]
-enum Found {
-    Changed(Entry, Entry),
-    OnlyInA(Entry),
-    OnlyInB(Entry),
-    Reordered(Entry, Entry),
-}
-
-impl Found {
-    /// Of differences at the same place one of the lesser rank is told.
-    fn rank(&self) -> (usize, u32) {
-        match self {
-            Found::Changed(a, _) => (0, a.at),
-            Found::OnlyInA(a) => (1, a.at),
-            Found::OnlyInB(b) => (2, b.at),
-            Found::Reordered(a, _) => (3, a.topic),
-        }
-    }
-}
-
-/// Two records that are the same one, to be compared by their fields.
-#[derive(Clone, Copy)]
-struct Pair(Entry, Entry);
-
-impl Fixed for Pair {
-    const BYTES: usize = 2 * Entry::BYTES;
-
-    fn put(&self, out: &mut Vec<u8>) {
-        self.0.put(out);
-        self.1.put(out);
-    }
-
-    fn take(parser: &mut Parser<'_>) -> Option<Pair> {
-        Some(Pair(Entry::take(parser)?, Entry::take(parser)?))
-    }
-}
-
-/// Where two records that are the same one are in the two logs.
-#[derive(Clone, Copy)]
-struct Places {
-    topic: u32,
-    a: u32,
-    b: u32,
-}
-
-impl Fixed for Places {
-    const BYTES: usize = 12;
-
-    fn put(&self, out: &mut Vec<u8>) {
-        for number in [self.topic, self.a, self.b] {
-            out.extend_from_slice(&number.to_le_bytes());
-        }
-    }
-
-    fn take(parser: &mut Parser<'_>) -> Option<Places> {
-        Some(Places {
-            topic: parser.u32()?,
-            a: parser.u32()?,
-            b: parser.u32()?,
-        })
-    }
-}
 
 struct Comparison<'a> {
     a: Index<'a>,
@@ -152,6 +98,10 @@ struct Comparison<'a> {
     sample: BTreeMap<u32, Pair>,
     /// Messages with another sequence number.
     renumbered: u64,
+    /// What has but a place in its flow and is not yet paired: of the first log in the bucket of that place.
+    left: (Buckets<Entry>, Buckets<Entry>),
+    /// By how much the places of the two logs differ.
+    shifts: Shifts,
     /// By field: in buckets by their place in the first log.
     to_read: Buckets<Pair>,
     /// In order: in buckets by their place in the first log.
@@ -159,23 +109,15 @@ struct Comparison<'a> {
     earliest: Option<Found>,
     /// The earliest that nobody injected.
     earliest_own: Option<Found>,
+    /// Of Farside's logs, whom the differences touched first.
+    reach: Reach,
+    /// In what the starts of the two runs differ.
+    starts: Starts,
     /// Topics whose schemas differ: their messages are read even where their bytes are the same.
     by_field: BTreeSet<u32>,
     /// Why messages on a topic were compared by their bytes only.
     reasons: BTreeSet<(u32, String)>,
 }
-
-/// How the topics of events begin that are planned before a run.
-const INJECTED: [&str; 4] = [
-    "/event/crash",
-    "/event/restart",
-    "/event/change",
-    "/event/told",
-];
-
-/// The order in which differences are sorted: time, step, whether an actor is the source, the
-/// source, its count, whether it is the fate of a message and no event, place in the log.
-type Order<'a> = (u64, u32, bool, &'a str, u64, bool, u32);
 
 impl<'a> Comparison<'a> {
     /// Reads both logs, and compares what is beside their messages.
@@ -201,6 +143,10 @@ impl<'a> Comparison<'a> {
         };
         a.keep_rest(&mut names)?;
         b.keep_rest(&mut names)?;
+        let ends = match mode {
+            Mode::Farside => [a.end(&mut names)?, b.end(&mut names)?],
+            Mode::Any => Default::default(),
+        };
         let mut order = a.topic_order(&mut names);
         order.extend(b.topic_order(&mut names));
         let mut beside = DiffReport::default();
@@ -225,10 +171,14 @@ impl<'a> Comparison<'a> {
             changes: BTreeMap::new(),
             sample: BTreeMap::new(),
             renumbered,
+            left: (Buckets::new(limits.left()), Buckets::new(limits.left())),
+            shifts: Shifts::default(),
             to_read: Buckets::new(limits.pairs),
             places: Buckets::new(limits.pairs),
             earliest: None,
             earliest_own: None,
+            reach: Reach::new(ends),
+            starts: Starts::default(),
             by_field,
             reasons: BTreeSet::new(),
         })
@@ -297,64 +247,28 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    fn order<'n>(names: &'n Names, entry: &Entry) -> Order<'n> {
-        let source = names.name(entry.source);
-        (
-            entry.time_ns,
-            entry.step,
-            source != "@control",
-            source,
-            entry.count,
-            !entry.event,
-            entry.at,
-        )
-    }
-
-    /// When a difference shows: the earlier of its two records.
-    fn when(&self, found: &Found) -> Order<'_> {
-        let order = |entry| Self::order(&self.names, entry);
-        match found {
-            Found::Changed(x, y) | Found::Reordered(x, y) => order(x).min(order(y)),
-            Found::OnlyInA(x) => order(x),
-            Found::OnlyInB(y) => order(y),
-        }
-    }
-
     fn found(&mut self, found: Found) {
-        let time_ns = self.when(&found).0;
-        let entry = match &found {
-            Found::Changed(entry, _) | Found::Reordered(entry, _) => entry,
-            Found::OnlyInA(entry) | Found::OnlyInB(entry) => entry,
-        };
-        let topic = entry.topic;
-        let first_ns = &mut self.topic(topic).first_ns;
-        *first_ns = Some(first_ns.map_or(time_ns, |known| known.min(time_ns)));
-        let place = (self.when(&found), found.rank());
+        let when = found.when(&self.names);
+        let place = (when, found.rank());
         let is_earlier = |known: &Option<Found>| match known {
-            Some(known) => place < (self.when(known), known.rank()),
+            Some(known) => place < (known.when(&self.names), known.rank()),
             None => true,
         };
         let (first, own) = (is_earlier(&self.earliest), is_earlier(&self.earliest_own));
+        let (time_ns, entry) = (when.0, found.both());
         if first {
             self.earliest = Some(found);
         }
-        if own && !self.is_injected(&found) {
-            self.earliest_own = Some(found);
-        }
-    }
-
-    /// Whether a difference is of an event that was planned before the run.
-    fn is_injected(&self, found: &Found) -> bool {
-        let injected = |entry: &Entry| {
-            let topic = self.names.name(entry.topic);
-            INJECTED.iter().any(|start| topic.starts_with(start))
-        };
-        self.mode == Mode::Farside
-            && match found {
-                Found::Changed(x, y) | Found::Reordered(x, y) => injected(x) && injected(y),
-                Found::OnlyInA(x) => injected(x),
-                Found::OnlyInB(y) => injected(y),
+        if self.mode == Mode::Farside {
+            if own && !found.is_injected(&self.names) {
+                self.earliest_own = Some(found);
             }
+            self.reach.add(&found, &self.names);
+        }
+        if let Some(entry) = entry.into_iter().flatten().next() {
+            let first_ns = &mut self.topic(entry.topic).first_ns;
+            *first_ns = Some(first_ns.map_or(time_ns, |known| known.min(time_ns)));
+        }
     }
 
     fn compare(mut self) -> Result<(DiffReport, Usage), LogError> {
@@ -362,6 +276,7 @@ impl<'a> Comparison<'a> {
         for bucket in 0..BUCKETS {
             self.compare_bucket(bucket)?;
         }
+        self.compare_places()?;
         for bucket in 0..BUCKETS {
             let mut pairs = self.to_read.read(bucket)?;
             pairs.sort_unstable_by_key(|pair| pair.0.at);
@@ -408,7 +323,13 @@ impl<'a> Comparison<'a> {
     /// Notes how many bytes wait in memory, these included.
     fn note_usage(&mut self, more: usize) {
         let (a, b) = (&self.a.entries, &self.b.entries);
-        let waiting = [a.held_bytes(), b.held_bytes(), self.to_read.held_bytes()];
+        let left = self.left.0.held_bytes() + self.left.1.held_bytes();
+        let waiting = [
+            a.held_bytes(),
+            b.held_bytes(),
+            left,
+            self.to_read.held_bytes(),
+        ];
         let held = waiting.iter().sum::<usize>() + self.places.held_bytes() + more;
         self.usage.most_bytes = self.usage.most_bytes.max(held);
     }
@@ -425,18 +346,77 @@ impl<'a> Comparison<'a> {
         let a = self.a.entries.read(bucket)?;
         let b = self.b.entries.read(bucket)?;
         self.note_usage((a.len() + b.len()) * Entry::BYTES);
-        let Matching {
-            pairs,
-            only_in_a,
-            only_in_b,
-        } = match self.mode {
+        let found = match self.mode {
             Mode::Farside => matching::matching(&a, &b),
             Mode::Any => aligning::aligned(&a, &b, self.rules.offset_ns),
         };
+        for (x, y) in &found.pairs {
+            self.shifts.add(&a[*x as usize], &b[*y as usize]);
+        }
+        self.pairs(&a, &b, &found.pairs)?;
+        for entry in found.only_in_a.iter().map(|at| a[*at as usize]) {
+            match entry.has_place {
+                true => self
+                    .left
+                    .0
+                    .push(entry::bucket_of(entry.place_key(entry.ordinal)), entry)?,
+                false => self.only_in_a(entry),
+            }
+        }
+        for entry in found.only_in_b.iter().map(|at| b[*at as usize]) {
+            match entry.has_place {
+                true => self.left.1.push(bucket, entry)?,
+                false => self.only_in_b(entry),
+            }
+        }
+        self.note_usage((a.len() + b.len()) * Entry::BYTES);
+        Ok(())
+    }
+
+    /// Pairs what has but a place in its flow and is said otherwise in the two logs.
+    fn compare_places(&mut self) -> Result<(), LogError> {
+        let mut shifts = std::mem::take(&mut self.shifts);
+        shifts.sort();
+        let mut placed = Buckets::new(self.limits.left());
+        for bucket in 0..BUCKETS {
+            for entry in self.left.1.read(bucket)? {
+                let key = entry.place_key(shifts.place_in_a(&entry));
+                placed.push(entry::bucket_of(key), entry)?;
+            }
+            self.note_usage(placed.held_bytes());
+        }
+        self.left.1 = Buckets::new(self.limits.left());
+        for bucket in 0..BUCKETS {
+            let (a, b) = (self.left.0.read(bucket)?, placed.read(bucket)?);
+            let found = matching::by_place(&a, &b, &shifts);
+            self.pairs(&a, &b, &found.pairs)?;
+            for at in found.only_in_a {
+                self.only_in_a(a[at as usize]);
+            }
+            for at in found.only_in_b {
+                self.only_in_b(b[at as usize]);
+            }
+            self.note_usage(placed.held_bytes() + (a.len() + b.len()) * Entry::BYTES);
+        }
+        Ok(())
+    }
+
+    fn only_in_a(&mut self, entry: Entry) {
+        self.topic(entry.topic).only_in_a += 1;
+        self.found(Found::OnlyInA(entry));
+    }
+
+    fn only_in_b(&mut self, entry: Entry) {
+        self.topic(entry.topic).only_in_b += 1;
+        self.found(Found::OnlyInB(entry));
+    }
+
+    /// Compares what is the same record in both logs.
+    fn pairs(&mut self, a: &[Entry], b: &[Entry], pairs: &[(u32, u32)]) -> Result<(), LogError> {
         // The bytes of two messages may differ and their fields not, or the other way round.
         let by_field = !self.rules.are_exact() || self.mode == Mode::Any;
         for (x, y) in pairs {
-            let (a, b) = (a[x as usize], b[y as usize]);
+            let (a, b) = (a[*x as usize], b[*y as usize]);
             self.renumbered += u64::from(a.sequence != b.sequence);
             let differently = self.by_field.contains(&a.topic) || self.by_field.contains(&b.topic);
             match a.content == b.content {
@@ -453,15 +433,6 @@ impl<'a> Comparison<'a> {
                 self.places.push(self.bucket_of(&a), places)?;
             }
         }
-        for entry in only_in_a.iter().map(|at| a[*at as usize]) {
-            self.topic(entry.topic).only_in_a += 1;
-            self.found(Found::OnlyInA(entry));
-        }
-        for entry in only_in_b.iter().map(|at| b[*at as usize]) {
-            self.topic(entry.topic).only_in_b += 1;
-            self.found(Found::OnlyInB(entry));
-        }
-        self.note_usage((a.len() + b.len()) * Entry::BYTES);
         Ok(())
     }
 
@@ -501,7 +472,10 @@ impl<'a> Comparison<'a> {
                     Mode::Farside => None,
                 };
                 if let Some(diff) = message.against(&mut self.b, &b, self.mode, given, changes)? {
-                    self.changed(a, b);
+                    // What is sent is the same but for what may differ.
+                    let sent_alike = self.mode == Mode::Farside && diff.field == "log_time";
+                    let said = if sent_alike { a.said } else { b.said };
+                    self.changed(a, Entry { said, ..b });
                     self.reasons.extend(diff.why.map(|why| (a.topic, why)));
                 }
             }
@@ -588,7 +562,7 @@ impl<'a> Comparison<'a> {
         }
         self.report.identical = self.earliest.is_none() && self.report.beside.is_empty();
         if let Some(found) = self.earliest {
-            let injected = self.is_injected(&found);
+            let injected = self.mode == Mode::Farside && found.is_injected(&self.names);
             let mut first = self.describe(found)?;
             first.injected = injected;
             self.report.first = Some(first);
@@ -606,7 +580,7 @@ impl<'a> Comparison<'a> {
             }
         }
         if self.mode == Mode::Farside {
-            self.report.spread = spread(self.topics.values());
+            self.walk_back()?;
         }
         let differing = |topic: &TopicDiff| topic.differences() > 0;
         self.report.topics = self.topics.into_values().filter(differing).collect();
@@ -620,8 +594,20 @@ impl<'a> Comparison<'a> {
         Ok((self.report, self.usage))
     }
 
+    /// Finds what the differences began with, whom they reached, and how.
+    fn walk_back(&mut self) -> Result<(), LogError> {
+        let logs = [&mut self.a, &mut self.b];
+        let files = [self.short.0.as_str(), self.short.1.as_str()];
+        let mut walker = Walker::new(logs, &mut self.names, &self.reach, &self.starts, files);
+        self.report.spread = walker.reached()?;
+        if let Some(first) = &self.earliest {
+            self.report.root = walker.root(first)?;
+        }
+        Ok(())
+    }
+
     fn describe(&mut self, found: Found) -> Result<FirstDifference, LogError> {
-        let time_ns = self.when(&found).0;
+        let time_ns = found.when(&self.names).0;
         let (mode, names) = (self.mode, &mut self.names);
         let mut first = match found {
             Found::OnlyInA(a) => {
@@ -663,38 +649,4 @@ impl<'a> Comparison<'a> {
         first.time_ns = time_ns;
         Ok(first)
     }
-}
-
-/// By actor, when it first says or does something else, in the order in which that was. What links and
-/// control events do is no work of an actor.
-fn spread<'a>(topics: impl Iterator<Item = &'a TopicDiff>) -> Vec<Reached> {
-    let mut reached: BTreeMap<&str, (u64, &str)> = BTreeMap::new();
-    for topic in topics {
-        let Some(time_ns) = topic.first_ns.filter(|_| topic.differences() > 0) else {
-            continue;
-        };
-        let inner = topic.topic.strip_prefix("/timer").unwrap_or(&topic.topic);
-        let of_links = ["/lost/", "/in_flight/", "/hand_over/", "/event/"];
-        let actor = inner
-            .strip_prefix('/')
-            .and_then(|rest| rest.rsplit_once('/'));
-        let Some((actor, _)) = actor.filter(|_| of_links.iter().all(|of| !inner.starts_with(of)))
-        else {
-            continue;
-        };
-        let first = (time_ns, topic.topic.as_str());
-        let known = reached.entry(actor).or_insert(first);
-        *known = first.min(*known);
-    }
-    let mut reached: Vec<Reached> = reached
-        .into_iter()
-        .map(|(actor, (time_ns, topic))| Reached {
-            actor: actor.to_owned(),
-            time_s: seconds(time_ns),
-            time_ns,
-            topic: topic.to_owned(),
-        })
-        .collect();
-    reached.sort_by(|a, b| (a.time_ns, &a.actor).cmp(&(b.time_ns, &b.actor)));
-    reached
 }
