@@ -217,9 +217,9 @@ pub struct Root {
     /// Of a link's decision: what is known of the draw behind it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub draw: Option<String>,
-    /// What differs at the starts of the two runs and fits the root: keys of the scenario with both values,
-    /// seeds, versions, files. All that differs, if nothing fits; empty if nothing does.
-    pub inputs: Vec<String>,
+    /// Of something planned: how much else that was planned for that time differs.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub more: u64,
 }
 
 /// One step on the way by which differences came.
@@ -255,8 +255,8 @@ pub struct Reached {
     /// The message, if it was by one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
-    /// What its way began with; empty only for logs whose records contradict each other.
-    pub root: String,
+    /// What its way began with; none only in logs whose records contradict each other.
+    pub root: Option<Root>,
     /// The way: whom the difference reached first, and so on to the actor itself.
     pub path: Vec<Hop>,
     /// How many steps are left out in the middle of a long way.
@@ -309,6 +309,9 @@ pub struct DiffReport {
     /// Of Farside's logs, what the first difference began with.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub root: Option<Root>,
+    /// What differs at the starts of the two runs and may be behind that: keys of the scenario with both
+    /// values, seeds, versions, files. All that differs, if nothing fits; empty if nothing does.
+    pub inputs: Vec<String>,
     /// Messages in both that differ.
     pub changed: u64,
     /// Messages that only the first log has.

@@ -188,7 +188,7 @@ impl<'w, 'i> Walker<'w, 'i> {
         let is_input = touched.input.as_ref().is_some_and(|_| is_reached);
         let (links, from) = match is_input {
             true => self.input(found)?,
-            false => (Vec::new(), self.by_itself(actor, found)?),
+            false => (Vec::new(), self.by_itself(actor, moment, found)?),
         };
         let told = self.tell(&both);
         let topic = both.iter().flatten().next().map(|one| one.topic.clone());
@@ -257,34 +257,32 @@ impl<'w, 'i> Walker<'w, 'i> {
         let both = self.both(found)?;
         let told = self.tell(&both);
         let (by_traffic, root) = (told.is_by_traffic(), self.decided(found, &both));
-        let root = From::Root(Box::new(root));
+        let itself = (Vec::new(), From::Root(Box::new(root)));
         if self.starts.rule(both.each_ref().map(Option::as_ref)) {
-            return Ok((Vec::new(), root));
+            return Ok(itself);
         }
         let reach = self.reach;
-        let link = reach
-            .links
-            .get(&entry.said.link)
-            .cloned()
-            .unwrap_or_default();
         let until_ns = found.when(self.names).0;
-        if let Some((moment, change)) = &link.input
-            && moment.time_ns <= until_ns
-        {
-            return self.input(change);
-        }
         let sent_ns = entry.said.sent_ns;
-        let before = |moment: &Moment| moment.time_ns <= sent_ns;
-        let traffic = link
-            .output
-            .filter(|(moment, other)| before(moment) && other.rank() != found.rank());
+        let link = reach.links.get(&entry.said.link);
+        let change = link.and_then(|link| link.input.as_ref());
+        let change = change.filter(|(moment, _)| moment.time_ns <= until_ns);
+        let traffic = link.and_then(|link| link.output.as_ref());
+        let traffic = traffic.filter(|(moment, _)| moment.time_ns <= sent_ns);
+        // A queue comes of what was carried before, or of how fast.
+        let is_first = |(moment, _): &&(Moment, Found)| {
+            traffic.is_none_or(|(other, _)| !by_traffic || moment.time_ns <= other.time_ns)
+        };
+        if let Some((_, change)) = change.filter(is_first) {
+            return self.changed(change, entry);
+        }
         if self.starts.may_decide() && !by_traffic {
-            return Ok((Vec::new(), root));
+            return Ok(itself);
         }
         if let Some((_, other)) = traffic {
-            let both = self.both(&other)?;
-            let name = self.tell(&both).name();
-            let hop = self.link_hop(entry, &other, format!("is given {name} otherwise"));
+            let both = self.both(other)?;
+            let how = format!("is given {} otherwise", self.tell(&both).name());
+            let hop = self.link_hop(entry, other, how);
             let sender = other.both().into_iter().flatten().next();
             let sender = sender.map_or(entry.said.sender, |other| other.said.sender);
             return Ok((vec![hop], From::Actor(sender)));
@@ -295,16 +293,29 @@ impl<'w, 'i> Walker<'w, 'i> {
             let touched = reach.actors.get(*end);
             let first = touched.map(|touched| [&touched.input, &touched.output]);
             let mut first = first.into_iter().flatten().flatten();
-            first.any(|(moment, first)| moment.time_ns < until_ns && first.rank() != found.rank())
+            first.any(|(moment, _)| moment.time_ns < until_ns)
         };
         match ends.iter().find(touched) {
             Some(end) if !self.starts.may_decide() => {
-                let what = format!("carries for {} otherwise", self.names.name(*end));
-                let hop = self.link_hop(entry, found, what);
+                let how = format!("carries for {} otherwise", self.names.name(*end));
+                let hop = self.link_hop(entry, found, how);
                 Ok((vec![hop], From::Actor(*end)))
             }
-            _ => Ok((Vec::new(), root)),
+            _ => Ok(itself),
         }
+    }
+
+    /// Where it comes from that a link was changed otherwise: from a plan, or from an actor.
+    fn changed(&mut self, change: &Found, entry: &Entry) -> Result<(Vec<Hop>, From), LogError> {
+        let (_, from) = self.input(change)?;
+        let hops = match &from {
+            From::Actor(actor) => {
+                let how = format!("is changed by {} otherwise", self.names.name(*actor));
+                vec![self.link_hop(entry, change, how)]
+            }
+            From::Root(_) => Vec::new(),
+        };
+        Ok((hops, from))
     }
 
     fn link_hop(&self, entry: &Entry, found: &Found, how: String) -> Hop {
@@ -320,7 +331,7 @@ impl<'w, 'i> Walker<'w, 'i> {
 
     /// Where it comes from that an actor did something otherwise, before anything reached it otherwise that
     /// the logs have.
-    fn by_itself(&mut self, actor: u32, found: &Found) -> Result<From, LogError> {
+    fn by_itself(&mut self, actor: u32, moment: &Moment, found: &Found) -> Result<From, LogError> {
         let both = self.both(found)?;
         if self.starts.has_unseen
             && let Some(sender) = self.unseen_sender(actor, found, &both)?
@@ -337,7 +348,9 @@ impl<'w, 'i> Walker<'w, 'i> {
             what: format!("{name} {what}, {before}"),
             actor: name,
             message: self.tell(&both).message(),
-            ..self.new_root(RootKind::Actor, found, &both)
+            time_s: seconds(moment.time_ns),
+            time_ns: moment.time_ns,
+            ..self.new_root(RootKind::Actor, found)
         })))
     }
 
@@ -357,8 +370,13 @@ impl<'w, 'i> Walker<'w, 'i> {
             if self.logs[side].event(&key, self.names)?.is_some() {
                 continue;
             }
-            let sender = self.names.number(&cause.source);
+            // The source of a delivery is its link, or within a host its sender.
+            let source = self.names.number(&cause.source);
             let reach = self.reach;
+            let carried = reach.links.get(&source).and_then(|link| link.output);
+            let carried =
+                carried.and_then(|(_, found)| found.both().into_iter().flatten().next().copied());
+            let sender = carried.map_or(source, |entry| entry.said.sender);
             let when = found.when(self.names).0;
             let touched = reach.actors.get(&sender).is_some_and(|touched| {
                 let first = [&touched.input, &touched.output];
@@ -374,9 +392,8 @@ impl<'w, 'i> Walker<'w, 'i> {
         Ok(None)
     }
 
-    fn new_root(&self, kind: RootKind, found: &Found, both: &Both) -> Root {
+    fn new_root(&self, kind: RootKind, found: &Found) -> Root {
         let time_ns = found.when(self.names).0;
-        let both = both.each_ref().map(Option::as_ref);
         Root {
             kind,
             time_s: seconds(time_ns),
@@ -385,8 +402,18 @@ impl<'w, 'i> Walker<'w, 'i> {
             actor: String::new(),
             message: None,
             draw: None,
-            inputs: self.starts.fitting(kind, found.class(), both),
+            more: 0,
         }
+    }
+
+    /// What differs at the starts and may be behind the root of a difference.
+    pub(super) fn inputs(&mut self, root: &Root, first: &Found) -> Result<Vec<String>, LogError> {
+        if root.kind == RootKind::End && self.reach.ends.iter().any(|end| end.is_cut) {
+            return Ok(Vec::new());
+        }
+        let both = self.both(first)?;
+        let both = both.each_ref().map(Option::as_ref);
+        Ok(self.starts.fitting(root.kind, first.class(), both))
     }
 
     /// Something that was planned.
@@ -399,16 +426,15 @@ impl<'w, 'i> Walker<'w, 'i> {
             Found::OnlyInB(_) => format!("in {} only", self.files[1]),
             Found::Changed(..) | Found::Reordered(..) => "differs".to_owned(),
         };
-        let root = self.new_root(RootKind::Event, found, &both);
+        let root = self.new_root(RootKind::Event, found);
         let more = match self.reach.injected {
-            Some((time_ns, count)) if time_ns == root.time_ns && count > 1 => {
-                format!(", and {} more that was planned for that time", count - 1)
-            }
-            _ => String::new(),
+            Some((time_ns, count)) if time_ns == root.time_ns => count.saturating_sub(1),
+            _ => 0,
         };
         Ok(Root {
-            what: format!("{class} of {whom}, {only}{more}"),
+            what: format!("{class} of {whom}, {only}"),
             actor: whom.to_owned(),
+            more,
             ..root
         })
     }
@@ -431,7 +457,7 @@ impl<'w, 'i> Walker<'w, 'i> {
                 true => "none: the scenario rules what becomes of it".to_owned(),
                 false => told.draw(),
             }),
-            ..self.new_root(RootKind::Verdict, found, both)
+            ..self.new_root(RootKind::Verdict, found)
         }
     }
 
@@ -444,7 +470,7 @@ impl<'w, 'i> Walker<'w, 'i> {
         };
         Ok(Root {
             what: format!("the run stops otherwise: {} | {}", note(0), note(1)),
-            ..self.new_root(RootKind::End, found, &both)
+            ..self.new_root(RootKind::End, found)
         })
     }
 
@@ -458,16 +484,11 @@ impl<'w, 'i> Walker<'w, 'i> {
         };
         let time = crate::shown::Seconds(end.time_ns);
         let (file, other) = (self.files[side], self.files[1 - side]);
-        let root = self.new_root(RootKind::End, found, &[None, None]);
+        let root = self.new_root(RootKind::End, found);
         Root {
             what: format!("{file} {how} at {time} s; up to there {other} says the same"),
             time_ns: end.time_ns,
             time_s: seconds(end.time_ns),
-            inputs: if end.is_cut {
-                Vec::new()
-            } else {
-                root.inputs.clone()
-            },
             ..root
         }
     }
@@ -512,7 +533,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             topic: origin.topic.clone(),
             how: origin.how.clone(),
             message: origin.message.clone(),
-            root: root.map_or(String::new(), |root| root.what),
+            root,
             path,
             path_omitted: omitted,
         }

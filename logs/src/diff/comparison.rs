@@ -602,6 +602,9 @@ impl<'a> Comparison<'a> {
         self.report.spread = walker.reached()?;
         if let Some(first) = &self.earliest {
             self.report.root = walker.root(first)?;
+            if let Some(root) = &self.report.root {
+                self.report.inputs = walker.inputs(root, first)?;
+            }
         }
         Ok(())
     }

@@ -116,7 +116,8 @@ impl Reach {
             true => entry.said.sent_ns,
             false => entry.time_ns,
         };
-        time_ns > end.time_ns || (time_ns == end.time_ns && end.is_cut)
+        // At the very end it may be behind the last event.
+        time_ns >= end.time_ns
     }
 
     /// Adds a difference.
@@ -198,8 +199,8 @@ impl Reach {
                 })
             }
             // In the other log it may still be under way.
-            (Some(a), None) => Some(a).filter(|a| a.time_ns <= self.ends[1].time_ns),
-            (None, Some(b)) => Some(b).filter(|b| b.time_ns <= self.ends[0].time_ns),
+            (Some(a), None) => Some(a).filter(|a| a.time_ns < self.ends[1].time_ns),
+            (None, Some(b)) => Some(b).filter(|b| b.time_ns < self.ends[0].time_ns),
             (None, None) => None,
         };
         if let Some(entry) = received {

@@ -29,6 +29,9 @@ const NOT_OF_ACTORS: [&str; 9] = [
     "crash", "lose", "deliver", "postpone", "links", "radios", "contacts", "log", "until",
 ];
 
+/// What runs do not depend on.
+const WITHOUT_EFFECT: [&str; 2] = ["description", "log"];
+
 /// Everything that a run depends on in which two logs differ.
 #[derive(Default)]
 pub(super) struct Starts {
@@ -63,6 +66,7 @@ impl Starts {
         let is_ruled = !found.is_empty();
         let within = |tables: &[&str], input: &Input| tables.contains(&table(input));
         let fits = |input: &Input| match (kind, class) {
+            _ if within(&WITHOUT_EFFECT, input) => false,
             (RootKind::Verdict, _) if is_ruled => false,
             (RootKind::Verdict, _) => within(&OF_LINKS, input),
             (RootKind::Event, RecordClass::Crash | RecordClass::Restart) => {

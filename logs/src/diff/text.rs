@@ -34,7 +34,7 @@ impl fmt::Display for DiffReport {
         };
         let names = short(Path::new(&self.file_a), Path::new(&self.file_b));
         if let Some(root) = &self.root {
-            reach::write_root(f, root)?;
+            reach::write_root(f, root, &self.inputs)?;
         }
         write!(f, "first difference at ")?;
         write_first(f, first, &names)?;

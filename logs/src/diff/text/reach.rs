@@ -15,27 +15,41 @@ const INPUTS_SHOWN: usize = 4;
 const BY_SHOWN: usize = 5;
 
 /// Writes in two or three lines what differences began with.
-pub(super) fn write_root(f: &mut fmt::Formatter<'_>, root: &Root) -> fmt::Result {
+pub(super) fn write_root(
+    f: &mut fmt::Formatter<'_>,
+    root: &Root,
+    inputs: &[String],
+) -> fmt::Result {
     let (time, what) = (Seconds(root.time_ns), Shown(&root.what));
     match root.kind {
-        RootKind::End => writeln!(f, "root: {what}")?,
-        _ => writeln!(f, "root: {time} s  {what}")?,
+        RootKind::End => write!(f, "root: {what}")?,
+        _ => write!(f, "root: {time} s  {what}")?,
     }
-    let word = match root.inputs.len() {
-        0 if root.kind == RootKind::End => return writeln!(f),
-        0 => "nothing: seed, scenario, files and code version are the same".to_owned(),
-        _ => {
-            let shown = root.inputs.iter().take(INPUTS_SHOWN);
-            let shown: Vec<String> = shown.map(|input| Shown(input).to_string()).collect();
-            match root.inputs.len().saturating_sub(INPUTS_SHOWN) {
-                0 => shown.join("; "),
-                more => format!("{}; and {more} more (--json has all)", shown.join("; ")),
-            }
-        }
-    };
-    writeln!(f, "  what differs at the start and may be why: {word}")?;
+    match root.more {
+        0 => writeln!(f)?,
+        more => writeln!(
+            f,
+            ", with {more} more that differ in what is planned for then"
+        )?,
+    }
     if let Some(draw) = &root.draw {
-        writeln!(f, "  its draw: {}", Shown(draw))?;
+        writeln!(f, "  draw: {}", Shown(draw))?;
+    }
+    if inputs.is_empty() && root.kind != RootKind::End {
+        let same = "seed, scenario, files and code version";
+        writeln!(f, "  though {same} are the same in both")?;
+    }
+    for (at, input) in inputs.iter().take(INPUTS_SHOWN).enumerate() {
+        let word = if at == 0 {
+            "the runs differ in"
+        } else {
+            "and in"
+        };
+        writeln!(f, "  {word} {}", Shown(input))?;
+    }
+    match inputs.len().saturating_sub(INPUTS_SHOWN) {
+        0 => {}
+        more => writeln!(f, "  and in {more} more (--json has all)")?,
     }
     writeln!(f)
 }
@@ -64,12 +78,7 @@ pub(super) fn write(
     for reached in spread.iter().take(shown) {
         let (time, actor) = (Seconds(reached.time_ns), Shown(&reached.actor).to_string());
         write!(f, "  {time} s  {actor:width$}  {}", Shown(&reached.how))?;
-        write_way(f, reached)?;
-        // Whose way begins elsewhere.
-        let own = root.is_some_and(|root| root.what == reached.root);
-        if !own && reached.path.len() == 1 && !reached.root.starts_with(reached.actor.as_str()) {
-            write!(f, "\n{:16}root: {}", "", Shown(&reached.root))?;
-        }
+        write_way(f, reached, root)?;
         writeln!(f)?;
     }
     match count.saturating_sub(shown) {
@@ -78,14 +87,25 @@ pub(super) fn write(
     }
 }
 
-/// The actors between the root and an actor.
-fn write_way(f: &mut fmt::Formatter<'_>, reached: &Reached) -> fmt::Result {
-    let Some((_, before)) = reached
-        .path
-        .split_last()
-        .filter(|(_, before)| !before.is_empty())
-    else {
-        return Ok(());
+/// The actors between the root and an actor; without any, its root, unless that is the one of all.
+fn write_way(f: &mut fmt::Formatter<'_>, reached: &Reached, root: Option<&Root>) -> fmt::Result {
+    let before = match reached.path.split_last() {
+        Some((_, before)) if !before.is_empty() => before,
+        _ => {
+            let is_own = |own: &&Root| {
+                let planned = own.kind == RootKind::Event
+                    && root.is_some_and(|root| root.time_ns == own.time_ns);
+                // What an actor does by itself has been said.
+                own.kind != RootKind::Actor && root != Some(own) && !planned
+            };
+            return match reached.root.as_ref().filter(is_own) {
+                Some(own) if own.kind == RootKind::Verdict => {
+                    write!(f, "  by link {}", Shown(&own.actor))
+                }
+                Some(own) => write!(f, "  by {}", Shown(&own.what)),
+                None => Ok(()),
+            };
+        }
     };
     let name = |hop: &Hop| Shown(&hop.actor).to_string();
     let names: Vec<String> = match before.len() + reached.path_omitted {
