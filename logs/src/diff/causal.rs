@@ -539,3 +539,6 @@ impl<'w, 'i> Walker<'w, 'i> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
