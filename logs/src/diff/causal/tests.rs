@@ -321,6 +321,40 @@ fn a_message_more_in_a_flow_is_one_message() {
     }
 }
 
+/// A link draws for another number. Who sent a message more is why it decides otherwise about the next.
+#[test]
+fn what_a_link_decides_of_a_message_with_another_number_is_by_its_sender() {
+    let a = run(3, &row(), &Change::Nothing);
+    let mut b = run(3, &row(), &Change::Nothing);
+    let flow: Vec<usize> = (0..b.messages.len())
+        .filter(|at| (b.messages[*at].from, b.messages[*at].to) == (0, 1))
+        .collect();
+    let next = b.messages[flow[4]].clone();
+    for at in &flow[4..] {
+        b.messages[*at].ordinal += 1;
+    }
+    b.messages[flow[4]].at_ns += 1_000_000;
+    b.messages.push(Message {
+        sent_ns: next.sent_ns - 7,
+        at_ns: next.at_ns + 500_000,
+        body: 5,
+        ..next
+    });
+    let report = compared(&a, &b, 5);
+    let of_1 = report
+        .spread
+        .iter()
+        .find(|reached| reached.actor == "rover_1")
+        .unwrap();
+    let path: Vec<&str> = of_1.path.iter().map(|hop| hop.actor.as_str()).collect();
+    assert_eq!(path, ["rover_0", "rover_1"], "{report}");
+    assert_eq!(
+        of_1.how,
+        "receives rover_0,rover_1,Fact,4, 1ms later in b.mcap"
+    );
+    assert_eq!(of_1.root.as_ref().unwrap().kind, RootKind::Actor);
+}
+
 #[test]
 fn nothing_is_reached_behind_the_end_of_a_log_that_is_cut() {
     let (a, folder) = (
