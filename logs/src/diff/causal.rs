@@ -246,6 +246,17 @@ impl<'w, 'i> Walker<'w, 'i> {
             };
             return Ok((Vec::new(), from));
         }
+        if self.reach.may_have_arrived(found) {
+            // Nothing says whether it was sent in the other run; whoever was reached may have sent it otherwise.
+            let sender = self.reach.actors.get(&entry.said.sender);
+            let first = sender.map(|sender| [&sender.input, &sender.output]);
+            let mut first = first.into_iter().flatten().flatten();
+            let is_reached = first.any(|(moment, _)| moment.time_ns <= entry.said.sent_ns);
+            return match is_reached {
+                true => Ok((Vec::new(), From::Actor(entry.said.sender))),
+                false => self.verdict(found, &entry),
+            };
+        }
         match found.is_sent_alike() && !found.is_renumbered() {
             true => self.verdict(found, &entry),
             false => Ok((Vec::new(), From::Actor(entry.said.sender))),
@@ -420,7 +431,11 @@ impl<'w, 'i> Walker<'w, 'i> {
     fn event(&mut self, found: &Found) -> Result<Root, LogError> {
         let both = self.both(found)?;
         let one = both.iter().flatten().next();
-        let (class, whom) = one.map_or(("", ""), |one| (one.class.name(), one.receiver.as_str()));
+        let whom = one.map_or("", |one| one.receiver.as_str());
+        let what = one.map_or(String::new(), |one| match one.class {
+            RecordClass::Told => format!("{whom} is told {}", one.kind),
+            class => format!("{} of {whom}", class.name()),
+        });
         let only = match found {
             Found::OnlyInA(_) => format!("in {} only", self.files[0]),
             Found::OnlyInB(_) => format!("in {} only", self.files[1]),
@@ -432,7 +447,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             _ => 0,
         };
         Ok(Root {
-            what: format!("{class} of {whom}, {only}"),
+            what: format!("{what}, {only}"),
             actor: whom.to_owned(),
             more,
             ..root

@@ -153,6 +153,14 @@ impl<'a> Comparison<'a> {
         let channels = [&a, &b].map(|log| log.scanner.channels().to_vec());
         let mut order = a.topic_order(&mut names);
         order.extend(b.topic_order(&mut names));
+        let mut reach = Reach::new(ends);
+        for topic in &order {
+            let name = names.name(*topic);
+            let arrived = ["/lost", "/in_flight"].map(|class| name.strip_prefix(class));
+            if arrived.iter().flatten().any(|topic| ignore.matches(topic)) {
+                reach.hidden.insert(*topic);
+            }
+        }
         let mut beside = DiffReport::default();
         let files = (short.0.as_str(), short.1.as_str());
         let by_field = beside::compare((&a, &b), files, mode, (&mut names, &order), &mut beside);
@@ -182,7 +190,7 @@ impl<'a> Comparison<'a> {
             places: Buckets::new(limits.pairs),
             earliest: None,
             earliest_own: None,
-            reach: Reach::new(ends),
+            reach,
             starts: Starts::default(),
             by_field,
             reasons: BTreeSet::new(),

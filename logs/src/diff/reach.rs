@@ -2,7 +2,7 @@
 //! and the first that it said or did otherwise. So much is kept, whatever the number of differences.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use farside::record::RecordClass;
 
@@ -87,6 +87,8 @@ pub(super) struct Reach {
     pub(super) actors: BTreeMap<u32, Touched>,
     pub(super) links: BTreeMap<u32, Touched>,
     pub(super) ends: [End; 2],
+    /// Topics of losses whose messages are on a topic that is not compared if they arrive.
+    pub(super) hidden: BTreeSet<u32>,
     /// That the run was stopped otherwise.
     pub(super) stop: Earliest,
     /// When what was planned differs first, and how often it does then.
@@ -99,6 +101,7 @@ impl Reach {
             actors: BTreeMap::new(),
             links: BTreeMap::new(),
             ends,
+            hidden: BTreeSet::new(),
             stop: None,
             injected: None,
         }
@@ -118,6 +121,14 @@ impl Reach {
         };
         // At the very end it may be behind the last event.
         time_ns >= end.time_ns
+    }
+
+    /// Whether only one log has the loss of a message that may have arrived in the other, unseen.
+    pub(super) fn may_have_arrived(&self, found: &Found) -> bool {
+        match found {
+            Found::OnlyInA(entry) | Found::OnlyInB(entry) => self.hidden.contains(&entry.topic),
+            Found::Changed(..) | Found::Reordered(..) => false,
+        }
     }
 
     /// Adds a difference.
@@ -174,6 +185,13 @@ impl Reach {
     fn message(&mut self, found: &Found, names: &Names) {
         let both = found.both();
         let entries = || both.into_iter().flatten();
+        if self.may_have_arrived(found) {
+            for entry in entries() {
+                let receiver = self.actors.entry(entry.said.receiver).or_default();
+                note(&mut receiver.input, Moment::of(entry, found), found, names);
+            }
+            return;
+        }
         if !found.is_sent_alike() {
             let sent = entries().min_by_key(|entry| entry.said.sent_ns);
             if let Some(entry) = sent {

@@ -58,7 +58,13 @@ impl Told<'_> {
             Some(RecordClass::Start) => "starts",
             Some(RecordClass::Crash) => "crashes",
             Some(RecordClass::Restart) => "restarts",
-            Some(RecordClass::Told) => "is told something",
+            Some(RecordClass::Told) => {
+                let kind = self.one().map_or("", |one| one.kind.as_str());
+                return format!(
+                    "is told {kind}{}",
+                    self.only().unwrap_or_else(|| " otherwise".to_owned())
+                );
+            }
             _ => return self.message_received(),
         };
         let how = self.only().unwrap_or_else(|| " otherwise".to_owned());
@@ -85,7 +91,10 @@ impl Told<'_> {
                 format!("receives {name}{says}{when}")
             }
             (Some(_), None) => self.received_once(0, b),
-            (None, _) => self.received_once(1, a),
+            (None, Some(_)) => self.received_once(1, a),
+            // Where it arrived it is on a topic that is not compared.
+            (None, None) if a.is_some() => self.received_once(1, a),
+            (None, None) => self.received_once(0, b),
         }
     }
 
@@ -128,7 +137,7 @@ impl Told<'_> {
     pub(super) fn fates(&self) -> String {
         let [a, b] = self
             .both
-            .map(|record| record.map_or("absent".to_owned(), fate));
+            .map(|record| record.map_or("on a topic that is not compared".to_owned(), fate));
         match (a == b, self.both) {
             (true, [Some(x), Some(y)]) => {
                 let at = |record: &LoggedRecord| {

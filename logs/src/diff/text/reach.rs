@@ -68,8 +68,10 @@ pub(super) fn write(
         false => ACTORS_SHOWN,
     };
     let count = spread.len();
-    let actors = if count == 1 { "actor" } else { "actors" };
-    writeln!(f, "\nit reached {count} {actors}, in this order")?;
+    match count {
+        1 => writeln!(f, "\nit reached 1 actor")?,
+        count => writeln!(f, "\nit reached {count} actors, in this order")?,
+    }
     let width = spread
         .iter()
         .take(shown)
