@@ -348,7 +348,8 @@ pub struct DiffReport {
 /// Compares two logs.
 ///
 /// Farside's logs are aligned by the identity of each message: sender, receiver, kind, and the
-/// match key where the protocol gave one, or else the ordinal. The messages of other MCAP files are
+/// match key where the protocol gave one; or else what says the same and was sent at the same time, and
+/// of the rest the place in the flow, without what only one log has before it. The messages of other MCAP files are
 /// aligned on each topic: what is the same, and between these what says the same, what has the same
 /// number, what was at the same time or nearest to it, and last by place; if the second log was recorded
 /// later by a time that is sure, after that. CDR, ROS 1, protobuf, JSON and FlatBuffers are compared field

@@ -22,6 +22,8 @@ const LETTERS: usize = 60;
 
 /// What came of a run.
 pub(super) struct Came {
+    /// The log that is of it.
+    log: String,
     ending: String,
     metrics: Map<String, Value>,
     violations: Vec<String>,
@@ -29,13 +31,14 @@ pub(super) struct Came {
 
 impl Came {
     /// Of a run that was executed.
-    pub(super) fn of(report: &Report, results: &Results) -> Self {
+    pub(super) fn of(log: &Path, report: &Report, results: &Results) -> Self {
         let mut metrics = results.metrics.clone();
         // Counts of events and messages by name are always a JSON object.
         if let Ok(counts) = serde_json::to_value(&report.counts) {
             metrics.insert("messages".to_owned(), counts);
         }
         Came {
+            log: log.display().to_string(),
             ending: ending(report),
             metrics,
             violations: results.violations.clone(),
@@ -61,7 +64,7 @@ impl Came {
             return Err(not_repeatable("it was interrupted as it was run again"));
         }
         let results = (assembled.system.conclude)(&report);
-        Ok(Came::of(&report, &results))
+        Ok(Came::of(path, &report, &results))
     }
 }
 
@@ -77,6 +80,7 @@ pub(super) struct Differs {
 /// What came of two runs, where it differs.
 #[derive(Serialize)]
 pub(super) struct BothCame {
+    logs: [String; 2],
     /// How they ended.
     ends: [String; 2],
     metrics: Vec<Differs>,
@@ -90,6 +94,7 @@ impl BothCame {
         let (x, y) = (Value::Object(a.metrics), Value::Object(b.metrics));
         differing("", Some(&x), Some(&y), &mut metrics);
         BothCame {
+            logs: [a.log, b.log],
             ends: [a.ending, b.ending],
             metrics,
             violations: [a.violations, b.violations],
@@ -128,15 +133,12 @@ fn differing(name: &str, a: Option<&Value>, b: Option<&Value>, found: &mut Vec<D
 
 impl fmt::Display for BothCame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [a, b] = &self.ends;
-        match a == b {
-            true => writeln!(f, "both {a}")?,
-            false => writeln!(f, "one {a}\nthe other {b}")?,
+        for (log, ending) in self.logs.iter().zip(&self.ends) {
+            writeln!(f, "{log}: {ending}")?;
         }
-        let [a, b] = &self.violations;
-        for (which, violations) in [("one", a), ("the other", b)] {
+        for (log, violations) in self.logs.iter().zip(&self.violations) {
             for violation in violations {
-                writeln!(f, "VIOLATED in {which}: {violation}")?;
+                writeln!(f, "VIOLATED in {log}: {violation}")?;
             }
         }
         let count = self.metrics.len();
@@ -174,6 +176,7 @@ mod tests {
 
     fn came(ending: &str, metrics: &Value) -> Came {
         Came {
+            log: format!("{ending}.mcap"),
             ending: ending.to_owned(),
             metrics: metrics.as_object().cloned().unwrap_or_default(),
             violations: Vec::new(),
@@ -187,10 +190,13 @@ mod tests {
         let both = BothCame::new(came("x", &a), came("y", &b));
         assert_eq!(
             both.to_string(),
-            "one x\nthe other y\n4 metrics differ\n  arrival_s[1]: 2.0 | 2.5\n  \
+            "x.mcap: x\ny.mcap: y\n4 metrics differ\n  arrival_s[1]: 2.0 | 2.5\n  \
              lost.burst: null | 1\n  lost.loss: 1 | null\n  why: null | [1]\n"
         );
         let same = BothCame::new(came("x", &a), came("x", &a));
-        assert_eq!(same.to_string(), "both x\nno metric differs\n");
+        assert_eq!(
+            same.to_string(),
+            "x.mcap: x\nx.mcap: x\nno metric differs\n"
+        );
     }
 }

@@ -161,7 +161,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let differences = diff(path, &args.out, &DiffOptions::default())?;
     let came = match args.metrics {
         true => {
-            let fork = Came::of(&report, &results);
+            let fork = Came::of(&args.out, &report, &results);
             Some(BothCame::new(Came::again(path, registry)?, fork))
         }
         false => None,

@@ -170,7 +170,7 @@ impl Told<'_> {
         }
     }
 
-    /// The parts of the delay that differ: of what chance added the draw itself is in the log.
+    /// What chance added to a delay, which is in the log, and the other parts that differ.
     fn parts(&self) -> String {
         let carriage = |record: Option<&LoggedRecord>| record.and_then(|one| one.carriage);
         let [Some(a), Some(b)] = self.both.map(carriage) else {
@@ -184,11 +184,14 @@ impl Told<'_> {
             let sign = if carriage.jitter_ns < 0 { "-" } else { "" };
             format!("{sign}{size}")
         });
+        let drawn = match jitter[0] == jitter[1] {
+            true => "the same in both".to_owned(),
+            false => format!("jitter {} | {}", jitter[0], jitter[1]),
+        };
         let parts = [
             ("queue", time(&|carriage| carriage.queue)),
             ("serialization", time(&|carriage| carriage.serialization)),
             ("propagation", time(&|carriage| carriage.propagation)),
-            ("jitter", jitter),
             ("retries", time(&|carriage| carriage.retries)),
             ("attempts", [a.attempts.to_string(), b.attempts.to_string()]),
         ];
@@ -197,8 +200,8 @@ impl Told<'_> {
             .map(|(part, [a, b])| format!("{part} {a} | {b}"))
             .collect();
         match texts.is_empty() {
-            true => "none: its parts are the same in both".to_owned(),
-            false => texts.join(", "),
+            true => drawn,
+            false => format!("{drawn}; what differs is {}", texts.join(", ")),
         }
     }
 
