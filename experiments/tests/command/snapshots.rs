@@ -155,6 +155,60 @@ fn texts_of_mistakes() {
     insta::assert_snapshot!("mistakes", all);
 }
 
+/// Why two logs differ, and whom that reached: up to the table of topics.
+#[test]
+fn texts_of_differences() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write(folder, &[("tiny.toml", TINY)]);
+    let all = "log.exclude=[]";
+    said(
+        folder,
+        &["run", "tiny.toml", "--set", all, "--out", "tiny.mcap"],
+    );
+    let loss = "links.\"node_*-rover_*\".loss=0.5";
+    let forks = [
+        vec!["--at", "2s", "--set", loss, "--out", "worse.mcap"],
+        vec!["--at", "2s", "--crash", "node_02", "--out", "crashed.mcap"],
+    ];
+    for fork in forks {
+        let (code, _, err) = run(folder, &[&["fork", "tiny.mcap"], fork.as_slice()].concat());
+        assert_eq!(code, 1, "{err}");
+    }
+    let (_, json, _) = run(folder, &["diff", "tiny.mcap", "worse.mcap", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let lost = report["spread"][0]["message"].as_str().expect("a message");
+    let lose = ["fork", "tiny.mcap", "--lose", lost, "--out", "lost.mcap"];
+    assert_eq!(run(folder, &lose).0, 1);
+    let key = "links.default.latency=8ms";
+    said(
+        folder,
+        &["run", "tiny.mcap", "--set", key, "--out", "key.mcap"],
+    );
+    said(
+        folder,
+        &["run", "tiny.mcap", "--until", "5s", "--out", "short.mcap"],
+    );
+    let mut text = String::new();
+    for (other, more) in [
+        ("worse.mcap", &[][..]),
+        ("crashed.mcap", &[]),
+        ("lost.mcap", &["--metrics"]),
+        ("key.mcap", &[]),
+        ("short.mcap", &[]),
+    ] {
+        let arguments = [&["diff", "tiny.mcap", other], more].concat();
+        let (code, out, err) = run(folder, &arguments);
+        assert_eq!(code, 1, "{arguments:?}: {out}{err}");
+        let (told, rest) = out.split_once(" records in tiny.mcap, ").expect("a table");
+        let told = told.trim_end_matches(|c: char| c.is_ascii_digit());
+        let came = rest.split("\n\n").last().filter(|_| !more.is_empty());
+        let came = came.unwrap_or_default();
+        text += &format!("$ farside {}\n{told}{came}\n", arguments.join(" "));
+    }
+    insta::assert_snapshot!("differences", text);
+}
+
 #[test]
 fn small_pictures() {
     let folder = tempfile::tempdir().unwrap();
