@@ -28,7 +28,7 @@ use rows::{Bounds, Happened, Rows};
 use series::Series;
 
 /// As many rows as a page of one log has; a page of two has half as many of each.
-const ROWS: usize = 1_800_000;
+const ROWS: usize = 2_200_000;
 
 /// Logs of up to so many messages are told to the nanosecond, larger ones to the microsecond.
 const EXACT: u64 = 250_000;
@@ -168,7 +168,7 @@ impl Reading {
         self.unreadable += 1;
     }
 
-    fn finish(self, path: &Path, info: &LogInfo, cut: Option<String>) -> Side {
+    fn finish(mut self, path: &Path, info: &LogInfo, cut: Option<String>) -> Side {
         let mut notes: Vec<String> = Vec::new();
         notes.extend(cut.map(|cut| format!("The log is {cut}.")));
         let missing = info.missing.iter().filter(|_| notes.is_empty());
@@ -182,6 +182,8 @@ impl Reading {
         }
         let (shown, left_out) = (self.rows.rows(), self.rows.left_out());
         let file = path.file_name().unwrap_or_default().to_string_lossy();
+        // First: what there is no room for is told in the head.
+        let details = self.rows.details.packed();
         let map = match self.map.is_empty() {
             true => Json::Null,
             false => self.map.told(),
@@ -200,7 +202,7 @@ impl Reading {
             rows: columns::block(&self.rows.bytes()),
             map: columns::block(map.to_string().as_bytes()),
             series: columns::block(self.series.told().to_string().as_bytes()),
-            details: columns::block(&self.rows.details.bytes()),
+            details,
             shown,
             left_out,
             notes,
@@ -234,7 +236,10 @@ fn said(message: &AnyMessage<'_>, record: &RecordRef<'_>) -> String {
         .map(|(name, ns)| format!("{name} {}", milliseconds(ns as f64)))
         .collect();
     if carriage.jitter_ns != 0 {
-        parts.push(format!("jitter {}", milliseconds(carriage.jitter_ns as f64)));
+        parts.push(format!(
+            "jitter {}",
+            milliseconds(carriage.jitter_ns as f64)
+        ));
     }
     if carriage.attempts != 1 {
         parts.push(format!("{} attempts", carriage.attempts));

@@ -108,7 +108,12 @@ fn colour(value: &Value<'_>) -> Json {
     let part = |name: &str, most: f64| {
         libm::round(number(value, &format!("color.{name}")).clamp(0.0, 1.0) * most) as u8
     };
-    json!([part("r", 255.0), part("g", 255.0), part("b", 255.0), part("a", 100.0)])
+    json!([
+        part("r", 255.0),
+        part("g", 255.0),
+        part("b", 255.0),
+        part("a", 100.0)
+    ])
 }
 
 impl Map {

@@ -9,7 +9,7 @@ use super::{Side, columns};
 const STYLE: &str = include_str!("assets/page.css");
 
 /// The scripts, a concern each: one may use those before it.
-const SCRIPTS: [&str; 9] = [
+pub(super) const SCRIPTS: [&str; 9] = [
     include_str!("assets/data.js"),
     include_str!("assets/look.js"),
     include_str!("assets/timeline.js"),
@@ -51,10 +51,8 @@ pub(super) fn page(title: &str, sides: &[&Side], diff: &Json) -> String {
                 (time_bar())
                 main {
                     @if !diff.is_null() { (differences()) }
-                    (map(sides.len()))
-                    (chart(sides.len()))
-                    (causes())
-                    (plots())
+                    div .column { (map(sides.len())) (causes()) }
+                    div .column { (chart(sides.len())) (plots()) }
                 }
                 footer { (help()) }
                 (block("head", &columns::block(head.to_string().as_bytes())))
@@ -86,7 +84,7 @@ fn time_bar() -> Markup {
                 label { span .wide { "Speed " }
                     select #speed aria-label="Speed" {
                         option value="0.1" { "0.1×" } option value="1" selected { "1×" } option value="4" { "4×" }
-                        option value="16" { "16×" } option value="64" { "64×" } option value="fit" { "30 s" }
+                        option value="16" { "16×" } option value="64" { "64×" } option value="fit" { "all in 30 s" }
                     }
                 }
                 output #now for="slider" { "0 s" }
@@ -157,7 +155,8 @@ fn causes() -> Markup {
     html! {
         section #causes aria-labelledby="causes-title" {
             h2 #causes-title { "Message and causes" }
-            div #message role="region" aria-live="polite" aria-label="The selected message" {
+            p #selected-said .hidden role="status" {}
+            div #message {
                 p .note { "Choose a message in the chart: what led to it is listed here, back to its root." }
             }
         }

@@ -411,11 +411,19 @@ mod tests {
             rows.add(&happened("delivered", 10 * count, count), String::new);
         }
         let mut unknown = happened("delivered", 40, 3);
-        unknown.cause = Some(KeyRef { source: "x", ..KeyRef::default() });
+        unknown.cause = Some(KeyRef {
+            source: "x",
+            ..KeyRef::default()
+        });
         rows.add(&unknown, String::new);
         // Flows, times, delays, causes, ordinals, copies of four rows.
         let expected = [
-            [0, 0, 0, 0], [0, 20, 20, 40], [0, 3, 3, 3], [0, 2, 2, 1], [0, 0, 0, 0], [0; 4],
+            [0, 0, 0, 0],
+            [0, 20, 20, 40],
+            [0, 3, 3, 3],
+            [0, 2, 2, 1],
+            [0, 0, 0, 0],
+            [0; 4],
         ];
         assert_eq!(rows.bytes(), expected.concat());
     }
@@ -431,7 +439,10 @@ mod tests {
         }
         assert_eq!((rows.rows(), rows.left_out()), (3, 2));
         let told = serde_json::to_value(rows.told()).unwrap();
-        assert_eq!(told["counts"], serde_json::json!({ "delivered": 3, "lost": 2 }));
+        assert_eq!(
+            told["counts"],
+            serde_json::json!({ "delivered": 3, "lost": 2 })
+        );
         assert_eq!(told["first_left_out_ns"], 2);
     }
 
@@ -443,7 +454,11 @@ mod tests {
             rows.add(&happened(class, at * 7, at), String::new);
         }
         let bins = &rows.bins;
-        assert!(bins.all.len() <= BINS && bins.all.len() > BINS / 4, "{}", bins.all.len());
+        assert!(
+            bins.all.len() <= BINS && bins.all.len() > BINS / 4,
+            "{}",
+            bins.all.len()
+        );
         let sum = |which: usize| bins.all.iter().map(|bin| bin[which]).sum::<u32>();
         assert_eq!((sum(0), sum(1)), (90_000, 10_000));
         let lanes: u32 = bins.lanes.values().flatten().flatten().sum();

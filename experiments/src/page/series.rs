@@ -106,7 +106,9 @@ fn rounded(value: f64) -> Json {
     let short = value as f32;
     match short.is_finite() {
         // Through its shortest text: as 64 bits it would have digits that nobody wrote.
-        true => format!("{short}").parse::<f64>().map_or(Json::Null, Json::from),
+        true => format!("{short}")
+            .parse::<f64>()
+            .map_or(Json::Null, Json::from),
         false if value.is_finite() => Json::from(value),
         false => Json::Null,
     }

@@ -33,7 +33,10 @@ pub(super) fn figure(curves: &Curves, file: &str) -> Figure {
             fields.push(&curve.field);
         }
     }
-    let times = curves.curves.iter().flat_map(|curve| curve.values.points.iter());
+    let times = curves
+        .curves
+        .iter()
+        .flat_map(|curve| curve.values.points.iter());
     let times = times.map(|(time_ns, _)| *time_ns as f64 / 1e9);
     let x = Scale::over(times, Spacing::Linear);
     let mut top = TOP;

@@ -4,12 +4,37 @@
 /** As many causes as are listed before the rest is asked for. */
 const LISTED = 60;
 const EFFECTS = 30;
+const PROPOSED = 12;
 
 class Causes {
   constructor(state) {
     this.state = state;
     this.box = byId("message");
     state.on("select", () => this.show());
+    state.on("side", () => { if (!state.selected) this.propose(); });
+    this.propose();
+  }
+
+  /** Before anything is chosen: what happened to actors, and the first losses. */
+  propose() {
+    const { state } = this;
+    const { rows, flows } = state.side;
+    const found = { events: [], lost: [] };
+    for (let row = 0; row < rows.n; row++) {
+      const { cls } = flows[rows.flow[row]];
+      if (cls === "lost") found.lost.push(row);
+      else if (EVENTS.includes(cls) && cls !== "start" && cls !== "stop") found.events.push(row);
+    }
+    const list = (title, its) => {
+      if (!its.length) return [];
+      const some = its.slice(0, PROPOSED).map((row) => element("li", {}, this.button(state.index, row)));
+      const heading = its.length > PROPOSED ? `${title}: the first ${PROPOSED} of ${its.length.toLocaleString("en")}` : title;
+      return [element("h4", {}, heading), element("ul", { class: "rows" }, ...some)];
+    };
+    this.box.replaceChildren(
+      element("p", { class: "note" }, "Choose a message in the chart, or here: what led to it is listed, back to its root."),
+      ...list("Crashes, changes and what actors were told", found.events), ...list("Losses", found.lost),
+    );
   }
 
   /** A row in a line: what, from whom to whom, and what became of it. */
@@ -50,6 +75,7 @@ class Causes {
     const says = element("div", {});
     const shown = [title, list, says, ...this.whatIf(side, row, flow), ...this.led(selected.side, row), ...this.caused(selected.side, row)];
     this.box.replaceChildren(...shown);
+    byId("selected-said").textContent = `${title.textContent}, at ${exactTime(rows.at[row])}`;
     const detail = await side.detail(row);
     if (state.selected !== selected) return;
     if (detail?.carried) list.append(element("dt", {}, "carried"), element("dd", {}, detail.carried));

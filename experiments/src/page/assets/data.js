@@ -109,6 +109,13 @@ function rowFrom(rows, time) {
   return low;
 }
 
+/** The first row after a time. */
+function rowAfter(rows, time) {
+  let row = rowFrom(rows, time);
+  while (row < rows.n && rows.at[row] <= time) row += 1;
+  return row;
+}
+
 /** What a flow is called by: class, sender, receiver, link, kind, reason. */
 function readFlow(told, flow) {
   const [cls, sender, receiver, link, kind, reason, family] = flow;

@@ -6,6 +6,7 @@ class Differences {
     this.state = state;
     this.diff = diff;
     const parts = [this.counts()];
+    if (diff.root) parts.push(this.root(diff.root));
     if (diff.first) parts.push(this.first(diff.first, "The first difference"));
     if (diff.consequence) parts.push(this.first(diff.consequence, "What that led to first"));
     if (diff.spread?.length) parts.push(this.spread());
@@ -36,6 +37,22 @@ class Differences {
     state.setTime(time, true);
   }
 
+  /** What differences began with: an input, or what a link decided. */
+  root(root) {
+    const go = () => this.goTo(root);
+    return element("div", { class: "first" }, element("h3", {}, `The root: ${exactTime(root.time_ns)}`), element("p", {}, root.what),
+      root.draw ? element("p", { class: "note" }, root.draw) : null,
+      element("button", { type: "button", onclick: go, "aria-label": "Show the root" }, "Show"));
+  }
+
+  /** To a message that is called as `fork` calls it; to a time, if there is none. */
+  goTo({ message, time_ns: time }) {
+    const parts = message ? message.split(",") : [];
+    const ordinal = Number((parts[3] ?? "").split("+")[0]);
+    if (parts.length !== 4 || !Number.isFinite(ordinal)) return this.state.setTime(time, true);
+    return this.go({ sender: parts[0], receiver: parts[1], kind: parts[2], ordinal, time_ns: time }, [1, 0]);
+  }
+
   first(first, title) {
     const { topic, sender, receiver, ordinal, field, a, b, time_ns: time } = first;
     const ids = [first.carried_a?.id, first.carried_b?.id];
@@ -45,7 +62,7 @@ class Differences {
       const kind = ids[index]?.split(",").at(-2);
       const go = () => this.go({ sender, receiver, ordinal, kind, time_ns: carried?.at_ns ?? time }, [index]);
       return element("tr", {}, element("th", { scope: "row" }, letter), element("td", {}, value || "—", element("small", {}, fate)),
-        element("td", {}, element("button", { type: "button", onclick: go, "aria-label": `Show it in ${letter}` }, "Show")));
+        element("td", {}, value === "absent" ? "" : element("button", { type: "button", onclick: go, "aria-label": `Show it in ${letter}` }, "Show")));
     };
     const causes = first.causes.slice(0, 12).map((cause) => {
       const what = `${timeText(cause.time_ns, this.state.until)} ${cause.topic}`;
@@ -60,9 +77,14 @@ class Differences {
 
   spread() {
     const { spread } = this.diff;
-    const item = ({ actor, time_ns: time, topic }) => {
-      const go = () => this.state.setTime(time, true);
-      return element("li", {}, element("button", { type: "button", class: "row", onclick: go }, element("time", {}, timeText(time, this.state.until)), element("b", {}, ` ${actor}`), element("small", {}, ` ${topic}`)));
+    const step = ({ actor, time_ns: time, topic, how, message }) => element("button", { type: "button", class: "row", onclick: () => this.goTo({ message, time_ns: time }) },
+      element("time", {}, timeText(time, this.state.until)), element("b", {}, ` ${actor}`), element("small", {}, ` ${how || topic}`));
+    const item = (reached) => {
+      const { path } = reached;
+      const way = path?.length > 1 ? element("details", {}, element("summary", {}, `the way there: ${plural(path.length, "step")}`),
+        element("ol", {}, ...path.map((hop) => element("li", {}, step(hop)))),
+        reached.path_omitted ? element("p", { class: "note" }, `${plural(reached.path_omitted, "step")} in the middle left out`) : null) : null;
+      return element("li", {}, step(reached), way);
     };
     const rest = spread.length > 200 ? element("p", { class: "note" }, `and ${spread.length - 200} more`) : null;
     return element("details", { open: "" }, element("summary", {}, `Whom it reached: ${plural(spread.length, "actor")}, shaded in the chart from then on`),

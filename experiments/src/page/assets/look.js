@@ -179,7 +179,10 @@ function durationText(ns) {
 
 function numberText(value) {
   const size = Math.abs(value);
-  if (size >= 1e6 || (size > 0 && size < 1e-3)) return value.toExponential(2).replace("e+", "e");
+  for (const [unit, sign] of [[1e12, "T"], [1e9, "G"], [1e6, "M"]]) {
+    if (size >= unit && size < unit * 1e6) return `${Number((value / unit).toPrecision(4)).toLocaleString("en")} ${sign}`;
+  }
+  if (size >= 1e6 || (size > 0 && size < 1e-3)) return String(Number(value.toExponential(2))).replace("e+", "e");
   return Number(value.toPrecision(4)).toLocaleString("en", { maximumFractionDigits: 6 });
 }
 
@@ -197,16 +200,20 @@ function ticks(from, until, about) {
 /** Ticks of times, with their texts: whole units of the span. */
 function timeTicks(from, until, about) {
   const span = until - from;
-  const [name, unit] = unitOf(span);
+  const [name, unit] = span >= 20 * 86400e9 ? ["d", 86400e9] : span >= 7200e9 ? ["h", 3600e9] : unitOf(span);
   const all = ticks(from / unit, until / unit, about);
   const step = all.length > 1 ? all[1] - all[0] : 1;
   const digits = Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
   return all.map((at) => ({ at: at * unit, text: `${at.toFixed(digits)} ${name}` }));
 }
 
+/** All that draws, for when there is no next frame: on paper. */
+const drawings = [];
+
 /** Calls once at the next frame, however often it is asked before. */
 function onceAFrame(draw) {
   let asked = false;
+  drawings.push(draw);
   return () => {
     if (asked) return;
     asked = true;

@@ -121,7 +121,6 @@ class MapView {
     this.scene = this.side.map && new Scene(this.side.map);
     this.scale = 1;
     this.centre = [0, 0];
-    this.draw = onceAFrame(() => this.drawNow());
     if (!this.scene) {
       this.canvas.hidden = true;
       const what = "This log has nothing to draw a map of: no messages in Foxglove's schemas that say where things "
@@ -129,6 +128,7 @@ class MapView {
       this.canvas.after(element("p", { class: "note" }, what));
       return;
     }
+    this.draw = onceAFrame(() => this.drawNow());
     this.reset();
     this.listen();
     for (const event of ["time", "select", "look", "filter"]) state.on(event, this.draw);
@@ -366,7 +366,9 @@ class MapView {
   }
 
   drawScale(pen, width, height) {
-    const metres = ticks(0, 90 / this.scale, 1).at(-1) || 90 / this.scale;
+    const most = 100 / this.scale;
+    const power = 10 ** Math.floor(Math.log10(most));
+    const metres = [5, 2, 1].find((factor) => factor * power <= most) * power;
     const long = metres * this.scale;
     pen.strokeStyle = pen.fillStyle = colour("--soft");
     pen.lineWidth = 1.5;
@@ -376,6 +378,6 @@ class MapView {
     pen.font = font(11);
     pen.textAlign = "left";
     pen.textBaseline = "bottom";
-    pen.fillText(`${numberText(metres)} m`, 12, height - 11);
+    pen.fillText(`${numberText(metres)} m`, 12, height - 12);
   }
 }

@@ -1,6 +1,9 @@
 // The page as a whole: what all parts share (the time, the span that is looked at, the side, what is selected), keys,
 // and in which order things are read and drawn.
 
+/** About so many rows are in sight where one is to be seen by itself. */
+const SEEN = 600;
+
 class State {
   constructor(sides) {
     this.sides = sides;
@@ -103,7 +106,8 @@ class State {
     const row = this.nextRow(start ?? this.time, direction, (flow) => side.flows[flow].cls === "lost", start !== null);
     if (row < 0) return;
     // Near enough that it is seen by itself.
-    if (this.to - this.from > this.until / 8) this.zoom(0.02, side.rows.at[row]);
+    const wanted = this.until * Math.min(0.02, SEEN / Math.max(1, side.rows.n));
+    if (this.to - this.from > 6 * wanted) this.zoom(wanted / (this.to - this.from), side.rows.at[row]);
     this.select(this.index, row);
   }
 }
@@ -197,7 +201,10 @@ async function start() {
   };
   window.addEventListener("resize", again);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
-  matchMedia("print").addEventListener("change", again);
+  matchMedia("print").addEventListener("change", () => {
+    again();
+    for (const draw of drawings) draw();
+  });
   // Whoever drives the page, as a test, finds here what is drawn where.
   window.farside = { state, sequence };
   requestAnimationFrame(() => { document.documentElement.dataset.ready = "yes"; });

@@ -3,7 +3,9 @@
 
 /** What is shown first, by words in the name of a field. */
 const FIRST = [/stored_j|battery|charge|energy/, /load/, /memory|queue|bytes/, /temp|_c$|power|_w$/];
-const PANELS = 4;
+const PANELS = 5;
+/** Into how many times the whole is divided for rates: more would show how often somebody sends, and not how much. */
+const RATES = 100;
 
 class Plots {
   constructor(state) {
@@ -52,7 +54,7 @@ class Plots {
         const rank = FIRST.findIndex((words) => words.test(field));
         if (!all.has(key)) all.set(key, { kind, field, rank: rank < 0 ? 9 : rank, curves: [] });
         for (const { actor, values, t, v } of curves) {
-          all.get(key).curves.push({ name: actor, side: index, values, t: sums(t).map((us) => us * 1e3), v, steps: false });
+          all.get(key).curves.push({ name: actor, side: index, values, t: sums(t).map((us) => us * 1e3), v });
         }
       }
     });
@@ -62,13 +64,26 @@ class Plots {
   rates() {
     const several = this.state.sides.length > 1;
     return this.state.sides.flatMap((side, index) => {
-      const { width_ns: width, all } = side.told.bins;
-      const seconds = width / 1e9;
+      const { width_ns: binWidth, all: bins } = side.told.bins;
+      const together = Math.max(1, Math.round(bins.length / RATES));
+      const width = binWidth * together;
+      const all = Array.from({ length: Math.ceil(bins.length / together) }, (_, at) => {
+        const some = bins.slice(at * together, (at + 1) * together);
+        return some.reduce(([arrived, lost], bin) => [arrived + bin[0], lost + bin[1]], [0, 0]);
+      });
+      // The last may be cut off by the end of the log: much shorter than the others, it is a part of the one before.
+      let rest = side.until - (all.length - 1) * width;
+      if (all.length > 1 && rest < width / 2) {
+        const [arrived, lost] = all.pop();
+        all[all.length - 1] = [all.at(-1)[0] + arrived, all.at(-1)[1] + lost];
+        rest += width;
+      }
+      const seconds = (at) => Math.max(1, at === all.length - 1 ? rest : width) / 1e9;
       const name = (what) => (several ? `${side.letter.toUpperCase()} ${what}` : what);
       const t = Float64Array.from(all, (_, bin) => bin * width);
       return [
-        { name: name(side.head.farside ? "delivered" : "logged"), side: index, t, v: all.map((bin) => bin[0] / seconds), steps: true, colour: "--s0", dash: several ? [[], [6, 3]][index] : [] },
-        { name: name("lost"), side: index, t, v: all.map((bin) => bin[1] / seconds), steps: true, colour: "--s1", dash: several ? [[2, 2], [1, 4]][index] : [3, 2] },
+        { name: name(side.head.farside ? "delivered" : "logged"), side: index, t, v: all.map((bin, at) => bin[0] / seconds(at)), steps: true, colour: "--s0", dash: several ? [[], [6, 3]][index] : [] },
+        { name: name("lost"), side: index, t, v: all.map((bin, at) => bin[1] / seconds(at)), steps: true, colour: "--s1", dash: several ? [[2, 2], [1, 4]][index] : [3, 2] },
       ].filter((curve) => curve.v.some((value) => value > 0));
     });
   }

@@ -3,7 +3,8 @@
 
 /** As many rows as are drawn one by one. */
 const SINGLE = 1500;
-const LANE = 18;
+/** How high a lane is at least, and where there is room at most. */
+const LANES = [18, 40];
 const AXIS = 26;
 /** How wide a time is for which rows are counted together. */
 const CELL = 4;
@@ -59,7 +60,7 @@ class Sequence {
       if (!classes.some((cls) => used.has(cls))) return;
       const box = element("input", { type: "checkbox", "data-fate": index, onchange: () => this.filter() });
       box.checked = on;
-      fates.append(element("label", {}, box, name));
+      fates.append(element("label", {}, box, index === 0 && !used.has("delivered") ? "messages" : name));
     });
     for (const id of ["actors", "kinds", "reasons"]) byId(id).addEventListener("input", () => this.filter());
     this.fillChoices();
@@ -99,7 +100,7 @@ class Sequence {
     side.flows.forEach((flow, at) => {
       if (onlyShown && !passes[index][at]) return;
       // Links have no lanes: what changes them is marked on the axis.
-      if (flow.cls !== "change") names.add(flow.receiver);
+      if (flow.cls !== "change" && flow.receiver !== "@control") names.add(flow.receiver);
       if (flow.sender !== "@control" && flow.cls !== "change") names.add(flow.sender);
     });
     this.lanes = [...names].sort(inOrderOfNames);
@@ -124,9 +125,11 @@ class Sequence {
     this.width = this.box.clientWidth;
     this.left = Math.min(130, Math.max(74, this.width * 0.16));
     const most = Math.min(620, Math.max(300, window.innerHeight * 0.62));
-    this.height = Math.min(most, AXIS + this.lanes.length * LANE + 10);
-    this.box.style.height = `${this.height}px`;
-    byId("room").style.height = `${Math.max(0, AXIS + this.lanes.length * LANE + 10 - this.height)}px`;
+    this.lane = Math.max(LANES[0], Math.min(LANES[1], Math.floor((most - AXIS - 10) / Math.max(1, this.lanes.length))));
+    this.height = Math.min(most, AXIS + this.lanes.length * this.lane + 10);
+    // Its border is a part of it.
+    this.box.style.height = `${this.height + 2}px`;
+    byId("room").style.height = `${Math.max(0, AXIS + this.lanes.length * this.lane + 10 - this.height)}px`;
     this.canvas.style.height = `${this.height}px`;
     this.top = this.box.scrollTop;
   }
@@ -142,7 +145,7 @@ class Sequence {
   }
 
   y(lane) {
-    return lane < 0 ? AXIS - 5 : AXIS + lane * LANE + LANE / 2 - this.top;
+    return lane < 0 ? AXIS - 5 : AXIS + lane * this.lane + this.lane / 2 - this.top;
   }
 
   // --- Drawing -------------------------------------------------------------------------------------------------
@@ -154,7 +157,7 @@ class Sequence {
     const { from, to } = this.state;
     const list = [];
     let count = 0;
-    const last = rowFrom(rows, to);
+    const last = rowAfter(rows, to);
     for (let row = rowFrom(rows, from); row < last; row++) {
       if (!passes[rows.flow[row]]) continue;
       if (count < SINGLE) list.push(row);
@@ -197,7 +200,7 @@ class Sequence {
     const { state } = this;
     const { told } = state.side;
     const span = `${timeText(state.from, state.to - state.from)} to ${timeText(state.to, state.to - state.from)}`;
-    const many = count > SINGLE ? `${plural(count, "message")}, counted by actor and time; nearer, each is shown` : plural(count, "message and event").replace("events", "events");
+    const many = count > SINGLE ? `${plural(count, "message")}, counted by actor and time; nearer, each is shown` : `${count.toLocaleString("en")} ${count === 1 ? "message or event" : "messages and events"}`;
     const out = told.left_out && state.to > told.first_left_out_ns
       ? ` From ${exactTime(told.first_left_out_ns)} on ${told.left_out.toLocaleString("en")} deliveries and timers are only counted: they cannot be chosen.` : "";
     const text = `${span}: ${many}.${out}`;
@@ -217,16 +220,16 @@ class Sequence {
     const ends = selected?.side === state.index ? [state.side.flow(selected.row).sender, state.side.flow(selected.row).receiver] : [];
     this.lanes.forEach((name, lane) => {
       const y = this.y(lane);
-      if (y < AXIS - LANE || y > height + LANE) return;
+      if (y < AXIS - this.lane || y > height + this.lane) return;
       const differs = state.reached.get(name);
       if (differs !== undefined) {
         // From here on what this actor says or does is another.
         const x = Math.max(this.left, this.x(differs));
         pen.fillStyle = colour("--s3");
         pen.globalAlpha = 0.16;
-        if (x < width) pen.fillRect(x, y - LANE / 2, width - x, LANE);
+        if (x < width) pen.fillRect(x, y - this.lane / 2, width - x, this.lane);
         pen.globalAlpha = 1;
-        if (x < width && x > this.left) pen.fillRect(x, y - LANE / 2, 2, LANE);
+        if (x < width && x > this.left) pen.fillRect(x, y - this.lane / 2, 2, this.lane);
       }
       pen.strokeStyle = colour("--rule");
       pen.lineWidth = 1;
@@ -280,12 +283,12 @@ class Sequence {
     const lanes = this.lanes.length;
     const [arrived, lost] = [new Uint32Array(columns * lanes), new Uint32Array(columns * lanes)];
     const scale = (this.width - this.left - 8) / (to - from) / CELL;
-    const last = rowFrom(rows, to);
+    const last = rowAfter(rows, to);
     const signs = [];
     for (let row = rowFrom(rows, from); row < last; row++) {
       const flow = rows.flow[row];
       if (!passes[flow]) continue;
-      const column = Math.floor((rows.at[row] - from) * scale);
+      const column = Math.min(columns - 1, Math.floor((rows.at[row] - from) * scale));
       const { cls } = side.flows[flow];
       const [sender, receiver] = this.laneOf[flow];
       if (cls === "lost") { if (sender >= 0) lost[sender * columns + column] += 1; }
@@ -294,14 +297,14 @@ class Sequence {
     }
     this.addCounted(arrived, lost, columns, scale);
     const most = arrived.reduce((most, count) => Math.max(most, count), 1);
-    const lanesSeen = this.lanes.map((_, lane) => lane).filter((lane) => this.y(lane) > AXIS - LANE && this.y(lane) < this.height + LANE);
+    const lanesSeen = this.lanes.map((_, lane) => lane).filter((lane) => this.y(lane) > AXIS - this.lane && this.y(lane) < this.height + this.lane);
     pen.fillStyle = colour("--s0");
     for (const lane of lanesSeen) {
       for (let column = 0; column < columns; column++) {
         const count = arrived[lane * columns + column];
         if (!count) continue;
         pen.globalAlpha = 0.2 + 0.75 * (Math.log(1 + count) / Math.log(1 + most));
-        pen.fillRect(this.left + column * CELL, this.y(lane) - LANE / 2 + 3, CELL - 0.6, LANE - 6);
+        pen.fillRect(this.left + column * CELL, this.y(lane) - this.lane / 2 + 3, CELL - 0.6, this.lane - 6);
       }
     }
     pen.globalAlpha = 1;
@@ -401,7 +404,7 @@ class Sequence {
     let count = 0;
     state.side.flows.forEach((flow, at) => { if (passes[at] && this.laneOf[at][1] < 0 && EVENTS.includes(flow.cls)) count += 1; });
     if (!count) return;
-    const last = rowFrom(rows, state.to);
+    const last = rowAfter(rows, state.to);
     for (let row = rowFrom(rows, state.from); row < last; row++) {
       const flow = rows.flow[row];
       if (!passes[flow] || this.laneOf[flow][1] >= 0 || !EVENTS.includes(state.side.flows[flow].cls)) continue;
@@ -423,7 +426,7 @@ class Sequence {
       if (distance < 12 && (!best || distance <= best.distance)) best = { row: mark.row, distance };
     }
     if (best) return best.row;
-    const lane = Math.floor((y - AXIS + this.top) / LANE);
+    const lane = Math.floor((y - AXIS + this.top) / this.lane);
     if (lane < 0 || lane >= this.lanes.length || x < this.left) return -1;
     const time = this.time(x);
     const reach = this.time(x + 8) - time;
@@ -436,7 +439,7 @@ class Sequence {
     const { rows } = this.state.side;
     const passes = this.state.passes[this.state.index];
     let best = -1;
-    const last = rowFrom(rows, time + reach);
+    const last = rowAfter(rows, time + reach);
     for (let row = rowFrom(rows, time - reach); row < last; row++) {
       if (!passes[rows.flow[row]] || !fits(rows.flow[row])) continue;
       if (best < 0 || Math.abs(rows.at[row] - time) < Math.abs(rows.at[best] - time)) best = row;
@@ -530,7 +533,7 @@ class Sequence {
     if (!selected || selected.side !== this.state.index) return;
     const lanes = this.laneOf[this.state.side.rows.flow[selected.row]].filter((lane) => lane >= 0);
     if (!lanes.length) return;
-    const [first, last] = [Math.min(...lanes) * LANE, (Math.max(...lanes) + 1) * LANE];
+    const [first, last] = [Math.min(...lanes) * this.lane, (Math.max(...lanes) + 1) * this.lane];
     const room = this.height - AXIS - 10;
     let top = this.box.scrollTop;
     if (last > top + room) top = last - room;

@@ -9,6 +9,8 @@ class Timeline {
     this.playing = false;
     this.draw = onceAFrame(() => this.drawNow());
     this.slider.max = String(state.until);
+    // As it was is too slow or too fast to see anything.
+    if (state.until > 300e9 || state.until < 2e9) byId("speed").value = "fit";
     this.slider.addEventListener("input", () => state.setTime(Number(this.slider.value)));
     // The page's keys step by what the chart shows, wherever the focus is.
     this.slider.addEventListener("keydown", (event) => {
