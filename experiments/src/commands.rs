@@ -1,6 +1,7 @@
 //! The commands, one file each, and what they share: errors and output.
 
 pub(crate) mod builtin;
+mod came;
 pub(crate) mod cat;
 pub(crate) mod check;
 mod describe;

@@ -4,19 +4,24 @@ mod agree;
 mod aligning;
 mod behaviour;
 mod beside;
+mod causal;
 mod chain;
 mod comparison;
 mod detail;
 mod entry;
+mod found;
 mod index;
 mod known;
 mod matching;
 mod offset;
+mod reach;
+mod root;
 mod scenario;
 mod spill;
 #[cfg(test)]
 mod tests;
 mod text;
+mod words;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -179,7 +184,62 @@ pub struct FirstDifference {
     pub causes_omitted: u64,
 }
 
-/// When a difference first showed in what an actor says or does.
+/// What the walk back from a difference ends at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RootKind {
+    /// A link decided otherwise about a message that was sent in both, alike.
+    Verdict,
+    /// Something that was planned: a crash, a restart, a change of a link, something that an actor is told.
+    Event,
+    /// An actor said or did something else before anything reached it otherwise.
+    Actor,
+    /// One of the runs, or one of the logs, ended earlier.
+    End,
+}
+
+/// What differences began with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Root {
+    /// What it is.
+    pub kind: RootKind,
+    /// When, in seconds: the earlier one of the two logs.
+    pub time_s: f64,
+    /// When, in nanoseconds.
+    pub time_ns: u64,
+    /// It in a sentence.
+    pub what: String,
+    /// The actor or the link; empty at an end.
+    pub actor: String,
+    /// The message, as `fork` and scenarios call it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+    /// Of a link's decision: what is known of the draw behind it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draw: Option<String>,
+    /// Of something planned: how much else that was planned for that time differs.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub more: u64,
+}
+
+/// One step on the way by which differences came.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Hop {
+    /// When, in seconds.
+    pub time_s: f64,
+    /// When, in nanoseconds.
+    pub time_ns: u64,
+    /// The actor that was reached, or a link whose later decisions depend on it.
+    pub actor: String,
+    /// How it was.
+    pub how: String,
+    /// The message, if it was by one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+}
+
+/// How a difference first reached an actor: as something that it received otherwise, or did not receive; or, if
+/// that came before, as something that it sent or did otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reached {
     /// The actor.
@@ -190,6 +250,17 @@ pub struct Reached {
     pub time_ns: u64,
     /// On which topic.
     pub topic: String,
+    /// How.
+    pub how: String,
+    /// The message, if it was by one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+    /// What its way began with; none only in logs whose records contradict each other.
+    pub root: Option<Root>,
+    /// The way: whom the difference reached first, and so on to the actor itself.
+    pub path: Vec<Hop>,
+    /// How many steps are left out in the middle of a long way.
+    pub path_omitted: usize,
 }
 
 /// How one topic differs.
@@ -235,6 +306,12 @@ pub struct DiffReport {
     /// If that was injected, the first difference that was not: what it led to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub consequence: Option<FirstDifference>,
+    /// Of Farside's logs, what the first difference began with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub root: Option<Root>,
+    /// What differs at the starts of the two runs and may be behind that: keys of the scenario with both
+    /// values, seeds, versions, files. All that differs, if nothing fits; empty if nothing does.
+    pub inputs: Vec<String>,
     /// Messages in both that differ.
     pub changed: u64,
     /// Messages that only the first log has.
@@ -262,8 +339,7 @@ pub struct DiffReport {
     /// What else is to be known: a log that is cut, seeds or schemas that differ, what could be
     /// compared by its bytes only.
     pub notes: Vec<String>,
-    /// Whom the difference reached, and when: by actor, the first thing that it says or does otherwise, in order
-    /// of time.
+    /// Of Farside's logs, whom the differences reached, in the order in which they did, and by which ways.
     pub spread: Vec<Reached>,
     /// The topics that differ, most differences first.
     pub topics: Vec<TopicDiff>,
@@ -316,6 +392,13 @@ pub(crate) struct Limits {
     message_bytes: usize,
     /// Whether the front of both is passed over as long as it agrees.
     passes_front: bool,
+}
+
+impl Limits {
+    /// How many of these may wait that are to be paired a second time.
+    fn left(&self) -> usize {
+        (self.entries / 4).max(1)
+    }
 }
 
 impl Default for Limits {

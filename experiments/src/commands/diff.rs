@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use farside_actors::units::parse_duration;
-use farside_logs::{DiffOptions, Tolerance};
+use farside_logs::{DiffOptions, DiffReport, Tolerance};
+use serde::Serialize;
 
 use super::Exit;
+use super::came::{BothCame, Came};
 use super::kinds::{self, FileKind};
 use super::{CommandError, output, print, print_json, view};
 use crate::page;
@@ -22,6 +24,9 @@ pub(crate) struct Args {
     /// List every topic, not one row for `/node_01/grant`, `/node_02/grant`, ...
     #[arg(long)]
     topics: bool,
+    /// Run both again, without logs, and say in which metrics they differ
+    #[arg(long)]
+    metrics: bool,
     /// Print JSON, with every topic
     #[arg(long)]
     json: bool,
@@ -67,6 +72,16 @@ fn given_tolerance(text: &str) -> Result<Given, String> {
     Ok(Given { field, within })
 }
 
+/// What `diff --json` prints.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    report: &'a DiffReport,
+    /// What came of the two runs, as they are run again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    came: Option<&'a BothCame>,
+}
+
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.a, registry)?;
     kinds::expect(FileKind::Log, &args.b, registry)?;
@@ -90,12 +105,27 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         let text = page::of_diff(sides.each_ref(), &report)?;
         view::write(out, &text, &inputs)?;
     }
+    let came = match args.metrics {
+        true => {
+            let [a, b] = [&args.a, &args.b].map(|path| Came::again(path, registry));
+            Some(BothCame::new(a?, b?))
+        }
+        false => None,
+    };
     if args.json {
-        print_json(&report)?;
-    } else if args.topics {
-        print(format!("{report:#}"))?;
+        print_json(&Document {
+            report: &report,
+            came: came.as_ref(),
+        })?;
     } else {
-        print(&report)?;
+        let mut text = match args.topics {
+            true => format!("{report:#}"),
+            false => report.to_string(),
+        };
+        if let Some(came) = &came {
+            text.push_str(&format!("\n{came}"));
+        }
+        print(text)?;
     }
     Ok(if report.identical {
         Exit::Done

@@ -13,6 +13,7 @@ use farside_logs::{
 use serde::Serialize;
 use toml::{Table, Value};
 
+use super::came::{BothCame, Came};
 use super::kinds::{self, FileKind};
 use super::logged::scenario_of;
 use super::run::{ExecutorName, duration, ending, log_options};
@@ -59,6 +60,9 @@ pub(crate) struct Args {
     /// Threads for kameo; as many as there are cores unless given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Run the log's run again as it was, too, and say in which metrics the two differ
+    #[arg(long)]
+    metrics: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -93,6 +97,9 @@ struct Document<'a> {
     digest: String,
     violations: &'a [String],
     remarks: &'a [String],
+    /// What came of the two runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    came: Option<&'a BothCame>,
     diff: &'a DiffReport,
 }
 
@@ -152,6 +159,13 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         tracing::warn!("{remark}");
     }
     let differences = diff(path, &args.out, &DiffOptions::default())?;
+    let came = match args.metrics {
+        true => {
+            let fork = Came::of(&report, &results);
+            Some(BothCame::new(Came::again(path, registry)?, fork))
+        }
+        false => None,
+    };
     let document = Document {
         log: path.display().to_string(),
         scenario: scenario.name(),
@@ -164,6 +178,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         digest: report.digest.to_string(),
         violations: &results.violations,
         remarks: &remarks,
+        came: came.as_ref(),
         diff: &differences,
     };
     if args.json {
@@ -193,6 +208,9 @@ fn told(document: &Document<'_>, at: SimDuration, report: &Report) -> String {
         text.push_str(&format!("VIOLATED: {violation}\n"));
     }
     text.push_str(&format!("\n{}", document.diff));
+    if let Some(came) = document.came {
+        text.push_str(&format!("\n{came}"));
+    }
     text
 }
 

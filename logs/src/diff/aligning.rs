@@ -274,7 +274,9 @@ mod tests {
             topic: 0,
             channel: 0,
             sequence,
-            event: false,
+            class: farside::record::RecordClass::Sample,
+            has_place: false,
+            said: Default::default(),
         }
     }
 

@@ -52,10 +52,9 @@ impl Held {
         index: &mut Index<'_>,
         entry: &Entry,
         mode: Mode,
-        (others, rules): (&[Arc<ChannelInfo>], &Rules),
+        (others, rules): ([&[Arc<ChannelInfo>]; 2], &Rules),
         changes: Option<&mut Changes>,
     ) -> Result<Option<FieldDiff>, LogError> {
-        let channels = index.scanner.channels().to_vec();
         let message = index.scanner.message_at(entry.position, entry.channel)?;
         let held = ScannedMessage {
             channel: &self.channel,
@@ -63,7 +62,6 @@ impl Held {
             data: &self.data,
             position: message.position,
         };
-        let others = [others, channels.as_slice()];
         let found = match mode {
             Mode::Any => any(&held, &message, others, rules),
             Mode::Farside => farside(&held, &message, rules),

@@ -7,7 +7,7 @@ use rustc_hash::FxBuildHasher;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::spill::{BUCKETS, Fixed};
-use crate::envelope::{KeyRef, RecordRef};
+use crate::envelope::{CLASSES, KeyRef, RecordRef};
 use crate::parse::Parser;
 use crate::scan::{Position, ScannedMessage};
 use crate::topics::Topics;
@@ -39,18 +39,39 @@ impl Names {
         number
     }
 
+    /// The number of a name that is likely the same as the one of this number.
+    fn number_near(&mut self, likely: u32, name: &str) -> u32 {
+        match self.names.get(likely as usize) {
+            Some(known) if known == name => likely,
+            _ => self.number(name),
+        }
+    }
+
     pub(super) fn name(&self, number: u32) -> &str {
         self.names.get(number as usize).map_or("", String::as_str)
     }
 }
 
-/// One record, in 88 bytes.
+/// Who says what to whom, by numbers of names; of other files' messages nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Said {
+    pub(super) sender: u32,
+    /// For events that are no messages, whom they happen to.
+    pub(super) receiver: u32,
+    /// Number of the empty name within a host.
+    pub(super) link: u32,
+    pub(super) sent_ns: u64,
+    /// Hash of the body.
+    pub(super) body: u64,
+}
+
+/// One record, in 120 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
-    /// Hash of the identity, without the place in the flow where a match key stands for it; in
-    /// other files than Farside's, of the message without its times.
+    /// Hash of the identity, without the place in the flow; in other files than Farside's, of the message
+    /// without its times.
     pub(super) identity: u64,
-    /// The place among records of one identity.
+    /// The place in the flow, or among records of one identity.
     pub(super) ordinal: u64,
     /// Hash of everything that is compared.
     pub(super) content: u64,
@@ -67,11 +88,37 @@ pub(super) struct Entry {
     pub(super) channel: u32,
     /// The number that the publisher gave the message.
     pub(super) sequence: u32,
-    /// False for the loss of a message and for one in flight: no event has their key.
-    pub(super) event: bool,
+    /// What the record is about; a sample, if it is none of Farside's.
+    pub(super) class: RecordClass,
+    /// Only its place tells it from others of its identity, and that may be another in the other log.
+    pub(super) has_place: bool,
+    pub(super) said: Said,
 }
 
 impl Entry {
+    /// What it is paired by: who says it, and of what has but a place what is said and when.
+    pub(super) fn said_key(&self) -> u64 {
+        match self.has_place {
+            false => self.identity,
+            true => mixed([self.identity, self.said.sent_ns, self.said.body]),
+        }
+    }
+
+    /// The same for a place in its flow.
+    pub(super) fn place_key(&self, place: u64) -> u64 {
+        mixed([self.identity, place, 0])
+    }
+
+    /// False for the loss of a message and for one in flight: no event has their key.
+    pub(super) fn is_event(&self) -> bool {
+        let none = [
+            RecordClass::Lost,
+            RecordClass::InFlight,
+            RecordClass::Sample,
+        ];
+        !none.contains(&self.class)
+    }
+
     /// Whether both are the same record, and say the same.
     pub(super) fn agrees(&self, other: &Entry) -> bool {
         (self.topic, self.identity, self.ordinal, self.content)
@@ -81,7 +128,7 @@ impl Entry {
     /// The bucket in which it meets all that it may be paired with.
     pub(super) fn bucket(&self, mode: Mode) -> usize {
         match mode {
-            Mode::Farside => (self.identity >> 32) as usize % BUCKETS,
+            Mode::Farside => bucket_of(self.said_key()),
             Mode::Any => self.topic as usize % BUCKETS,
         }
     }
@@ -98,8 +145,22 @@ impl Entry {
     }
 }
 
+/// The bucket of a key.
+pub(super) fn bucket_of(key: u64) -> usize {
+    (key >> 32) as usize % BUCKETS
+}
+
+/// One hash of several numbers.
+fn mixed(numbers: [u64; 3]) -> u64 {
+    let mut bytes = [0; 24];
+    for (part, number) in bytes.chunks_exact_mut(8).zip(numbers) {
+        part.copy_from_slice(&number.to_le_bytes());
+    }
+    xxh3_64(&bytes)
+}
+
 impl Fixed for Entry {
-    const BYTES: usize = 6 * 8 + 8 * 4 + 1;
+    const BYTES: usize = 8 * 8 + 11 * 4 + 2;
 
     fn put(&self, out: &mut Vec<u8>) {
         let long = [
@@ -109,6 +170,8 @@ impl Fixed for Entry {
             self.time_ns,
             self.count,
             self.position.frame,
+            self.said.sent_ns,
+            self.said.body,
         ];
         let short = [
             self.position.inner,
@@ -119,6 +182,9 @@ impl Fixed for Entry {
             self.topic,
             self.channel,
             self.sequence,
+            self.said.sender,
+            self.said.receiver,
+            self.said.link,
         ];
         for number in long {
             out.extend_from_slice(&number.to_le_bytes());
@@ -126,14 +192,24 @@ impl Fixed for Entry {
         for number in short {
             out.extend_from_slice(&number.to_le_bytes());
         }
-        out.push(u8::from(self.event));
+        out.push(self.class as u8);
+        out.push(u8::from(self.has_place));
     }
 
     fn take(parser: &mut Parser<'_>) -> Option<Entry> {
-        let [identity, ordinal, content, time_ns, count, frame] =
-            [(); 6].map(|()| parser.u64().unwrap_or_default());
+        let [
+            identity,
+            ordinal,
+            content,
+            time_ns,
+            count,
+            frame,
+            sent_ns,
+            body,
+        ] = [(); 8].map(|()| parser.u64().unwrap_or_default());
         let [inner, at, step, tie, source, topic, channel, sequence] =
             [(); 8].map(|()| parser.u32().unwrap_or_default());
+        let [sender, receiver, link] = [(); 3].map(|()| parser.u32().unwrap_or_default());
         Some(Entry {
             identity,
             ordinal,
@@ -148,7 +224,15 @@ impl Fixed for Entry {
             topic,
             channel,
             sequence,
-            event: parser.u8()? != 0,
+            class: *CLASSES.get(usize::from(parser.u8()?))?,
+            has_place: parser.u8()? != 0,
+            said: Said {
+                sender,
+                receiver,
+                link,
+                sent_ns,
+                body,
+            },
         })
     }
 }
@@ -171,6 +255,8 @@ pub(super) struct Builder<'a> {
     /// How many records there were on a topic, or of an identity that has no ordinal of its own.
     places: HashMap<u64, u64, FxBuildHasher>,
     scratch: Vec<u8>,
+    /// Of the last entry: the next is often of the same.
+    last: [u32; 4],
     /// The flow of the last entry's record and its ordinal there, if it has a match key.
     pub(super) keyed: Option<(u64, u64)>,
 }
@@ -184,6 +270,7 @@ impl<'a> Builder<'a> {
             topics: Vec::new(),
             places: HashMap::default(),
             scratch: Vec::new(),
+            last: [0; 4],
             keyed: None,
         }
     }
@@ -280,7 +367,9 @@ impl<'a> Builder<'a> {
             topic,
             channel: message.channel.serial,
             sequence: message.head.sequence,
-            event: false,
+            class: RecordClass::Sample,
+            has_place: false,
+            said: Said::default(),
         }
     }
 
@@ -295,6 +384,12 @@ impl<'a> Builder<'a> {
         let (identity, ordinal) = self.identity(record);
         self.note_key(record);
         let key = &record.key;
+        let body = xxh3_64(record.body);
+        let texts = [record.sender, record.receiver, record.link, key.source];
+        for (last, text) in self.last.iter_mut().zip(texts) {
+            *last = names.number_near(*last, text);
+        }
+        let [sender, receiver, link, source] = self.last;
         let content = {
             let out = &mut self.scratch;
             out.clear();
@@ -304,7 +399,7 @@ impl<'a> Builder<'a> {
             }
             out.extend_from_slice(&key.time_ns.to_le_bytes());
             out.extend_from_slice(&record.sent_ns.to_le_bytes());
-            out.extend_from_slice(record.body);
+            out.extend_from_slice(&body.to_le_bytes());
             xxh3_64(out)
         };
         Entry {
@@ -317,11 +412,19 @@ impl<'a> Builder<'a> {
             at,
             step: key.step,
             tie: key.tie,
-            source: names.number(key.source),
+            source,
             topic,
             channel: message.channel.serial,
             sequence: 0,
-            event: !matches!(record.class, RecordClass::Lost | RecordClass::InFlight),
+            class: record.class,
+            has_place: record.match_key.is_none() && has_own_place(record),
+            said: Said {
+                sender,
+                receiver,
+                link,
+                sent_ns: record.sent_ns,
+                body,
+            },
         }
     }
 
@@ -365,7 +468,6 @@ impl<'a> Builder<'a> {
             }
             None if has_own_place(record) => {
                 out.push(2);
-                out.extend_from_slice(&record.ordinal.to_le_bytes());
                 (xxh3_64(out), record.ordinal)
             }
             None => {

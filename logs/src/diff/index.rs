@@ -10,6 +10,7 @@ use rustc_hash::FxBuildHasher;
 
 use super::behaviour::{Rate, Times};
 use super::entry::{Builder, Entry, Mode, Names};
+use super::reach::End;
 use super::spill::Buckets;
 use crate::LogError;
 use crate::envelope::{KeyRef, RecordRef};
@@ -255,6 +256,24 @@ impl<'a> Index<'a> {
         Ok(())
     }
 
+    /// When the log of a run ends that has been read to its end.
+    pub(super) fn end(&mut self, names: &mut Names) -> Result<End, LogError> {
+        let is_cut = self.beside.cut.is_some() || !self.beside.has_end();
+        let ends = self
+            .beside
+            .metadata
+            .iter()
+            .filter(|(name, _)| name == "farside.end");
+        let times = ends.filter_map(|(_, entries)| entries.get("end_time_ns")?.parse().ok());
+        let mut time_ns = times.max().unwrap_or(0);
+        if let Some(last) = self.rows.len().checked_sub(1).filter(|_| is_cut) {
+            let entries = self.row(last, names)?;
+            let times = entries.iter().map(|entry| entry.time_ns);
+            time_ns = times.max().unwrap_or(0);
+        }
+        Ok(End { time_ns, is_cut })
+    }
+
     /// Whether records on this topic agreed.
     pub(super) fn agrees_on(&self, topic: u32) -> bool {
         let agreed = self.agreed_by_topic.get(topic as usize);
@@ -392,7 +411,7 @@ impl<'a> Index<'a> {
                 if entry.key(names) != *key {
                     return Ok(None);
                 }
-                if entry.event {
+                if entry.is_event() {
                     return Ok(Some(*entry));
                 }
             }

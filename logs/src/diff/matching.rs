@@ -1,5 +1,7 @@
 //! Pairing the records of two logs by identity, and finding those out of order.
 
+use std::collections::BTreeMap;
+
 use super::entry::Entry;
 
 /// Which of the entries of two logs are the same records.
@@ -11,43 +13,127 @@ pub(super) struct Matching {
     pub(super) only_in_b: Vec<u32>,
 }
 
-fn by_identity(entries: &[Entry]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..entries.len() as u32).collect();
-    order.sort_unstable_by_key(|at| {
-        let entry = &entries[*at as usize];
-        (entry.identity, entry.ordinal, *at)
-    });
+/// The places of entries, in the order of their keys.
+fn sorted(entries: &[Entry], key: impl Fn(&Entry) -> u64) -> Vec<(u64, u64, u32)> {
+    let places = (0..).zip(entries);
+    let keys = places.map(|(at, entry)| (key(entry), entry.ordinal, at));
+    let mut order: Vec<(u64, u64, u32)> = keys.collect();
+    order.sort_unstable();
     order
 }
 
-/// Pairs the n-th record of each identity in one log with the n-th in the other.
-pub(super) fn matching(a: &[Entry], b: &[Entry]) -> Matching {
-    let (order_a, order_b) = (by_identity(a), by_identity(b));
-    let identity_a = |at: usize| a[order_a[at] as usize].identity;
-    let identity_b = |at: usize| b[order_b[at] as usize].identity;
+/// Pairs records of the same key: by what `pair` makes of the places of all that have it in both logs.
+fn by_key(
+    (a, b): (&[Entry], &[Entry]),
+    (key_a, key_b): (impl Fn(&Entry) -> u64, impl Fn(&Entry) -> u64),
+    pair: impl Fn(&mut Vec<(u32, u32)>, &[(u64, u64, u32)], &[(u64, u64, u32)]),
+) -> Matching {
+    let (order_a, order_b) = (sorted(a, key_a), sorted(b, key_b));
     let mut found = Matching::default();
-    let (mut i, mut j) = (0, 0);
-    while i < order_a.len() && j < order_b.len() {
-        match identity_a(i).cmp(&identity_b(j)) {
-            std::cmp::Ordering::Less => {
-                found.only_in_a.push(order_a[i]);
-                i += 1;
+    let mut rest = order_b.as_slice();
+    for group in order_a.chunk_by(|one, other| one.0 == other.0) {
+        let from = rest.partition_point(|other| other.0 < group[0].0);
+        let to = from + rest[from..].partition_point(|other| other.0 == group[0].0);
+        pair(&mut found.pairs, group, &rest[from..to]);
+        rest = &rest[to..];
+    }
+    found.pairs.sort_unstable();
+    let mut paired = [vec![false; a.len()], vec![false; b.len()]];
+    for (x, y) in &found.pairs {
+        paired[0][*x as usize] = true;
+        paired[1][*y as usize] = true;
+    }
+    let left = |side: usize| {
+        let places = (0..).zip(&paired[side]);
+        places.filter(|(_, paired)| !**paired).map(|(at, _)| at)
+    };
+    found.only_in_a = left(0).collect();
+    found.only_in_b = left(1).collect();
+    found
+}
+
+/// The n-th with the n-th.
+fn in_turn(pairs: &mut Vec<(u32, u32)>, a: &[(u64, u64, u32)], b: &[(u64, u64, u32)]) {
+    pairs.extend(a.iter().zip(b).map(|(x, y)| (x.2, y.2)));
+}
+
+/// Pairs the n-th record of each identity in one log with the n-th in the other. Of records that have but a
+/// place in a flow those are the same that say the same, sent at the same time, whatever their places.
+pub(super) fn matching(a: &[Entry], b: &[Entry]) -> Matching {
+    by_key(
+        (a, b),
+        (Entry::said_key, Entry::said_key),
+        |pairs, xs, ys| {
+            let by_place = xs.first().is_some_and(|x| a[x.2 as usize].has_place);
+            if !by_place || xs.len().min(ys.len()) < 2 && xs.len().max(ys.len()) < 2 {
+                return in_turn(pairs, xs, ys);
             }
-            std::cmp::Ordering::Greater => {
-                found.only_in_b.push(order_b[j]);
-                j += 1;
+            // The same said twice at one time: those that have the same place first.
+            let places = |others: &[(u64, u64, u32)], place: u64| {
+                others.binary_search_by_key(&place, |other| other.1).is_ok()
+            };
+            let split = |all: &[(u64, u64, u32)], others: &[(u64, u64, u32)]| {
+                let (same, rest): (Vec<_>, Vec<_>) =
+                    all.iter().copied().partition(|one| places(others, one.1));
+                [same, rest]
+            };
+            for (xs, ys) in split(xs, ys).iter().zip(&split(ys, xs)) {
+                in_turn(pairs, xs, ys);
             }
-            std::cmp::Ordering::Equal => {
-                found.pairs.push((order_a[i], order_b[j]));
-                i += 1;
-                j += 1;
-            }
+        },
+    )
+}
+
+/// Pairs what is left of records that have but a place in a flow: by their places, as they would be without
+/// what only one of the logs has before them.
+pub(super) fn by_place(a: &[Entry], b: &[Entry], shifts: &Shifts) -> Matching {
+    let place_a = |entry: &Entry| entry.place_key(entry.ordinal);
+    let place_b = |entry: &Entry| entry.place_key(shifts.place_in_a(entry));
+    by_key((a, b), (place_a, place_b), in_turn)
+}
+
+/// Places that are remembered of messages that have another in the other log.
+const SHIFTED: usize = 1 << 18;
+
+/// By how much the places in flows of the second log are those of the first, from a place on.
+#[derive(Default)]
+pub(super) struct Shifts {
+    /// By flow: from which place in the second log on, and by how much.
+    flows: BTreeMap<u64, Vec<(u64, i64)>>,
+    count: usize,
+}
+
+impl Shifts {
+    /// Notes two records that are the same.
+    pub(super) fn add(&mut self, a: &Entry, b: &Entry) {
+        if !a.has_place || a.ordinal == b.ordinal || self.count >= SHIFTED {
+            return;
+        }
+        let shift = b.ordinal.wrapping_sub(a.ordinal).cast_signed();
+        self.flows
+            .entry(b.identity)
+            .or_default()
+            .push((b.ordinal, shift));
+        self.count += 1;
+    }
+
+    /// Brings them in order, once there are all.
+    pub(super) fn sort(&mut self) {
+        for flow in self.flows.values_mut() {
+            flow.sort_unstable();
+            flow.dedup_by_key(|(_, shift)| *shift);
         }
     }
-    found.only_in_a.extend(&order_a[i..]);
-    found.only_in_b.extend(&order_b[j..]);
-    found.pairs.sort_unstable();
-    found
+
+    /// The place in the first log of a record of the second.
+    pub(super) fn place_in_a(&self, b: &Entry) -> u64 {
+        let Some(flow) = self.flows.get(&b.identity) else {
+            return b.ordinal;
+        };
+        let behind = flow.partition_point(|(from, _)| *from <= b.ordinal);
+        let shift = behind.checked_sub(1).map_or(0, |at| flow[at].1);
+        b.ordinal.wrapping_sub(shift.cast_unsigned())
+    }
 }
 
 /// Records in the order of one log, given by their places in the other: how many would have to

@@ -1,6 +1,7 @@
 //! In what the scenarios of two logs differ, key by key.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use toml::{Table, Value};
 
@@ -12,8 +13,37 @@ const KEYS_SHOWN: usize = 12;
 /// Letters of a value that are shown.
 const VALUE_SHOWN: usize = 60;
 
-/// Notes what is not the same at the starts of two logs.
-pub(super) fn note(notes: &mut Vec<String>, a: &Log, b: &Log) {
+/// Something in which the starts of two runs differ.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Input {
+    /// What it is: a dotted key of the scenario, or `seed`, `tie seed`, `code version`, `file`.
+    pub(super) key: String,
+    /// In both; none where it is not there.
+    pub(super) values: [Option<String>; 2],
+}
+
+impl Input {
+    fn new(key: &str, values: [Option<String>; 2]) -> Self {
+        let key = key.to_owned();
+        Input { key, values }
+    }
+}
+
+impl fmt::Display for Input {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [a, b] = self.values.each_ref().map(|value| match value {
+            None => "none".to_owned(),
+            Some(value) => match value.char_indices().nth(VALUE_SHOWN) {
+                Some((at, _)) => format!("{}...", &value[..at]),
+                None => value.clone(),
+            },
+        });
+        write!(f, "{}: {a} | {b}", self.key)
+    }
+}
+
+/// Notes what is not the same at the starts of two logs, and gives all of it that a run depends on.
+pub(super) fn note(notes: &mut Vec<String>, a: &Log, b: &Log) -> Vec<Input> {
     let pair = |what: &str, one: &str, other: &str| -> Option<String> {
         let or_none = |text: &str| match text {
             "" => "none".to_owned(),
@@ -21,43 +51,53 @@ pub(super) fn note(notes: &mut Vec<String>, a: &Log, b: &Log) {
         };
         (one != other).then(|| format!("{what} differ: {} | {}", or_none(one), or_none(other)))
     };
-    let tie_seed = |log: &Log| log.tie_seed().map_or(String::new(), |n| n.to_string());
-    let (one, other) = (a.head(), b.head());
-    let starts = [
-        pair("seeds", &a.seed().to_string(), &b.seed().to_string()),
-        pair("tie seeds", &tie_seed(a), &tie_seed(b)),
-        pair("scenarios", &one.scenario, &other.scenario),
+    let tie_seed = |log: &Log| log.tie_seed().map(|n| n.to_string());
+    let mut inputs = Vec::new();
+    let of_all = [
+        ("seed", [a, b].map(|log| Some(log.seed().to_string()))),
+        ("tie seed", [a, b].map(tie_seed)),
+        (
+            "code version",
+            [a, b].map(|log| Some(log.code_version().to_owned())),
+        ),
     ];
-    notes.extend(starts.into_iter().flatten());
+    for (what, values) in of_all {
+        if values[0] != values[1] {
+            let [one, other] = values
+                .each_ref()
+                .map(|value| value.as_deref().unwrap_or(""));
+            notes.extend(pair(&format!("{what}s"), one, other));
+            inputs.push(Input::new(what, values));
+        }
+    }
+    let (one, other) = (a.head(), b.head());
+    notes.extend(pair("scenarios", &one.scenario, &other.scenario));
     if one.scenario_hash != other.scenario_hash {
         match differing(a.scenario(), b.scenario()) {
-            Some(keys) => {
+            Some(mut keys) => {
                 let more = keys.len().saturating_sub(KEYS_SHOWN);
-                let named = keys.into_iter().take(KEYS_SHOWN);
+                let named = keys.iter().take(KEYS_SHOWN);
                 notes.extend(named.map(|key| format!("scenario: {key}")));
                 if more > 0 {
                     notes.push(format!("scenario: and {more} more keys"));
                 }
+                inputs.append(&mut keys);
             }
-            None => notes.extend(pair(
-                "resolved scenarios",
-                &one.scenario_hash,
-                &other.scenario_hash,
-            )),
+            None => {
+                let hashes = [&one.scenario_hash, &other.scenario_hash];
+                notes.extend(pair("resolved scenarios", hashes[0], hashes[1]));
+                let hashes = hashes.map(|hash| Some(hash.clone()));
+                inputs.push(Input::new("resolved scenario", hashes));
+            }
         }
     }
     let filtered = |log: &Log| log.exclude().join(", ");
-    notes.extend(pair(
-        "code versions",
-        &one.code_version,
-        &other.code_version,
-    ));
     notes.extend(pair("filtered topics", &filtered(a), &filtered(b)));
+    inputs
 }
 
-/// The keys that differ, as `links.default.loss: 0.02 | 0.05`; none if one of the two is no TOML.
-/// The seed is told apart from the scenario.
-fn differing(a: Option<&str>, b: Option<&str>) -> Option<Vec<String>> {
+/// The keys that differ; none if one of the two is no TOML. The seed is told apart from the scenario.
+fn differing(a: Option<&str>, b: Option<&str>) -> Option<Vec<Input>> {
     let read = |text: Option<&str>| {
         let table: Table = text?.parse().ok()?;
         let mut keys = BTreeMap::new();
@@ -69,15 +109,13 @@ fn differing(a: Option<&str>, b: Option<&str>) -> Option<Vec<String>> {
     let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
     names.sort();
     names.dedup();
-    let value = |keys: &BTreeMap<String, String>, name: &String| {
-        keys.get(name).map_or("none".to_owned(), |value| {
-            let cut = value.char_indices().nth(VALUE_SHOWN);
-            cut.map_or(value.clone(), |(at, _)| format!("{}...", &value[..at]))
-        })
-    };
-    let differ = |name: &&String| a.get(*name) != b.get(*name);
-    let line = |name: &String| format!("{name}: {} | {}", value(&a, name), value(&b, name));
-    Some(names.into_iter().filter(differ).map(line).collect())
+    let both = |name: &String| [a.get(name).cloned(), b.get(name).cloned()];
+    let inputs = names.into_iter().map(|name| Input::new(name, both(name)));
+    Some(
+        inputs
+            .filter(|input| input.values[0] != input.values[1])
+            .collect(),
+    )
 }
 
 /// Each value that holds no others, by its dotted key.
@@ -121,7 +159,9 @@ mod tests {
             "links.\"a*\".loss: none | 1",
             "links.default.loss: 0.02 | 0.05",
         ];
-        assert_eq!(differing(Some(a), Some(b)).unwrap(), keys);
+        let found = differing(Some(a), Some(b)).unwrap();
+        let found: Vec<String> = found.iter().map(Input::to_string).collect();
+        assert_eq!(found, keys);
         assert_eq!(differing(Some(a), Some("{")), None);
     }
 }

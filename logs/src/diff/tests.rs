@@ -355,9 +355,9 @@ fn memory_is_bounded_where_nothing_agrees() {
         assert_eq!(report.changed, 20_000);
         assert_eq!(usage.agreed, [0, 0]);
         // Two logs' entries, the pairs, one bucket of each, the messages, and how they are ordered.
-        let most = 2 * 1000 * 81 + 500 * (162 + 12) + 500 * 162 + 20_000 + 1000 + 4 * 20_000;
+        let most = 4 * 1000 * 110 + 500 * (220 + 12) + 500 * 220 + 20_000 + 1000 + 4 * 20_000;
         assert!(usage.most_bytes < most, "{usage:?}, {most}");
-        assert!(usage.file_bytes >= 2 * 19_000 * 81, "{usage:?}");
+        assert!(usage.file_bytes >= 2 * 19_000 * 110, "{usage:?}");
     }
 }
 

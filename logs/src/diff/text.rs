@@ -1,5 +1,7 @@
 //! A comparison as people read it: the first difference and its causes, then how far it spread.
 
+mod reach;
+
 use std::fmt;
 use std::path::Path;
 
@@ -9,9 +11,6 @@ use crate::shown::{Seconds, Shown};
 
 /// Rows of the table that people are shown, unless they ask for all.
 const ROWS_SHOWN: usize = 15;
-
-/// Actors that a difference has reached, as people are shown.
-const ACTORS_SHOWN: usize = 5;
 
 /// Causes that people are shown.
 const CAUSES_SHOWN: usize = 12;
@@ -34,6 +33,9 @@ impl fmt::Display for DiffReport {
             return self.write_not_compared(f);
         };
         let names = short(Path::new(&self.file_a), Path::new(&self.file_b));
+        if let Some(root) = &self.root {
+            reach::write_root(f, root, &self.inputs)?;
+        }
         write!(f, "first difference at ")?;
         write_first(f, first, &names)?;
         write_causes(f, first)?;
@@ -42,7 +44,7 @@ impl fmt::Display for DiffReport {
             write_first(f, consequence, &names)?;
             write_causes(f, consequence)?;
         }
-        self.write_spread(f)?;
+        reach::write(f, &self.spread, self.root.as_ref())?;
         self.write_table(f)?;
         self.write_behaviour(f)?;
         self.write_not_compared(f)
@@ -90,30 +92,6 @@ pub(super) fn short<'a>(a: &'a Path, b: &'a Path) -> (String, String) {
 }
 
 impl DiffReport {
-    /// Whom it reached when.
-    fn write_spread(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shown = match f.alternate() {
-            true => self.spread.len(),
-            false => ACTORS_SHOWN,
-        };
-        if self.spread.len() < 2 {
-            return Ok(());
-        }
-        writeln!(
-            f,
-            "\nit reached {} actors, in this order",
-            self.spread.len()
-        )?;
-        for reached in self.spread.iter().take(shown) {
-            let (time, actor) = (Seconds(reached.time_ns), Shown(&reached.actor));
-            writeln!(f, "  {time} s  {actor}  on {}", Shown(&reached.topic))?;
-        }
-        match self.spread.len().saturating_sub(shown) {
-            0 => Ok(()),
-            more => writeln!(f, "  and {more} more (--topics lists all)"),
-        }
-    }
-
     fn write_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (a, b) = short(Path::new(&self.file_a), Path::new(&self.file_b));
         writeln!(
