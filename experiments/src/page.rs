@@ -53,8 +53,8 @@ struct Reading {
     rows: Rows,
     map: Map,
     series: Series,
-    /// Since when times count; a log of another program counts from its first message.
-    start_ns: Option<u64>,
+    /// Since when times count; a log of another program counts from its earliest message.
+    start_ns: u64,
     is_farside: bool,
     unreadable: u64,
     first_unreadable: String,
@@ -80,7 +80,8 @@ pub(crate) fn read(path: &Path, logs: usize) -> Result<Side, LogError> {
         map: Map::default(),
         series: Series::default(),
         is_farside: start_ns.is_some(),
-        start_ns,
+        // Messages may be in any order: time begins with the earliest.
+        start_ns: start_ns.or(info.start_ns).unwrap_or(0),
         unreadable: 0,
         first_unreadable: String::new(),
     };
@@ -93,8 +94,7 @@ pub(crate) fn read(path: &Path, logs: usize) -> Result<Side, LogError> {
 
 impl Reading {
     fn add(&mut self, message: &AnyMessage<'_>) {
-        let start_ns = *self.start_ns.get_or_insert(message.log_time_ns());
-        let at_ns = message.log_time_ns().saturating_sub(start_ns);
+        let at_ns = message.log_time_ns().saturating_sub(self.start_ns);
         self.rows.reaches(at_ns);
         let channel = message.channel();
         let schema = channel.schema.as_ref().map_or("", |schema| &schema.name);
@@ -136,9 +136,8 @@ impl Reading {
             Err(error) => self.miss(message, &error.to_string()),
         }
         let published = message.publish_time_ns();
-        let start_ns = self.start_ns.unwrap_or(0);
-        // What was published before the first message was logged cannot be drawn.
-        let sent_ns = published.saturating_sub(start_ns).min(at_ns);
+        // What was published before the first message was logged is drawn from there.
+        let sent_ns = published.saturating_sub(self.start_ns).min(at_ns);
         let topic = escaped(message.topic());
         let happened = Happened {
             class: "message",

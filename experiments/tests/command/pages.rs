@@ -97,7 +97,8 @@ fn a_loss_is_chosen_its_causes_are_followed_and_the_slider_goes_with_them() {
         browser.press("l");
         browser.wait("document.getElementById('selected').textContent.includes('lost')");
         browser.click_on("#play");
-        browser.wait(&format!("farside.state.time > {}", slider(&mut browser)));
+        let stood = slider(&mut browser);
+        browser.wait(&format!("farside.state.time > {stood}"));
         assert_eq!(browser.complaints, Vec::<String>::new(), "{width}");
     }
 }
@@ -325,7 +326,8 @@ fn a_million_messages_are_seen_at_once_and_take_less_than_20_megabytes() {
         return;
     };
     let paint = "performance.getEntriesByName('first-contentful-paint')[0].startTime";
-    let [paint_ms, ready_ms] = [paint, "performance.now()"].map(|what| number(&browser.value(what)));
+    let [paint_ms, ready_ms] =
+        [paint, "performance.now()"].map(|what| number(&browser.value(what)));
     let redraw = "(() => { const start = performance.now(); farside.sequence.drawNow(); return performance.now() - start; })()";
     let all_ms = number(&browser.value(redraw));
     browser.press("l");
