@@ -40,6 +40,15 @@ impl Thinned {
         }
     }
 
+    /// Its points, as close to each other at its end as at its beginning.
+    pub(crate) fn evenly(&self) -> Vec<(u64, f64)> {
+        let mut even = self.clone();
+        if self.width_ns > 0 {
+            even.thin();
+        }
+        even.points
+    }
+
     fn thin(&mut self) {
         let times = self.points.iter().map(|(time_ns, _)| *time_ns);
         let (from, until) = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
@@ -83,6 +92,14 @@ mod tests {
         assert_eq!(curve.values, 100_000);
         assert_eq!(curve.range, Some([0.0, 99.0]));
         assert!(curve.points.contains(&(54_321_000, 99.0)));
+        let even = curve.evenly();
+        let half = even.partition_point(|(time_ns, _)| *time_ns < 50_000_000);
+        assert!(
+            half.abs_diff(even.len() - half) < even.len() / 50,
+            "{half} of {}",
+            even.len()
+        );
+        assert!(even.contains(&(54_321_000, 99.0)));
         assert_eq!(curve.points[0], (0, 0.0));
         assert_eq!(curve.points.last(), Some(&(99_999_000, value(99_999))));
         assert!(curve.points.is_sorted_by_key(|(time_ns, _)| *time_ns));

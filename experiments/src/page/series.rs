@@ -79,8 +79,8 @@ impl Series {
                 .iter()
                 .map(|(actor, curve)| {
                     let mut before = 0;
-                    let (times, values): (Vec<u64>, Vec<Json>) = curve
-                        .points
+                    let points = curve.evenly();
+                    let (times, values): (Vec<u64>, Vec<Json>) = points
                         .iter()
                         .map(|(time_ns, value)| {
                             let time = time_ns / 1_000;

@@ -184,7 +184,7 @@ impl Browser {
             "Page.navigate",
             json!({ "url": format!("file://{letters}") }),
         );
-        self.wait("document.documentElement.dataset.ready === 'yes'");
+        self.wait("document.documentElement?.dataset.ready === 'yes'");
     }
 
     /// Clicks at a place of the window.

@@ -103,7 +103,7 @@ class Causes {
     const { state } = this;
     const side = state.sides[index];
     const { chain, unknown } = state.causes;
-    const heading = element("h4", {}, `What led to it: ${plural(chain.length, "step")} back`);
+    const heading = chain.length ? element("h4", {}, `What led to it: ${plural(chain.length, "step")} back`) : element("h4", {}, "What led to it");
     if (!side.head.farside) return [element("p", { class: "note" }, "Logs of other programs do not say what caused a message.")];
     const item = ({ row: cause, repeats, since }) => {
       const more = repeats ? element("small", {}, ` and ${plural(repeats, "time")} before, since ${timeText(side.rows.at[since], side.until)}`) : null;

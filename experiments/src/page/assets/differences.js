@@ -8,7 +8,7 @@ class Differences {
     const parts = [this.counts()];
     if (diff.root) parts.push(this.root(diff.root));
     if (diff.first) parts.push(this.first(diff.first, "The first difference"));
-    if (diff.consequence) parts.push(this.first(diff.consequence, "What that led to first"));
+    if (diff.consequence) parts.push(this.first(diff.consequence, "Its first consequence"));
     if (diff.spread?.length) parts.push(this.spread());
     if (diff.topics?.length) parts.push(this.topics());
     byId("difference").replaceChildren(...parts);

@@ -159,7 +159,7 @@ function timeText(ns, span) {
   if (name === "s" && span >= 7200e9) {
     const s = ns / 1e9;
     const two = (part) => String(Math.floor(part)).padStart(2, "0");
-    return `${Math.floor(s / 3600)}:${two((s / 60) % 60)}:${two(s % 60)} h`;
+    return `${Math.floor(s / 3600)}:${two((s / 60) % 60)}:${two(s % 60)}.${Math.floor((s % 1) * 10)}`;
   }
   return `${(ns / unit).toFixed(digits)} ${name}`;
 }

@@ -3,8 +3,9 @@
 
 /** As many messages under way as are drawn. */
 const UNDER_WAY = 400;
-/** How long a loss is shown, as a share of the whole time. */
-const AFTERGLOW = 1 / 400;
+/** How long a loss is shown, as a share of what the chart shows, and of these how many. */
+const AFTERGLOW = 1 / 200;
+const LOST = 40;
 
 /** Sums of differences. */
 function sums(differences) {
@@ -131,7 +132,7 @@ class MapView {
     this.draw = onceAFrame(() => this.drawNow());
     this.reset();
     this.listen();
-    for (const event of ["time", "select", "look", "filter"]) state.on(event, this.draw);
+    for (const event of ["time", "select", "look", "filter", "view"]) state.on(event, this.draw);
     this.draw();
   }
 
@@ -290,36 +291,49 @@ class MapView {
 
   /** Messages under way as dots between sender and receiver, and what was lost just now as crosses. */
   drawMessages(pen, time) {
-    const { rows, flows, until } = this.side;
+    const { rows, flows } = this.side;
     const passes = this.state.passes[this.index];
     let under = 0;
     let lost = 0;
-    const glow = until * AFTERGLOW;
+    const glow = (this.state.to - this.state.from) * AFTERGLOW;
     const last = rowFrom(rows, time + rows.longest + 1);
+    const crosses = [];
     for (let row = rowFrom(rows, time - glow); row < last; row++) {
       const flow = flows[rows.flow[row]];
       if (!passes[rows.flow[row]] || flow.sender === flow.receiver) continue;
       const isLost = flow.cls === "lost" && rows.at[row] <= time;
       const isUnderWay = rows.sent[row] <= time && rows.at[row] > time && ["delivered", "lost", "in_flight"].includes(flow.cls);
       if (!isLost && !isUnderWay) continue;
-      if (isLost) lost += 1; else under += 1;
-      if (under + lost > UNDER_WAY) continue;
-      const [from, to] = [this.scene.actor(flow.sender, time), this.scene.actor(flow.receiver, time)];
-      if (!from || !to) continue;
-      const [a, b] = [this.to(from), this.to(to)];
-      const delay = Math.max(1, rows.at[row] - rows.sent[row]);
-      const share = isLost ? 0.5 : Math.min(1, (time - rows.sent[row]) / delay);
-      const at = [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
-      pen.strokeStyle = pen.fillStyle = colour(isLost ? "--s1" : "--s0");
-      pen.lineWidth = 1;
-      pen.globalAlpha = 0.35;
-      pen.beginPath(); pen.moveTo(...a); pen.lineTo(...b); pen.stroke();
-      pen.globalAlpha = 1;
-      if (isLost) drawSign(pen, "lost", ...at);
-      else { pen.beginPath(); pen.arc(...at, 2.6, 0, 7); pen.fill(); }
+      if (isLost) {
+        lost += 1;
+        crosses.push(row);
+        continue;
+      }
+      under += 1;
+      if (under <= UNDER_WAY) this.drawMessage(pen, row, time);
     }
-    const hidden = under + lost > UNDER_WAY ? `, ${UNDER_WAY} of them drawn` : "";
+    for (const row of crosses.slice(-LOST)) this.drawMessage(pen, row, time);
+    const hidden = under > UNDER_WAY || lost > LOST ? `; ${Math.min(under, UNDER_WAY)} and ${Math.min(lost, LOST)} of these are drawn` : "";
     return `${plural(under, "message")} under way, ${lost} lost just now${hidden}.`;
+  }
+
+  drawMessage(pen, row, time) {
+    const { rows } = this.side;
+    const flow = this.side.flow(row);
+    const isLost = flow.cls === "lost" && rows.at[row] <= time;
+    const [from, to] = [this.scene.actor(flow.sender, time), this.scene.actor(flow.receiver, time)];
+    if (!from || !to) return;
+    const [a, b] = [this.to(from), this.to(to)];
+    const delay = Math.max(1, rows.at[row] - rows.sent[row]);
+    const share = isLost ? 0.5 : Math.min(1, (time - rows.sent[row]) / delay);
+    const at = [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+    pen.strokeStyle = pen.fillStyle = colour(isLost ? "--s1" : "--s0");
+    pen.lineWidth = 1;
+    pen.globalAlpha = 0.35;
+    pen.beginPath(); pen.moveTo(...a); pen.lineTo(...b); pen.stroke();
+    pen.globalAlpha = 1;
+    if (isLost) drawSign(pen, "lost", ...at);
+    else { pen.beginPath(); pen.arc(...at, 2.6, 0, 7); pen.fill(); }
   }
 
   /** The ends of the message that is selected, and of what led to it. */
