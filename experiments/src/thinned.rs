@@ -95,7 +95,7 @@ mod tests {
         let even = curve.evenly();
         let half = even.partition_point(|(time_ns, _)| *time_ns < 50_000_000);
         assert!(
-            half.abs_diff(even.len() - half) < even.len() / 50,
+            half.abs_diff(even.len() - half) < even.len() / 10,
             "{half} of {}",
             even.len()
         );

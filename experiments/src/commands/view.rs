@@ -1,6 +1,6 @@
 //! `farside view`: a run as a page for a browser.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use farside_logs::refuse_input;
 use serde_json::json;
@@ -62,13 +62,13 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 }
 
 /// Writes a page, unless something else is there.
-pub(super) fn write(out: &PathBuf, text: &str, inputs: &[PathBuf]) -> Result<(), CommandError> {
+pub(super) fn write(out: &Path, text: &str, inputs: &[PathBuf]) -> Result<(), CommandError> {
     refuse_input(out, inputs)?;
     output::write_whole(out, text.as_bytes(), Format::View, inputs)
 }
 
 /// Says what a page does not have.
-pub(super) fn warn(path: &std::path::Path, side: &Side) {
+pub(super) fn warn(path: &Path, side: &Side) {
     for note in &side.notes {
         tracing::warn!("{}: {note}", path.display());
     }

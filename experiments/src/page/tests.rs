@@ -1,8 +1,17 @@
 //! Pages of logs.
 
-use serde_json::json;
+use std::io::Read;
+use std::path::Path;
+
+use base64::Engine;
+use farside::Executor;
+use farside::ruling::MessageId;
+use farside_logs::{LogOptions, LogWriter};
+use serde_json::{Value as Json, json};
 
 use super::{Side, columns, markup};
+use crate::registry::Registry;
+use crate::scenario::Scenario;
 
 /// What would end a script or begin one, if it were taken for markup.
 const HOSTILE: &str = "</script></title><script>window.hacked=1</script><!--\"'&amp;";
@@ -89,4 +98,135 @@ fn scripts_end_no_script_and_make_no_markup_of_texts() {
             assert!(!script.contains(wrong), "{wrong}");
         }
     }
+}
+
+/// A row as the page's script reads it: class, sender, receiver and kind, its time, its cause, its ordinal.
+struct Row {
+    names: [String; 4],
+    at_ns: u64,
+    cause: Option<usize>,
+    ordinal: u64,
+}
+
+/// The columns of a page, read as `assets/data.js` does it.
+fn decoded(side: &Side) -> Vec<Row> {
+    let packed = base64::engine::general_purpose::STANDARD.decode(&side.rows);
+    let mut bytes = Vec::new();
+    let packed = packed.unwrap();
+    flate2::read::ZlibDecoder::new(packed.as_slice())
+        .read_to_end(&mut bytes)
+        .unwrap();
+    let told = &side.head["told"];
+    let mut rest = bytes.as_slice();
+    let mut column = |length: &Json| {
+        let (its, behind) = rest.split_at(length.as_u64().unwrap() as usize);
+        rest = behind;
+        let mut numbers = vec![0_u64];
+        let mut shift = 0;
+        for byte in its {
+            *numbers.last_mut().unwrap() |= u64::from(byte & 0x7f) << shift;
+            shift += 7;
+            if byte & 0x80 == 0 {
+                numbers.push(0);
+                shift = 0;
+            }
+        }
+        numbers.pop();
+        numbers
+    };
+    let columns: Vec<Vec<u64>> = told["columns"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(&mut column)
+        .collect();
+    let signed = |number: u64| (number >> 1) as i64 ^ -((number & 1) as i64);
+    let unit_ns = told["unit_ns"].as_u64().unwrap();
+    let mut at = 0_u64;
+    let mut next = std::collections::BTreeMap::new();
+    let row = |row: usize| {
+        let flow = &told["flows"][columns[0][row] as usize];
+        let name = |part: usize| {
+            let number = flow[part].as_u64().unwrap() as usize;
+            told["names"][number].as_str().unwrap().to_owned()
+        };
+        at = at.wrapping_add_signed(signed(columns[1][row]));
+        let family: &mut u64 = next.entry(flow[6].as_u64()).or_default();
+        let ordinal = family.wrapping_add_signed(signed(columns[4][row]));
+        *family = ordinal + 1;
+        Row {
+            names: [0, 1, 2, 4].map(name),
+            at_ns: at * unit_ns,
+            cause: columns[3][row]
+                .checked_sub(2)
+                .map(|back| row - 1 - back as usize),
+            ordinal,
+        }
+    };
+    (0..columns[0].len()).map(row).collect()
+}
+
+/// A small log in which messages are lost.
+fn log(path: &Path) {
+    let sets = ["team.rovers=3", "until=3s", "links.default.loss=0.2"].map(str::to_owned);
+    let scenario = Scenario::open("network/crater-dense", &sets, &Registry::builtin()).unwrap();
+    let mut assembled = scenario.assemble().unwrap();
+    let options = LogOptions {
+        scenario: scenario.name().to_owned(),
+        resolved: scenario.resolved().unwrap(),
+        ..LogOptions::default()
+    };
+    assembled
+        .sim
+        .observe(LogWriter::create(path, options).unwrap());
+    assembled.sim.run(Executor::Inline).unwrap();
+}
+
+/// What `farside_logs::causes` finds by keys in the log is what the page has by rows.
+#[test]
+fn causes_on_the_page_are_those_that_the_log_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    log(&path);
+    let side = super::read(&path, 1).unwrap();
+    let rows = decoded(&side);
+    assert_eq!(rows.len(), side.shown as usize);
+    let is_message = |row: &&Row| ["delivered", "lost"].contains(&row.names[0].as_str());
+    let (mut compared, mut lost) = (0, 0);
+    for row in rows.iter().filter(is_message).step_by(41) {
+        let [class, sender, receiver, kind] = &row.names;
+        let id = format!("{sender},{receiver},{kind},{}", row.ordinal);
+        let id: MessageId = id.parse().unwrap();
+        let chain = farside_logs::causes(&path, &id, usize::MAX)
+            .unwrap()
+            .unwrap();
+        let expected: Vec<(u64, String, String)> = chain.events[1..]
+            .iter()
+            .map(|event| &event.record)
+            .map(|record| {
+                (
+                    record.key.time_ns,
+                    record.receiver.clone(),
+                    record.kind.clone(),
+                )
+            })
+            .collect();
+        let mut found: Vec<(u64, String, String)> = Vec::new();
+        let (mut cause, mut before) = (row.cause, None);
+        while let Some(at) = cause {
+            let Row { names, at_ns, .. } = &rows[at];
+            let repeats = names[0] == "timer" && before == Some(names);
+            if !repeats {
+                found.push((*at_ns, names[2].clone(), names[3].clone()));
+            }
+            (cause, before) = (rows[at].cause, Some(names));
+        }
+        assert_eq!(found, expected, "{id}");
+        compared += 1;
+        lost += u32::from(class == "lost");
+    }
+    assert!(
+        compared > 20 && lost > 2,
+        "{compared} compared, {lost} of them lost"
+    );
 }
