@@ -12,7 +12,7 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, plot,
-    problem, recover, replay, report, reproduce, run, shown, shrink, study, verify, why,
+    problem, recover, replay, report, reproduce, run, shown, shrink, study, verify, view, why,
 };
 use crate::registry::Registry;
 
@@ -77,6 +77,8 @@ enum Command {
     Draw(draw::Args),
     /// Plot fields of messages over time, of any MCAP file
     Plot(plot::Args),
+    /// Write a run as a page for a browser: map, messages, causes and curves, of any MCAP file
+    View(view::Args),
     /// Run a scenario in many cells and with many seeds; go on where an earlier start ended
     Study(study::Args),
     /// List the studies that are built in
@@ -236,6 +238,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Shrink(args) => shrink::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Plot(args) => plot::run(&args),
+        Command::View(args) => view::run(&args, registry),
         Command::Study(args) => study::run(&args, registry),
         Command::Studies(args) => builtin::studies(&args, registry),
         Command::Reproduce(args) => reproduce::run(&args, registry),

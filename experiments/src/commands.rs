@@ -27,6 +27,7 @@ pub(crate) mod shrink;
 pub(crate) mod study;
 mod table;
 pub(crate) mod verify;
+pub(crate) mod view;
 pub(crate) mod why;
 
 use std::io::Write;

@@ -21,6 +21,7 @@
 pub mod cli;
 mod commands;
 pub mod export;
+mod page;
 mod recorded;
 pub mod registry;
 pub mod report;
@@ -29,5 +30,6 @@ mod sequence;
 pub mod shrink;
 pub mod stats;
 pub mod study;
+mod thinned;
 mod version;
 mod wall;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use farside::suggest::{did_you_mean, nearest};
 
 use crate::LogError;
+use crate::envelope::RecordRef;
 use crate::fields;
 use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
 use crate::topics::Topics;
@@ -47,6 +48,25 @@ impl<'a> AnyMessage<'a> {
     /// Its bytes, as they are encoded.
     pub fn data(&self) -> &'a [u8] {
         self.message.data
+    }
+
+    /// The record of a Farside run that it holds; none if it is a message of another program, a state sample,
+    /// something that viewers draw, or malformed.
+    ///
+    /// ```no_run
+    /// let mut messages = farside_logs::AnyMessages::open("run.mcap", &[])?;
+    /// while let Some(message) = messages.next()? {
+    ///     if let Some(record) = message.record() {
+    ///         println!("{} {}", record.key.time_ns, record.receiver);
+    ///     }
+    /// }
+    /// # Ok::<(), farside_logs::LogError>(())
+    /// ```
+    pub fn record(&self) -> Option<RecordRef<'a>> {
+        match self.message.channel.role() {
+            "message" | "event" => RecordRef::read(self.message.data),
+            _ => None,
+        }
     }
 
     /// What it says.

@@ -12,7 +12,7 @@ use crate::commands::kept::printed;
 use crate::scenario::Scenario;
 
 /// The commands, with a log that is broken and one that is whole.
-const COMMANDS: [&[&str]; 17] = [
+const COMMANDS: [&[&str]; 19] = [
     &["info", "BROKEN"],
     &["info", "BROKEN", "--topics"],
     &["info", "BROKEN", "--json"],
@@ -29,6 +29,8 @@ const COMMANDS: [&[&str]; 17] = [
         "--json",
     ],
     &["draw", "BROKEN", "--list"],
+    &["view", "BROKEN", "--html", "OUT.html"],
+    &["diff", "WHOLE", "BROKEN", "--html", "OUT.diff.html"],
     &["draw", "BROKEN", "--out", "OUT.svg"],
     &[
         "fork",

@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::Exit;
 use super::came::{BothCame, Came};
 use super::kinds::{self, FileKind};
-use super::{CommandError, output, print, print_json};
+use super::{CommandError, output, print, print_json, view};
+use crate::page;
 use crate::registry::Registry;
 
 #[derive(clap::Args)]
@@ -29,6 +30,9 @@ pub(crate) struct Args {
     /// Print JSON, with every topic
     #[arg(long)]
     json: bool,
+    /// Write a page too that shows both runs, with what differs, as `view` does of one
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
     /// Take as equal what differs by at most this: numbers (1e-6, absolutely or as a share), times (10ms), or
     /// a field and all within it (header.stamp=10ms, ranges=1e-6, log_time=1ms); may be repeated
     #[arg(long, value_name = "[FIELD=]X", value_parser = given_tolerance)]
@@ -81,7 +85,8 @@ struct Document<'a> {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.a, registry)?;
     kinds::expect(FileKind::Log, &args.b, registry)?;
-    output::spare(&[args.a.clone(), args.b.clone()], &[])?;
+    let inputs = [args.a.clone(), args.b.clone()];
+    output::spare(&inputs, args.html.as_slice())?;
     let mut options = DiffOptions {
         ignore: args.ignore.clone(),
         topics: args.topic.clone(),
@@ -95,6 +100,11 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
         }
     }
     let report = farside_logs::diff(&args.a, &args.b, &options)?;
+    if let Some(out) = &args.html {
+        let sides = [page::read(&args.a, 2)?, page::read(&args.b, 2)?];
+        let text = page::of_diff(sides.each_ref(), &report)?;
+        view::write(out, &text, &inputs)?;
+    }
     let came = match args.metrics {
         true => {
             let [a, b] = [&args.a, &args.b].map(|path| Came::again(path, registry));

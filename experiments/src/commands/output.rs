@@ -18,6 +18,8 @@ pub(super) enum Format {
     Svg,
     /// A report's page: all are alike up to the title.
     Page,
+    /// A page of one run or of two: all are alike up to the title.
+    View,
     /// A table with a header: one of its kind starts with the same column.
     Table,
     /// Results of tests in XML: all are alike up to the name.
@@ -45,7 +47,7 @@ impl Format {
     fn beginning(self, bytes: &[u8]) -> &[u8] {
         let ends_with: &[u8] = match self {
             Format::Svg => b"viewBox=",
-            Format::Page => b"<title>",
+            Format::Page | Format::View => b"<title>",
             Format::Table => b",",
             Format::Junit => b"name=",
             Format::Plan => b"/",
@@ -66,6 +68,7 @@ impl Format {
         match self {
             Format::Svg | Format::Pdf | Format::Png => "figure",
             Format::Page => "report",
+            Format::View => "page of a run",
             Format::Table => "table of this kind",
             Format::Junit => "JUnit file",
             Format::Plan => "plan",

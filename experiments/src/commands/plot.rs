@@ -100,9 +100,9 @@ pub(crate) fn run(args: &Args) -> Result<Exit, CommandError> {
             json!({
                 "topic": curve.topic,
                 "field": curve.field,
-                "values": curve.values,
-                "least": curve.range.map(|[least, _]| least),
-                "greatest": curve.range.map(|[_, greatest]| greatest),
+                "values": curve.values.values,
+                "least": curve.values.range.map(|[least, _]| least),
+                "greatest": curve.values.range.map(|[_, greatest]| greatest),
                 "no_number": curve.no_number,
             })
         };

@@ -1,5 +1,6 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
+mod browser;
 mod cluster;
 mod common;
 mod contacts;
@@ -8,6 +9,7 @@ mod ink;
 mod layouts;
 mod logs;
 mod outputs;
+mod pages;
 mod pictures;
 mod plan;
 mod problem;

@@ -8,6 +8,7 @@ use farside_logs::{AnyMessage, AnyMessages, Log, Value};
 
 use super::Wanted;
 use crate::commands::CommandError;
+use crate::thinned::Thinned;
 
 /// As many curves as can be told apart.
 const CURVES: usize = 42;
@@ -22,20 +23,14 @@ pub(super) struct Part {
 }
 
 /// A field of a topic over time.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Curve {
     pub(super) topic: String,
     pub(super) field: String,
-    /// Times in nanoseconds and values, thinned.
-    pub(super) points: Vec<(u64, f64)>,
-    /// How many values there were.
-    pub(super) values: u64,
-    /// The least and the greatest finite value.
-    pub(super) range: Option<[f64; 2]>,
+    /// Its values, thinned.
+    pub(super) values: Thinned,
     /// Messages whose field was no number.
     pub(super) no_number: u64,
-    /// Values stand for a time of this length each, once there are too many.
-    width_ns: u64,
 }
 
 /// All that is plotted.
@@ -87,7 +82,7 @@ impl Curves {
         for one in wanted {
             let its = curves.iter().filter(|curve| curve.field == one.field);
             let mut its = its.filter(|curve| one.topics.matches(&curve.topic));
-            if its.all(|curve| curve.values == 0) {
+            if its.all(|curve| curve.values.values == 0) {
                 return Err(none(one, &curves, &fields, &remarks));
             }
         }
@@ -104,7 +99,7 @@ impl Curves {
         }
         let curves = curves
             .into_iter()
-            .filter(|curve| curve.values > 0)
+            .filter(|curve| curve.values.values > 0)
             .collect();
         Ok(Curves { curves, remarks })
     }
@@ -128,14 +123,15 @@ fn add(
     let curve = curves.entry(key).or_insert_with(|| Curve {
         topic: message.topic().to_owned(),
         field: wanted.field.clone(),
-        ..Curve::default()
+        values: Thinned::to(POINTS),
+        no_number: 0,
     });
     let field = &wanted.field;
     let found = value
         .at(field)
         .or_else(|| value.at(&format!("body.{field}")));
     match found.and_then(|found| found.as_f64()) {
-        Some(number) => curve.push(time_ns, number),
+        Some(number) => curve.values.push(time_ns, number),
         None => curve.no_number += 1,
     }
     Ok(())
@@ -154,66 +150,4 @@ fn none(wanted: &Wanted, curves: &[Curve], fields: &[String], remarks: &[String]
     }
     let hint = did_you_mean(nearest(field, fields.iter().map(String::as_str)).as_deref());
     text(&format!("no message has a number there{hint}"))
-}
-
-impl Curve {
-    /// Adds a value. Once there are too many, of each short time the first, least, greatest and last are kept.
-    fn push(&mut self, time_ns: u64, value: f64) {
-        self.values += 1;
-        if value.is_finite() {
-            let [least, greatest] = self.range.unwrap_or([value; 2]);
-            self.range = Some([least.min(value), greatest.max(value)]);
-        }
-        self.points.push((time_ns, value));
-        if self.points.len() >= 4 * POINTS {
-            self.thin();
-        }
-    }
-
-    fn thin(&mut self) {
-        let times = self.points.iter().map(|(time_ns, _)| *time_ns);
-        let (from, until) = (times.clone().min().unwrap_or(0), times.max().unwrap_or(0));
-        self.width_ns = ((until - from) / (POINTS as u64 / 4) + 1).max(self.width_ns);
-        let width_ns = self.width_ns;
-        let mut kept: Vec<(u64, f64)> = Vec::new();
-        for group in self
-            .points
-            .chunk_by(|a, b| a.0 / width_ns == b.0 / width_ns)
-        {
-            let order = |a: &&(u64, f64), b: &&(u64, f64)| a.1.total_cmp(&b.1);
-            let ends = [group.first(), group.last()];
-            let extremes = [group.iter().min_by(order), group.iter().max_by(order)];
-            let mut some: Vec<(u64, f64)> = ends
-                .into_iter()
-                .chain(extremes)
-                .flatten()
-                .copied()
-                .collect();
-            some.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-            some.dedup_by(|a, b| a.0 == b.0 && a.1.to_bits() == b.1.to_bits());
-            kept.append(&mut some);
-        }
-        self.points = kept;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn thinned_curves_keep_their_extremes_and_ends() {
-        let mut curve = Curve::default();
-        let value = |at: u64| if at == 54_321 { 99.0 } else { (at % 17) as f64 };
-        for at in 0..100_000 {
-            curve.push(at * 1_000, value(at));
-        }
-        assert!(curve.points.len() < 4 * POINTS, "{}", curve.points.len());
-        assert_eq!(curve.values, 100_000);
-        assert_eq!(curve.range, Some([0.0, 99.0]));
-        assert!(curve.points.contains(&(54_321_000, 99.0)));
-        assert_eq!(curve.points[0], (0, 0.0));
-        assert_eq!(curve.points.last(), Some(&(99_999_000, value(99_999))));
-        assert!(curve.points.is_sorted_by_key(|(time_ns, _)| *time_ns));
-    }
 }

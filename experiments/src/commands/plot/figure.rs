@@ -33,7 +33,10 @@ pub(super) fn figure(curves: &Curves, file: &str) -> Figure {
             fields.push(&curve.field);
         }
     }
-    let times = curves.curves.iter().flat_map(|curve| curve.points.iter());
+    let times = curves
+        .curves
+        .iter()
+        .flat_map(|curve| curve.values.points.iter());
     let times = times.map(|(time_ns, _)| *time_ns as f64 / 1e9);
     let x = Scale::over(times, Spacing::Linear);
     let mut top = TOP;
@@ -43,7 +46,7 @@ pub(super) fn figure(curves: &Curves, file: &str) -> Figure {
         .iter()
         .map(|field| {
             let its = curves.curves.iter().filter(|curve| curve.field == *field);
-            let values = its.flat_map(|curve| curve.range.into_iter().flatten());
+            let values = its.flat_map(|curve| curve.values.range.into_iter().flatten());
             (*field, Scale::over(values, Spacing::Linear))
         })
         .collect();
@@ -68,7 +71,7 @@ pub(super) fn figure(curves: &Curves, file: &str) -> Figure {
         panels.push(panel);
         top += HEIGHT + height + APART;
     }
-    let values: u64 = curves.curves.iter().map(|curve| curve.values).sum();
+    let values: u64 = curves.curves.iter().map(|curve| curve.values.values).sum();
     let count = curves.curves.len();
     let description =
         format!("{values} values of {count} curves, by the times at which they were logged");
@@ -131,9 +134,9 @@ fn line(curve: &Curve, series: usize, area: &Area, (x, y): (&Scale, &Scale)) -> 
         let time = *time_ns as f64 / 1e9;
         (area.x(x.place(time)), area.y(y.place(*value)))
     };
-    let pieces = curve.points.split(|(_, value)| !value.is_finite());
+    let pieces = curve.values.points.split(|(_, value)| !value.is_finite());
     let pieces: Vec<&[(u64, f64)]> = pieces.filter(|piece| !piece.is_empty()).collect();
-    let marks = curve.points.len() <= MARKED;
+    let marks = curve.values.points.len() <= MARKED;
     html! {
         g class={ "s" (series) } {
             title { (curve.topic) }
