@@ -19,4 +19,5 @@ mod scenarios;
 mod seams;
 mod snapshots;
 mod studies;
+mod ties;
 mod traffic;
