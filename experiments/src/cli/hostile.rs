@@ -12,7 +12,7 @@ use crate::commands::kept::printed;
 use crate::scenario::Scenario;
 
 /// The commands, with a log that is broken and one that is whole.
-const COMMANDS: [&[&str]; 17] = [
+const COMMANDS: [&[&str]; 26] = [
     &["info", "BROKEN"],
     &["info", "BROKEN", "--topics"],
     &["info", "BROKEN", "--json"],
@@ -44,6 +44,22 @@ const COMMANDS: [&[&str]; 17] = [
     ],
     &["recover", "BROKEN", "--out", "OUT.mcap"],
     &["recover", "BROKEN", "--out", "OUT.mcap", "--json"],
+    &["cat", "BROKEN"],
+    &["cat", "BROKEN", "--csv"],
+    &["plot", "BROKEN", "/**.ordinal", "--out", "OUT.plot.svg"],
+    &[
+        "draw",
+        "BROKEN",
+        "--sequence",
+        "mermaid",
+        "--out",
+        "OUT.mmd",
+    ],
+    &["draw", "BROKEN", "--causes", "--out", "OUT.dot"],
+    &["why", "BROKEN", "a"],
+    &["why", "BROKEN", "rover_01", "--json"],
+    &["replay", "BROKEN", "--actor", "*"],
+    &["ties", "BROKEN", "--seeds", "1", "--jobs", "1", "--json"],
     // What takes something else and is given a log.
     &["check", "BROKEN"],
     &["study", "BROKEN", "--out", "OUT.study"],

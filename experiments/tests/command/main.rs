@@ -1,5 +1,6 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
+mod accounts;
 mod cluster;
 mod common;
 mod contacts;
@@ -16,6 +17,7 @@ mod replays;
 mod report;
 mod running;
 mod scenarios;
+mod schemas;
 mod seams;
 mod snapshots;
 mod studies;
