@@ -330,7 +330,7 @@ mod tests {
         let other = parted(5, &[a.clone(), b.clone()], &[c.clone(), a.clone()]).unwrap();
         assert_eq!((other.event.id.as_str(), other.is_of_b), ("b", false));
         assert_eq!(other.beside, Some(c));
-        let less = parted(5, &[a.clone()], &[a.clone(), a.clone()]).unwrap();
+        let less = parted(5, std::slice::from_ref(&a), &[a.clone(), a.clone()]).unwrap();
         assert!(less.is_of_b);
     }
 
