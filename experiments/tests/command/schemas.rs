@@ -219,6 +219,12 @@ fn ros() -> Vec<Hostile> {
         cdr(&huge),
     ));
     all.push(hostile(
+        "a union without an end",
+        idl,
+        "union U switch (long)",
+        cdr(&huge),
+    ));
+    all.push(hostile(
         "a comment without an end",
         idl,
         "/* struct R {",
