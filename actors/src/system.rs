@@ -29,7 +29,7 @@ use serde_json::{Map, Value};
 use crate::link::{Degrade, LinkConfigError};
 
 use crate::wiring::{LinkBuilder, Links, Wire, Wiring};
-pub use account::{Account, Doing, Phase};
+pub use account::{Account, Doing, Phase, outages};
 pub use builtin::Builtin;
 pub use documented::{parted, with_about};
 pub use error::SetupError;

@@ -12,13 +12,14 @@ use tracing_subscriber::prelude::*;
 
 use crate::commands::{
     CommandError, Exit, builtin, cat, check, complain, diff, draw, explain, fork, info, plan, plot,
-    problem, recover, replay, report, reproduce, run, shown, shrink, study, verify, view, why,
+    problem, recover, replay, report, reproduce, run, shown, shrink, study, ties, verify, view,
+    why,
 };
 use crate::registry::Registry;
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done; for verify, diff, fork, replay and reproduce: the same; for recover: nothing is lost
+  0  done; for verify, diff, fork, replay, reproduce and ties: the same; for recover: nothing is lost
   1  the answer is \"different\", \"violated\" or \"something is lost\"
   2  the input is wrong
   3  the run failed or was interrupted; what was logged until then is readable";
@@ -71,6 +72,8 @@ enum Command {
     Why(why::Args),
     /// Let some actors of a logged run live again, all else as recorded, and compare what they do
     Replay(replay::Args),
+    /// Run a scenario with simultaneous events in other orders, and say which conclusions change
+    Ties(ties::Args),
     /// Find the smallest part of a failing run that still fails so
     Shrink(shrink::Args),
     /// Draw a picture of a run, from its log
@@ -235,6 +238,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Exit, CommandError>
         Command::Fork(args) => fork::run(&args, registry),
         Command::Why(args) => why::run(&args, registry),
         Command::Replay(args) => replay::run(&args, registry),
+        Command::Ties(args) => ties::run(&args, registry),
         Command::Shrink(args) => shrink::run(&args, registry),
         Command::Draw(args) => draw::run(&args, registry),
         Command::Plot(args) => plot::run(&args),

@@ -26,6 +26,7 @@ pub(crate) mod run;
 pub(crate) mod shrink;
 pub(crate) mod study;
 mod table;
+pub(crate) mod ties;
 pub(crate) mod verify;
 pub(crate) mod view;
 pub(crate) mod why;
@@ -102,6 +103,9 @@ pub(crate) enum CommandError {
     /// Arguments that do not go together.
     #[error("{0}")]
     Arguments(String),
+    /// Ctrl-C before there was an answer.
+    #[error("interrupted: {0}")]
+    Interrupted(String),
     /// Two things that a command writes would be one file.
     #[error("{}: is written to by this command twice: it is also {other}", .out.display())]
     TwoOutputs { out: PathBuf, other: String },
@@ -157,6 +161,7 @@ impl CommandError {
                 | BuildError::DuplicateName { .. },
             ) => Exit::Wrong,
             CommandError::Build(_)
+            | CommandError::Interrupted(_)
             | CommandError::Write { .. }
             | CommandError::Output(_)
             | CommandError::Json(_) => Exit::Failed,

@@ -341,6 +341,15 @@ impl Scenario {
         })
     }
 
+    /// The degradations as they are from its last fork on.
+    pub(crate) fn last_degrades(&self) -> &[Degrade] {
+        &self
+            .changed
+            .last()
+            .map_or(&self.shared, Changed::shared)
+            .degrade
+    }
+
     /// Builds the simulation.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use farside::Executor;
 use farside_experiments::registry::Registry;
 use farside_experiments::scenario::{Assembled, Scenario};
-use farside_logs::{LogOptions, LogWriter};
+use farside_logs::{AnyMessages, LogOptions, LogWriter};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 
@@ -166,4 +166,53 @@ pub fn each_record(bytes: &[u8], mut each: impl FnMut(Record<'_>)) {
         }
         each(mcap::parse_record(opcode, data).expect("the log is in order"));
     }
+}
+
+/// How messages of another program are written.
+pub struct Foreign {
+    pub schema_encoding: &'static str,
+    pub message_encoding: &'static str,
+    /// What the schema calls the type of the message.
+    pub type_name: &'static str,
+}
+
+/// Reads a message of another program: the first two bytes say how long the schema is, the message is what comes
+/// behind it. Whatever they are, there is a value or an error, and the same one again.
+pub fn read_foreign(kind: &Foreign, bytes: &[u8]) {
+    let Some((length, rest)) = bytes.split_first_chunk() else {
+        return;
+    };
+    let length = usize::from(u16::from_le_bytes(*length));
+    let (schema, body) = rest.split_at(length.min(rest.len()));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a");
+    let file = std::fs::File::create(&path).expect("a file");
+    let mut writer = mcap::WriteOptions::new().compression(None).create(file).expect("a writer");
+    let schema = writer.add_schema(kind.type_name, kind.schema_encoding, schema);
+    let channel = writer.add_channel(
+        schema.expect("a schema"),
+        "/x",
+        kind.message_encoding,
+        &BTreeMap::new(),
+    );
+    let header = mcap::records::MessageHeader {
+        channel_id: channel.expect("a channel"),
+        sequence: 0,
+        log_time: 1,
+        publish_time: 1,
+    };
+    writer.write_to_known_channel(&header, body).expect("a message");
+    writer.finish().expect("an end");
+    let mut messages = AnyMessages::open(&path, &[]).expect("a whole file");
+    let message = messages.next().expect("a whole file").expect("a message");
+    let told = || match message.value() {
+        Ok(value) => {
+            value.flatten(&mut |_, part| assert!(!part.to_string().is_empty()));
+            value.to_string()
+        }
+        Err(error) => error.to_string(),
+    };
+    let first = told();
+    assert!(!first.is_empty());
+    assert_eq!(first, told());
 }

@@ -148,6 +148,14 @@ pub enum LogError {
         /// The nearest that there is, as a question; empty if none is near.
         hint: String,
     },
+    /// A name that is a part of a time, of which nothing can be said alone.
+    #[error("{field:?} is a part of a time, and times are compared as a whole: name {time:?}")]
+    PartOfTime {
+        /// The field that was named.
+        field: String,
+        /// The time.
+        time: String,
+    },
     /// More topics than an MCAP file can have channels.
     #[error("no channel is left for topic {topic}: a log has at most {limit}")]
     TooManyTopics {

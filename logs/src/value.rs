@@ -184,6 +184,11 @@ const TIMES: [(&str, &str); 4] = [
     ("seconds", "nanos"),
 ];
 
+/// Whether two fields of these names, in either order, are a time.
+pub(crate) fn are_time(one: &str, other: &str) -> bool {
+    TIMES.contains(&(one, other)) || TIMES.contains(&(other, one))
+}
+
 impl<'a> Value<'a> {
     /// The value of a field of an object.
     pub fn field(&self, name: &str) -> Option<&Value<'a>> {

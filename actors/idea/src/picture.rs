@@ -1,6 +1,7 @@
 //! Pictures of a run, drawn from its log alone: the timelines of an agent with what its cycles cost, and
 //! the drive on the ground with goals and alarms. The same log gives the same bytes.
 
+pub(crate) mod account;
 mod bars;
 mod history;
 mod map;

@@ -332,40 +332,8 @@ impl Team {
             .outages
             .iter()
             .filter(|outage| outage.actor == actor);
-        let mut phases = account.phases;
-        for outage in outages {
-            let (from_ns, to_ns) = (outage.from_ns, outage.to_ns.unwrap_or(self.until_ns));
-            let mut split = Vec::new();
-            for phase in phases {
-                if phase.until_ns <= from_ns || phase.from_ns >= to_ns {
-                    split.push(phase);
-                    continue;
-                }
-                if phase.from_ns < from_ns {
-                    split.push(Phase {
-                        until_ns: from_ns,
-                        ..phase.clone()
-                    });
-                }
-                split.push(Phase {
-                    from_ns: phase.from_ns.max(from_ns),
-                    until_ns: phase.until_ns.min(to_ns),
-                    doing: Doing::Down,
-                    text: "is down".to_owned(),
-                    waits_for: Vec::new(),
-                });
-                if phase.until_ns > to_ns {
-                    split.push(Phase {
-                        from_ns: to_ns,
-                        ..phase
-                    });
-                }
-            }
-            phases = split;
-        }
-        let mut account = Account::default();
-        phases.into_iter().for_each(|phase| account.push(phase));
-        account
+        let spans = outages.map(|outage| (outage.from_ns, outage.to_ns));
+        account.with_outages(spans, self.until_ns)
     }
 }
 

@@ -1,5 +1,9 @@
 //! What an actor did in a run and what it waited for, as its system tells it from the run's log.
 
+use farside::record::RecordClass;
+
+use super::picture::{PictureError, Recording};
+
 /// What an actor does for a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
@@ -82,4 +86,82 @@ impl Account {
             _ => self.phases.push(phase),
         }
     }
+
+    /// The same account, in which the actor is down from when to when it is; without an end it is to
+    /// `until_ns`.
+    ///
+    /// ```
+    /// use farside_actors::system::{Account, Doing, Phase};
+    /// let mut account = Account::default();
+    /// account.push(Phase {
+    ///     from_ns: 0, until_ns: 9, doing: Doing::Active, text: "drives".to_owned(), waits_for: Vec::new(),
+    /// });
+    /// let account = account.with_outages([(3, Some(5)), (8, None)], 9);
+    /// assert_eq!(account.spent_ns(Doing::Down), 3);
+    /// assert_eq!(account.phases.len(), 4);
+    /// ```
+    #[must_use]
+    pub fn with_outages(
+        self,
+        outages: impl IntoIterator<Item = (u64, Option<u64>)>,
+        until_ns: u64,
+    ) -> Account {
+        let mut phases = self.phases;
+        for (from_ns, to_ns) in outages {
+            let to_ns = to_ns.unwrap_or(until_ns);
+            let mut split = Vec::new();
+            for phase in phases {
+                if phase.until_ns <= from_ns || phase.from_ns >= to_ns {
+                    split.push(phase);
+                    continue;
+                }
+                if phase.from_ns < from_ns {
+                    split.push(Phase {
+                        until_ns: from_ns,
+                        ..phase.clone()
+                    });
+                }
+                split.push(Phase {
+                    from_ns: phase.from_ns.max(from_ns),
+                    until_ns: phase.until_ns.min(to_ns),
+                    doing: Doing::Down,
+                    text: "is down".to_owned(),
+                    waits_for: Vec::new(),
+                });
+                if phase.until_ns > to_ns {
+                    split.push(Phase {
+                        from_ns: to_ns,
+                        ..phase
+                    });
+                }
+            }
+            phases = split;
+        }
+        let mut account = Account::default();
+        phases.into_iter().for_each(|phase| account.push(phase));
+        account
+    }
+}
+
+/// When an actor was down in a recorded run: from when to when, in order of time; without an end it was to
+/// the end of the run.
+///
+/// # Errors
+/// When the recording cannot be read.
+pub fn outages(run: &dyn Recording, actor: &str) -> Result<Vec<(u64, Option<u64>)>, PictureError> {
+    let mut outages: Vec<(u64, Option<u64>)> = Vec::new();
+    run.for_each(&mut |record| {
+        match record.class {
+            _ if record.actor != actor => {}
+            RecordClass::Crash => outages.push((record.time_ns, None)),
+            RecordClass::Restart => {
+                if let Some((_, to_ns @ None)) = outages.last_mut() {
+                    *to_ns = Some(record.time_ns);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    Ok(outages)
 }

@@ -3,11 +3,12 @@
 use farside::{Report, SimDuration};
 use farside_actors::system::settings::Table;
 use farside_actors::system::{
-    Assembly, Builtin, Entries, Invariant, Metric, Removable, Results, Section, Settings, Setup,
-    SetupError, System,
+    Account, Assembly, Builtin, Entries, Invariant, Metric, PictureError, Recording, Removable,
+    Results, Section, Settings, Setup, SetupError, System,
 };
 use serde::{Deserialize, Serialize};
 
+use crate::account;
 use crate::{FlowConfig, TrafficConfig, TrafficError, TrafficMetrics, assemble, builtin, metrics};
 
 /// The most flows that the summary shows one by one.
@@ -89,6 +90,16 @@ impl Settings for TrafficScenario {
             listed("hosts", "traffic.hosts"),
         ];
         members.chain(rest).collect()
+    }
+
+    fn account(
+        &self,
+        actor: &str,
+        run: &dyn Recording,
+        until_ns: Option<u64>,
+        _setup: &mut Setup<'_>,
+    ) -> Result<Option<Account>, PictureError> {
+        account::account(&self.traffic, actor, run, until_ns)
     }
 
     fn assemble(&self, setup: &mut Setup<'_>) -> Result<Assembly, SetupError> {

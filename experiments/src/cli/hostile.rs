@@ -12,7 +12,7 @@ use crate::commands::kept::printed;
 use crate::scenario::Scenario;
 
 /// The commands, with a log that is broken and one that is whole.
-const COMMANDS: [&[&str]; 19] = [
+const COMMANDS: &[&[&str]] = &[
     &["info", "BROKEN"],
     &["info", "BROKEN", "--topics"],
     &["info", "BROKEN", "--json"],
@@ -46,6 +46,34 @@ const COMMANDS: [&[&str]; 19] = [
     ],
     &["recover", "BROKEN", "--out", "OUT.mcap"],
     &["recover", "BROKEN", "--out", "OUT.mcap", "--json"],
+    &["cat", "BROKEN"],
+    &["cat", "BROKEN", "--csv"],
+    &["plot", "BROKEN", "/**.ordinal", "--out", "OUT.plot.svg"],
+    &[
+        "draw",
+        "BROKEN",
+        "--sequence",
+        "mermaid",
+        "--out",
+        "OUT.mmd",
+    ],
+    &["draw", "BROKEN", "--causes", "--out", "OUT.dot"],
+    &["why", "BROKEN", "a"],
+    &["why", "BROKEN", "rover_01", "--json"],
+    &["replay", "BROKEN", "--actor", "*"],
+    &["ties", "BROKEN", "--seeds", "1", "--jobs", "1", "--json"],
+    &[
+        "shrink",
+        "BROKEN",
+        "--violates",
+        "violation",
+        "--budget",
+        "2",
+        "--jobs",
+        "1",
+        "--out",
+        "OUT.toml",
+    ],
     // What takes something else and is given a log.
     &["check", "BROKEN"],
     &["study", "BROKEN", "--out", "OUT.study"],
@@ -238,4 +266,23 @@ fn no_command_panics_at_some_broken_logs() {
 #[ignore = "ten thousand corruptions, through every command: tens of minutes"]
 fn no_command_panics_at_any_broken_log() {
     hostile(1, 10_000);
+}
+
+/// A command that is new is tried, or stands here as one that is never given a file of messages.
+#[test]
+fn every_command_is_tried() {
+    const NO_LOG: [&str; 7] = [
+        "completions",
+        "explain",
+        "help",
+        "problem",
+        "reproduce",
+        "scenarios",
+        "studies",
+    ];
+    let command = command_line(&Registry::builtin());
+    for name in command.get_subcommands().map(|of| of.get_name()) {
+        let tried = COMMANDS.iter().any(|words| words[0] == name);
+        assert!(tried || NO_LOG.contains(&name), "{name} is not tried");
+    }
 }

@@ -1,5 +1,7 @@
 //! `farside fork`: a logged run again, with something changed from an instant on, and what came of it.
 
+mod degrades;
+
 use std::path::PathBuf;
 
 use farside::ruling::MessageId;
@@ -134,6 +136,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     assembled
         .sim
         .observe(LogWriter::create(&args.out, options)?);
+    let applied = degrades::watch(&mut assembled.sim, scenario.last_degrades(), at);
     progress::show(&mut assembled.sim, assembled.system.goal, scenario.until());
     interrupt::raise_on_interrupt(assembled.sim.interrupt());
     let report = assembled.sim.run(executor)?;
@@ -155,6 +158,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let mut remarks = assembled.remarks;
     remarks.extend(assembled.planned.never_reached(&report));
     remarks.extend(scenario.unmet_rulings(&report));
+    remarks.extend(applied.idle(report.end_time));
     for remark in &remarks {
         tracing::warn!("{remark}");
     }

@@ -47,7 +47,7 @@ impl Interrupts {
     }
 
     /// Raises `run` too when it is raised.
-    fn watch(&self, run: &Arc<AtomicBool>) {
+    pub(crate) fn watch(&self, run: &Arc<AtomicBool>) {
         let mut runs = self.0.runs.lock().unwrap_or_else(PoisonError::into_inner);
         runs.retain(|run| run.strong_count() > 0);
         runs.push(Arc::downgrade(run));

@@ -1,5 +1,6 @@
 //! The `farside` command as a user meets it: what it prints where, and how it exits.
 
+mod accounts;
 mod browser;
 mod cluster;
 mod common;
@@ -18,7 +19,9 @@ mod replays;
 mod report;
 mod running;
 mod scenarios;
+mod schemas;
 mod seams;
 mod snapshots;
 mod studies;
+mod ties;
 mod traffic;

@@ -149,7 +149,8 @@ impl<'a> Parser<'a> {
             if self.tokens.is_at(";")? {
                 return Ok(());
             }
-            self.tokens.next()?;
+            let next = self.tokens.next()?;
+            next.ok_or_else(|| format!("{name} is a {what} that does not end"))?;
         }
         self.tokens.skip_group()?;
         self.add_struct(

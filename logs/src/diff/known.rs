@@ -63,11 +63,14 @@ pub(super) fn check(
     let ignored = |name: &String| options.ignore.contains(name) && is_topic(name);
     let is_missing =
         |names: &BTreeSet<String>, name: &String| !names.contains(name) && !ignored(name);
-    if !rules.named().any(|name| is_missing(&names, &name)) {
-        return Ok(());
+    if rules.named().any(|name| is_missing(&names, &name)) {
+        for log in [a, b] {
+            of_messages(log.scanner.path(), &mut names)?;
+        }
     }
-    for log in [a, b] {
-        of_messages(log.scanner.path(), &mut names)?;
+    let mut parts = rules.named().filter(|name| !ignored(name));
+    if let Some((field, time)) = parts.find_map(|name| part_of_time(&names, name)) {
+        return Err(LogError::PartOfTime { field, time });
     }
     match rules.named().find(|name| is_missing(&names, name)) {
         None => Ok(()),
@@ -77,6 +80,17 @@ pub(super) fn check(
             Err(LogError::NoSuchField { field, hint })
         }
     }
+}
+
+/// A field that is a part of a time, and that time: whatever is said of it alone has no effect, since times are
+/// compared as a whole.
+fn part_of_time(names: &BTreeSet<String>, field: String) -> Option<(String, String)> {
+    let (time, part) = field.rsplit_once('.')?;
+    let within = format!("{time}.");
+    let others = names.iter().filter_map(|name| name.strip_prefix(&within));
+    let others: Vec<&str> = others.filter(|other| *other != part).collect();
+    let is_time = matches!(others[..], [other] if value::are_time(part, other));
+    is_time.then(|| (field.clone(), time.to_owned()))
 }
 
 /// The fields that a channel's schema declares.

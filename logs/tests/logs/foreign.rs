@@ -255,3 +255,61 @@ fn messages_are_read_as_values() {
     assert!(messages.next().unwrap().is_none());
     assert!(messages.check_topics().is_err());
 }
+
+/// `known.py`, beside the files, says who has encoded them and who has read them again.
+#[test]
+fn messages_that_known_tools_have_encoded_are_read_as_known_tools_read_them() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/foreign");
+    let known = std::fs::read(folder.join("known.json")).unwrap();
+    let known: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(&known).unwrap();
+    let mut messages = AnyMessages::open(folder.join("known.mcap"), &[]).unwrap();
+    let mut read = 0;
+    while let Some(message) = messages.next().unwrap() {
+        let value = message.value().unwrap();
+        let told: serde_json::Value = serde_json::from_str(&value.to_string()).unwrap();
+        let expected = &known[message.topic()];
+        match message.topic() {
+            "/any" => {
+                let mut packed = told["a"].clone();
+                let url = packed
+                    .as_object_mut()
+                    .and_then(|packed| packed.remove("@type"));
+                assert_eq!(url.unwrap(), "type.googleapis.com/demo.Inside");
+                assert_eq!(packed, *expected);
+                // A type that nobody knows stays packed; one of another file is unpacked.
+                assert_eq!(told["many"][0]["nanos"], 34);
+                assert_eq!(told["unknown"]["value"], "CAE=");
+            }
+            _ => assert_eq!(told, *expected, "{}", message.topic()),
+        }
+        read += 1;
+    }
+    assert_eq!(read, known.len());
+}
+
+#[test]
+fn a_part_of_a_time_is_not_left_out_alone() {
+    let of = |ignore: &[&str], tolerance: &[&str]| {
+        let options = DiffOptions {
+            ignore: ignore.iter().map(|name| (*name).to_owned()).collect(),
+            field_tolerances: tolerance
+                .iter()
+                .map(|name| ((*name).to_owned(), Tolerance::Number(1.0)))
+                .collect(),
+            ..DiffOptions::default()
+        };
+        compare_with(&poses(), &poses(), &options)
+    };
+    assert!(of(&["header.stamp"], &[]).unwrap().identical);
+    for (ignore, tolerance) in [
+        (&["header.stamp.sec"][..], &[][..]),
+        (&["header.stamp.nanosec"], &[]),
+        (&[], &["header.stamp.sec"]),
+    ] {
+        let error = of(ignore, tolerance).unwrap_err().to_string();
+        assert!(
+            error.ends_with("times are compared as a whole: name \"header.stamp\""),
+            "{error}"
+        );
+    }
+}

@@ -3,6 +3,7 @@
 //!
 //! What is learnt, and one rover's resources, are drawn as for the system `misus`.
 
+pub(super) mod account;
 mod activities;
 mod goals;
 mod history;

@@ -198,8 +198,8 @@ fn told_without(
     *running.lock().unwrap_or_else(PoisonError::into_inner) = assembled.sim.interrupt();
     let report = assembled.sim.run(farside::Executor::Inline)?;
     if matches!(report.end, End::Interrupted) {
-        return Err(wrong(
-            "interrupted: what it would have escaped is not told".to_owned(),
+        return Err(CommandError::Interrupted(
+            "what it would have escaped is not told".to_owned(),
         ));
     }
     let log = Log::open(&path)?;

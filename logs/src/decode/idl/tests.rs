@@ -74,6 +74,7 @@ fn what_is_not_read_is_refused_with_its_line() {
         ),
         ("@value(x) struct R { long x; };", "integer"),
         ("const string S = \"a", "text that does not end"),
+        ("union U switch (long)", "union that does not end"),
         ("struct R { long x; }", ""),
     ] {
         let told = shown("R", text);

@@ -1,0 +1,13 @@
+//! Reads FlatBuffers by their reflection, both made up: see `read_foreign`.
+#![no_main]
+
+use farside_fuzz::{Foreign, read_foreign};
+use libfuzzer_sys::fuzz_target;
+
+const KIND: Foreign = Foreign {
+    schema_encoding: "flatbuffer",
+    message_encoding: "flatbuffer",
+    type_name: "demo.Scan",
+};
+
+fuzz_target!(|bytes: &[u8]| read_foreign(&KIND, bytes));
