@@ -227,6 +227,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             Some(cause) if record.class.is_fate() => cause.to_ref(),
             _ => record.key.to_ref(),
         });
+        let acts = acts.filter(|key| key.time_ns == output.time_ns);
         Ok(match (first, acts.max()) {
             (Some(first), Some(last)) => first <= last,
             _ => true,

@@ -6,7 +6,7 @@ use crate::diff::{Hop, Reached, Root, RootKind};
 use crate::shown::{Seconds, Shown};
 
 /// Actors that people are shown, unless they ask for all.
-const ACTORS_SHOWN: usize = 12;
+const ACTORS_SHOWN: usize = 6;
 
 /// Inputs that people are shown.
 const INPUTS_SHOWN: usize = 4;
