@@ -69,6 +69,8 @@ fn every_command_speaks_of_a_system_of_somebody_elses() {
     let text = said(folder, &["draw", "run.mcap"]);
     assert!(text.contains("calls heard"), "{text}");
     assert!(folder.join("run-calls.svg").exists());
+    said(folder, &["view", "run.mcap"]);
+    assert!(folder.join("run.html").exists());
     said(folder, &["study", "beacons/loss", "--out", "loss"]);
     said(folder, &["report", "loss"]);
     let again = [
