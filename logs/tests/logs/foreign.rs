@@ -271,7 +271,9 @@ fn messages_that_known_tools_have_encoded_are_read_as_known_tools_read_them() {
         match message.topic() {
             "/any" => {
                 let mut packed = told["a"].clone();
-                let url = packed.as_object_mut().and_then(|packed| packed.remove("@type"));
+                let url = packed
+                    .as_object_mut()
+                    .and_then(|packed| packed.remove("@type"));
                 assert_eq!(url.unwrap(), "type.googleapis.com/demo.Inside");
                 assert_eq!(packed, *expected);
                 // A type that nobody knows stays packed; one of another file is unpacked.
