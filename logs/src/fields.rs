@@ -209,6 +209,15 @@ mod tests {
     use super::near;
 
     #[test]
+    fn a_tolerance_is_absolute_or_a_share_of_the_larger_one() {
+        // Far more apart than the tolerance, and less than its share.
+        assert!(near(1e9, 1e9 + 100.0, 1e-6) && !near(1e9, 1e9 + 10_000.0, 1e-6));
+        // Less apart than the tolerance, and far more than its share.
+        assert!(near(0.0, 5e-7, 1e-6) && !near(0.0, 2e-6, 1e-6));
+        assert!(near(-1e-9, 1e-9, 1e-6) && !near(1.0, 1.0 + 1e-12, 0.0));
+    }
+
+    #[test]
     fn infinity_and_no_number_are_near_to_themselves_only() {
         let numbers = [
             f64::INFINITY,

@@ -125,3 +125,30 @@ fn the_scenario_of_a_log_is_run_with_its_own_tie_seed_first() {
         assert!(text(&refused.stderr).contains(said), "{arguments:?}");
     }
 }
+
+#[test]
+fn a_fork_says_which_degradations_no_message_met() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "slow.toml", "rate = '8kbit/s'");
+    let run = farside(folder.path(), &["run", "slow.toml"]);
+    assert_eq!(run.status.code(), Some(0));
+    let remarks = |degrade: &str| {
+        let set = format!("degrade=[{degrade}]");
+        let arguments = [
+            "fork", "run.mcap", "--at", "1s", "--set", &set, "--out", "f.mcap", "--json",
+        ];
+        let forked = farside(folder.path(), &arguments);
+        assert!(forked.status.code() < Some(2), "{}", text(&forked.stderr));
+        read(&forked)["remarks"].to_string()
+    };
+    // Hosts send at 0 s, 1 s and 2 s.
+    let idle = remarks("{ at = '1500ms', until = '1900ms', links = 'a-relay', loss = 0.5 }");
+    assert!(
+        idle.contains(
+            "degrade.0 applied to no message: none was sent over a-relay from 1.5s to 1.9s"
+        ),
+        "{idle}"
+    );
+    let met = remarks("{ at = '1500ms', until = '2100ms', links = 'a-relay', loss = 0.5 }");
+    assert!(!met.contains("applied to no message"), "{met}");
+}

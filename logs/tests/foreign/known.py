@@ -92,15 +92,22 @@ message Inside { sint32 z = 1; fixed64 f = 2; repeated float r = 3; map<string, 
 message Held { google.protobuf.Any a = 1; repeated google.protobuf.Any many = 2; google.protobuf.Timestamp t = 3;
   google.protobuf.Any unknown = 4; Inside inside = 5; }
 ''')
+Path('other.proto').write_text('''syntax = "proto3";
+package demo2;
+message Other { string words = 1; }
+''')
 from grpc_tools import protoc
-protoc.main(['', '-I.', '-I' + str(Path(protoc.__file__).parent / '_proto'), '--python_out=.', 'held.proto'])
+protoc.main(['', '-I.', '-I' + str(Path(protoc.__file__).parent / '_proto'), '--python_out=.', 'held.proto', 'other.proto'])
 sys.path.insert(0, '.')
 import held_pb2
+import other_pb2
 inside = held_pb2.Inside(z=-7, f=2**63 + 1, r=[0.5, -2.0], m={'x': -1})
 held = held_pb2.Held(inside=inside)
 held.a.Pack(inside)
 x = held.many.add(); x.Pack(timestamp_pb2.Timestamp(seconds=12, nanos=34))
 x = held.many.add(); x.Pack(inside)
+other = other_pb2.Other(words='of another schema')
+x = held.many.add(); x.Pack(other)
 held.t.seconds = 1; held.t.nanos = 2
 held.unknown.type_url = 'type.googleapis.com/gone.Type'; held.unknown.value = b'\x08\x01'
 from mcap_protobuf.schema import build_file_descriptor_set
@@ -119,6 +126,7 @@ def put(topic, encoding, name, schema_encoding, schema, data):
 put('/idl/little', 'cdr', 'demo_msgs/msg/Whole', 'ros2idl', idl.encode(), store.serialize_cdr(whole, 'demo_msgs/msg/Whole', little_endian=True))
 put('/idl/big', 'cdr', 'demo_msgs/msg/Whole', 'ros2idl', idl.encode(), store.serialize_cdr(whole, 'demo_msgs/msg/Whole', little_endian=False))
 put('/ros1', 'ros1', 'demo_msgs/Whole', 'ros1msg', ros1.encode(), one_store.serialize_ros1(whole1, 'demo_msgs/msg/Whole'))
+put('/other', 'protobuf', 'demo2.Other', 'protobuf', build_file_descriptor_set(other_pb2.Other).SerializeToString(), other.SerializeToString())
 put('/any', 'protobuf', 'demo.Held', 'protobuf', descriptors, held.SerializeToString(deterministic=True))
 w.finish(); out.close()
 
@@ -140,6 +148,8 @@ for schema, channel, message in make_reader(open('known.mcap', 'rb')).iter_messa
         values[channel.topic] = plain(store.deserialize_cdr(message.data, 'demo_msgs/msg/Whole'))
     elif channel.topic == '/ros1':
         values[channel.topic] = plain(Ros1().decoder_for('ros1', schema)(message.data))
+    elif channel.topic == '/other':
+        values[channel.topic] = {'words': other_pb2.Other.FromString(message.data).words}
     else:
         packed = held_pb2.Inside.FromString(held_pb2.Held.FromString(message.data).a.value)
         values[channel.topic] = {'z': packed.z, 'f': packed.f, 'r': list(packed.r), 'm': dict(packed.m)}

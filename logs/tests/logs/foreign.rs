@@ -276,9 +276,10 @@ fn messages_that_known_tools_have_encoded_are_read_as_known_tools_read_them() {
                     .and_then(|packed| packed.remove("@type"));
                 assert_eq!(url.unwrap(), "type.googleapis.com/demo.Inside");
                 assert_eq!(packed, *expected);
-                // A type that nobody knows stays packed; one of another file is unpacked.
+                // A type that nobody knows stays packed; one that another channel's schema has is unpacked.
                 assert_eq!(told["many"][0]["nanos"], 34);
                 assert_eq!(told["unknown"]["value"], "CAE=");
+                assert_eq!(told["many"][2]["words"], "of another schema");
             }
             _ => assert_eq!(told, *expected, "{}", message.topic()),
         }
