@@ -134,8 +134,13 @@ fn try_all(folder: &Path, broken: &[u8], what: &dyn Fn() -> String) {
         let ended = ended.unwrap_or_else(|_| panic!("{command:?} panicked: {}", what()));
         let said = String::from_utf8(said).unwrap();
         match ended {
+            // Without a message `cat` has nothing to print, and says on stderr where the log is cut.
             Ok(Exit::Done | Exit::Different) => {
-                assert!(!said.is_empty(), "{command:?}: {}", what())
+                assert!(
+                    !said.is_empty() || command[0] == "cat",
+                    "{command:?}: {}",
+                    what()
+                )
             }
             Ok(Exit::Wrong | Exit::Failed) => {}
             Err(error) => assert!(!error.to_string().is_empty()),
