@@ -60,6 +60,7 @@ pub(super) fn common_offset(
         }
         candidates.push(middle);
     }
+    candidates.retain(|one| *one == 0 || one.unsigned_abs() >= LEAST_NS);
     candidates.sort_unstable_by_key(|one| one.unsigned_abs());
     candidates.dedup();
     judge(a, b, &candidates)

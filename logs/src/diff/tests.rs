@@ -253,6 +253,30 @@ impl Logs {
     }
 }
 
+/// Messages that never repeat, each a nanosecond earlier in the second log: clocks are taken as one.
+#[test]
+fn what_is_nearly_at_one_time_has_no_offset() {
+    let measured = |shift: u64, body: u8| -> Vec<Made> {
+        let one = |at: u64| Made {
+            fate: 0,
+            sender: 0,
+            receiver: 1,
+            ordinal: at,
+            match_key: None,
+            time_ns: 10 * at + 10 - shift,
+            sent_ns: 10 * at + 10 - shift,
+            count: at,
+            cause: None,
+            body: vec![body, at as u8],
+            attempts: 0,
+        };
+        (0..20).map(one).collect()
+    };
+    let logs = Logs::write(&measured(0, 1), &measured(1, 2), [0, 0], false);
+    let (found, _) = logs.compare(&DiffOptions::default(), ways()[0]);
+    assert_eq!(found.offset_ns, 0);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
