@@ -9,8 +9,10 @@ pub(crate) mod condition;
 pub mod contacts;
 mod crash;
 mod error;
+mod file;
 mod fork;
 mod location;
+mod parts;
 mod planned;
 mod reference;
 mod rulings;
@@ -25,33 +27,27 @@ use farside::suggest::nearest;
 use farside::{End, Report, SimDuration, SimTime, Simulation};
 use farside_actors::link::{Degrade, LinksConfig};
 use farside_actors::radio::RadioConfig;
-use farside_actors::system::settings::Table;
-use farside_actors::system::{
-    Assembly, Files, Seeds, Settings, Setup, SetupError, System, no_file,
-};
+use farside_actors::system::{Assembly, Files, Seeds, Settings, Setup, SetupError};
 use farside_actors::wiring::LinkBuilder;
 use farside_actors::{settings, units};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 use crate::registry::Registry;
 pub use condition::Forbidden;
 use contacts::{ContactsConfig, LinkContacts};
 pub use crash::Crash;
 pub use error::ScenarioError;
+pub(crate) use file::{read, stem};
 use fork::Changed;
 pub use fork::Fork;
 pub(crate) use fork::check_replay;
 pub use location::SourceLocation;
+use parts::{part, roots, system_name};
 pub use planned::{Never, Planned};
 pub use reference::shared_sections;
 pub use rulings::{Deliver, Lose, Postpone};
 pub(crate) use source::Source;
-
-/// The most bytes of a scenario or study that are read.
-const MAX_BYTES: u64 = 4 << 20;
 
 settings! {
     /// What every scenario has, whatever its system.
@@ -549,119 +545,6 @@ impl SplitTables for toml::Table {
         *self = plain;
         tables
     }
-}
-
-pub(crate) fn stem(name: &str) -> String {
-    let stem = Path::new(name).file_stem();
-    stem.map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into())
-}
-
-/// Reads the text of a scenario or study.
-pub(crate) fn read(
-    path: &Path,
-    missing: impl FnOnce() -> ScenarioError,
-) -> Result<String, ScenarioError> {
-    let io = |source| ScenarioError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let size = match std::fs::metadata(path) {
-        Ok(metadata) if metadata.is_dir() => {
-            return Err(io(std::io::ErrorKind::IsADirectory.into()));
-        }
-        // A pipe that nobody writes to would be waited for without end.
-        Ok(metadata) if !metadata.is_file() => return Err(io(no_file())),
-        Ok(metadata) => metadata.len(),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(missing());
-        }
-        Err(error) => return Err(io(error)),
-    };
-    if size > MAX_BYTES {
-        return Err(ScenarioError::TooLarge {
-            path: path.to_owned(),
-            actual_bytes: size,
-            limit_bytes: MAX_BYTES,
-        });
-    }
-    // It may have grown.
-    use std::io::Read as _;
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(io)?;
-    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(io)?;
-    String::from_utf8(bytes).map_err(|error| ScenarioError::NotUtf8 {
-        path: path.to_owned(),
-        at_byte: error.utf8_error().valid_up_to(),
-    })
-}
-
-/// The value of `system`, which decides who reads the rest.
-fn system_name(source: &Source, root: &DeTable<'_>) -> Result<String, ScenarioError> {
-    match root
-        .get("system")
-        .map(|value| (value.span(), value.get_ref()))
-    {
-        Some((_, DeValue::String(name))) => Ok(name.to_string()),
-        Some((span, other)) => Err(ScenarioError::Invalid {
-            place: source.place(span.start),
-            key: "system".to_owned(),
-            message: format!(
-                "found {}: expected the name of a system, as in system = \"network\"",
-                other.type_str()
-            ),
-        }),
-        None => Err(ScenarioError::Invalid {
-            place: source.place(0),
-            key: "system".to_owned(),
-            message:
-                "this key is missing: expected the name of a system, as in system = \"network\""
-                    .to_owned(),
-        }),
-    }
-}
-
-type Parts<'i> = (Spanned<DeTable<'i>>, Spanned<DeTable<'i>>);
-
-/// Parts the document into the keys that all systems share and those of this one.
-fn part<'i>(
-    source: &Source,
-    document: Spanned<DeTable<'i>>,
-    sections: &[String],
-) -> Result<Parts<'i>, ScenarioError> {
-    let span = document.span();
-    let shared_keys = &Shared::sections("")[0].keys;
-    let (mut shared, mut own) = (DeTable::new(), DeTable::new());
-    for (key, value) in document.into_inner() {
-        let name = key.get_ref().as_ref();
-        if shared_keys.iter().any(|key| key.name == name) {
-            shared.insert(key, value);
-        } else if sections.iter().any(|section| section == name) {
-            own.insert(key, value);
-        } else {
-            let own = || sections.iter().map(String::as_str);
-            let known = || shared_keys.iter().map(|key| key.name).chain(own());
-            return Err(ScenarioError::UnknownKey {
-                place: source.place(key.span().start),
-                found: name.to_owned(),
-                nearest: nearest(name, known()),
-                expected: format!("one of {}", known().collect::<Vec<_>>().join(", ")),
-                within: String::new(),
-            });
-        }
-    }
-    Ok((Spanned::new(span.clone(), shared), Spanned::new(span, own)))
-}
-
-/// The top-level tables that a system reads.
-fn roots(system: &dyn System) -> Vec<String> {
-    let mut roots = Vec::new();
-    for section in system.sections() {
-        let root = section.root().to_owned();
-        if !roots.contains(&root) {
-            roots.push(root);
-        }
-    }
-    roots
 }
 
 #[cfg(test)]

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use farside::suggest::{did_you_mean, nearest};
 
 use crate::LogError;
+use crate::channel::ChannelInfo;
 use crate::envelope::RecordRef;
 use crate::fields;
-use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+use crate::scan::{Item, ScannedMessage, Scanner};
 use crate::topics::Topics;
 use crate::value::Unreadable;
 use crate::value::Value;

@@ -8,9 +8,9 @@ mod values;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::channel::{ChannelInfo, SchemaInfo};
 use crate::decode::{Layout, cdr};
 use crate::envelope::RecordRef;
-use crate::scan::{ChannelInfo, SchemaInfo};
 use crate::shown::{Seconds, apart, hex};
 use crate::value::{Unreadable, Value};
 

@@ -8,12 +8,13 @@ use farside::Counts;
 use serde::Serialize;
 
 use crate::LogError;
+use crate::channel::ChannelInfo;
 use crate::envelope::{RecordRef, seconds};
 use crate::fields::{self, Encoded};
 use crate::frames::{Care, HEAD_BYTES};
 use crate::group;
 use crate::log::Head;
-use crate::scan::{ChannelInfo, Item, ScannedMessage, Scanner};
+use crate::scan::{Item, ScannedMessage, Scanner};
 use crate::shown::{Seconds, Shown};
 use crate::source::Sum;
 

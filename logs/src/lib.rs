@@ -57,6 +57,7 @@
 //! the record. A major version changes or removes them.
 
 mod any;
+mod channel;
 mod decode;
 mod descriptors;
 mod diff;
@@ -84,6 +85,7 @@ mod wire;
 mod writer;
 
 pub use any::{AnyMessage, AnyMessages};
+pub use channel::{ChannelInfo, SchemaInfo};
 pub use diff::{
     Carried, Cause, CauseChain, CausedBy, DiffOptions, DiffReport, FieldChange, FirstDifference,
     Rate, Reached, TopicDiff, causes, diff,
@@ -100,7 +102,6 @@ pub use replay::{
     Again, OutputCount, OutputSide, ReplayOutcome, ReplayedOutput, ReplayedStep, again, charges_in,
     filtered_inputs, replay,
 };
-pub use scan::{ChannelInfo, SchemaInfo};
 pub use shown::{escaped, is_hidden};
 pub use value::{NumberKind, Numbers, Unreadable, Value};
 pub use verify::{Mismatch, Verifier, VerifyHandle, VerifyOutcome};

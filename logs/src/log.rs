@@ -7,9 +7,10 @@ use farside::record::RecordClass;
 use farside::{Carriage, MatchKey};
 
 use crate::LogError;
+use crate::channel::{ChannelInfo, Role};
 use crate::envelope::{CheckpointRef, KeyRef, RecordRef};
 use crate::frames::{HEAD_BYTES, LIMIT_BYTES};
-use crate::scan::{ChannelInfo, Item, Role, ScannedMessage, Scanner};
+use crate::scan::{Item, ScannedMessage, Scanner};
 use crate::source::{Attached, Sum};
 use crate::writer::{Attachment, FORMAT_MAJOR, FORMAT_MINOR, SCENARIO_ATTACHMENT};
 

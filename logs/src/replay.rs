@@ -17,9 +17,10 @@ pub use again::{Again, again};
 pub use told::{OutputCount, OutputSide, ReplayOutcome, ReplayedOutput, ReplayedStep};
 
 use crate::LogError;
+use crate::channel::SchemaInfo;
 use crate::envelope::{KeyRef, RecordRef};
 use crate::log::{Ending, Log, Step};
-use crate::scan::{ScannedMessage, SchemaInfo};
+use crate::scan::ScannedMessage;
 use crate::topics::{Topics, topic_before_1_3, topic_of};
 use told::Schemas;
 

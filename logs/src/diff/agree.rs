@@ -5,7 +5,7 @@ use super::index::Index;
 use mcap::records::MessageHeader;
 
 use crate::LogError;
-use crate::scan::ChannelInfo;
+use crate::channel::ChannelInfo;
 
 /// Reads both logs up to where they cease to agree, and keeps the first records that do not. Gives
 /// how many of those that agree have another sequence number.

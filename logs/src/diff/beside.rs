@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::DiffReport;
 use super::entry::{Mode, Names};
 use super::index::{Beside, Index};
-use crate::scan::{ChannelInfo, SchemaInfo};
+use crate::channel::{ChannelInfo, SchemaInfo};
 use crate::shown::{apart, escaped};
 use crate::source::{Attached, Sum};
 use crate::writer::SCENARIO_ATTACHMENT;

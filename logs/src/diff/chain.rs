@@ -8,10 +8,10 @@ use super::Limits;
 use super::entry::{Mode, Names};
 use super::index::Index;
 use crate::LogError;
+use crate::channel::ChannelInfo;
 use crate::envelope::RecordRef;
 use crate::log::{LoggedKey, LoggedRecord};
 use crate::messages::find_messages;
-use crate::scan::ChannelInfo;
 use crate::topics::Topics;
 use farside::record::RecordClass;
 

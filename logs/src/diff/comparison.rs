@@ -19,10 +19,10 @@ use super::spill::{BUCKETS, Buckets};
 use super::{DiffOptions, DiffReport, FirstDifference, Limits, TopicDiff, Usage};
 use super::{agree, beside, detail, known, offset, scenario, text};
 use crate::LogError;
+use crate::channel::ChannelInfo;
 use crate::envelope::seconds;
 use crate::fields::{FieldDiff, Rules};
 use crate::log::Log;
-use crate::scan::ChannelInfo;
 use crate::shown::Seconds;
 use crate::topics::Topics;
 

@@ -10,7 +10,7 @@ use super::entry::Mode;
 use super::index::Index;
 use crate::LogError;
 use crate::any::AnyMessages;
-use crate::scan::ChannelInfo;
+use crate::channel::ChannelInfo;
 use crate::topics::Topics;
 use crate::value;
 

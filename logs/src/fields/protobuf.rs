@@ -16,7 +16,7 @@ use std::sync::Arc;
 use prost_types::field_descriptor_proto::Type;
 
 use super::{Bound, DEPTH, FieldDiff, Path, Rules, near, raw};
-use crate::scan::{ChannelInfo, SchemaInfo};
+use crate::channel::{ChannelInfo, SchemaInfo};
 use crate::schema::{Field, FieldType, MessageType, Types};
 use crate::shown::{SHOWN, shorten};
 use crate::value::Unreadable;

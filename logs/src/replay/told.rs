@@ -7,9 +7,9 @@ use farside::replay::{Difference, Output, OutputClass, ReplayReport, Step, Tally
 use farside::{Kind, RunInfo};
 use serde::Serialize;
 
+use crate::channel::SchemaInfo;
 use crate::envelope::seconds;
 use crate::fields::{self, Encoded, FieldDiff, Rules};
-use crate::scan::SchemaInfo;
 use crate::schema::Types;
 use crate::shown::Seconds;
 use crate::verify::kind_types;

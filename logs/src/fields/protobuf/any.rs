@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::{Side, held, merged, side};
-use crate::scan::ChannelInfo;
+use crate::channel::ChannelInfo;
 use crate::schema::{MessageType, Types};
 use crate::wire::Value;
 

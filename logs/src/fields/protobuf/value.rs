@@ -7,7 +7,7 @@ use prost_types::field_descriptor_proto::Type;
 
 use super::scalar::{Scalar, WireBits};
 use super::{Side, any, content, elements, entries, held, merged, side};
-use crate::scan::ChannelInfo;
+use crate::channel::ChannelInfo;
 use crate::schema::{Field, FieldType, MessageType, Types};
 use crate::value::{DEPTH, Unreadable, VALUES};
 use crate::value::{NumberKind, Numbers, Value};
