@@ -234,12 +234,9 @@ fn damaged(log: &[u8], seed: u64) -> Vec<u8> {
 }
 
 /// Cuts at each `step`th place of a small log, and so many corruptions of a small one and of a larger one.
+/// They are tried on all cores: what is printed is kept by thread.
 fn hostile(step: usize, corruptions: u64) {
     let small = traffic(Compression::Zstd);
-    let folder = folder_with(&small);
-    for cut in (0..small.len()).step_by(step) {
-        try_all(folder.path(), &small[..cut], &|| format!("cut at {cut}"));
-    }
     let mut kinds = Vec::new();
     for compression in [Compression::Zstd, Compression::None] {
         kinds.push(traffic(compression));
@@ -251,15 +248,32 @@ fn hostile(step: usize, corruptions: u64) {
         without_checksums(&mut log);
         kinds.push(log);
     }
-    let folders: Vec<_> = kinds.iter().map(|log| folder_with(log)).collect();
-    for seed in 0..corruptions {
-        // Most are small, and so are done soon.
-        let at = (seed % 8) as usize;
-        let broken = damaged(&kinds[at], seed);
-        try_all(folders[at].path(), &broken, &|| {
-            format!("log {at}, seed {seed}")
-        });
-    }
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let work = &|worker: usize| {
+        let folder = folder_with(&small);
+        let cuts = (0..small.len()).step_by(step);
+        for cut in cuts.skip(worker).step_by(workers) {
+            try_all(folder.path(), &small[..cut], &|| format!("cut at {cut}"));
+        }
+        let folders: Vec<_> = kinds.iter().map(|log| folder_with(log)).collect();
+        for seed in (worker as u64..corruptions).step_by(workers) {
+            let at = seed as usize % kinds.len();
+            let broken = damaged(&kinds[at], seed);
+            try_all(folders[at].path(), &broken, &|| {
+                format!("log {at}, seed {seed}")
+            });
+        }
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers)
+            .map(|worker| scope.spawn(move || work(worker)))
+            .collect();
+        for thread in threads {
+            if let Err(panic) = thread.join() {
+                std::panic::resume_unwind(panic);
+            }
+        }
+    });
 }
 
 #[test]
