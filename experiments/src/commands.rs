@@ -170,13 +170,25 @@ impl CommandError {
 }
 
 pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), CommandError> {
-    #[cfg(test)]
-    if kept::keep(bytes) {
-        return Ok(());
-    }
-    let mut out = std::io::stdout().lock();
-    let written = out.write_all(bytes).and_then(|()| out.flush());
+    let written = Printed.write_all(bytes).and_then(|()| Printed.flush());
     written.map_err(CommandError::Output)
+}
+
+/// Standard output, for what is printed as it is read.
+pub(crate) struct Printed;
+
+impl Write for Printed {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        #[cfg(test)]
+        if kept::keep(bytes) {
+            return Ok(bytes.len());
+        }
+        std::io::stdout().lock().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        std::io::stdout().lock().flush()
+    }
 }
 
 /// Prints a text, and a newline if it has none at its end; see [`shown`].

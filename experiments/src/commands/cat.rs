@@ -8,7 +8,7 @@ use farside_actors::units::parse_duration;
 use farside_logs::{AnyMessage, AnyMessages, Value};
 
 use super::kinds::{self, FileKind};
-use super::{CommandError, Exit, output};
+use super::{CommandError, Exit, Printed, output};
 use crate::registry::Registry;
 
 /// Columns of a table: messages that make more are no table.
@@ -68,7 +68,7 @@ impl Window {
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
     kinds::expect(FileKind::Log, &args.log, registry)?;
     output::spare(std::slice::from_ref(&args.log), &[])?;
-    let mut out = BufWriter::new(std::io::stdout().lock());
+    let mut out = BufWriter::new(Printed);
     match args.csv {
         true => table(args, &mut out)?,
         false => lines(args, &mut out)?,
