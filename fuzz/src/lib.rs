@@ -37,7 +37,9 @@ pub fn log() -> &'static [u8] {
             resolved: scenario.resolved().expect("it can be written"),
             ..LogOptions::default()
         };
-        assembled.sim.observe(LogWriter::create(&path, options).expect("a log"));
+        assembled
+            .sim
+            .observe(LogWriter::create(&path, options).expect("a log"));
         assembled.sim.run(Executor::Inline).expect("a run");
         std::fs::read(&path).expect("the log is there")
     })
@@ -54,7 +56,9 @@ pub fn broken(input: &[u8]) -> Vec<u8> {
         match edit[0] % 4 {
             0 if place < broken.len() => broken[place] = edit[4],
             1 => drop(broken.drain(place.min(end)..end)),
-            2 => broken.splice(place..place, (0..edit[3]).map(|_| edit[4])).for_each(drop),
+            2 => broken
+                .splice(place..place, (0..edit[3]).map(|_| edit[4]))
+                .for_each(drop),
             3 if edit[4] == 0 => broken.truncate(place),
             _ => {}
         }
@@ -90,7 +94,9 @@ pub fn write_edited(input: &[u8], paths: [&Path; 2]) {
 /// The log, record by record, with edits.
 fn rewritten(edits: &[Edit]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
-    let options = mcap::WriteOptions::new().compression(None).profile("farside");
+    let options = mcap::WriteOptions::new()
+        .compression(None)
+        .profile("farside");
     let mut writer = options.create(&mut out).expect("a writer");
     let (mut schemas, mut channels) = (BTreeMap::new(), BTreeMap::new());
     let mut number = 0;
@@ -113,7 +119,9 @@ fn rewritten(edits: &[Edit]) -> Vec<u8> {
                 times = edited(edit, &mut data, &mut header.log_time, times);
             }
             for _ in 0..times {
-                writer.write_to_known_channel(&header, &data).expect("a message");
+                writer
+                    .write_to_known_channel(&header, &data)
+                    .expect("a message");
             }
             number += 1;
         }
@@ -128,7 +136,9 @@ fn rewritten(edits: &[Edit]) -> Vec<u8> {
             writer.attach(&attachment).expect("an attachment");
         }
         Record::Metadata(Metadata { name, metadata }) => {
-            writer.write_metadata(&Metadata { name, metadata }).expect("metadata");
+            writer
+                .write_metadata(&Metadata { name, metadata })
+                .expect("metadata");
         }
         _ => {}
     });
@@ -176,18 +186,11 @@ pub struct Foreign {
     pub type_name: &'static str,
 }
 
-/// Reads a message of another program: the first two bytes say how long the schema is, the message is what comes
-/// behind it. Whatever they are, there is a value or an error, and the same one again.
-pub fn read_foreign(kind: &Foreign, bytes: &[u8]) {
-    let Some((length, rest)) = bytes.split_first_chunk() else {
-        return;
-    };
-    let length = usize::from(u16::from_le_bytes(*length));
-    let (schema, body) = rest.split_at(length.min(rest.len()));
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("a");
-    let file = std::fs::File::create(&path).expect("a file");
-    let mut writer = mcap::WriteOptions::new().compression(None).create(file).expect("a writer");
+/// Writes a log of another program with one message.
+pub fn write_foreign(path: &Path, kind: &Foreign, schema: &[u8], body: &[u8]) {
+    let file = std::fs::File::create(path).expect("a file");
+    let options = mcap::WriteOptions::new().compression(None);
+    let mut writer = options.create(file).expect("a writer");
     let schema = writer.add_schema(kind.type_name, kind.schema_encoding, schema);
     let channel = writer.add_channel(
         schema.expect("a schema"),
@@ -201,8 +204,23 @@ pub fn read_foreign(kind: &Foreign, bytes: &[u8]) {
         log_time: 1,
         publish_time: 1,
     };
-    writer.write_to_known_channel(&header, body).expect("a message");
+    writer
+        .write_to_known_channel(&header, body)
+        .expect("a message");
     writer.finish().expect("an end");
+}
+
+/// Reads a message of another program: the first two bytes say how long the schema is, the message is what comes
+/// behind it. Whatever they are, there is a value or an error, and the same one again.
+pub fn read_foreign(kind: &Foreign, bytes: &[u8]) {
+    let Some((length, rest)) = bytes.split_first_chunk() else {
+        return;
+    };
+    let length = usize::from(u16::from_le_bytes(*length));
+    let (schema, body) = rest.split_at(length.min(rest.len()));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a");
+    write_foreign(&path, kind, schema, body);
     let mut messages = AnyMessages::open(&path, &[]).expect("a whole file");
     let message = messages.next().expect("a whole file").expect("a message");
     let told = || match message.value() {

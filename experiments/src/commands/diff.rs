@@ -102,6 +102,9 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
     let report = farside_logs::diff(&args.a, &args.b, &options)?;
     if let Some(out) = &args.html {
         let sides = [page::read(&args.a, 2)?, page::read(&args.b, 2)?];
+        for (path, side) in inputs.iter().zip(&sides) {
+            view::warn(path, side);
+        }
         let text = page::of_diff(sides.each_ref(), &report)?;
         view::write(out, &text, &inputs)?;
     }

@@ -7,6 +7,7 @@ use farside_actors::system::Files;
 use farside_logs::{Log, RunSummary};
 
 use super::CommandError;
+use super::kinds::{self, FileKind};
 use crate::registry::Registry;
 use crate::scenario::{Scenario, ScenarioError};
 
@@ -90,12 +91,22 @@ pub(super) fn notes(summary: &RunSummary, registry: &Registry) -> Vec<String> {
     notes
 }
 
-/// The scenario that a log holds, with some keys set, ties shuffled as they were.
-pub(super) fn changed(
-    path: &Path,
+/// What a user names to be run, with some keys set: a log's own scenario, or a scenario.
+pub(super) fn given(
+    name: &str,
     sets: &[String],
     registry: &Registry,
 ) -> Result<Scenario, CommandError> {
+    let path = Path::new(name);
+    if kinds::is_log(path, registry) {
+        return changed(path, sets, registry);
+    }
+    kinds::expect(FileKind::Scenario, path, registry)?;
+    Ok(Scenario::open(name, sets, registry)?)
+}
+
+/// The scenario that a log holds, with some keys set, ties shuffled as they were.
+fn changed(path: &Path, sets: &[String], registry: &Registry) -> Result<Scenario, CommandError> {
     let summary = farside_logs::info(path)?.run;
     let summary = summary.ok_or_else(|| CommandError::NotRepeatable {
         path: path.to_owned(),

@@ -1,7 +1,7 @@
 //! `farside run`: run a scenario, log every message, say what came of it.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use farside::{Counts, End, Executor, Report, SimDuration, Simulation};
@@ -11,8 +11,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::Exit;
-use super::kinds::{self, FileKind};
-use super::logged::{FILE_PREFIX, changed};
+use super::logged::{FILE_PREFIX, given};
 use super::table::{self, Group};
 use super::{CommandError, complain, interrupt, output, print, print_json, progress};
 use crate::scenario::{Assembled, Scenario};
@@ -134,13 +133,7 @@ impl<'a> From<&'a Counts> for Messages<'a> {
 }
 
 pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError> {
-    let given = Path::new(&args.scenario);
-    let mut scenario = if kinds::is_log(given, registry) {
-        changed(given, &args.sets, registry)?
-    } else {
-        kinds::expect(FileKind::Scenario, given, registry)?;
-        Scenario::open(&args.scenario, &args.sets, registry)?
-    };
+    let mut scenario = given(&args.scenario, &args.sets, registry)?;
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
     }

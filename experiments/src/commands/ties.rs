@@ -5,7 +5,7 @@ mod parting;
 mod runs;
 mod text;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use farside::SimDuration;
 use serde::Serialize;
@@ -13,8 +13,7 @@ use serde::Serialize;
 use self::conclusions::{Changed, TOLERANCE};
 use self::parting::Parting;
 use self::runs::Runs;
-use super::kinds::{self, FileKind};
-use super::logged::changed;
+use super::logged::given;
 use super::run::{DEFAULT_SCENARIO, duration};
 use super::{CommandError, Exit, interrupt, output, print, print_json};
 use crate::registry::Registry;
@@ -135,13 +134,7 @@ pub(crate) fn run(args: &Args, registry: &Registry) -> Result<Exit, CommandError
 
 /// What is run.
 fn scenario(args: &Args, registry: &Registry) -> Result<Scenario, CommandError> {
-    let given = Path::new(&args.scenario);
-    let mut scenario = if kinds::is_log(given, registry) {
-        changed(given, &args.sets, registry)?
-    } else {
-        kinds::expect(FileKind::Scenario, given, registry)?;
-        Scenario::open(&args.scenario, &args.sets, registry)?
-    };
+    let mut scenario = given(&args.scenario, &args.sets, registry)?;
     if let Some(seed) = args.seed {
         scenario.set_seed(seed);
     }

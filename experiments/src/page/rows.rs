@@ -73,7 +73,11 @@ const LETTERS: usize = 300;
 
 impl Names {
     pub(super) fn number(&mut self, text: &str) -> u32 {
-        let end = text.char_indices().nth(LETTERS).map(|(end, _)| end);
+        // Nearly all are far below the bound, and then there is nothing to look for.
+        let end = match text.len() <= LETTERS {
+            true => None,
+            false => text.char_indices().nth(LETTERS).map(|(end, _)| end),
+        };
         let text = if self.texts.len() >= NAMES && !self.known.contains_key(text) {
             "(more names than a page holds)"
         } else {
@@ -281,8 +285,10 @@ impl Rows {
     /// Adds what happened; `detail` says what there is to know beyond that, if it is wanted.
     pub(super) fn add(&mut self, happened: &Happened<'_>, detail: impl FnOnce() -> String) {
         self.reaches(happened.at_ns);
-        let count = self.counts.entry(happened.class.to_owned());
-        *count.or_default() += 1;
+        match self.counts.get_mut(happened.class) {
+            Some(count) => *count += 1,
+            None => drop(self.counts.insert(happened.class.to_owned(), 1)),
+        }
         let ends = [happened.sender, happened.receiver].map(|name| self.names.number(name));
         self.bins.count(happened, ends);
         let rows = self.rows as usize;

@@ -25,7 +25,7 @@ const HOPS_LISTED: usize = 16;
 
 /// Where the way to an actor comes from.
 #[derive(Clone)]
-enum From {
+enum Upstream {
     Actor(u32),
     Root(Box<Root>),
 }
@@ -38,7 +38,7 @@ struct Origin {
     how: String,
     /// The links on the way from whom it comes, whose state matters.
     links: Vec<Hop>,
-    from: From,
+    from: Upstream,
 }
 
 /// What the walks need of a comparison.
@@ -102,7 +102,7 @@ impl<'w, 'i> Walker<'w, 'i> {
                 match entry.class {
                     RecordClass::Stop => return Ok(Some(self.stopped(first)?)),
                     RecordClass::HandOver | RecordClass::Sample => None,
-                    RecordClass::Timer => Some(From::Actor(entry.said.receiver)),
+                    RecordClass::Timer => Some(Upstream::Actor(entry.said.receiver)),
                     _ => Some(self.input(first)?.1),
                 }
             }
@@ -111,11 +111,11 @@ impl<'w, 'i> Walker<'w, 'i> {
         let earliest = || {
             let origins = self.origins.iter();
             let first = origins.min_by(|a, b| a.1.moment.cmp(&b.1.moment, self.names));
-            first.map(|(actor, _)| From::Actor(*actor))
+            first.map(|(actor, _)| Upstream::Actor(*actor))
         };
         Ok(match from.or_else(earliest) {
-            Some(From::Root(root)) => Some(*root),
-            Some(From::Actor(actor)) => self.way(actor).1,
+            Some(Upstream::Root(root)) => Some(*root),
+            Some(Upstream::Actor(actor)) => self.way(actor).1,
             None => None,
         })
     }
@@ -185,7 +185,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             (None, None) => return Ok(None),
         };
         let both = self.both(found)?;
-        let is_input = touched.input.as_ref().is_some_and(|_| is_reached);
+        let is_input = touched.input.is_some() && is_reached;
         let (links, from) = match is_input {
             true => self.input(found)?,
             false => (Vec::new(), self.by_itself(actor, moment, found)?),
@@ -235,15 +235,15 @@ impl<'w, 'i> Walker<'w, 'i> {
     }
 
     /// Where something that reached an actor otherwise comes from, and links on the way.
-    fn input(&mut self, found: &Found) -> Result<(Vec<Hop>, From), LogError> {
+    fn input(&mut self, found: &Found) -> Result<(Vec<Hop>, Upstream), LogError> {
         let Some(entry) = found.both().into_iter().flatten().next().copied() else {
-            return Ok((Vec::new(), From::Actor(0)));
+            return Ok((Vec::new(), Upstream::Actor(0)));
         };
         if !entry.class.is_fate() {
             let is_planned = self.names.name(entry.source) == "@control";
             let from = match entry.class {
-                RecordClass::Change if !is_planned => From::Actor(entry.source),
-                _ => From::Root(Box::new(self.event(found)?)),
+                RecordClass::Change if !is_planned => Upstream::Actor(entry.source),
+                _ => Upstream::Root(Box::new(self.event(found)?)),
             };
             return Ok((Vec::new(), from));
         }
@@ -254,22 +254,22 @@ impl<'w, 'i> Walker<'w, 'i> {
             let mut first = first.into_iter().flatten().flatten();
             let is_reached = first.any(|(moment, _)| moment.time_ns <= entry.said.sent_ns);
             return match is_reached {
-                true => Ok((Vec::new(), From::Actor(entry.said.sender))),
+                true => Ok((Vec::new(), Upstream::Actor(entry.said.sender))),
                 false => self.verdict(found, &entry),
             };
         }
         match found.is_sent_alike() && !found.is_renumbered() {
             true => self.verdict(found, &entry),
-            false => Ok((Vec::new(), From::Actor(entry.said.sender))),
+            false => Ok((Vec::new(), Upstream::Actor(entry.said.sender))),
         }
     }
 
     /// Where it comes from that a link decided otherwise about a message.
-    fn verdict(&mut self, found: &Found, entry: &Entry) -> Result<(Vec<Hop>, From), LogError> {
+    fn verdict(&mut self, found: &Found, entry: &Entry) -> Result<(Vec<Hop>, Upstream), LogError> {
         let both = self.both(found)?;
         let told = self.tell(&both);
         let (by_traffic, root) = (told.is_by_traffic(), self.decided(found, &both));
-        let itself = (Vec::new(), From::Root(Box::new(root)));
+        let itself = (Vec::new(), Upstream::Root(Box::new(root)));
         if self.starts.rule(both.each_ref().map(Option::as_ref)) {
             return Ok(itself);
         }
@@ -297,7 +297,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             let hop = self.link_hop(entry, other, how);
             let sender = other.both().into_iter().flatten().next();
             let sender = sender.map_or(entry.said.sender, |other| other.said.sender);
-            return Ok((vec![hop], From::Actor(sender)));
+            return Ok((vec![hop], Upstream::Actor(sender)));
         }
         // Where its ends are, and what else is on its channel, depends on what reached them.
         let ends = [entry.said.sender, entry.said.receiver];
@@ -311,21 +311,21 @@ impl<'w, 'i> Walker<'w, 'i> {
             Some(end) if !self.starts.may_decide() => {
                 let how = format!("carries for {} otherwise", self.names.name(*end));
                 let hop = self.link_hop(entry, found, how);
-                Ok((vec![hop], From::Actor(*end)))
+                Ok((vec![hop], Upstream::Actor(*end)))
             }
             _ => Ok(itself),
         }
     }
 
     /// Where it comes from that a link was changed otherwise: from a plan, or from an actor.
-    fn changed(&mut self, change: &Found, entry: &Entry) -> Result<(Vec<Hop>, From), LogError> {
+    fn changed(&mut self, change: &Found, entry: &Entry) -> Result<(Vec<Hop>, Upstream), LogError> {
         let (_, from) = self.input(change)?;
         let hops = match &from {
-            From::Actor(actor) => {
+            Upstream::Actor(actor) => {
                 let how = format!("is changed by {} otherwise", self.names.name(*actor));
                 vec![self.link_hop(entry, change, how)]
             }
-            From::Root(_) => Vec::new(),
+            Upstream::Root(_) => Vec::new(),
         };
         Ok((hops, from))
     }
@@ -343,12 +343,17 @@ impl<'w, 'i> Walker<'w, 'i> {
 
     /// Where it comes from that an actor did something otherwise, before anything reached it otherwise that
     /// the logs have.
-    fn by_itself(&mut self, actor: u32, moment: &Moment, found: &Found) -> Result<From, LogError> {
+    fn by_itself(
+        &mut self,
+        actor: u32,
+        moment: &Moment,
+        found: &Found,
+    ) -> Result<Upstream, LogError> {
         let both = self.both(found)?;
         if self.starts.has_unseen
             && let Some(sender) = self.unseen_sender(actor, found, &both)?
         {
-            return Ok(From::Actor(sender));
+            return Ok(Upstream::Actor(sender));
         }
         let name = self.names.name(actor).to_owned();
         let what = self.tell(&both).done();
@@ -356,7 +361,7 @@ impl<'w, 'i> Walker<'w, 'i> {
             true => "before any difference in what reached it on topics that were compared",
             false => "before any difference in what reached it",
         };
-        Ok(From::Root(Box::new(Root {
+        Ok(Upstream::Root(Box::new(Root {
             what: format!("{name} {what}, {before}"),
             actor: name,
             message: self.tell(&both).message(),
@@ -527,8 +532,8 @@ impl<'w, 'i> Walker<'w, 'i> {
             });
             hops.extend(origin.links.iter().rev().cloned());
             match &origin.from {
-                From::Actor(actor) => next = *actor,
-                From::Root(root) => break Some((**root).clone()),
+                Upstream::Actor(actor) => next = *actor,
+                Upstream::Root(root) => break Some((**root).clone()),
             }
         };
         hops.reverse();

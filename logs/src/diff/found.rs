@@ -43,52 +43,7 @@ impl Found {
             Found::Reordered(a, _) => (3, a.topic),
         }
     }
-}
 
-/// Two records that are the same one, to be compared by their fields.
-#[derive(Clone, Copy)]
-pub(super) struct Pair(pub(super) Entry, pub(super) Entry);
-
-impl Fixed for Pair {
-    const BYTES: usize = 2 * Entry::BYTES;
-
-    fn put(&self, out: &mut Vec<u8>) {
-        self.0.put(out);
-        self.1.put(out);
-    }
-
-    fn take(parser: &mut Parser<'_>) -> Option<Pair> {
-        Some(Pair(Entry::take(parser)?, Entry::take(parser)?))
-    }
-}
-
-/// Where two records that are the same one are in the two logs.
-#[derive(Clone, Copy)]
-pub(super) struct Places {
-    pub(super) topic: u32,
-    pub(super) a: u32,
-    pub(super) b: u32,
-}
-
-impl Fixed for Places {
-    const BYTES: usize = 12;
-
-    fn put(&self, out: &mut Vec<u8>) {
-        for number in [self.topic, self.a, self.b] {
-            out.extend_from_slice(&number.to_le_bytes());
-        }
-    }
-
-    fn take(parser: &mut Parser<'_>) -> Option<Places> {
-        Some(Places {
-            topic: parser.u32()?,
-            a: parser.u32()?,
-            b: parser.u32()?,
-        })
-    }
-}
-
-impl Found {
     /// Its record in the first log, and that in the second.
     pub(super) fn both(&self) -> [Option<&Entry>; 2] {
         match self {
@@ -138,6 +93,49 @@ impl Found {
     /// Whether it has another number in its flow in the other log: to a link that is another message.
     pub(super) fn is_renumbered(&self) -> bool {
         matches!(self, Found::Changed(a, b) if a.has_place && a.ordinal != b.ordinal)
+    }
+}
+
+/// Two records that are the same one, to be compared by their fields.
+#[derive(Clone, Copy)]
+pub(super) struct Pair(pub(super) Entry, pub(super) Entry);
+
+impl Fixed for Pair {
+    const BYTES: usize = 2 * Entry::BYTES;
+
+    fn put(&self, out: &mut Vec<u8>) {
+        self.0.put(out);
+        self.1.put(out);
+    }
+
+    fn take(parser: &mut Parser<'_>) -> Option<Pair> {
+        Some(Pair(Entry::take(parser)?, Entry::take(parser)?))
+    }
+}
+
+/// Where two records that are the same one are in the two logs.
+#[derive(Clone, Copy)]
+pub(super) struct Places {
+    pub(super) topic: u32,
+    pub(super) a: u32,
+    pub(super) b: u32,
+}
+
+impl Fixed for Places {
+    const BYTES: usize = 12;
+
+    fn put(&self, out: &mut Vec<u8>) {
+        for number in [self.topic, self.a, self.b] {
+            out.extend_from_slice(&number.to_le_bytes());
+        }
+    }
+
+    fn take(parser: &mut Parser<'_>) -> Option<Places> {
+        Some(Places {
+            topic: parser.u32()?,
+            a: parser.u32()?,
+            b: parser.u32()?,
+        })
     }
 }
 
